@@ -5,10 +5,12 @@ mod output;
 
 mod cli;
 mod commands;
+mod failure;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
+use failure::Failure;
 use files::{BUG, Heap};
 use run::engine::interrupt;
 use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
@@ -32,11 +34,11 @@ fn main() -> ExitCode {
     };
     files::ends_with(interrupt::out_of_memory);
     report_a_panic_once();
-    let Ok(code) = catch_unwind(|| dispatch(arguments)) else {
+    let Ok(ended) = catch_unwind(|| dispatch(arguments)) else {
         interrupt::clean();
         exit(BUG);
     };
-    let code = output::finish(code);
+    let code = output::finish(ended.unwrap_or_else(print_failure));
     interrupt::uninstall();
     // A command that fails because its programs were ended has been interrupted.
     let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
@@ -73,14 +75,23 @@ fn report_a_panic_once() {
     }));
 }
 
-fn dispatch(arguments: Arguments) -> u8 {
+/// Prints why a command has no result; returns its exit code.
+fn print_failure(Failure { code, why }: Failure) -> u8 {
+    match code {
+        EXIT_INTERRUPTED => interrupt::announce(),
+        _ => eprintln!("harness: {why}"),
+    }
+    code
+}
+
+fn dispatch(arguments: Arguments) -> Result<u8, Failure> {
     match arguments.command {
         Command::Verify(arguments) => commands::verify::run(*arguments),
         Command::Selftest(arguments) => commands::selftest::run(&arguments),
-        Command::Gate(arguments) => commands::gate::run(*arguments),
-        Command::Bench(arguments) => commands::bench::run(*arguments),
-        Command::Report(arguments) => commands::report::run(&arguments),
-        Command::Track(arguments) => commands::track::run(&arguments),
+        Command::Gate(arguments) => Ok(commands::gate::run(*arguments)),
+        Command::Bench(arguments) => Ok(commands::bench::run(*arguments)),
+        Command::Report(arguments) => Ok(commands::report::run(&arguments)),
+        Command::Track(arguments) => Ok(commands::track::run(&arguments)),
         Command::Shrink(arguments) => commands::shrink::run(&arguments),
         Command::Audit(arguments) => commands::audit::run(&arguments),
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
@@ -92,9 +103,9 @@ fn dispatch(arguments: Arguments) -> u8 {
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),
         Command::Completions(arguments) => {
-            commands::completions::run(&arguments, &mut Arguments::command())
+            Ok(commands::completions::run(&arguments, &mut Arguments::command()))
         }
-        Command::Planted(arguments) => commands::planted::run(&arguments),
+        Command::Planted(arguments) => Ok(commands::planted::run(&arguments)),
         Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     }
 }

@@ -16,14 +16,26 @@ pub const KEY_END: u64 = 1 << 57;
 pub const SIDE_BITS: u64 = 3;
 
 /// Position of a leaf relative to the body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
-    /// Outside the body.
+    /// Outside the body
     Outside = 0,
-    /// Inside the body.
+    /// Inside the body
     Inside = 1,
-    /// The surface crosses the leaf.
+    /// The surface crosses the leaf
     Crossing = 2,
 }
 

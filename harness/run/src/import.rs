@@ -30,6 +30,17 @@ pub enum Refusal {
     Interrupted,
 }
 
+impl Refusal {
+    /// The same with the file's name.
+    #[must_use]
+    pub fn of_file(self, path: &Path) -> Self {
+        match self {
+            Self::Input(error) => Self::Input(error.of_file(path)),
+            other => other,
+        }
+    }
+}
+
 impl From<ImportError> for Refusal {
     fn from(error: ImportError) -> Self {
         Self::Input(error)

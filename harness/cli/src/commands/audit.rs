@@ -1,16 +1,18 @@
 //! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
-use super::import::{Failure, Imported, Source};
+use super::import::{Imported, Source};
 use super::values::{Input, Output};
+use crate::failure::Failure;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use check::promises::Promises;
 use clap::Args;
 use contract::case::Case;
+use contract::files::named;
 use contract::manifest;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -47,29 +49,24 @@ pub struct Arguments {
 }
 
 /// Audits, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    audited(arguments).unwrap_or_else(|(code, why)| {
-        eprintln!("harness: {why}");
-        code
-    })
-}
-
-fn audited(arguments: &Arguments) -> Result<u8, Failure> {
+///
+/// # Errors
+/// If the mesh cannot be read, or the engine does not support the case.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { mesh, promises, require_checks, nodes_max, json, source } = arguments;
-    let input = |why| (EXIT_INPUT, why);
     let find = |name: &String| Description::find(name, &Paths::find());
-    let engine = promises.as_ref().map(find).transpose().map_err(input)?;
+    let engine = promises.as_ref().map(find).transpose()?;
     let case = source.read_case()?;
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
-        return Err((EXIT_MISSING, format!("left out: {why}")));
+        return Err(Failure::missing(format!("left out: {why}")));
     }
     // The temporary directory of an imported mesh lives as long as this value.
     let imported = match mesh.join(manifest::FILE).exists() {
         true if source.is_given() => {
             let why = "has a manifest, which states root and sides: omit the options for them";
-            return Err(input(format!("{} {why}", mesh.display())));
+            return Err(Failure::input(format!("{} {why}", mesh.display())));
         }
         true => None,
         false => Some(imported(mesh, source, case.as_ref())?),
@@ -83,7 +80,7 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
     println!("{report}");
     if let Some(path) = json {
         let written = AuditRecord::of(&report).write(path);
-        written.map_err(|error| input(format!("{}: {error}", path.display())))?;
+        written.map_err(|error| named(path, &error))?;
     }
     let not_run = || report.not_run().next().is_some();
     Ok(match report.holds() {
@@ -96,12 +93,10 @@ fn audited(arguments: &Arguments) -> Result<u8, Failure> {
 
 /// The leaf set of a mesh without a manifest, in a temporary directory.
 fn imported(mesh: &Path, source: &Source, case: Option<&Case>) -> Result<TempDir, Failure> {
-    let io = |error: std::io::Error| (EXIT_INPUT, error.to_string());
-    let place = tempfile::tempdir().map_err(io)?;
+    let place = tempfile::tempdir()?;
     match source.read(mesh, case)? {
         Imported::Words(set) => set.create(place.path()),
         Imported::Tree(tree) => tree.link(place.path()),
-    }
-    .map_err(io)?;
+    }?;
     Ok(place)
 }

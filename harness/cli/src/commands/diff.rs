@@ -1,10 +1,11 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
 use super::values::Input;
+use crate::failure::Failure;
 use check::diff::{self, Trust};
 use clap::Args;
 use contract::case::Case;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 
 /// `harness diff`.
 #[derive(Args, Debug)]
@@ -30,20 +31,16 @@ pub struct Arguments {
 }
 
 /// Compares and prints; returns the exit code.
-pub fn run(Arguments { a, b, case, trust_manifests, ignore_root }: &Arguments) -> u8 {
+///
+/// # Errors
+/// If a mesh or the case cannot be read.
+pub fn run(
+    Arguments { a, b, case, trust_manifests, ignore_root }: &Arguments,
+) -> Result<u8, Failure> {
     let trust = if *trust_manifests { Trust::Manifests } else { Trust::Leaves };
-    let compared = case.as_deref().map(Case::read).transpose().map_err(|error| error.to_string());
-    match compared
-        .and_then(|case| diff::diff(a, b, case.as_ref(), trust).map_err(|error| error.to_string()))
-    {
-        Ok(report) => {
-            println!("A {}\nB {}\n{report}", a.display(), b.display());
-            let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
-            if is_same { EXIT_HOLDS } else { EXIT_FAILED }
-        }
-        Err(error) => {
-            eprintln!("harness: {error}");
-            EXIT_INPUT
-        }
-    }
+    let case = case.as_deref().map(Case::read).transpose()?;
+    let report = diff::diff(a, b, case.as_ref(), trust).map_err(Failure::input)?;
+    println!("A {}\nB {}\n{report}", a.display(), b.display());
+    let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
+    Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED })
 }

@@ -3,14 +3,14 @@
 use super::foam::FoamArguments;
 use super::selection::SelectionArguments;
 use super::values::Input;
+use crate::failure::Failure;
 use clap::Args;
-use export::error::ExportError;
 use export::format::{self, FORMATS};
 use export::mesh::Mesh;
 use export::options::{Options, Summary, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use run::engine::interrupt;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
+use run::verify::report::EXIT_HOLDS;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -52,24 +52,17 @@ fn after_help() -> String {
 }
 
 /// Writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    match write(arguments) {
-        Ok(Summary { leaves, files, bytes, notes }) => {
-            let file = arguments.file.display();
-            let per_cell = bytes as f64 / leaves as f64;
-            let files = if files == 1 { String::new() } else { format!(" in {files} files") };
-            println!("{file}: {leaves} cells, {bytes} bytes{files} ({} per cell)", brief(per_cell));
-            notes.iter().for_each(|note| println!("  {note}"));
-            EXIT_HOLDS
-        }
-        Err(error) => {
-            eprintln!("harness: {error}");
-            match error {
-                ExportError::Interrupted => EXIT_INTERRUPTED,
-                _ => EXIT_INPUT,
-            }
-        }
-    }
+///
+/// # Errors
+/// If the mesh cannot be read, or the file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let Summary { leaves, files, bytes, notes } = write(arguments)?;
+    let file = arguments.file.display();
+    let per_cell = bytes as f64 / leaves as f64;
+    let files = if files == 1 { String::new() } else { format!(" in {files} files") };
+    println!("{file}: {leaves} cells, {bytes} bytes{files} ({} per cell)", brief(per_cell));
+    notes.iter().for_each(|note| println!("  {note}"));
+    Ok(EXIT_HOLDS)
 }
 
 /// A number with one decimal, or with two significant digits if it is less than 1.
@@ -78,10 +71,10 @@ fn brief(number: f64) -> String {
     format!("{number:.decimals$}")
 }
 
-fn write(arguments: &Arguments) -> Result<Summary, ExportError> {
+fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let Arguments { mesh, file, jobs, selection, foam } = arguments;
     let format = format::of(file)?;
-    let case = foam.case(format.ending).map_err(ExportError::Request)?;
+    let case = foam.case(format.ending)?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
@@ -89,7 +82,7 @@ fn write(arguments: &Arguments) -> Result<Summary, ExportError> {
     let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.0.finish_and_clear();
-    written
+    Ok(written?)
 }
 
 /// A line on standard error, only if that is a terminal.

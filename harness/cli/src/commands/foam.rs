@@ -1,10 +1,10 @@
 //! The options of `harness export` that only meshes for OpenFOAM have.
 
+use super::values::read_case;
+use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
 use export::options::{Foam, Label, Processors, Regions, Style};
-use run::engine::paths::Paths;
-use std::path::Path;
 
 /// Options of meshes for OpenFOAM.
 #[derive(Args, Debug)]
@@ -32,7 +32,7 @@ impl FoamArguments {
     ///
     /// # Errors
     /// If the case cannot be read, or if an option has no effect on the format with this ending.
-    pub fn case(&self, ending: &str) -> Result<Option<Case>, String> {
+    pub fn case(&self, ending: &str) -> Result<Option<Case>, Failure> {
         let Self { ascii, label, regions, processors, case } = self;
         let given = [
             ("--ascii", *ascii),
@@ -44,15 +44,11 @@ impl FoamArguments {
         if let Some((name, _)) = given.iter().find(|(_, is_given)| *is_given)
             && ending != "/polyMesh"
         {
-            return Err(format!(
+            return Err(Failure::input(format!(
                 "{name} has no effect on {ending}: omit it, or write CASE/constant/polyMesh"
-            ));
+            )));
         }
-        let read = |name: &String| {
-            let path = Paths::find().catalogue.case_file(name, Path::new(""))?;
-            Case::read(&path).map_err(|error| error.to_string())
-        };
-        case.as_ref().map(read).transpose()
+        case.as_deref().map(read_case).transpose()
     }
 
     /// The options, with the case that they name.

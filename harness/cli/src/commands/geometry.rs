@@ -1,16 +1,16 @@
 //! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
 use std::num::NonZero;
-use std::path::Path;
 
 use super::files::put;
 use super::values::{self, Output, root};
+use crate::failure::Failure;
 use clap::Args;
 use contract::lattice::Root;
 use geometry::input::{Input, Requested};
-use geometry::report::Diagnosis;
 use geometry::{Options, diagnose};
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use report::json::pretty;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 
 /// `harness geometry`.
 #[derive(Args, Debug)]
@@ -42,17 +42,10 @@ pub struct Arguments {
 }
 
 /// Diagnoses, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    match diagnosed(arguments) {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("harness: {error}");
-            EXIT_INPUT
-        }
-    }
-}
-
-fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
+///
+/// # Errors
+/// If the geometry cannot be meshed, or the file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
     let input = Input::read(&arguments.file, &Requested { spacing_min, root, root_scale })?;
     let options =
@@ -60,12 +53,7 @@ fn diagnosed(arguments: &Arguments) -> Result<u8, String> {
     let diagnosis = diagnose(&input, &options);
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {
-        write(path, &diagnosis)?;
+        put(path, &pretty(&diagnosis))?;
     }
     Ok(if diagnosis.changes_region { EXIT_FAILED } else { EXIT_HOLDS })
-}
-
-fn write(path: &Path, diagnosis: &Diagnosis) -> Result<(), String> {
-    let json = serde_json::to_string_pretty(diagnosis).map_err(|error| error.to_string())?;
-    put(path, &(json + "\n")).map_err(|error| error.to_string())
 }

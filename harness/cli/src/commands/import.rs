@@ -1,6 +1,7 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
-use super::values::{Input, root};
+use super::values::{Input, read_case, root};
+use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
 use contract::import::htg::ImportedTree;
@@ -10,8 +11,7 @@ use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Sides};
 use contract::word::{self, KEY_END};
 use run::engine::paths::Paths;
-use run::import::Refusal;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::verify::report::EXIT_HOLDS;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -62,9 +62,6 @@ pub struct Source {
     timeout: u64,
 }
 
-/// Why there is no mesh: exit code and sentence.
-pub type Failure = (u8, String);
-
 impl Source {
     /// Whether any option is given that has no effect on a leaf-set directory.
     pub fn is_given(&self) -> bool {
@@ -77,11 +74,7 @@ impl Source {
     /// # Errors
     /// If it is not in the catalogue, or is invalid.
     pub fn read_case(&self) -> Result<Option<Case>, Failure> {
-        let read = |name: &String| {
-            let path = Paths::find().catalogue.case_file(name, Path::new(""))?;
-            Case::read(&path).map_err(|error| error.to_string())
-        };
-        self.case.as_ref().map(read).transpose().map_err(|why| (EXIT_INPUT, why))
+        self.case.as_deref().map(read_case).transpose()
     }
 
     /// Reads the mesh.
@@ -89,7 +82,7 @@ impl Source {
     /// # Errors
     /// If it is not a usable mesh, or if Python or VTK is missing.
     pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
-        let input = |error: import::ImportError| (EXIT_INPUT, error.of_file(mesh).to_string());
+        let input = |error: import::ImportError| Failure::input(error.of_file(mesh));
         let root = self.root.or(case.map(|case| case.root));
         let format = self.format.map_or_else(|| import::guess(mesh), Ok).map_err(input)?;
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
@@ -103,11 +96,7 @@ impl Source {
         let request = Request { sides: self.sides.clone(), root, position: self.position };
         let limit = Duration::from_secs(self.timeout);
         let cells = run::import::read(mesh, format, &request, &Paths::find(), limit);
-        let cells = cells.map_err(|why| match why {
-            Refusal::Input(error) => input(error),
-            Refusal::Missing(why) => (EXIT_MISSING, why),
-            Refusal::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
-        })?;
+        let cells = cells.map_err(|refusal| refusal.of_file(mesh))?;
         let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
         if root.is_none() && cells.root.is_none() {
             let Root { origin: [x, y, z], edge } = set.manifest.root;
@@ -144,22 +133,15 @@ impl Imported {
 }
 
 /// Reads and writes; returns the exit code.
-pub fn run(Arguments { mesh, out, source }: &Arguments) -> u8 {
-    let read = source.read_case().and_then(|case| source.read(mesh, case.as_ref()));
-    let imported = read.and_then(|set| {
-        set.create(out).map_err(|error| (EXIT_INPUT, error.to_string()))?;
-        Ok(set)
-    });
-    match imported {
-        Ok(set) => {
-            println!("{}: {}", out.display(), summary(set.manifest()));
-            EXIT_HOLDS
-        }
-        Err((code, why)) => {
-            eprintln!("harness: {why}");
-            code
-        }
-    }
+///
+/// # Errors
+/// If the mesh cannot be read or written.
+pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
+    let case = source.read_case()?;
+    let set = source.read(mesh, case.as_ref())?;
+    set.create(out)?;
+    println!("{}: {}", out.display(), summary(set.manifest()));
+    Ok(EXIT_HOLDS)
 }
 
 /// Number of cells, levels, sides, and the part of the root that they fill.

@@ -1,7 +1,8 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use super::programs::ProgramArguments;
-use super::values::{Output, cell_count, with_extension};
+use super::values::{Output, Point, cell_count, with_extension};
+use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
 use contract::files::{Content, named, write_together};
@@ -14,11 +15,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::json::pretty;
 use report::leak::{picture, polyline};
 use run::base_tree::BaseTrees;
-use run::engine::failure::Failure;
+use run::engine::failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::Duration;
@@ -47,8 +48,8 @@ pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
     /// Start of the path [default: a point of every region that leaked between a coarser spacing and the case's]
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
-    from: Option<[f64; 3]>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    from: Option<Point>,
     /// End of the path: a point, or `far` for the root's boundary
     #[arg(long, value_name = "X,Y,Z|far", default_value = "far", value_parser = target, allow_hyphen_values = true, requires = "from")]
     to: Target,
@@ -76,29 +77,23 @@ pub struct Arguments {
 }
 
 /// Searches, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    answered(arguments).unwrap_or_else(|(code, why)| {
-        eprintln!("harness: {why}");
-        code
-    })
-}
-
-fn answered(arguments: &Arguments) -> Result<u8, (u8, String)> {
-    let input = |why: String| (EXIT_INPUT, why);
-    let programs = Programs::find(arguments.programs.given()).map_err(input)?;
-    let path = programs.paths.catalogue.case_file(&arguments.case, Path::new("")).map_err(input)?;
-    let case = Case::read(&path).map_err(|error| input(error.to_string()))?;
+///
+/// # Errors
+/// If the case cannot be read or meshed, or a file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let programs = Programs::find(arguments.programs.given())?;
+    let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
+    let case = Case::read(&path)?;
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
-    let mut trees = BaseTrees::new(engine, &path, &case, limit).map_err(input)?;
+    let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
     let progress = Progress::new();
     let (mut first, ends) = match arguments.from {
-        Some(from) => (None, vec![(from, arguments.to)]),
+        Some(Point(from)) => (None, vec![(from, arguments.to)]),
         None => {
             progress.step("meshing the base tree of the case");
-            let tree =
-                trees.with_seeds(case.level_surface).map_err(|e| failed(LeakError::Source(e)))?;
-            let ends = leaked(&case, &tree).map_err(input)?;
+            let tree = trees.with_seeds(case.level_surface)?;
+            let ends = leaked(&case, &tree)?;
             (Some(tree.words), ends)
         }
     };
@@ -146,20 +141,16 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<([f64; 3], Target)>, String
     Ok(leaks.iter().map(|leak| (leak.point, to)).collect())
 }
 
-fn failed(error: LeakError<Failure>) -> (u8, String) {
+fn failed(error: LeakError<failure::Failure>) -> Failure {
     match error {
-        LeakError::Interrupted => interrupted(),
-        LeakError::Source(failure) if failure.is_interrupt() => interrupted(),
-        LeakError::Source(failure) => (EXIT_INPUT, failure.to_string()),
-        LeakError::Input(why) => (EXIT_INPUT, why),
+        LeakError::Interrupted => Failure::interrupted(),
+        LeakError::Source(failure) => failure.into(),
+        LeakError::Input(why) => why.into(),
     }
 }
 
 /// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
-fn engine<'a>(
-    programs: &'a Programs,
-    given: &ProgramArguments,
-) -> Result<&'a Engine, (u8, String)> {
+fn engine<'a>(programs: &'a Programs, given: &ProgramArguments) -> Result<&'a Engine, Failure> {
     let all = [
         (&programs.mesher, given.mesher.is_some(), "mesher"),
         (&programs.reference, given.reference.is_some(), "reference"),
@@ -172,15 +163,11 @@ fn engine<'a>(
         (_, wrong) => {
             let (engine, _, name) = wrong.unwrap_or(&all[0]);
             let path = engine.program().display();
-            let why =
-                format!("the {name} is missing: build {path}, or give another path with --{name}");
-            Err((EXIT_MISSING, why))
+            Err(Failure::missing(format!(
+                "the {name} is missing: build {path}, or give another path with --{name}"
+            )))
         }
     }
-}
-
-fn interrupted() -> (u8, String) {
-    (EXIT_INTERRUPTED, "interrupted".to_owned())
 }
 
 /// Writes the requested files, unless the user interrupts before they are complete. Without a path there is none to draw.
@@ -189,7 +176,7 @@ fn write(
     case: &Case,
     answers: &Answers,
     widest: Option<(&Passage, &[u64])>,
-) -> Result<(), (u8, String)> {
+) -> Result<(), Failure> {
     let passages: Vec<&Passage> =
         answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
     let complete = |written: io::Result<()>| match interrupt::requested() {
@@ -210,12 +197,8 @@ fn write(
     let of_path = of_path.into_iter().filter(|_| widest.is_some());
     let all = [(&arguments.json, json)].into_iter().chain(of_path);
     let files: Vec<_> = all.filter_map(|(file, fill)| Some((file.as_deref()?, fill))).collect();
-    let unwritten = |path: &Path, error: io::Error| match error.kind() {
-        ErrorKind::Interrupted => interrupted(),
-        _ => (EXIT_INPUT, named(path, &error).to_string()),
-    };
-    write_together(&files, unwritten)?;
-    if files.is_empty() && interrupt::requested() { Err(interrupted()) } else { Ok(()) }
+    write_together(&files, |path, error| Failure::from(named(path, &error)))?;
+    if files.is_empty() && interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
 /// A line on standard error that names the current step, only if that is a terminal.
@@ -243,19 +226,13 @@ impl Watch for Progress {
     }
 }
 
-/// Parses three numbers.
-fn point(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    let three = numbers.ok().and_then(|n| <[f64; 3]>::try_from(n).ok());
-    three
-        .filter(|p| p.iter().all(|c| c.is_finite()))
-        .ok_or_else(|| "give three numbers: X,Y,Z".to_owned())
-}
-
 fn target(text: &str) -> Result<Target, String> {
     match text {
         "far" => Ok(Target::Far),
-        _ => point(text).map(Target::Point).map_err(|why| format!("{why}, or far")),
+        _ => match text.parse() {
+            Ok(Point(point)) => Ok(Target::Point(point)),
+            Err(why) => Err(format!("{why}, or far")),
+        },
     }
 }
 
@@ -264,11 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_have_three_finite_numbers() {
-        assert_eq!(point("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
-        for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", ""] {
-            assert!(point(wrong).is_err(), "{wrong}");
-        }
+    fn an_end_is_a_point_or_far() {
         assert_eq!(target("far"), Ok(Target::Far));
         assert_eq!(target("0,0,1"), Ok(Target::Point([0.0, 0.0, 1.0])));
     }

@@ -1,8 +1,11 @@
 //! `harness man`: manual pages from the definition of the command line.
 
+use crate::failure::Failure;
 use clap::{Args, Command};
 use clap_mangen::{Man, generate_to};
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use contract::files::named;
+use run::verify::report::EXIT_HOLDS;
+use std::fs;
 use std::path::PathBuf;
 
 /// `harness man`.
@@ -14,22 +17,21 @@ pub struct Arguments {
 }
 
 /// Writes the pages of the command line `definition`; returns the exit code.
-pub fn run(arguments: &Arguments, definition: Command) -> u8 {
-    let written = match &arguments.directory {
+///
+/// # Errors
+/// If the pages cannot be written.
+pub fn run(arguments: &Arguments, definition: Command) -> Result<u8, Failure> {
+    match &arguments.directory {
         None => {
             let mut page = Vec::new();
-            let rendered = Man::new(definition).render(&mut page);
-            rendered.map(|()| print!("{}", String::from_utf8_lossy(&page)))
+            Man::new(definition).render(&mut page)?;
+            print!("{}", String::from_utf8_lossy(&page));
         }
         Some(directory) => {
-            std::fs::create_dir_all(directory).and_then(|()| generate_to(definition, directory))
-        }
-    };
-    match written {
-        Ok(()) => EXIT_HOLDS,
-        Err(error) => {
-            eprintln!("harness: the manual pages cannot be written: {error}");
-            EXIT_INPUT
+            let written = fs::create_dir_all(directory);
+            let written = written.and_then(|()| generate_to(definition, directory));
+            written.map_err(|error| named(directory, &error))?;
         }
     }
+    Ok(EXIT_HOLDS)
 }

@@ -2,21 +2,18 @@
 
 use super::programs::ProgramArguments;
 use super::values::Input;
+use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
-use run::engine::failure::End;
+use contract::files::named;
 use run::engine::layout::Layout;
 use run::engine::options::RunOptions;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
-
-/// An exit code and the message.
-pub type Failure = (u8, String);
 
 /// A mesh on disk or a case, and how a case is meshed.
 #[derive(Args, Debug)]
@@ -64,18 +61,17 @@ impl MeshArguments {
     pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<Meshed, Failure> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
-            let case = self.case.as_deref().map(Case::read).transpose();
-            let case = case.map_err(|error| input(error.to_string()))?;
+            let case = self.case.as_deref().map(Case::read).transpose()?;
             return Ok(Meshed { dir: given.to_owned(), case, _made: None });
         }
         if self.case.is_some() {
             let shown = given.display();
-            return Err(input(format!(
+            return Err(Failure::input(format!(
                 "{shown} is not a leaf-set directory, which --case requires"
             )));
         }
         let Programs { engine, paths, .. } = self.engine.find()?;
-        let path = paths.catalogue.case_file(&self.mesh, Path::new("")).map_err(input)?;
+        let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         self.engine.mesh(&engine, &path, layout, ungraded)
     }
 }
@@ -85,8 +81,8 @@ impl EngineArguments {
     ///
     /// # Errors
     /// If the engine is not known.
-    pub fn find(&self) -> Result<Programs, Failure> {
-        Programs::find_with_engine(&self.engine, self.programs.given()).map_err(input)
+    pub fn find(&self) -> Result<Programs, String> {
+        Programs::find_with_engine(&self.engine, self.programs.given())
     }
 
     /// Time limit of a run.
@@ -105,34 +101,18 @@ impl EngineArguments {
         layout: &Layout,
         ungraded: bool,
     ) -> Result<Meshed, Failure> {
-        let case = Case::read(path).map_err(|error| input(error.to_string()))?;
-        let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir();
-        let made = made.map_err(|error| input(error.to_string()))?;
+        let case = Case::read(path)?;
+        let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let (dir, logs) = (made.path().join("mesh"), made.path().join("logs"));
-        fs::create_dir(&logs).map_err(|error| input(format!("{}: {error}", logs.display())))?;
-        let prepared = engine.prepare(path, &made.path().join("case")).map_err(input)?;
+        fs::create_dir(&logs).map_err(|error| named(&logs, &error))?;
+        let prepared = engine.prepare(path, &made.path().join("case"))?;
         let options = RunOptions {
             mesh: Some(&dir),
             report: false,
             ungraded,
             ..RunOptions::new(&logs, self.limit())
         };
-        engine.run(&prepared, layout, &options).map_err(|failure| failed(&failure))?;
+        engine.run(&prepared, layout, &options)?;
         Ok(Meshed { dir, case: Some(case), _made: Some(made) })
     }
-}
-
-/// A program without a result.
-pub fn failed(failure: &run::engine::failure::Failure) -> Failure {
-    let code = match &failure.end {
-        End::Missing(_) => EXIT_MISSING,
-        End::Interrupted => EXIT_INTERRUPTED,
-        _ => EXIT_INPUT,
-    };
-    (code, failure.to_string())
-}
-
-/// Invalid input.
-pub fn input(why: String) -> Failure {
-    (EXIT_INPUT, why)
 }

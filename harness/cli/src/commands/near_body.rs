@@ -1,9 +1,9 @@
 //! `harness near-body`: the surface that a mesh hands over to a near-body mesher, and its gap to the wall.
 
 use super::selection::SelectionArguments;
-use super::values::{Input, Output, with_extension};
+use super::values::{Input, Output, read_case, with_extension};
+use crate::failure::Failure;
 use clap::Args;
-use contract::case::Case;
 use contract::files::{Content, write_together};
 use export::error::ExportError;
 use export::mesh::Mesh;
@@ -13,8 +13,7 @@ use export::near_body::gap::{Gap, gaps};
 use export::near_body::polygons::Polygons;
 use export::near_body::report::Report;
 use run::engine::interrupt;
-use run::engine::paths::Paths;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED};
+use run::verify::report::EXIT_HOLDS;
 use std::path::Path;
 
 /// `harness near-body`.
@@ -47,47 +46,27 @@ pub struct Arguments {
 }
 
 /// Measures, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    match found(arguments) {
-        Ok(report) => {
-            print!("{report}");
-            EXIT_HOLDS
-        }
-        Err(error) => {
-            eprintln!("harness: {error}");
-            match error {
-                ExportError::Interrupted => EXIT_INTERRUPTED,
-                _ => EXIT_INPUT,
-            }
-        }
-    }
-}
-
-fn found(arguments: &Arguments) -> Result<Report, ExportError> {
+///
+/// # Errors
+/// If the mesh cannot be read or has no such surface, or a file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
     let mesh = Mesh::open(&arguments.mesh)?;
-    let case = arguments.case.as_deref().map(|name| read_case(name, &mesh)).transpose()?;
+    let case = arguments.case.as_deref().map(read_case).transpose()?;
+    case.iter().try_for_each(|case| mesh.require_case(case))?;
     let selection = arguments.selection.of(&mesh)?;
     let faces = front(&mesh, &selection, &check)?;
     if faces.is_empty() {
         let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface to hand over";
-        return Err(ExportError::Request(why.to_owned()));
+        return Err(Failure::input(why));
     }
     let gaps = case.map(|case| gaps(&case, &faces, &check)).transpose()?;
     let polygons = Polygons::new(&faces);
     let report =
         Report::new(&mesh, &faces, &polygons, gaps.as_deref(), selection == Default::default())?;
     write(arguments, &mesh, &faces, &polygons, gaps.as_deref(), &report)?;
-    Ok(report)
-}
-
-/// The case, which must be that of the mesh.
-fn read_case(name: &str, mesh: &Mesh) -> Result<Case, ExportError> {
-    let path =
-        Paths::find().catalogue.case_file(name, Path::new("")).map_err(ExportError::Request)?;
-    let case = Case::read(&path).map_err(|error| ExportError::Request(error.to_string()))?;
-    mesh.require_case(&case)?;
-    Ok(case)
+    print!("{report}");
+    Ok(EXIT_HOLDS)
 }
 
 fn write(

@@ -1,8 +1,9 @@
 //! `harness picture --paper`: the pictures of the paper, made of one case.
 
-use super::meshed::{Failure, MeshArguments, Meshed, input};
-use super::view::{command, unread, unwritten, write_view};
-use contract::files::{Staging, nearest_directory};
+use super::meshed::{MeshArguments, Meshed};
+use super::view::{command, write_view};
+use crate::failure::Failure;
+use contract::files::{Staging, named, nearest_directory};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};
@@ -27,12 +28,12 @@ const INDEX: &str = "index.html";
 pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
     if Path::new(&source.mesh).is_dir() {
         let why = format!("{} is a directory: --paper meshes a case several times", source.mesh);
-        return Err(input(why));
+        return Err(Failure::input(why));
     }
     let Programs { engine, paths, .. } = source.engine.find()?;
-    let path = paths.catalogue.case_file(&source.mesh, Path::new("")).map_err(input)?;
-    let plain = PlainCase::read(&path).map_err(input)?;
-    let named = |error| input(format!("{}: {error}", out.display()));
+    let path = paths.catalogue.case_file(&source.mesh, Path::new(""))?;
+    let plain = PlainCase::read(&path)?;
+    let named = |error| named(out, &error);
     let staging = Staging::inside(nearest_directory(out)).map_err(named)?;
     let layout = Layout::on(Ranks::Simulated { ranks: RANKS, seed: 1 });
     let mut drawn: Vec<Option<Drawn>> = MEMBERS.iter().map(|_| None).collect();
@@ -40,10 +41,8 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
         if drawn[i].is_some() {
             continue;
         }
-        let place = tempfile::tempdir().map_err(|error| input(error.to_string()))?;
-        let case = variant(&plain, first.made)
-            .write(place.path(), StlForm::Any)
-            .map_err(|error| input(error.to_string()))?;
+        let place = tempfile::tempdir()?;
+        let case = variant(&plain, first.made).write(place.path(), StlForm::Any)?;
         let meshed = source.engine.mesh(&engine, &case, &layout, first.made == Made::Base)?;
         for (member, drawn) in MEMBERS.iter().zip(&mut drawn) {
             if member.made == first.made {
@@ -53,7 +52,7 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
     }
     let pictures: Vec<_> = MEMBERS.into_iter().zip(drawn.into_iter().flatten()).collect();
     let text = page(&source.mesh, &command(), &pictures);
-    put(&staging.path().join(INDEX), text.as_bytes()).map_err(unwritten)?;
+    put(&staging.path().join(INDEX), text.as_bytes())?;
     staging.publish(|staged| publish(staged, out)).map_err(named)?;
     println!("{} pictures; the page is {}", pictures.len(), out.join(INDEX).display());
     Ok(())
@@ -87,36 +86,32 @@ fn draw_member(
     paths: &Paths,
     source: &MeshArguments,
 ) -> Result<Drawn, Failure> {
-    let failed = |error: &dyn std::fmt::Display| input(format!("{}: {error}", member.name));
     let case = meshed.case.as_ref().expect("a case was meshed");
-    let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
+    let mesh = Mesh::open(&meshed.dir)?;
     let (selection, zoom, level_max) = request(member.part, case);
     let (body, colour) = (Some(&case.facets[..]), member.colour);
     let request = Request { selection, body, colour, zoom, level_max, command: command() };
     let file = |extension: &str| out.join(format!("{}.{extension}", member.name));
     if matches!(member.part, Part::View | Part::ViewOfBody) {
-        let mut scene = Scene::collect(&mesh, &request).map_err(unread)?;
+        let mut scene = Scene::collect(&mesh, &request)?;
         if member.part == Part::ViewOfBody {
             scene = scene.of_body();
         }
         write_view(&scene, &file("html"), paths, source)?;
         return match write_view(&scene, &file("png"), paths, source) {
-            Ok(()) => {
-                fs::read(file("png")).map(|png| Drawn::View(Some(png))).map_err(|e| failed(&e))
-            }
+            Ok(()) => Ok(Drawn::View(Some(fs::read(file("png"))?))),
             // Without pyvista the page lacks this picture, and its HTML file remains.
-            Err((EXIT_MISSING, why)) => {
+            Err(Failure { code: EXIT_MISSING, why }) => {
                 eprintln!("harness: {why}");
                 Ok(Drawn::View(None))
             }
             Err(other) => Err(other),
         };
     }
-    let collect =
-        |format: Format| Picture::collect(&mesh, &request, &format.detail()).map_err(unread);
+    let collect = |format: Format| Picture::collect(&mesh, &request, &format.detail());
     let tex = tikz(&collect(Format::Tikz)?);
-    put(&file("tex"), tex.as_bytes()).map_err(unwritten)?;
+    put(&file("tex"), tex.as_bytes())?;
     let picture = collect(Format::Svg)?;
-    write(&picture, Format::Svg, &file("svg")).map_err(unwritten)?;
+    write(&picture, Format::Svg, &file("svg"))?;
     Ok(Drawn::Slice(svg(&picture)))
 }

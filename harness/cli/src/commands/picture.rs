@@ -1,9 +1,10 @@
 //! `harness picture`: draws a slice of a mesh, a view in three dimensions, or the pictures of the paper.
 
-use super::meshed::{Failure, MeshArguments, Meshed, input};
+use super::meshed::{MeshArguments, Meshed};
 use super::paper;
 use super::selection::SelectionArguments;
-use super::view::{command, unread, unwritten, write_view};
+use super::view::{command, write_view};
+use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use contract::octant::LEVEL_MAX;
 use export::mesh::Mesh;
@@ -90,44 +91,41 @@ impl From<Colour> for colour::Colour {
 }
 
 /// Draws; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    let drawn = match arguments.paper {
-        true => paper::draw(&arguments.source, &arguments.out),
-        false => draw(arguments),
-    };
-    match drawn {
-        Ok(()) => EXIT_HOLDS,
-        Err((code, why)) => {
-            eprintln!("harness: {why}");
-            code
-        }
+///
+/// # Errors
+/// If the mesh cannot be made or read, or a file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    match arguments.paper {
+        true => paper::draw(&arguments.source, &arguments.out)?,
+        false => draw(arguments)?,
     }
+    Ok(EXIT_HOLDS)
 }
 
 fn draw(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
-    let format = requested(arguments).map_err(input)?;
+    let format = requested(arguments)?;
     if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
         let why =
             "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
-        return Err(input(why.to_owned()));
+        return Err(Failure::input(why));
     }
     let layout = match *ranks {
         Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
         None => SERIAL.clone(),
     };
     let meshed = source.open(&layout, *ungraded)?;
-    let mesh = Mesh::open(&meshed.dir).map_err(unread)?;
+    let mesh = Mesh::open(&meshed.dir)?;
     if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
-        mesh.require_case(case).map_err(unread)?;
+        mesh.require_case(case)?;
     }
     let request = request(arguments, &meshed, &mesh)?;
     if arguments.view || format == Format::Html {
-        let scene = Scene::collect(&mesh, &request).map_err(unread)?;
+        let scene = Scene::collect(&mesh, &request)?;
         write_view(&scene, out, &Paths::find(), source)?;
     } else {
-        let picture = Picture::collect(&mesh, &request, &format.detail()).map_err(unread)?;
-        write(&picture, format, out).map_err(unwritten)?;
+        let picture = Picture::collect(&mesh, &request, &format.detail())?;
+        write(&picture, format, out)?;
         println!("{}", picture.title());
     }
     println!("{}", out.display());
@@ -157,7 +155,7 @@ fn request<'a>(
     mesh: &Mesh,
 ) -> Result<Request<'a>, Failure> {
     Ok(Request {
-        selection: arguments.selection.of(mesh).map_err(unread)?,
+        selection: arguments.selection.of(mesh)?,
         body: meshed.case.as_ref().map(|case| &case.facets[..]),
         colour: arguments.colour.into(),
         zoom: arguments.zoom,

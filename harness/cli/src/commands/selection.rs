@@ -1,10 +1,11 @@
 //! Which part of a mesh a command uses.
 
-use clap::{Args, ValueEnum};
+use super::values::numbers;
+use clap::Args;
 use contract::lattice::Root;
 use contract::manifest::Sides;
 use contract::octant::LEVEL_MAX;
-use contract::word;
+use contract::word::Side;
 use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
@@ -30,14 +31,6 @@ pub struct SelectionArguments {
     slice: Option<Plane>,
 }
 
-/// A side of the surface.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Side {
-    Outside,
-    Inside,
-    Crossing,
-}
-
 /// A plane normal to an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Plane {
@@ -55,13 +48,8 @@ impl SelectionArguments {
         let root = &mesh.manifest.root;
         let slice =
             self.slice.map(|plane| plane.of(root)).transpose().map_err(ExportError::Request)?;
-        let side = self.side.map(|side| match side {
-            Side::Outside => word::Side::Outside,
-            Side::Inside => word::Side::Inside,
-            Side::Crossing => word::Side::Crossing,
-        });
         let clip = self.clip.map(|corners| corners.map(|corner| root.quantise_clamped(corner)));
-        Ok(Selection { clip, level_max: self.level_max, side, rank: self.rank, slice })
+        Ok(Selection { clip, level_max: self.level_max, side: self.side, rank: self.rank, slice })
     }
 
     /// Refuses conditions on what the mesh does not have.
@@ -100,11 +88,8 @@ impl Plane {
 
 /// Parses a box; the corners are returned in ascending order.
 fn clip(text: &str) -> Result<[[f64; 3]; 2], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
-    let six = numbers.and_then(|numbers| <[f64; 6]>::try_from(numbers).ok());
-    let [x0, y0, z0, x1, y1, z1] = six
-        .filter(|six| six.iter().all(|c| c.is_finite()))
-        .ok_or_else(|| "give six numbers: X0,Y0,Z0,X1,Y1,Z1".to_owned())?;
+    let [x0, y0, z0, x1, y1, z1] =
+        numbers(text).ok_or_else(|| "give six numbers: X0,Y0,Z0,X1,Y1,Z1".to_owned())?;
     let axes = [(x0, x1), (y0, y1), (z0, z1)];
     if axes.iter().any(|(from, to)| from == to) {
         return Err("the box has no volume: use --slice for the cells at a plane".to_owned());

@@ -1,15 +1,17 @@
 //! `harness selftest`: corrupts correct meshes and prints which check detects each corruption.
 
 use super::programs::ProgramArguments;
+use crate::failure::Failure;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
+use contract::files::named;
 use contract::leafset;
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
 use run::engine::options::RunOptions;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -29,31 +31,18 @@ pub struct Arguments {
 }
 
 /// Meshes the cases, corrupts the meshes and prints the table; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    match try_run(arguments) {
-        Ok(code) => code,
-        Err((code, why)) => {
-            eprintln!("harness: {why}");
-            code
-        }
-    }
-}
-
-/// An exit code and the message.
-type Failure = (u8, String);
-
-fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
-    let programs = find(arguments)?;
+///
+/// # Errors
+/// If a case cannot be meshed.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let programs = Programs::find(arguments.programs.given())?;
     if !programs.reference.program().is_file() {
         let path = programs.reference.program().display();
-        return Err((
-            EXIT_MISSING,
-            format!(
-                "the reference is missing: build {path}, or give another path with --reference"
-            ),
-        ));
+        return Err(Failure::missing(format!(
+            "the reference is missing: build {path}, or give another path with --reference"
+        )));
     }
-    let scratch = tempfile::tempdir().map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    let scratch = tempfile::tempdir()?;
     let cases =
         if arguments.case.is_empty() { built_in(scratch.path())? } else { arguments.case.clone() };
     let limit = Duration::from_secs(arguments.timeout);
@@ -64,7 +53,7 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
     let cases = meshed.collect::<Result<Vec<SelftestCase>, Failure>>()?;
     let mutants = scratch.path().join("mutants");
     let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&cases, &mutants));
-    let report = report.map_err(|error| (EXIT_INPUT, format!("{}: {error}", mutants.display())))?;
+    let report = report.map_err(|error| named(&mutants, &error))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
 }
@@ -73,13 +62,10 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
 fn built_in(scratch: &Path) -> Result<Vec<PathBuf>, Failure> {
     let write = |(name, text): (&str, &str)| {
         let path = scratch.join(format!("{name}.toml"));
-        fs::write(&path, text).map(|()| path).map_err(|error| (EXIT_INPUT, error.to_string()))
+        fs::write(&path, text)?;
+        Ok(path)
     };
     selftest::CASES.into_iter().map(write).collect()
-}
-
-fn find(arguments: &Arguments) -> Result<Programs, Failure> {
-    Programs::find(arguments.programs.given()).map_err(|why| (EXIT_INPUT, why))
 }
 
 /// Meshes a case with the reference in `directory`: the mesh, and the base tree T0.
@@ -89,11 +75,12 @@ fn mesh_case(
     directory: &Path,
     limit: Duration,
 ) -> Result<SelftestCase, Failure> {
-    let case = Case::read(path).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+    let case = Case::read(path)?;
+    let failed = |why| Failure { code: EXIT_FAILED, why };
     let mut meshes = Vec::new();
     for (name, ungraded) in [("mesh", false), ("base", true)] {
         let logs = directory.join(format!("{name}-logs"));
-        fs::create_dir_all(&logs).map_err(|error| (EXIT_INPUT, error.to_string()))?;
+        fs::create_dir_all(&logs)?;
         let out = directory.join(name);
         let options = RunOptions {
             mesh: Some(&out),
@@ -102,12 +89,11 @@ fn mesh_case(
             ..RunOptions::new(&logs, limit)
         };
         programs.reference.run(path, &SERIAL, &options).map_err(|failure| match &failure.end {
-            End::Missing(_) => (EXIT_MISSING, failure.to_string()),
-            End::Interrupted => (EXIT_INTERRUPTED, "interrupted".to_owned()),
-            End::Exited { code: 2, error } => (EXIT_INPUT, error.clone()),
-            _ => (EXIT_FAILED, format!("{failure}, on {}", path.display())),
+            End::Missing(_) | End::Interrupted => Failure::from(failure),
+            End::Exited { code: 2, error } => Failure::input(error),
+            _ => failed(format!("{failure}, on {}", path.display())),
         })?;
-        meshes.push(leafset::read(&out).map_err(|error| (EXIT_FAILED, error.to_string()))?);
+        meshes.push(leafset::read(&out).map_err(|error| failed(error.to_string()))?);
     }
     let base = meshes.pop().expect("the loop reads two meshes");
     let mesh = meshes.pop().expect("the loop reads two meshes");

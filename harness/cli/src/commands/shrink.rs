@@ -1,14 +1,16 @@
 //! `harness shrink`: reduces a failing case and writes it as a directory.
 
 use super::programs::ProgramArguments;
+use crate::failure::Failure;
 use bench::shrink::bundle::{self, Repeat};
-use bench::shrink::probe::{Probe, Trial, Unknown};
+use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, Verdict, shrink, verdict};
 use clap::Args;
+use contract::files::named;
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_MISSING};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -52,21 +54,13 @@ pub struct Arguments {
 }
 
 /// Shrinks, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    try_run(arguments).unwrap_or_else(|why| {
-        eprintln!("harness: {why}");
-        match why {
-            Unknown::LeftOut(_) => EXIT_MISSING,
-            Unknown::Error(_) => EXIT_INPUT,
-        }
-    })
-}
-
-fn try_run(arguments: &Arguments) -> Result<u8, Unknown> {
-    let wrong = Unknown::Error;
+///
+/// # Errors
+/// If the engine does not support the case, or a program cannot be run.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let given = arguments.programs.given();
     let program = given.mesher.as_ref().map(|path| path.to_string_lossy().into_owned());
-    let programs = Programs::find_with_engine(&arguments.engine, given).map_err(wrong)?;
+    let programs = Programs::find_with_engine(&arguments.engine, given)?;
     let limit = Duration::from_secs(arguments.timeout);
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
@@ -74,11 +68,11 @@ fn try_run(arguments: &Arguments) -> Result<u8, Unknown> {
         Some(ranks) => Ranks::Simulated { ranks: ranks as usize, seed: arguments.seed },
     };
     let catalogue = &programs.paths.catalogue;
-    let path = catalogue.case_file(&arguments.case, Path::new("")).map_err(wrong)?;
-    let probe = Probe::new(programs.engine, programs.reference, ranks, limit).map_err(wrong)?;
+    let path = catalogue.case_file(&arguments.case, Path::new(""))?;
+    let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
     let check = arguments.check.as_deref();
     if arguments.test_only {
-        let case = PlainCase::read(&path).map_err(wrong)?;
+        let case = PlainCase::read(&path)?;
         return Ok(match verdict(&Trial { case, ranks }, &probe, check)? {
             Verdict::Fails(failure) => {
                 println!("{failure}");
@@ -101,8 +95,8 @@ fn try_run(arguments: &Arguments) -> Result<u8, Unknown> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let repeat = Repeat { engine: arguments.engine.clone(), program };
-    let readme = bundle::write(&shrunk, &probe, &repeat, &out)
-        .map_err(|error| wrong(format!("{}: {error}", out.display())))?;
+    let readme =
+        bundle::write(&shrunk, &probe, &repeat, &out).map_err(|error| named(&out, &error))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

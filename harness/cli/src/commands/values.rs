@@ -1,11 +1,15 @@
 //! Parsers of option values.
 
+use crate::failure::Failure;
 use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
+use contract::case::Case;
 use contract::lattice::Root;
+use run::engine::paths::Paths;
 pub use run::verify::options::whole_seconds;
 use std::io;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// A file that the command writes. It is checked when the command line is parsed, before any work: it can be written, and the
 /// command does not read it.
@@ -81,18 +85,50 @@ pub fn percentage(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "give a percentage from 0 to 1000".to_owned())
 }
 
+/// A point in the user's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point(pub [f64; 3]);
+
+impl FromStr for Point {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers(text).map(Self).ok_or_else(|| "give three numbers: X,Y,Z".to_owned())
+    }
+}
+
+/// As many finite numbers, separated by commas.
+pub fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let finite = |n: &str| n.trim().parse().ok().filter(|c: &f64| c.is_finite());
+    text.split(',').map(finite).collect::<Option<Vec<f64>>>()?.try_into().ok()
+}
+
+/// Reads the case with this name in geometries/catalogue.toml, or the case file with this path.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn read_case(name: &str) -> Result<Case, Failure> {
+    Ok(Case::read(&Paths::find().catalogue.case_file(name, Path::new(""))?)?)
+}
+
 /// Parses a root from four numbers.
 pub fn root(text: &str) -> Result<Root, String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y, z, edge] if text.split(',').count() == 4 => Ok(Root { origin: [x, y, z], edge }),
-        _ => Err("give four numbers: X,Y,Z,EDGE".to_owned()),
-    }
+    let [x, y, z, edge] =
+        numbers(text).ok_or_else(|| "give four numbers: X,Y,Z,EDGE".to_owned())?;
+    Ok(Root { origin: [x, y, z], edge })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_have_three_finite_numbers() {
+        assert_eq!("-1, 2.5,3e2".parse(), Ok(Point([-1.0, 2.5, 300.0])));
+        for wrong in ["1,2", "1,2,3,4", "1,2,x", "1,2,nan", ""] {
+            assert!(wrong.parse::<Point>().is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn a_time_limit_is_at_least_a_second_and_at_most_a_week() {

@@ -3,6 +3,7 @@
 use super::files::put;
 use super::programs::ProgramArguments;
 use super::values::Output;
+use crate::failure::Failure;
 use clap::Args;
 use report::verification::json::json;
 use report::verification::junit::junit;
@@ -10,8 +11,8 @@ use report::verification::markdown::markdown;
 use report::verification::table::table;
 use run::engine::programs::Programs;
 use run::verify::options::Options;
-use run::verify::report::{EXIT_INPUT, EXIT_MISSING, Report, exit_first};
-use run::verify::{VerifyError, verify};
+use run::verify::report::{EXIT_INPUT, Report, exit_first};
+use run::verify::verify;
 use std::env;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
@@ -27,43 +28,28 @@ pub struct Arguments {
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<Output>,
-    /// Verify another mesher: name in harness/engines or path of a description [default: the mesher itself]
-    #[arg(long, value_name = "ENGINE")]
-    pub engine: Option<String>,
+    /// Verify another mesher: name in harness/engines or path of a description
+    #[arg(long, value_name = "ENGINE", default_value = "mesher")]
+    pub engine: String,
     /// Paths of the programs.
     #[command(flatten)]
     pub programs: ProgramArguments,
 }
 
 /// Verifies, prints and writes; returns the exit code.
-pub fn run(arguments: Arguments) -> u8 {
-    let engine = arguments.engine.as_deref().unwrap_or("mesher");
-    let programs = match Programs::find_with_engine(engine, arguments.programs.given()) {
-        Ok(programs) => programs,
-        Err(why) => {
-            eprintln!("harness: {why}");
-            return EXIT_INPUT;
-        }
-    };
-    let Arguments { options, junit, json, .. } = arguments;
-    let report = match verify(&options, &programs) {
-        Ok(report) => report,
-        Err(error) => {
-            eprintln!("harness: {error}");
-            return match error {
-                VerifyError::Input(_) => EXIT_INPUT,
-                VerifyError::Missing(_) => EXIT_MISSING,
-            };
-        }
-    };
+///
+/// # Errors
+/// If the verification cannot begin, or a report cannot be written.
+pub fn run(arguments: Arguments) -> Result<u8, Failure> {
+    let Arguments { options, junit, json, engine, programs } = arguments;
+    let programs = Programs::find_with_engine(&engine, programs.given())?;
+    let report = verify(&options, &programs)?;
     print!("{}", table(&report));
-    match write(&report, &options, junit, json) {
-        Ok(()) => report.exit_code(),
-        Err(error) => {
-            eprintln!("harness: a report could not be written: {error}");
-            exit_first(report.exit_code(), EXIT_INPUT)
-        }
-    }
+    write(&report, &options, junit, json).map_err(|error| Failure {
+        code: exit_first(report.exit_code(), EXIT_INPUT),
+        why: format!("a report could not be written: {error}"),
+    })?;
+    Ok(report.exit_code())
 }
 
 /// Writes the requested forms of the report, and all forms into the directory of `--out`.

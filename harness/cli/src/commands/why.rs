@@ -1,20 +1,19 @@
 //! `harness why`: explains the leaf at a point, or finds splits that no rule requires.
 
-use super::values::Output;
-use std::fmt::Display;
-use std::num::NonZero;
-use std::path::Path;
-
-use super::meshed::{Failure, MeshArguments, input};
+use super::files::put;
+use super::meshed::MeshArguments;
+use super::values::{Output, Point};
+use crate::failure::Failure;
 use check::why::Mesh;
 use clap::Args;
-use contract::files::write_atomically;
-use contract::leafset::ReadError;
 use contract::mesh;
 use report::json::pretty;
 use run::engine::layout::SERIAL;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use serde::Serialize;
+use std::fmt::Display;
+use std::num::NonZero;
+use std::path::Path;
 
 const EXAMPLES: &str = "Examples:
   harness why uav-small 0.1,0,0.2                mesh a case of the catalogue and explain the leaf at a point
@@ -34,7 +33,7 @@ pub struct Arguments {
     #[command(flatten)]
     source: MeshArguments,
     /// The point to explain, in the user's units
-    #[arg(value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, required_unless_present = "unneeded")]
+    #[arg(value_name = "X,Y,Z", allow_hyphen_values = true, required_unless_present = "unneeded")]
     point: Option<Point>,
     /// Find all splits that no rule requires, instead of explaining a point
     #[arg(long, conflicts_with = "point")]
@@ -47,30 +46,21 @@ pub struct Arguments {
     first: NonZero<usize>,
 }
 
-/// A point in the user's units.
-#[derive(Clone, Copy, Debug)]
-struct Point([f64; 3]);
-
 /// Explains or audits, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    try_run(arguments).unwrap_or_else(|(code, why)| {
-        eprintln!("harness: {why}");
-        code
-    })
-}
-
-fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
+///
+/// # Errors
+/// If the mesh cannot be made or read, or the question has no answer.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let made = arguments.source.open(&SERIAL, false)?;
-    let read = |error: ReadError| input(error.to_string());
-    let disk = mesh::Mesh::open(&made.dir).map_err(read)?;
-    let tree = disk.tree().map_err(read)?;
+    let disk = mesh::Mesh::open(&made.dir)?;
+    let tree = disk.tree()?;
     let mesh = Mesh::of(&disk.manifest, &tree, made.case.as_ref())
-        .map_err(|why| input(format!("{}: {why}", made.dir.display())))?;
+        .map_err(|why| format!("{}: {why}", made.dir.display()))?;
     if let Some(Point(point)) = arguments.point {
-        print(&mesh.at(point).map_err(input)?, arguments.json.as_deref())?;
+        print(&mesh.at(point)?, arguments.json.as_deref())?;
         return Ok(EXIT_HOLDS);
     }
-    let found = mesh.unneeded(arguments.first.get()).map_err(input)?;
+    let found = mesh.unneeded(arguments.first.get())?;
     print(&found, arguments.json.as_deref())?;
     Ok(if found.unneeded == 0 { EXIT_HOLDS } else { EXIT_FAILED })
 }
@@ -78,16 +68,5 @@ fn try_run(arguments: &Arguments) -> Result<u8, Failure> {
 /// Prints a result and writes it as JSON.
 fn print<T: Display + Serialize>(result: &T, json: Option<&Path>) -> Result<(), Failure> {
     println!("{result}");
-    let Some(path) = json else { return Ok(()) };
-    let written = write_atomically(path, |out| out.write_all(pretty(result).as_bytes()));
-    written.map_err(|error| (EXIT_INPUT, format!("{}: {error}", path.display())))
-}
-
-/// Parses a point from three numbers.
-fn point(text: &str) -> Result<Point, String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    match numbers.ok().and_then(|numbers| <[f64; 3]>::try_from(numbers).ok()) {
-        Some(point) => Ok(Point(point)),
-        None => Err("give three numbers: X,Y,Z".to_owned()),
-    }
+    Ok(json.map_or(Ok(()), |path| put(path, &pretty(result)))?)
 }
