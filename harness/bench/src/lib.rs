@@ -16,6 +16,12 @@ pub mod study;
 pub mod testing;
 pub mod track;
 
+/// Returns the name of a variant, as files have it.
+fn name_of(variant: &impl serde::Serialize) -> String {
+    let name = serde_json::to_value(variant).expect("a variant without data is a string");
+    name.as_str().unwrap_or_default().to_owned()
+}
+
 /// Prints what a long command does on standard error. If that cannot be written, the command goes on.
 fn announce(what: &str) {
     use std::io::Write;

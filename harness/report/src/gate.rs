@@ -3,13 +3,13 @@
 use crate::markdown::escaped;
 use crate::table::Table;
 use crate::verification::junit::to_text;
-use bench::gate::report::{End, Finding, Layer, Report, Verdict};
+use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use std::fmt::Write as _;
 use std::time::Duration;
 
 /// The report as text: a section per layer; unchanged values are only counted.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &GateReport) -> String {
     let mut text = format!("{}\n", heading(report));
     for layer in &report.layers {
         // Writing into a string cannot fail.
@@ -23,7 +23,7 @@ pub fn text(report: &Report) -> String {
 }
 
 /// The report as Markdown, for the summary page of a CI system.
-pub fn markdown(report: &Report) -> String {
+pub fn markdown(report: &GateReport) -> String {
     let mut rows: Vec<Vec<String>> = Vec::new();
     for layer in &report.layers {
         let mut head = vec![layer.name.to_string(), summary(layer)];
@@ -51,7 +51,7 @@ pub fn markdown(report: &Report) -> String {
 }
 
 /// The report as JUnit XML: a suite per layer, a test per metric. Inconclusive metrics are skipped tests with a reason.
-pub fn junit(report: &Report) -> String {
+pub fn junit(report: &GateReport) -> String {
     let mut xml = quick_junit::Report::new("harness gate");
     xml.set_time(Duration::from_secs_f64(report.time_s));
     for layer in &report.layers {
@@ -69,11 +69,11 @@ pub fn junit(report: &Report) -> String {
 }
 
 /// The report as JSON.
-pub fn json(report: &Report) -> String {
+pub fn json(report: &GateReport) -> String {
     crate::json::pretty(report)
 }
 
-fn test(finding: &Finding) -> TestCase {
+fn test(finding: &GateFinding) -> TestCase {
     let status = match finding.verdict {
         Verdict::Regression => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
@@ -102,7 +102,7 @@ fn test(finding: &Finding) -> TestCase {
     test
 }
 
-fn heading(report: &Report) -> String {
+fn heading(report: &GateReport) -> String {
     match &report.baseline {
         Some(baseline) => format!("candidate {} against baseline {baseline}", report.candidate),
         None => format!("candidate {}", report.candidate),
@@ -110,7 +110,7 @@ fn heading(report: &Report) -> String {
 }
 
 /// The verdict on the candidate, with the time of the gate.
-fn verdict(report: &Report) -> String {
+fn verdict(report: &GateReport) -> String {
     let end = match report.end() {
         End::Holds(total) if report.baseline.is_some() => {
             format!("nothing got worse in {total} comparisons")
@@ -150,13 +150,13 @@ fn summary(layer: &Layer) -> String {
 }
 
 /// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.
-fn is_shown(layer: &Layer, finding: &Finding) -> bool {
+fn is_shown(layer: &Layer, finding: &GateFinding) -> bool {
     use bench::gate::report::LayerName::{Correctness, Time};
     finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
 }
 
-fn line(finding: &Finding) -> String {
-    let Finding { case, metric, verdict, note, .. } = finding;
+fn line(finding: &GateFinding) -> String {
+    let GateFinding { case, metric, verdict, note, .. } = finding;
     let mut line = format!("{verdict:<12} {case}: {metric}");
     if let (Some(old), Some(new)) = (finding.baseline, finding.candidate) {
         let _ = write!(line, " {} -> {}", number(old), number(new));
@@ -181,15 +181,16 @@ mod tests {
     use bench::gate::measures::{Measured, Measures};
     use bench::gate::report::LayerName;
 
-    fn sample() -> Report {
+    fn sample() -> GateReport {
         let measured = |named: &str| Measured { named: named.into(), ..Measured::default() };
-        let mut report = Report::new(Some(measured("main")), Measures::of_program(measured(".")));
+        let mut report =
+            GateReport::new(Some(measured("main")), Measures::of_program(measured(".")));
         let cases = || vec!["cube".to_owned()];
         let mut counters = Layer::new(LayerName::Counters, cases());
         counters.findings = vec![
-            Finding::exact("cube", "rays", [6, 7], 0.0, Verdict::Changed),
-            Finding::exact("cube", "messages", [6, 6], 0.0, Verdict::Changed),
-            Finding::noted("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
+            GateFinding::exact("cube", "rays", [6, 7], 0.0, Verdict::Changed),
+            GateFinding::exact("cube", "messages", [6, 6], 0.0, Verdict::Changed),
+            GateFinding::noted("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
         ];
         let left_out = Some("no valgrind".into());
         report.layers =
@@ -202,7 +203,7 @@ mod tests {
         let mut report = sample();
         let note = "the record does not contain this case";
         report.layers[0].findings =
-            vec![Finding::noted("cube", "baseline", Verdict::Missing, note)];
+            vec![GateFinding::noted("cube", "baseline", Verdict::Missing, note)];
         let expected = format!("INCOMPLETE: counters of cube: nothing was compared: {note}");
         assert!(text(&report).contains(&expected), "{}", text(&report));
         assert!(markdown(&report).contains(&expected));

@@ -13,11 +13,11 @@ struct PingPong {
     /// `octree-pingpong/1`.
     schema: String,
     /// Message sizes with their median one-way times.
-    points: Vec<Point>,
+    points: Vec<Ping>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Point {
+struct Ping {
     bytes: f64,
     time_s: f64,
 }

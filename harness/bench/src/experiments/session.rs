@@ -5,25 +5,39 @@ use super::execute::{Failed, Runner};
 use super::record::Record;
 use super::{machine, network};
 use check::promises::Independence;
+use clap::Args;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
+use run::verify::options::whole_seconds;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The options of a session.
-#[derive(Debug)]
-pub struct Options {
-    /// How ranks are started.
+/// The options of a session, as on the command line.
+#[derive(Args, Clone, Debug)]
+pub struct SessionOptions {
+    /// No runs on MPI
+    #[arg(long)]
+    pub no_mpi: bool,
+    /// Repetitions of every run; 95 % intervals of a median need six
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    pub repeat: Option<u16>,
+    /// Command that starts ranks; {ranks} is replaced by their number
+    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
     pub launcher: Launcher,
-    /// Latency and bandwidth; measured by default if the launcher exists.
+    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
+    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
     pub network: Option<Network>,
-    /// The record.
-    pub record: PathBuf,
-    /// Time limit of a run.
-    pub limit: Duration,
-    /// The harness's command line, for the record.
-    pub command: Vec<String>,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = whole_seconds)]
+    pub timeout: u64,
+}
+
+impl SessionOptions {
+    /// Returns how often a run is repeated that the file repeats so often.
+    pub(crate) fn repeats(&self, of_file: usize) -> usize {
+        self.repeat.map_or(of_file, usize::from)
+    }
 }
 
 /// Why a session ended early.
@@ -38,7 +52,7 @@ pub enum BenchError {
 }
 
 /// A run to be repeated.
-pub(crate) struct Point {
+pub(crate) struct Planned {
     pub setup: Setup,
     pub case: PathBuf,
     pub repeats: usize,
@@ -50,7 +64,7 @@ pub(crate) struct Point {
     pub failed: bool,
 }
 
-impl Point {
+impl Planned {
     /// The program and the case.
     pub fn mesh(&self) -> (String, PathBuf) {
         (self.setup.engine.clone(), self.case.clone())
@@ -69,7 +83,7 @@ type Mesh = [String; 5];
 
 /// A running session.
 pub(crate) struct Bench<'a> {
-    pub(crate) options: &'a Options,
+    pub(crate) options: &'a SessionOptions,
     pub(crate) runner: Runner<'a>,
     pub(crate) record: Record,
     pub(crate) progress: &'a mut dyn FnMut(&str),
@@ -80,14 +94,15 @@ pub(crate) struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// Opens the record and begins a session; runs leave their files in `place`.
     pub(crate) fn open(
-        options: &'a Options,
+        options: &'a SessionOptions,
+        record: &Path,
         engines: Vec<String>,
         programs: &'a Programs,
         place: &'a Path,
         progress: &'a mut dyn FnMut(&str),
     ) -> Result<Self, BenchError> {
-        let record = Record::new(&options.record);
-        let (launcher, limit) = (&options.launcher, options.limit);
+        let record = Record::new(record);
+        let (launcher, limit) = (&options.launcher, Duration::from_secs(options.timeout));
         let runner = Runner { programs, launcher, limit, place };
         let (lines, digests) = (Vec::new(), HashMap::new());
         let mut bench = Self { options, runner, record, progress, lines, digests };
@@ -113,7 +128,7 @@ impl Bench<'_> {
             (engine, lacks)
         };
         let session = Session {
-            command: self.options.command.clone(),
+            command: std::env::args().collect(),
             machine: machine::describe(&self.options.launcher.program(), repository),
             load_average: machine::load_average(),
             lacks: engines.into_iter().map(lacks).collect(),
@@ -139,7 +154,7 @@ impl Bench<'_> {
 
     pub(crate) fn run(
         &mut self,
-        point: &mut Point,
+        point: &mut Planned,
         repeat: usize,
         warm_up: bool,
     ) -> Result<(), BenchError> {
@@ -174,7 +189,7 @@ impl Bench<'_> {
         self.failed(point, why)
     }
 
-    fn failed(&mut self, point: &mut Point, why: String) -> Result<(), BenchError> {
+    fn failed(&mut self, point: &mut Planned, why: String) -> Result<(), BenchError> {
         (self.progress)(&format!("failed: {why}"));
         point.failed = true;
         let command = format!("{} on {} ranks", point.setup.engine, point.setup.ranks);
@@ -188,7 +203,7 @@ impl Bench<'_> {
     }
 
     /// Writes a mesh to the record's file system and audits it.
-    pub(crate) fn audit(&mut self, point: &mut Point) -> Result<(), BenchError> {
+    pub(crate) fn audit(&mut self, point: &mut Planned) -> Result<(), BenchError> {
         let s = &point.setup;
         (self.progress)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
         let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
@@ -201,7 +216,7 @@ impl Bench<'_> {
     }
 
     /// Requires the mesh of an engine that promises the definition to be that of the mesher, once for each mesh.
-    fn right_mesh(&self, point: &Point, run: &Run) -> Result<(), String> {
+    fn right_mesh(&self, point: &Planned, run: &Run) -> Result<(), String> {
         let engine = self.runner.programs.labelled(&point.setup.engine);
         if !run.warm_up || engine.name() == "mesher" || !engine.description().promises.definition {
             return Ok(());

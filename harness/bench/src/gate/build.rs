@@ -138,20 +138,17 @@ pub(super) fn revision_of(named: &str, repository: &Path) -> Result<String, Stri
 /// Puts a revision's files into a directory.
 fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateError> {
     fs::create_dir_all(tree).map_err(|error| wrong(tree, &error))?;
-    let archive = tree.with_extension("tar");
-    let mut git = Command::new("git");
-    git.arg("-C").arg(repository).args(["archive", "--format=tar", "-o"]);
-    git.arg(&archive).arg(revision);
-    let mut tar = Command::new("tar");
-    tar.arg("-xf").arg(&archive).arg("-C").arg(tree);
-    for mut command in [git, tar] {
-        let output = command.output().map_err(|error| wrong(tree, &error))?;
-        if !output.status.success() {
+    let mut command = Command::new("sh");
+    command.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
+    let output = command.arg(repository).arg(revision).arg(tree).output();
+    let output = output.map_err(|error| wrong(tree, &error))?;
+    match output.status.success() {
+        true => Ok(()),
+        false => {
             let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            return Err(GateError::Input(format!("{revision} cannot be unpacked: {error}")));
+            Err(GateError::Input(format!("{revision} cannot be unpacked: {error}")))
         }
     }
-    fs::remove_file(&archive).map_err(|error| wrong(&archive, &error))
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

@@ -3,7 +3,7 @@
 
 use super::known::{Known, against, known};
 use super::measures::Measures;
-use super::report::{CHECKS, Finding, Layer, LayerName, Verdict};
+use super::report::{CHECKS, GateFinding, Layer, LayerName, Verdict};
 use super::rules::Selected;
 use super::subject::Baseline;
 use super::{Bench, GateError};
@@ -85,10 +85,10 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
 }
 
 /// A finding for the serial mesh, and one for each number of ranks.
-fn findings(bench: &Bench, case: &Selected, report: &CaseReport) -> Vec<Finding> {
+fn findings(bench: &Bench, case: &Selected, report: &CaseReport) -> Vec<GateFinding> {
     let name = &case.rule.name;
     if let Some(why) = &report.input_error {
-        return vec![Finding::noted(name, CHECKS, Verdict::Regression, why)];
+        return vec![GateFinding::noted(name, CHECKS, Verdict::Regression, why)];
     }
     let ranks = std::iter::once(None).chain(bench.ranks_on_mpi(case).into_iter().map(Some));
     let of_ranks = |ranks: Option<usize>| {
@@ -100,7 +100,7 @@ fn findings(bench: &Bench, case: &Selected, report: &CaseReport) -> Vec<Finding>
     ranks.map(of_ranks).collect()
 }
 
-fn finding(case: &str, metric: &str, checks: &[&Check]) -> Finding {
+fn finding(case: &str, metric: &str, checks: &[&Check]) -> GateFinding {
     let tally: Tally = checks.iter().copied().collect();
     let failure = checks.iter().find_map(|check| match &check.outcome {
         Outcome::Fail { why } => {
@@ -121,5 +121,5 @@ fn finding(case: &str, metric: &str, checks: &[&Check]) -> Finding {
         Some(why) => (Verdict::Regression, format!("{} checks fail, the first: {why}", tally.fail)),
         None => (Verdict::Unchanged, format!("{} checks hold", tally.pass)),
     };
-    Finding { compared, ..Finding::noted(case, metric, verdict, note) }
+    GateFinding { compared, ..GateFinding::noted(case, metric, verdict, note) }
 }

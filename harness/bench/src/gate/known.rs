@@ -1,7 +1,7 @@
 //! Known findings: a mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more
 //! findings.
 
-use super::report::{CHECKS, Finding, Verdict};
+use super::report::{CHECKS, GateFinding, Verdict};
 use run::verify::case::RUNS;
 use run::verify::report::{CaseReport, Check, Outcome};
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub fn known(case: &CaseReport) -> Known {
 }
 
 /// Compares a case that fails checks with the failed checks of the baseline.
-pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> Finding {
+pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> GateFinding {
     let candidate = known(case);
     let is_worse = |check: &&Check| {
         check.failed() && baseline.get(&key(check)).is_none_or(|old| candidate[&key(check)] > *old)
@@ -51,7 +51,7 @@ pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> Finding {
         (None, None) => (Verdict::Improvement, counts),
     };
     let numbers = [total(baseline), total(&candidate)].map(|count| count as f64);
-    Finding::of_values(name, CHECKS, verdict, numbers, note)
+    GateFinding::of_values(name, CHECKS, verdict, numbers, note)
 }
 
 #[cfg(test)]

@@ -97,10 +97,10 @@ impl Measures {
     /// One sentence, if it is neither.
     pub fn parse(text: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
-        struct Report {
+        struct GateReport {
             candidate_measures: Measures,
         }
-        let measures: Self = match serde_json::from_slice::<Report>(text) {
+        let measures: Self = match serde_json::from_slice::<GateReport>(text) {
             Ok(report) => report.candidate_measures,
             Err(_) => serde_json::from_slice(text)
                 .map_err(|error| format!("not a record of `harness gate`: {error}"))?,

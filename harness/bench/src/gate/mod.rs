@@ -25,7 +25,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use measures::Measures;
 use numbers::Measurement;
-use report::{Finding, Layer, LayerName, Report, Verdict};
+use report::{GateFinding, GateReport, Layer, LayerName, Verdict};
 use rules::{Rules, Selected};
 use run::engine::failure::Failure;
 use run::engine::interrupt;
@@ -135,7 +135,7 @@ pub struct Bench<'a> {
 ///
 /// # Errors
 /// If the gate cannot start; later failures are in the report.
-pub fn gate(options: &GateOptions, programs: &Programs) -> Result<Report, GateError> {
+pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, GateError> {
     let start = Instant::now();
     let rules =
         Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
@@ -160,7 +160,7 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<Report, GateEr
         machine: machine::describe(mpirun, &options.repository).label(),
         ..Measures::of_program(candidate.measured)
     };
-    let mut report = Report::new(baseline.measured(), measures);
+    let mut report = GateReport::new(baseline.measured(), measures);
     report.require_layers = options.require_layers;
     run_layers(&bench, &baseline, &mut report)?;
     report.interrupted = interrupt::requested();
@@ -180,7 +180,11 @@ fn no_mpi(engine: &Engine, programs: &Programs) -> Option<String> {
     description.run.parallel.is_none().then(why)
 }
 
-fn run_layers(bench: &Bench, baseline: &Baseline, report: &mut Report) -> Result<(), GateError> {
+fn run_layers(
+    bench: &Bench,
+    baseline: &Baseline,
+    report: &mut GateReport,
+) -> Result<(), GateError> {
     // Without a choice of layers, those are requested for which the rules have a case.
     let requested = |name: &LayerName| match bench.options.layers.is_empty() {
         true => bench.asked(*name).next().is_some(),
@@ -219,10 +223,10 @@ impl Bench<'_> {
     }
 
     /// Returns the other cases of a layer as findings with their reasons.
-    fn cases_left_out(&self, layer: LayerName) -> impl Iterator<Item = Finding> {
+    fn cases_left_out(&self, layer: LayerName) -> impl Iterator<Item = GateFinding> {
         self.asked(layer).filter_map(|case| {
             let why = case.path.as_ref().err()?;
-            Some(Finding::noted(&case.rule.name, "runs", Verdict::LeftOut, why))
+            Some(GateFinding::noted(&case.rule.name, "runs", Verdict::LeftOut, why))
         })
     }
 
@@ -238,11 +242,11 @@ impl Bench<'_> {
     }
 
     /// Returns the reason for which a case is not run on its real ranks, as a finding.
-    fn ranks_left_out(&self, case: &Selected) -> Option<Finding> {
+    fn ranks_left_out(&self, case: &Selected) -> Option<GateFinding> {
         let simulates = self.candidate.description().run.simulated.is_some();
         let asks = !case.rule.mpi.is_empty() || !case.rule.ranks.is_empty() && !simulates;
         let why = self.no_mpi.as_ref().filter(|_| asks)?;
-        Some(Finding::noted(&case.rule.name, "ranks on MPI", Verdict::LeftOut, why))
+        Some(GateFinding::noted(&case.rule.name, "ranks on MPI", Verdict::LeftOut, why))
     }
 
     /// Returns the ranks on which a case is counted.

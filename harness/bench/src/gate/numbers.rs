@@ -4,7 +4,7 @@
 use super::Bench;
 use super::callgrind::Profile;
 use super::measures::{CaseMeasures, Measures, Numbers};
-use super::report::{Finding, Layer, LayerName, Verdict};
+use super::report::{GateFinding, Layer, LayerName, Verdict};
 use super::rules::Selected;
 use super::subject::Baseline;
 use check::promises::Independence;
@@ -50,7 +50,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer:
             Err(why) if why.is_interrupt() => break,
             Err(why) => {
                 let finding =
-                    Finding::noted(case_name, "runs", Verdict::Regression, why.to_string());
+                    GateFinding::noted(case_name, "runs", Verdict::Regression, why.to_string());
                 layer.findings.push(finding);
             }
             Ok(mut candidate) => {
@@ -62,7 +62,7 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer:
                 }
                 match old(bench, baseline, case, name) {
                     Err(why) => {
-                        layer.findings.push(Finding::noted(
+                        layer.findings.push(GateFinding::noted(
                             case_name,
                             "baseline",
                             Verdict::Missing,
@@ -124,16 +124,16 @@ fn compare(
     layer: LayerName,
     old: Option<Measurement>,
     mut new: Measurement,
-) -> Vec<Finding> {
+) -> Vec<GateFinding> {
     let name = &case.rule.name;
     let numbers = new.measures.of_layer(layer).clone();
     let Some(mut old) = old else {
         let note = format!("{} quantities", numbers.len());
         let verdict = if numbers.is_empty() { Verdict::Missing } else { Verdict::Measured };
         let compared = numbers.len() as u64;
-        return vec![Finding {
+        return vec![GateFinding {
             compared,
-            ..Finding::noted(name, &layer.to_string(), verdict, note)
+            ..GateFinding::noted(name, &layer.to_string(), verdict, note)
         }];
     };
     let geometries = [&old.measures.geometry, &new.measures.geometry];
@@ -141,7 +141,7 @@ fn compare(
         && one != other
     {
         let why = format!("other facets were read: their digest is {other}, and was {one}");
-        return vec![Finding::noted(name, "geometry", Verdict::Missing, why)];
+        return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
     }
     let before = old.measures.of_layer(layer).clone();
     let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
@@ -161,13 +161,13 @@ fn compare(
 }
 
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct.
-fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> Finding {
+fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFinding {
     let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
     let (verdict, note) = match old == new {
         true => (Verdict::Unchanged, shown(new)),
         false => (Verdict::Changed, format!("different mesh: {} was {}", shown(new), shown(old))),
     };
-    Finding::noted(case, "digest", verdict, note)
+    GateFinding::noted(case, "digest", verdict, note)
 }
 
 /// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
@@ -177,7 +177,7 @@ fn compared_numbers(
     old: &Numbers,
     new: &Numbers,
     tolerance: &dyn Fn(&str) -> f64,
-) -> Vec<Finding> {
+) -> Vec<GateFinding> {
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
     let shared = |name: &&&String| old.contains_key(**name) && new.contains_key(**name);
     let is_counter = |name: &&&String| **name != CELLS;
@@ -190,23 +190,23 @@ fn compared_numbers(
             old.len(),
             new.len()
         );
-        findings.push(Finding::noted(case, &layer.to_string(), Verdict::Missing, why));
+        findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
     }
     // Noise within the tolerance is not worth a line.
     let less = if layer == LayerName::Counters { Verdict::Changed } else { Verdict::Unchanged };
     findings.extend(names.into_iter().map(|metric| {
         let finding = match (old.get(metric), new.get(metric)) {
             (Some(&old), Some(&new)) => {
-                Finding::exact(case, metric, [old, new], tolerance(metric), less)
+                GateFinding::exact(case, metric, [old, new], tolerance(metric), less)
             }
-            (None, new) => Finding::noted(
+            (None, new) => GateFinding::noted(
                 case,
                 metric,
                 Verdict::Changed,
                 format!("new, {}", new.unwrap_or(&0)),
             ),
             (Some(old), None) => {
-                Finding::noted(case, metric, Verdict::Changed, format!("removed, was {old}"))
+                GateFinding::noted(case, metric, Verdict::Changed, format!("removed, was {old}"))
             }
         };
         let grown = finding.candidate.unwrap_or(0.0) - finding.baseline.unwrap_or(0.0);
@@ -214,12 +214,12 @@ fn compared_numbers(
         match finding.verdict {
             // The size of the mesh is a result, not a cost: a change is neither better nor worse.
             Verdict::Improvement | Verdict::Regression | Verdict::Changed if is_result => {
-                Finding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding }
+                GateFinding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding }
             }
             Verdict::Regression
                 if layer == LayerName::Memory && grown <= MEMORY_NOISE_BYTES as f64 =>
             {
-                Finding { verdict: Verdict::Unchanged, note: String::new(), ..finding }
+                GateFinding { verdict: Verdict::Unchanged, note: String::new(), ..finding }
             }
             _ => finding,
         }

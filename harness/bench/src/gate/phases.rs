@@ -4,7 +4,7 @@
 //! Invariant: a phase that became slower is a regression only if the other phases do not save that time, because
 //! work may move from one phase to another.
 
-use super::report::{Finding, Verdict};
+use super::report::{GateFinding, Verdict};
 use super::rules::TimeRules;
 use crate::statistics::comparison::{Comparison, Round};
 use crate::statistics::trimmed_mean;
@@ -67,7 +67,7 @@ pub(super) fn findings(
     whole: &Quantity,
     phases: &[Quantity],
     rules: &TimeRules,
-) -> Vec<Finding> {
+) -> Vec<GateFinding> {
     let least_s = rules.phase_min / 100.0 * whole.times()[0];
     let change_s = |phase: &Quantity| phase.times()[1] - phase.times()[0];
     let is_changed = |phase: &&Quantity| {
@@ -87,7 +87,7 @@ pub(super) fn findings(
         let part = 100.0 * change_s(phase) / whole.times()[0];
         let note = format!("{part:+.1} % of the whole{why}; {}", certainty(&phase.found?));
         let metric = format!("{prefix}{}", metric(&phase.name));
-        Some(Finding::of_values(case, &metric, verdict, phase.times(), note))
+        Some(GateFinding::of_values(case, &metric, verdict, phase.times(), note))
     };
     changed.iter().filter_map(finding).collect()
 }

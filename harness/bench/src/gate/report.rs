@@ -1,6 +1,6 @@
 //! The report of a gate, which every output form prints.
 //!
-//! Invariants, executed by [`Report::check_invariants`] before it is printed:
+//! Invariants, executed by [`GateReport::check_invariants`] before it is printed:
 //! - every case that a layer was asked for has a finding in it, unless the layer was left out or interrupted, and no other case has one;
 //! - a change is that of the two values beside it, and a verdict for the worse or better has the sign of its change;
 //! - a finding that was left out or is missing compared nothing.
@@ -41,13 +41,7 @@ impl LayerName {
 
 impl fmt::Display for LayerName {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(match self {
-            Self::Correctness => "correctness",
-            Self::Counters => "counters",
-            Self::Memory => "memory",
-            Self::Instructions => "instructions",
-            Self::Time => "time",
-        })
+        f.pad(&crate::name_of(self))
     }
 }
 
@@ -75,22 +69,13 @@ pub enum Verdict {
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(match self {
-            Self::LeftOut => "left out",
-            Self::Measured => "measured",
-            Self::Improvement => "improvement",
-            Self::Unchanged => "unchanged",
-            Self::Changed => "changed",
-            Self::Inconclusive => "inconclusive",
-            Self::Missing => "missing",
-            Self::Regression => "regression",
-        })
+        f.pad(&crate::name_of(self).replace('_', " "))
     }
 }
 
 /// One metric of one case.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Finding {
+pub struct GateFinding {
     /// The case.
     pub case: String,
     /// The metric.
@@ -109,7 +94,7 @@ pub struct Finding {
     pub note: String,
 }
 
-impl Finding {
+impl GateFinding {
     /// Returns a finding without numbers, which compared nothing.
     pub fn noted(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
         Self {
@@ -208,7 +193,7 @@ pub struct Layer {
     /// Why it was skipped as a whole: a prerequisite is missing.
     pub left_out: Option<String>,
     /// The findings.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<GateFinding>,
     /// Wall time, in seconds.
     pub time_s: f64,
 }
@@ -258,7 +243,7 @@ pub enum End {
 
 /// The whole comparison.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Report {
+pub struct GateReport {
     /// [`SCHEMA`].
     pub schema: String,
     /// Name and version of the harness.
@@ -279,7 +264,7 @@ pub struct Report {
     pub time_s: f64,
 }
 
-impl Report {
+impl GateReport {
     /// Returns a report without layers.
     pub fn new(baseline: Option<Measured>, candidate_measures: Measures) -> Self {
         Self {
@@ -317,7 +302,7 @@ impl Report {
                 }
             }
             let mut missing = layer.findings.iter().filter(|f| f.verdict == Verdict::Missing);
-            if let Some(Finding { case, metric, note, .. }) = missing.next() {
+            if let Some(GateFinding { case, metric, note, .. }) = missing.next() {
                 return End::Incomplete(format!("{} of {case}: {metric}: {note}", layer.name));
             }
             if layer.cases.is_empty() {

@@ -8,7 +8,7 @@
 use super::Bench;
 use super::numbers::prefix;
 use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, certainty, size};
-use super::report::{Finding, Layer, LayerName, Verdict};
+use super::report::{GateFinding, Layer, LayerName, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
 use crate::statistics::comparison::{Comparison, Round, compare};
@@ -55,7 +55,8 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
                 Err(failure) if failure.is_interrupt() => break,
                 Err(why) => {
                     let metric = format!("{}time", prefix(ranks));
-                    let finding = Finding::noted(name, &metric, Verdict::Missing, why.to_string());
+                    let finding =
+                        GateFinding::noted(name, &metric, Verdict::Missing, why.to_string());
                     layer.findings.push(finding);
                 }
             }
@@ -133,7 +134,7 @@ fn seconds(run: &Completed, name: &str) -> f64 {
 }
 
 /// Tests all quantities of all cases together.
-fn judged(bench: &Bench, measured: &mut [Timed]) -> Vec<Finding> {
+fn judged(bench: &Bench, measured: &mut [Timed]) -> Vec<GateFinding> {
     let rules = &bench.rules.time;
     let quantities = || measured.iter().flat_map(|timed| &timed.quantities);
     let compared: Vec<Comparison> = quantities()
@@ -147,7 +148,7 @@ fn judged(bench: &Bench, measured: &mut [Timed]) -> Vec<Finding> {
     let of_case = |Timed { case, ranks, quantities }: &Timed| {
         let (whole, phases) = quantities.split_at(2);
         let prefix = prefix(*ranks);
-        let mut findings: Vec<Finding> = whole
+        let mut findings: Vec<GateFinding> = whole
             .iter()
             .filter_map(|quantity| whole_finding(case, &prefix, quantity, rules))
             .collect();
@@ -163,7 +164,7 @@ fn whole_finding(
     prefix: &str,
     quantity: &Quantity,
     rules: &TimeRules,
-) -> Option<Finding> {
+) -> Option<GateFinding> {
     let found = quantity.found?;
     let note = format!(
         "{} rounds; {}, minimum detectable effect {:.1} %",
@@ -172,7 +173,7 @@ fn whole_finding(
         100.0 * found.visible.max(rules.effect_min / 100.0)
     );
     let metric = format!("{prefix}{}", quantity.name);
-    Some(Finding::of_values(case, &metric, verdict(&found, rules), quantity.times(), note))
+    Some(GateFinding::of_values(case, &metric, verdict(&found, rules), quantity.times(), note))
 }
 
 /// An effect with a p-value below this is not reported as unchanged.

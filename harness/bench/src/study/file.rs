@@ -6,7 +6,7 @@
 use super::measure::{Kind, Measure};
 use crate::experiments::entry::{Comm, Setup};
 use run::engine::description::{Description, is_own};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -88,7 +88,7 @@ pub struct RunSpec {
 }
 
 /// A kind of experiment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Experiment {
     /// The same mesh on increasingly many ranks.
@@ -105,13 +105,7 @@ pub enum Experiment {
 
 impl fmt::Display for Experiment {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Strong => "strong",
-            Self::Weak => "weak",
-            Self::Spacing => "spacing",
-            Self::Layers => "layers",
-            Self::Weights => "weights",
-        })
+        f.write_str(&crate::name_of(self))
     }
 }
 

@@ -5,11 +5,11 @@ use crate::experiments::group::Group;
 use crate::experiments::number::grouped;
 use crate::experiments::pop;
 use crate::statistics::median;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A quantity. Times are wall times by the program's own clock, or projected times for simulated ranks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Cells / time / ranks.
@@ -79,25 +79,7 @@ pub struct Sample<'a> {
 impl fmt::Display for Measure {
     /// Its name in a targets file.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::CellsPerSecondPerCore => "cells_per_second_per_core",
-            Self::FacetsPerSecondPerCore => "facets_per_second_per_core",
-            Self::Seconds => "seconds",
-            Self::SpeedUp => "speed_up",
-            Self::RateRatio => "rate_ratio",
-            Self::PeakBytes => "peak_bytes",
-            Self::BytesPerCell => "bytes_per_cell",
-            Self::BytesPerCellBeyond => "bytes_per_cell_beyond",
-            Self::TimePerCellGrowth => "time_per_cell_growth",
-            Self::LambdaCells => "lambda_cells",
-            Self::LambdaCpu => "lambda_cpu",
-            Self::Efficiency => "efficiency",
-            Self::ParallelEfficiency => "parallel_efficiency",
-            Self::PhaseShare => "phase_share",
-            Self::AuditHolds => "audit_holds",
-            Self::AuditCellsPerSecondPerCore => "audit_cells_per_second_per_core",
-            Self::AuditPeakBytes => "audit_peak_bytes",
-        })
+        f.write_str(&crate::name_of(self))
     }
 }
 

@@ -13,4 +13,4 @@ mod session;
 
 pub use file::Study;
 pub use judge::judged;
-pub use session::{Outcome, Overrides, measure};
+pub use session::{Outcome, measure};

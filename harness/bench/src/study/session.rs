@@ -8,7 +8,9 @@ use super::row;
 use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
 use crate::experiments::execute::{Failed, has_message_matrix};
 use crate::experiments::feasible;
-use crate::experiments::session::{Bench, BenchError, Options, Point, temporary_directory};
+use crate::experiments::session::{
+    Bench, BenchError, Planned, SessionOptions, temporary_directory,
+};
 use crate::experiments::sizing::Sizes;
 use crate::experiments::variant::Base;
 use contract::case::Case;
@@ -35,18 +37,18 @@ pub struct Outcome {
 /// # Errors
 /// If a series is invalid, or the record or a temporary directory cannot be written.
 pub fn measure(
-    options: &Options,
+    options: &SessionOptions,
+    record: &Path,
     study: &Study,
-    overrides: &Overrides,
     programs: &Programs,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = temporary_directory()?;
-    let bench = Bench::open(options, study.engines(), programs, place.path(), progress)?;
+    let bench = Bench::open(options, record, study.engines(), programs, place.path(), progress)?;
     let mut session = Session {
         bench,
         study,
-        overrides,
+        options,
         bases: BTreeMap::new(),
         meshes: BTreeMap::new(),
         made: BTreeSet::new(),
@@ -84,22 +86,11 @@ pub fn measure(
     Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
 }
 
-/// Options of the command line that override the file.
-#[derive(Clone, Debug, Default)]
-pub struct Overrides {
-    /// Repetitions of every run, instead of the file's.
-    pub repeats: Option<usize>,
-    /// No runs on MPI, as requested by the user.
-    pub no_mpi: bool,
-    /// The launcher is missing.
-    pub no_launcher: bool,
-}
-
 /// A running session.
 struct Session<'a> {
     bench: Bench<'a>,
     study: &'a Study,
-    overrides: &'a Overrides,
+    options: &'a SessionOptions,
     /// Geometries read so far, by their source, with the known sizes of their meshes by n.
     bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
     /// Meshes with a written case file, or the reason for a failure.
@@ -123,7 +114,7 @@ struct Ready {
 impl Session<'_> {
     /// Runs a series: every size by all programs in turn.
     fn series(&mut self, series: &Series) -> Result<(), BenchError> {
-        let no_mpi = self.overrides.no_mpi || self.overrides.no_launcher;
+        let no_mpi = self.mpi_left_out().is_some();
         let mesh = Mesh { case: Some(series.case.clone()), ..Mesh::default() };
         let input = |failed| match failed {
             Failed::Interrupted => BenchError::Interrupted,
@@ -162,10 +153,10 @@ impl Session<'_> {
                             self.bench.leave_out(setup, why)?;
                             continue;
                         }
-                        points.extend(series.choices().into_iter().map(|choice| Point {
+                        points.extend(series.choices().into_iter().map(|choice| Planned {
                             setup: chosen(setup.clone(), choice),
                             case: case.clone(),
-                            repeats: self.overrides.repeats.unwrap_or(series.repeats),
+                            repeats: self.options.repeats(series.repeats),
                             warm_up: true,
                             audit: false,
                             failed: false,
@@ -231,8 +222,8 @@ impl Session<'_> {
         Ok(judge(study, row, &self.bench.lines))
     }
 
-    fn point(&self, spec: &RunSpec, ready: Ready) -> Point {
-        let repeats = self.overrides.repeats.unwrap_or(spec.repeats);
+    fn point(&self, spec: &RunSpec, ready: Ready) -> Planned {
+        let repeats = self.options.repeats(spec.repeats);
         let setup = Setup {
             experiment: EXPERIMENT.to_owned(),
             ranks: spec.ranks,
@@ -242,21 +233,20 @@ impl Session<'_> {
             ..Setup::serial(&spec.mesh, ready.spacing_min, ready.layer_cells_min)
         };
         let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);
-        Point { setup, case: ready.case, repeats, warm_up, audit: spec.audit, failed: false }
+        Planned { setup, case: ready.case, repeats, warm_up, audit: spec.audit, failed: false }
     }
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
-        match (self.overrides.no_mpi, self.overrides.no_launcher) {
-            (true, _) => Some("--no-mpi was given"),
-            (false, true) => Some("the launcher is missing"),
-            _ => None,
+        match self.options.no_mpi {
+            true => Some("--no-mpi was given"),
+            false => (!self.options.launcher.is_found()).then_some("the launcher is missing"),
         }
     }
 
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
     /// the time or the memory is not run on that mesh.
-    fn make(&mut self, points: &mut [Point]) -> Result<(), BenchError> {
+    fn make(&mut self, points: &mut [Planned]) -> Result<(), BenchError> {
         if !self.network && points.iter().any(|p| p.setup.comm == Comm::Sim) {
             self.network = true;
             self.bench.measure_network()?;
@@ -353,17 +343,17 @@ impl Session<'_> {
         let needs_mpi = |row: &Row| {
             self.study.runs_of(row).iter().any(|n| self.study.run[*n].comm == Comm::Mpi)
         };
-        let missing = self.overrides.no_launcher && !self.overrides.no_mpi;
+        let missing = !self.options.no_mpi && !self.options.launcher.is_found();
         let missing = missing && self.study.row.iter().any(needs_mpi);
-        let program = self.bench.options.launcher.program();
+        let program = self.options.launcher.program();
         missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()))
     }
 }
 
 /// Returns, for every mesh of every engine, the index of the point that warms it up: the one on the most ranks that reports
 /// a message matrix, otherwise the first.
-fn warmers(points: &[Point]) -> Vec<usize> {
-    let worth = |point: &Point| match has_message_matrix(&point.setup) {
+fn warmers(points: &[Planned]) -> Vec<usize> {
+    let worth = |point: &Planned| match has_message_matrix(&point.setup) {
         true => point.setup.ranks,
         false => 0,
     };
@@ -403,9 +393,9 @@ fn given_case(mesh: &Mesh, directory: &Path) -> Result<String, String> {
 mod tests {
     use super::*;
 
-    fn point(comm: Comm, ranks: usize, case: &str) -> Point {
+    fn point(comm: Comm, ranks: usize, case: &str) -> Planned {
         let setup = crate::testing::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
-        Point { setup, case: case.into(), repeats: 1, warm_up: true, audit: false, failed: false }
+        Planned { setup, case: case.into(), repeats: 1, warm_up: true, audit: false, failed: false }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::unit;
 use crate::gate::measures::{CaseMeasures, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::phases::{CPU, WALL};
-use crate::gate::report::{LayerName, Report};
+use crate::gate::report::{GateReport, LayerName};
 use crate::jsonl::{self, Line};
 use crate::origin::Origins;
 use serde::{Deserialize, Serialize};
@@ -100,7 +100,7 @@ impl Record {
                 self.metrics.insert(format!("{case}/{metric}"), *value as f64);
             }
         }
-        if let Ok(report) = serde_json::from_slice::<Report>(text) {
+        if let Ok(report) = serde_json::from_slice::<GateReport>(text) {
             let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
             for finding in times.flat_map(|layer| &layer.findings) {
                 let (ranks, time) =

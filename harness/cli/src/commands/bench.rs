@@ -2,17 +2,15 @@
 
 use super::files::{prepare, put};
 use super::programs::ProgramArguments;
-use bench::experiments::entry::{Entry, Judged, Line, Machine, Network, Verdict};
+use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
 use bench::experiments::group::Groups;
-use bench::experiments::network;
 use bench::experiments::record::{self, Content};
-use bench::experiments::session::{BenchError, Options};
-use bench::study::{self, Overrides, Study};
+use bench::experiments::session::{BenchError, SessionOptions};
+use bench::study::{self, Study};
 use clap::Args;
 use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
-use run::engine::launcher::Launcher;
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
@@ -21,7 +19,7 @@ use run::verify::report::{
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Name of the table of targets in a report's directory.
 const PAGE: &str = "targets.md";
@@ -40,24 +38,11 @@ pub struct Arguments {
     /// Print the tables of an existing record without measuring
     #[arg(long)]
     show: bool,
-    /// No runs on MPI
-    #[arg(long)]
-    no_mpi: bool,
-    /// Repetitions of every run; 95 % intervals of a median need six
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
-    repeat: Option<u16>,
-    /// Command that starts ranks; {ranks} is replaced by their number
-    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
-    launcher: Launcher,
-    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
-    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
-    network: Option<Network>,
+    #[command(flatten)]
+    session: SessionOptions,
     /// File of JSON lines to append to [default: reports/out/bench.jsonl]
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = super::values::whole_seconds)]
-    timeout: u64,
     /// Also write a report; the record is then DIR/record.jsonl unless --record is given
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -101,24 +86,13 @@ fn measure(arguments: &Arguments) -> Result<u8, u8> {
     page.iter().try_for_each(|page| prepare(page)).map_err(|error| refuse(error.to_string()))?;
     let mut study = read(arguments)?;
     let programs = programs(arguments, &mut study)?;
-    let overrides = Overrides {
-        repeats: arguments.repeat.map(usize::from),
-        no_mpi: arguments.no_mpi,
-        no_launcher: !arguments.launcher.is_found(),
-    };
-    let options = Options {
-        launcher: arguments.launcher.clone(),
-        network: arguments.network,
-        record: record_path(arguments),
-        limit: Duration::from_secs(arguments.timeout),
-        command: std::env::args().collect(),
-    };
+    let record = record_path(arguments);
     let start = Instant::now();
     let mut progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&options, &study, &overrides, &programs, &mut progress);
+    let outcome = study::measure(&arguments.session, &record, &study, &programs, &mut progress);
     let outcome = outcome.map_err(|error| refuse(error.to_string()))?;
     let written = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
-    println!("record: {}", options.record.display());
+    println!("record: {}", record.display());
     if outcome.interrupted {
         eprintln!("harness: {}", BenchError::Interrupted);
         return Ok(EXIT_INTERRUPTED);

@@ -3,7 +3,7 @@
 use super::files::{prepare, put};
 use super::programs::ProgramArguments;
 use super::values::Output;
-use bench::gate::report::{End, Report};
+use bench::gate::report::{End, GateReport};
 use bench::gate::{GateError, GateOptions, gate};
 use clap::Args;
 use report::gate::{json, junit, markdown, text};
@@ -74,7 +74,7 @@ fn refuse(error: &GateError) -> u8 {
     }
 }
 
-fn exit_code(report: &Report) -> u8 {
+fn exit_code(report: &GateReport) -> u8 {
     match report.end() {
         End::Holds(_) => EXIT_HOLDS,
         End::Interrupted => EXIT_INTERRUPTED,
@@ -83,7 +83,7 @@ fn exit_code(report: &Report) -> u8 {
     }
 }
 
-fn write(report: &Report, arguments: &Arguments) -> io::Result<()> {
+fn write(report: &GateReport, arguments: &Arguments) -> io::Result<()> {
     let forms: [(&Option<Output>, &dyn Fn() -> String); 4] = [
         (&arguments.record, &|| report.candidate_measures.json()),
         (&arguments.junit, &|| junit(report)),

@@ -3,7 +3,7 @@
 use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
-use super::lint::{Finding, RULES, Verdict};
+use super::lint::{RULES, Ruling, Verdict};
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
@@ -29,7 +29,7 @@ pub struct Drawn<'a> {
 pub fn page(
     groups: &Groups,
     drawn: &[Drawn],
-    findings: &[Finding],
+    findings: &[Ruling],
     lines: &[Line],
     trend: Option<&str>,
 ) -> String {
@@ -93,12 +93,12 @@ fn figure(drawn: &Drawn) -> Markup {
     page_figure(&f.id, &f.title, &drawn.svg, &caption)
 }
 
-fn rules(findings: &[Finding]) -> Markup {
+fn rules(findings: &[Ruling]) -> Markup {
     let mut rows = Vec::new();
     for (i, rule) in RULES.iter().enumerate() {
         for verdict in [Verdict::Broken, Verdict::Kept] {
             let of_rule = findings.iter().filter(|f| f.rule == i + 1 && f.verdict == verdict);
-            let row = |(why, findings): (&str, Vec<&Finding>)| {
+            let row = |(why, findings): (&str, Vec<&Ruling>)| {
                 let places: Vec<&str> = findings.iter().map(|f| f.about.as_str()).collect();
                 let places = match places.len() {
                     n if n > 3 => format!("{n} figures"),

@@ -25,7 +25,7 @@ use bench::track::analyse;
 use bench::track::history::Record;
 use contract::files::{named, write_atomically};
 use html::Drawn;
-use lint::{Finding, Verdict};
+use lint::{Ruling, Verdict};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub struct Written {
     /// Number of figures.
     pub figures: usize,
     /// The rules that are broken.
-    pub broken: Vec<Finding>,
+    pub broken: Vec<Ruling>,
 }
 
 /// Writes figures, page, LaTeX fragment and artifact description of a record into `directory`, with the trend of a

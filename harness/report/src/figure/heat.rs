@@ -63,8 +63,13 @@ fn draw_layer(canvas: &mut Canvas, figure: &Figure, order: usize, layer: &Layer,
     let ticks: Vec<f64> = ticks.collect();
     let [x, y] = [&figure.x, &figure.y].map(|axis| axis.clone().with_ticks(ticks.clone()));
     let (first, last) = (-0.5, order as f64 - 0.5);
-    let _ =
-        axes(canvas, [&x, &y], [first..last, last..first], (left, TOP), (left + EDGE, TOP + EDGE));
+    let _ = axes(
+        canvas,
+        [&x, &y],
+        [first..last, last..first],
+        ((left, TOP), (left + EDGE, TOP + EDGE)),
+        false,
+    );
 }
 
 /// All shades, ticks at powers of ten, and the quantity.
@@ -80,7 +85,13 @@ fn draw_scale(canvas: &mut Canvas, layer: &Layer, left: f64, top: f64) {
     let ticks = powers.map(|power| low * 10f64.powi(power)).collect();
     let x = Axis { ticks, ..Axis::log(&layer.label) };
     let y = Axis { ticks: vec![f64::NAN], ..Axis::linear("") };
-    let _ = axes(canvas, [&x, &y], [low..high, 1.0..0.0], (left, top), (left + EDGE, top + height));
+    let _ = axes(
+        canvas,
+        [&x, &y],
+        [low..high, 1.0..0.0],
+        ((left, top), (left + EDGE, top + height)),
+        false,
+    );
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ pub mod heat;
 pub mod palette;
 #[cfg(feature = "figures")]
 pub mod raster;
-mod scale;
+pub(crate) mod scale;
 pub mod svg;
 pub mod tex;
 

@@ -1,6 +1,7 @@
 //! Ranges of axes, and ticks of logarithmic ones.
 
 use super::Axis;
+use bench::order::distinct;
 use plotters::coord::combinators::{IntoLogRange, LogCoord};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
@@ -92,6 +93,17 @@ pub fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     let all = choices.into_iter().find(|c| c.len() > 2).unwrap_or_default();
     let every = all.len().div_ceil(8).max(1);
     all.into_iter().step_by(every).collect()
+}
+
+/// The labels of ticks, with as many digits as tell them apart.
+pub fn tick_labels(ticks: &[f64]) -> Vec<String> {
+    let short: Vec<String> = ticks.iter().map(|tick| tick_label(*tick)).collect();
+    if distinct(&short).len() == ticks.len() {
+        return short;
+    }
+    let step = ticks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    ticks.iter().map(|tick| format!("{tick:.decimals$}")).collect()
 }
 
 /// The digits as exponents.

@@ -4,8 +4,8 @@
 
 use super::canvas::*;
 use super::palette::colour;
-use super::scale::{Scale, range, ticks};
-use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat, tick_label};
+use super::scale::{Scale, range, tick_labels, ticks};
+use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat};
 use plotters::coord::combinators::BindKeyPoints;
 use plotters::coord::ranged1d::Ranged;
 use plotters::prelude::*;
@@ -49,9 +49,9 @@ const SYMBOL: f64 = 80.0;
 const LINE: f64 = SIZE + 8.0;
 
 /// Space at the left of data on this axis.
-fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
-    let widths = ticks(axis, ends).into_iter().map(|tick| width(&tick_label(tick)));
-    widths.map(|width| BESIDE_TICKS + width).fold(LEFT, f64::max)
+pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
+    let labels = tick_labels(&ticks(axis, ends));
+    labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
 }
 
 /// Draws the legend in as many rows as it needs, and returns its lower end.
@@ -101,12 +101,23 @@ fn reference_dashes(index: usize) -> Dashes {
 /// Where values are on the page.
 pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
 
-/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values; returns where values are.
-pub fn axes(canvas: &Canvas, axes: [&Axis; 2], ends: [Range<f64>; 2], from: At, to: At) -> ToPage {
+/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values and perhaps a grid;
+/// returns where values are.
+pub fn axes(
+    canvas: &Canvas,
+    axes: [&Axis; 2],
+    ends: [Range<f64>; 2],
+    (from, to): (At, At),
+    grid: bool,
+) -> ToPage {
     let scales = || [0, 1].map(|i| Scale::new(axes[i], &ends[i]));
     let [x, y] = scales();
-    let (x, y) =
-        (x.with_key_points(ticks(axes[0], &ends[0])), y.with_key_points(ticks(axes[1], &ends[1])));
+    let [at_x, at_y] = [0, 1].map(|i| ticks(axes[i], &ends[i]));
+    let label = |ticks: &[f64], value: &f64| {
+        let at = ticks.iter().position(|tick| tick == value);
+        at.map_or_else(String::new, |at| tick_labels(ticks).swap_remove(at))
+    };
+    let (x, y) = (x.with_key_points(at_x.clone()), y.with_key_points(at_y.clone()));
     let space = |i: usize, space: f64| if axes[i].label.is_empty() { 0.0 } else { space };
     // The label of the vertical axis keeps clear of the edge of the page.
     let [left, below] = [space(1, left(axes[1], &ends[1]) - 14.0), space(0, BELOW)];
@@ -118,13 +129,12 @@ pub fn axes(canvas: &Canvas, axes: [&Axis; 2], ends: [Range<f64>; 2], from: At, 
         .set_label_area_size(LabelAreaPosition::Bottom, below)
         .build_cartesian_2d(x, y)
         .expect("the rectangle lies on the page");
-    let format = |value: &f64| tick_label(*value);
+    let (of_x, of_y) = (|value: &f64| label(&at_x, value), |value: &f64| label(&at_y, value));
     let mut mesh = chart.configure_mesh();
-    // A matrix, whose first row is at the top, has no grid.
-    let grid = if ends[1].start > ends[1].end { TRANSPARENT } else { FAINT.to_rgba() };
+    let grid = if grid { FAINT.to_rgba() } else { TRANSPARENT };
     mesh.light_line_style(TRANSPARENT).bold_line_style(grid).axis_style(BLACK.stroke_width(2));
     mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(12);
-    mesh.x_label_formatter(&format).y_label_formatter(&format);
+    mesh.x_label_formatter(&of_x).y_label_formatter(&of_y);
     mesh.x_desc(axes[0].label.as_str()).y_desc(axes[1].label.as_str());
     mesh.draw().expect("a string accepts every element");
     canvas.frame(from, to);
@@ -156,8 +166,8 @@ fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark
         canvas,
         [&figure.x, &figure.y],
         [x, y.clone()],
-        (left, top),
-        (f64::from(WIDTH) - RIGHT, bottom),
+        ((left, top), (f64::from(WIDTH) - RIGHT, bottom)),
+        true,
     );
     for mark in marks {
         let ends = [y.start, y.end].map(|y| to_page(mark.x, y));
@@ -208,7 +218,7 @@ fn draw_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
     // The names of the bars are below the axis in place of ticks, and its label is below them.
     let unnamed = Axis { label: " ".to_owned(), ticks: vec![f64::NAN], ..Axis::linear("") };
     let ends = [0.0..count.max(1) as f64, y.clone()];
-    let to_page = axes(canvas, [&unnamed, &figure.y], ends, (left, top), (right, bottom));
+    let to_page = axes(canvas, [&unnamed, &figure.y], ends, ((left, top), (right, bottom)), true);
     let gap = if count > 20 { 0.1 } else { 0.2 };
     for (i, names) in labels.iter().enumerate() {
         let (begin, end, mut sum) = (i as f64 + gap, (i + 1) as f64 - gap, 0.0);

@@ -7,8 +7,7 @@ use crate::figure::csv::table;
 /// of their leaves and the number of them. Comments at the head, starting with `#`, name the picture and its command.
 pub fn csv(picture: &Picture) -> String {
     let head = format!("# {}\n# {}\n", picture.title(), picture.command);
-    let axes = super::squares::plane_axes(picture.slice.axis).map(|a| ["x", "y", "z"][a]);
-    let ends = [0, 1].map(|end| axes.map(|axis| format!("{axis}{end}")));
+    let ends = [0, 1].map(|end| picture.axes().map(|axis| format!("{axis}{end}")));
     let value = match picture.colour {
         super::Colour::Spacing => "level".to_owned(),
         colour => colour.to_string(),

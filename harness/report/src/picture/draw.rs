@@ -2,17 +2,17 @@
 
 use super::Picture;
 use super::colour::short;
-use super::sheet::Sheet;
 use super::squares::Square;
-use crate::figure::canvas::{Anchor, INK, SIZE, WIDTH, document};
+use crate::figure::Axis;
+use crate::figure::canvas::{Anchor, Canvas, INK, SIZE, WIDTH, document};
 use crate::figure::palette::hex;
+use crate::figure::scale::ticks;
+use crate::figure::svg as axes;
 use crate::section::Planar;
 use std::collections::BTreeSet;
 
 /// Least space for the ticks and the label of the vertical axis, and space at the right.
 const SIDES: (f64, f64) = (200.0, 40.0);
-/// Space for the label of the vertical axis and for its ticks, without their labels.
-const BESIDE_TICKS: f64 = 100.0;
 /// Greatest height of the window: it and its margins fit on a page.
 const HEIGHT_MAX: f64 = 1650.0;
 /// Space below the window for ticks, label and scale.
@@ -30,9 +30,7 @@ fn width(text: &str) -> f64 {
 
 /// Left edge of a window on the page.
 fn left(window: &[Planar; 2]) -> f64 {
-    let ticks = Ticks::of(window[0][1], window[1][1]);
-    let widest = ticks.values().iter().map(|&t| width(&ticks.label(t))).fold(0.0, f64::max);
-    SIDES.0.max(BESIDE_TICKS + widest)
+    axes::left(&Axis::linear(""), &(window[0][1]..window[1][1])).max(SIDES.0)
 }
 
 /// Units of the page per unit of the user in a window.
@@ -73,31 +71,38 @@ impl Page<'_> {
 }
 
 /// Draws the picture; returns its height.
-pub fn draw(picture: &Picture, sheet: &mut dyn Sheet) -> u32 {
-    let top = legend(picture, sheet) + 14.0;
-    let left = left(&picture.window);
-    let page = Page { picture, left, top, scale: scale(&picture.window) };
+fn draw(picture: &Picture, canvas: &mut Canvas) -> u32 {
+    let top = legend(picture, canvas) + 14.0;
+    let page = Page { picture, left: left(&picture.window), top, scale: scale(&picture.window) };
     // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
-    let (low, high) = (page.at(picture.window[0]), page.at(picture.window[1]));
-    sheet.rectangles(&[[low.0, high.1, high.0 - low.0, low.1 - high.1]], "#FFFFFF", None);
-    squares(&page, sheet);
-    section(&page, sheet);
-    let corners = [low, (high.0, low.1), high, (low.0, high.1), low];
-    let frame: Vec<_> = corners.windows(2).map(|w| [w[0], w[1]]).collect();
-    sheet.segments(&frame, INK, 2.0);
-    axes(&page, sheet);
-    below(&page, sheet);
-    (low.1 + BELOW) as u32
+    let [low, high] = picture.window;
+    let ((left, bottom), (right, top)) = (page.at(low), page.at(high));
+    canvas.fill(&[[left, top, right - left, bottom - top]], "#FFFFFF");
+    for Layer { fill, outline, squares } in layers(picture) {
+        let rectangles: Vec<[f64; 4]> =
+            squares.into_iter().filter_map(|square| page.rectangle(square)).collect();
+        match outline {
+            _ if rectangles.is_empty() => {}
+            Some(outline) => canvas.outlined(&rectangles, &hex(fill), &hex(outline)),
+            None => canvas.fill(&rectangles, &hex(fill)),
+        }
+    }
+    section(&page, canvas);
+    let [x, y] = picture.axes().map(Axis::linear);
+    let ends = [low[0]..high[0], low[1]..high[1]];
+    let _ = axes::axes(canvas, [&x, &y], ends, ((left, top), (right, bottom)), false);
+    below(&page, canvas);
+    (bottom + BELOW) as u32
 }
 
 /// Draws the legend in as many rows as it needs; returns its lower end.
-fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
+fn legend(picture: &Picture, canvas: &mut Canvas) -> f64 {
     let (entries, remark) = picture.colour.legend(&picture.key);
     let right = f64::from(WIDTH) - SIDES.1;
     let left = left(&picture.window);
     let (mut x, mut y) = (left, ROW / 2.0);
     let title = if remark.is_empty() { picture.colour.to_string() } else { remark };
-    sheet.text(&title, (x, y), Anchor::Start);
+    canvas.text(&title, (x, y), Anchor::Start);
     x += width(&title) + 40.0;
     let line = picture.section.as_ref().map(|_| "geometry");
     let names = entries.iter().map(|(name, fill)| (*name, Some(*fill)));
@@ -109,42 +114,49 @@ fn legend(picture: &Picture, sheet: &mut dyn Sheet) -> f64 {
         match fill {
             Some(fill) => {
                 let symbol = [x, y - 18.0, SYMBOL, 36.0];
-                sheet.rectangles(&[symbol], &hex(fill), Some(&outline(fill)));
+                canvas.outlined(&[symbol], &hex(fill), &hex(outline(fill)));
             }
-            None => sheet.segments(&[[(x, y), (x + SYMBOL, y)]], INK, SECTION.0),
+            None => canvas.segments(&[[(x, y), (x + SYMBOL, y)]], INK, SECTION.0),
         }
-        sheet.text(name, (x + SYMBOL + 14.0, y), Anchor::Start);
+        canvas.text(name, (x + SYMBOL + 14.0, y), Anchor::Start);
         x += entry;
     }
     y + ROW / 2.0
 }
 
 /// The colour of outlines around a fill: the same hue, so that small cells look like those of the legend.
-fn outline(fill: [u8; 3]) -> String {
+pub fn outline(fill: [u8; 3]) -> [u8; 3] {
     let is_light = fill.iter().map(|&c| u32::from(c)).sum::<u32>() > 360;
-    hex(fill.map(|c| if is_light { c / 2 } else { c / 2 + 105 }))
+    fill.map(|c| if is_light { c / 2 } else { c / 2 + 105 })
 }
 
-fn squares(page: &Page, sheet: &mut dyn Sheet) {
-    let Picture { squares, key, .. } = page.picture;
-    // Outlines are drawn last, so that no fill covers half of one.
-    for outlined in [false, true] {
-        for entry in key {
+/// Squares of one colour, with outlines or without.
+pub struct Layer<'a> {
+    pub fill: [u8; 3],
+    pub outline: Option<[u8; 3]>,
+    pub squares: Vec<&'a Square>,
+}
+
+/// The squares by colour. Outlined ones are last, so that no fill covers half of an outline.
+pub fn layers(picture: &Picture) -> impl Iterator<Item = Layer<'_>> {
+    let Picture { squares, key, .. } = picture;
+    let both = [false, true].into_iter();
+    both.flat_map(|outlined| key.iter().map(move |entry| (outlined, entry))).map(
+        |(outlined, entry)| {
             let shown = |s: &&Square| {
                 s.value == entry.value && (s.level <= squares.level_outlined) == outlined
             };
-            let rectangles: Vec<[f64; 4]> =
-                squares.squares.iter().filter(shown).filter_map(|s| page.rectangle(s)).collect();
-            if !rectangles.is_empty() {
-                let fill = hex(entry.fill);
-                let outline = outlined.then(|| outline(entry.fill));
-                sheet.rectangles(&rectangles, &fill, outline.as_deref());
+            let outline = outlined.then(|| outline(entry.fill));
+            Layer {
+                fill: entry.fill,
+                outline,
+                squares: squares.squares.iter().filter(shown).collect(),
             }
-        }
-    }
+        },
+    )
 }
 
-fn section(page: &Page, sheet: &mut dyn Sheet) {
+fn section(page: &Page, canvas: &mut Canvas) {
     let Some(section) = &page.picture.section else { return };
     let tenths = |(x, y): (f64, f64)| ((x * 10.0) as i64, (y * 10.0) as i64);
     let mut drawn = BTreeSet::new();
@@ -157,86 +169,34 @@ fn section(page: &Page, sheet: &mut dyn Sheet) {
         })
         .collect();
     if !segments.is_empty() {
-        sheet.segments(&segments, "#FFFFFF", SECTION.1);
-        sheet.segments(&segments, "#000000", SECTION.0);
+        canvas.segments(&segments, "#FFFFFF", SECTION.1);
+        canvas.segments(&segments, "#000000", SECTION.0);
     }
 }
 
-fn axes(page: &Page, sheet: &mut dyn Sheet) {
-    let Picture { window: [low, high], slice, .. } = page.picture;
-    let names = super::squares::plane_axes(slice.axis).map(|a| ["x", "y", "z"][a]);
-    let (corner, opposite) = (page.at(*low), page.at(*high));
-    let mut marks = Vec::new();
-    let ticks = [0, 1].map(|i| Ticks::of(low[i], high[i]));
-    for t in ticks[0].values() {
-        let (x, y) = page.at([t, low[1]]);
-        marks.push([(x, y), (x, y + 12.0)]);
-        sheet.text(&ticks[0].label(t), (x, y + 22.0), Anchor::Below);
-    }
-    for t in ticks[1].values() {
-        let (x, y) = page.at([low[0], t]);
-        marks.push([(x, y), (x - 12.0, y)]);
-        sheet.text(&ticks[1].label(t), (x - 20.0, y), Anchor::End);
-    }
-    sheet.segments(&marks, INK, 2.0);
-    let middle = ((corner.0 + opposite.0) / 2.0, (corner.1 + opposite.1) / 2.0);
-    sheet.text(names[0], (middle.0, corner.1 + 76.0), Anchor::Below);
-    sheet.text(names[1], (50.0, middle.1), Anchor::Turned);
+/// A length that is a round part of another.
+fn round_length(length: f64) -> f64 {
+    let ticks = ticks(&Axis::linear(""), &(0.0..length));
+    ticks.into_iter().find(|tick| *tick > 0.0).unwrap_or(length)
 }
 
 /// The scale, and the plane and number of cells.
-fn below(page: &Page, sheet: &mut dyn Sheet) {
-    let Picture { window: [low, high], squares, slice, root, .. } = page.picture;
-    let y = page.at(*low).1 + 170.0;
-    let length = Ticks::of(0.0, high[0] - low[0]).step;
+fn below(page: &Page, canvas: &mut Canvas) {
+    let picture = page.picture;
+    let [low, high] = picture.window;
+    let y = page.at(low).1 + 170.0;
+    let length = round_length(high[0] - low[0]);
     let (left, right) = (page.left, page.left + length * page.scale);
     let bar = [
         [(left, y), (right, y)],
         [(left, y - 12.0), (left, y + 12.0)],
         [(right, y - 12.0), (right, y + 12.0)],
     ];
-    sheet.segments(&bar, INK, 4.0);
+    canvas.segments(&bar, INK, 4.0);
     let label = short(length);
-    sheet.text(&label, (right + 16.0, y), Anchor::Start);
-    let plane = super::plane_name(root, *slice);
-    sheet.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
-    let noun = if squares.leaves == 1 { "cell" } else { "cells" };
-    let merged = if squares.is_merged { ", the smallest merged" } else { "" };
-    let cells = format!("{} {noun} in the plane{merged}", squares.leaves);
-    sheet.text(&cells, (page.left, y + ROW), Anchor::Start);
-}
-
-/// Ticks at multiples of a round step.
-struct Ticks {
-    low: f64,
-    high: f64,
-    step: f64,
-}
-
-impl Ticks {
-    fn of(low: f64, high: f64) -> Self {
-        let step_min = (high - low) / 6.0;
-        let power = 10f64.powf(step_min.log10().floor());
-        let steps = [1.0, 2.0, 5.0, 10.0].map(|f| f * power);
-        let step = steps.into_iter().find(|s| *s >= step_min).unwrap_or(step_min);
-        Self { low, high, step }
-    }
-
-    fn values(&self) -> Vec<f64> {
-        let slack = (self.high - self.low) * 1e-9;
-        let (first, last) = ((self.low - slack) / self.step, (self.high + slack) / self.step);
-        (first.ceil() as i64..=last.floor() as i64).map(|i| i as f64 * self.step).collect()
-    }
-
-    /// A label that differs from that of the next tick.
-    fn label(&self, value: f64) -> String {
-        let decimals = (-self.step.log10().floor()).max(0.0) as usize;
-        // Adding zero turns -0 into 0.
-        let value = (value / self.step).round() * self.step + 0.0;
-        if decimals > 6 || value.abs() >= 1e6 {
-            short(value)
-        } else {
-            format!("{value:.decimals$}")
-        }
-    }
+    canvas.text(&label, (right + 16.0, y), Anchor::Start);
+    let plane = super::plane_name(&picture.root, picture.slice);
+    canvas.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
+    let cells = picture.count();
+    canvas.text(&cells, (page.left, y + ROW), Anchor::Start);
 }

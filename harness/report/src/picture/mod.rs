@@ -9,7 +9,6 @@ mod draw;
 pub mod format;
 pub mod scene;
 pub mod set;
-mod sheet;
 pub mod squares;
 mod surface;
 #[cfg(test)]
@@ -234,6 +233,19 @@ impl Picture {
             plane_name(root, *slice),
             squares.leaves
         )
+    }
+
+    /// The names of the axes of the plane: first to the right, then upwards.
+    fn axes(&self) -> [&'static str; 2] {
+        plane_axes(self.slice.axis).map(|axis| ["x", "y", "z"][axis])
+    }
+
+    /// The number of cells, as text.
+    fn count(&self) -> String {
+        let Squares { leaves, is_merged, .. } = self.squares;
+        let noun = if leaves == 1 { "cell" } else { "cells" };
+        let merged = if is_merged { ", the smallest merged" } else { "" };
+        format!("{leaves} {noun} in the plane{merged}")
     }
 
     /// The corners of a square in the plane, in the user's units.

@@ -191,10 +191,10 @@ fn tikz_has_every_square_and_csv_every_shape() {
     let shown = Request { selection: at(2, 3.0), body: Some(&cube), ..request(Colour::Level) };
     let picture = Picture::collect(&mesh, &shown, &TEX).unwrap();
     let tex = tikz(&picture);
-    // Squares, the symbols of two levels and the background.
-    assert_eq!(tex.matches(" rectangle +").count(), 7 + 2 + 1, "{tex}");
+    assert_eq!(tex.matches(" rectangle ").count(), 7, "{tex}");
+    assert_eq!(tex.matches("area legend").count(), 2, "{tex}");
     assert_eq!(tex.matches('{').count(), tex.matches('}').count());
-    assert!(tex.contains("(200,752) rectangle +(340,340)"), "{tex}");
+    assert!(tex.contains("(0,340) rectangle (340,680)"), "{tex}");
     let csv = csv(&picture);
     assert!(csv.starts_with(
         "# Slice z = 3 of a mesh, 7 cells by level\n# harness picture mesh --out a.svg\n"

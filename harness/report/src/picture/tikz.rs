@@ -1,99 +1,98 @@
-//! A picture as PGF/TikZ, so that it is set in the fonts of the document. Requires `\usepackage{tikz}`.
+//! A picture for LaTeX, set in the fonts of the document: an axis of `pgfplots`.
 
-use super::Picture;
-use super::draw::draw;
-use super::sheet::Sheet;
-use crate::figure::canvas::{Anchor, INK, WIDTH};
-use crate::figure::tex::escape;
+use super::draw::{Layer, layers, outline};
+use super::{Picture, plane_name};
+use crate::figure::canvas::WIDTH;
+use crate::figure::tex::{PREAMBLE, escape};
 use std::fmt::Write;
-
-/// The picture as a `tikzpicture` as wide as a line.
-pub fn tikz(picture: &Picture) -> String {
-    let mut sheet = Tikz { body: String::new(), colours: Vec::new() };
-    draw(picture, &mut sheet);
-    let mut text = String::from("% Requires \\usepackage{tikz}\n");
-    // Writing into a string cannot fail, here and below.
-    let _ = writeln!(text, "% {}\n% {}", picture.title(), picture.command);
-    let unit = 1.0 / f64::from(WIDTH);
-    let _ = writeln!(
-        text,
-        "\\begin{{tikzpicture}}[x={unit}\\linewidth, y=-{unit}\\linewidth, line cap=round, font=\\footnotesize]"
-    );
-    for (i, colour) in sheet.colours.iter().enumerate() {
-        let _ = writeln!(text, "\\definecolor{{picture{i}}}{{HTML}}{{{}}}", &colour[1..]);
-    }
-    text + &sheet.body + "\\end{tikzpicture}\n"
-}
 
 /// Shapes of one path: TeX keeps a whole path in memory.
 const SHAPES_PER_PATH: usize = 400;
 
-struct Tikz {
-    body: String,
-    /// The colours, in the notation of SVG.
-    colours: Vec<String>,
-}
+/// Width of the window in units, of which the line has [`WIDTH`].
+const WINDOW: f64 = 1360.0;
 
-impl Tikz {
-    /// The name of a colour.
-    fn colour(&mut self, colour: &str) -> String {
-        if colour == INK {
-            return "black".to_owned();
+/// The picture as a `tikzpicture` as wide as a line. Shapes are below the axis, in a unit of their own: `pgfplots` would take ten times as
+/// long for them.
+pub fn tikz(picture: &Picture) -> String {
+    let [low, high] = picture.window;
+    let scale = WINDOW / (high[0] - low[0]);
+    let at = |p: [f64; 2]| {
+        let [x, y] = [0, 1].map(|i| (p[i].clamp(low[i], high[i]) - low[i]) * scale);
+        format!("({},{})", tenth(x), tenth(y))
+    };
+    let line = f64::from(WIDTH);
+    let mut out = format!(
+        "% Requires {PREAMBLE}\n% {}\n% {}\n\\begin{{tikzpicture}}[x={unit}\\linewidth, y={unit}\\linewidth, line cap=round]\n",
+        picture.title(),
+        picture.command,
+        unit = 1.0 / line
+    );
+    for Layer { fill, outline, squares } in layers(picture) {
+        // A line of the same colour closes the seams between paths, which viewers show.
+        let (edge, width) = outline.map_or((fill, 0.1), |outline| (outline, 0.2));
+        for (name, [r, g, b]) in [("cell", fill), ("edge", edge)] {
+            // Writing into a string cannot fail, here and below.
+            let _ = writeln!(out, "\\definecolor{{{name}}}{{RGB}}{{{r},{g},{b}}}");
         }
-        let known = self.colours.iter().position(|c| c == colour);
-        let index = known.unwrap_or_else(|| {
-            self.colours.push(colour.to_owned());
-            self.colours.len() - 1
+        let command = format!("\\filldraw[fill=cell, draw=edge, line width={width}pt]");
+        paths(&mut out, &command, &squares, |square| {
+            let [from, to] = picture.corners(square).map(at);
+            format!("{from} rectangle {to}")
         });
-        format!("picture{index}")
     }
-
-    fn path<T>(&mut self, command: &str, shapes: &[T], shape: impl Fn(&T) -> String) {
-        for shapes in shapes.chunks(SHAPES_PER_PATH) {
-            let shapes: Vec<String> = shapes.iter().map(&shape).collect();
-            let _ = writeln!(self.body, "{command} {};", shapes.join("\n "));
-        }
+    if let Some(section) = &picture.section {
+        let command = "\\draw[black, line width=0.7pt]";
+        paths(&mut out, command, section, |[from, to]| format!("{} -- {}", at(*from), at(*to)));
     }
+    axis(&mut out, picture, [WINDOW, (high[1] - low[1]) * scale].map(|edge| edge / line));
+    out + "\\end{tikzpicture}\n"
 }
 
-/// The width of a line on a page 160 mm wide.
-fn points(width: f64) -> f64 {
-    (width * 455.0 / f64::from(WIDTH) * 100.0).round() / 100.0
+/// The axis and the legend; `edges` are those of the window in widths of a line.
+fn axis(out: &mut String, picture: &Picture, edges: [f64; 2]) {
+    let ([low, high], [x, y]) = (picture.window, picture.axes());
+    let below = format!("{}; {}", plane_name(&picture.root, picture.slice), picture.count());
+    let (entries, remark) = picture.colour.legend(&picture.key);
+    let title = if remark.is_empty() { picture.colour.to_string() } else { remark };
+    let _ = writeln!(
+        out,
+        "\\begin{{axis}}[\n  at={{(0,0)}}, anchor=south west, scale only axis, width={}\\linewidth, height={}\\linewidth, enlargelimits=false,\n  \
+         xmin={}, xmax={}, ymin={}, ymax={}, scaled ticks=false, tick align=outside, tick pos=left,\n  \
+         xlabel style={{align=center}}, xlabel={{{x}\\\\{}}}, ylabel={{{y}}},\n  \
+         legend style={{at={{(0.5,1.03)}},anchor=south,legend columns=6,draw=none,font=\\footnotesize}}\n]\n\
+         \\addlegendimage{{empty legend}}\\addlegendentry{{{}}}",
+        edges[0],
+        edges[1],
+        low[0],
+        high[0],
+        low[1],
+        high[1],
+        escape(&below),
+        escape(&title)
+    );
+    let rgb = |[r, g, b]: [u8; 3]| format!("{{rgb,255:red,{r};green,{g};blue,{b}}}");
+    for (name, fill) in entries {
+        let (fill, line, name) = (rgb(fill), rgb(outline(fill)), escape(name));
+        let _ = writeln!(
+            out,
+            "\\addlegendimage{{area legend,fill={fill},draw={line}}}\\addlegendentry{{{name}}}"
+        );
+    }
+    if picture.section.is_some() {
+        out.push_str("\\addlegendimage{black,line legend}\\addlegendentry{geometry}\n");
+    }
+    out.push_str("\\end{axis}\n");
 }
 
 /// A coordinate to a tenth of a unit, without the digits that differences add.
 fn tenth(value: f64) -> f64 {
-    (value * 10.0).round() / 10.0 + 0.0
+    (value * 10.0).round() / 10.0
 }
 
-impl Sheet for Tikz {
-    fn rectangles(&mut self, rectangles: &[[f64; 4]], fill: &str, outline: Option<&str>) {
-        let fill = self.colour(fill);
-        // A line of the same colour closes the seams between paths, which viewers show.
-        let (draw, width) = outline.map_or((fill.clone(), 0.1), |o| (self.colour(o), 0.2));
-        let command = format!("\\filldraw[fill={fill}, draw={draw}, line width={width}pt]");
-        self.path(&command, rectangles, |r| {
-            let [x, y, width, height] = r.map(tenth);
-            format!("({x},{y}) rectangle +({width},{height})")
-        });
-    }
-
-    fn segments(&mut self, segments: &[[(f64, f64); 2]], colour: &str, width: f64) {
-        let command = format!("\\draw[{}, line width={}pt]", self.colour(colour), points(width));
-        self.path(&command, segments, |[p, q]| {
-            format!("({},{}) -- ({},{})", tenth(p.0), tenth(p.1), tenth(q.0), tenth(q.1))
-        });
-    }
-
-    fn text(&mut self, text: &str, (x, y): (f64, f64), anchor: Anchor) {
-        let place = match anchor {
-            Anchor::Start => "anchor=west",
-            Anchor::Below => "anchor=north",
-            Anchor::End => "anchor=east",
-            Anchor::Turned => "rotate=90, anchor=south",
-        };
-        let text = escape(text);
-        let (x, y) = (tenth(x), tenth(y));
-        let _ = writeln!(self.body, "\\node[{place}, inner sep=0pt] at ({x},{y}) {{{text}}};");
+fn paths<T>(out: &mut String, command: &str, shapes: &[T], shape: impl Fn(&T) -> String) {
+    for shapes in shapes.chunks(SHAPES_PER_PATH) {
+        let shapes: Vec<String> = shapes.iter().map(&shape).collect();
+        let _ = writeln!(out, "{command} {};", shapes.join("\n "));
     }
 }

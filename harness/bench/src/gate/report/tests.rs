@@ -1,23 +1,24 @@
 use super::*;
 use proptest::prelude::*;
 
-fn report(layers: Vec<Layer>) -> Report {
-    Report { layers, ..Report::new(None, Measures::default()) }
+fn report(layers: Vec<Layer>) -> GateReport {
+    GateReport { layers, ..GateReport::new(None, Measures::default()) }
 }
 
-fn layer(findings: &[Finding]) -> Layer {
+fn layer(findings: &[GateFinding]) -> Layer {
     let cases = vec!["a".to_owned(), "b".to_owned()];
     Layer { findings: findings.to_vec(), ..Layer::new(LayerName::Counters, cases) }
 }
 
-fn equal(case: &str) -> Finding {
-    Finding::exact(case, "rays", [7, 7], 0.0, Verdict::Changed)
+fn equal(case: &str) -> GateFinding {
+    GateFinding::exact(case, "rays", [7, 7], 0.0, Verdict::Changed)
 }
 
 #[test]
 fn only_growth_beyond_the_tolerance_is_a_regression() {
-    let verdict =
-        |values, tolerance| Finding::exact("c", "m", values, tolerance, Verdict::Changed).verdict;
+    let verdict = |values, tolerance| {
+        GateFinding::exact("c", "m", values, tolerance, Verdict::Changed).verdict
+    };
     assert_eq!(verdict([100, 100], 0.0), Verdict::Unchanged);
     assert_eq!(verdict([100, 101], 0.0), Verdict::Regression);
     assert_eq!(verdict([100, 101], 1.5), Verdict::Changed);
@@ -34,16 +35,16 @@ fn a_gate_that_compared_nothing_of_a_case_does_not_hold() {
     assert!(is_incomplete(vec![]), "no layer");
     assert!(is_incomplete(vec![Layer::new(LayerName::Time, vec![])]), "no case");
     assert!(is_incomplete(vec![layer(&[equal("a")])]), "nothing of b");
-    let missing = Finding::noted("b", "rays", Verdict::Missing, "not in the record");
+    let missing = GateFinding::noted("b", "rays", Verdict::Missing, "not in the record");
     assert!(is_incomplete(vec![layer(&[equal("a"), missing.clone()])]), "nothing of b");
     assert!(is_incomplete(vec![layer(&[equal("a"), equal("b"), missing])]), "one of two of b");
-    let new = Finding::noted("b", "rays", Verdict::Changed, "new");
+    let new = GateFinding::noted("b", "rays", Verdict::Changed, "new");
     assert!(is_incomplete(vec![layer(&[equal("a"), new])]), "no shared quantity of b");
-    let out = Finding::noted("b", "rays", Verdict::LeftOut, "no boxes");
+    let out = GateFinding::noted("b", "rays", Verdict::LeftOut, "no boxes");
     let some = report(vec![layer(&[equal("a"), out.clone()])]);
     assert!(matches!(some.end(), End::Holds(_)));
-    assert!(matches!(Report { require_layers: true, ..some }.end(), End::Incomplete(_)));
-    let all = Finding { case: "a".into(), ..out.clone() };
+    assert!(matches!(GateReport { require_layers: true, ..some }.end(), End::Incomplete(_)));
+    let all = GateFinding { case: "a".into(), ..out.clone() };
     assert!(is_incomplete(vec![layer(&[all, out])]), "all left out");
     let skipped = Layer { left_out: Some("no valgrind".into()), ..layer(&[]) };
     assert!(is_incomplete(vec![skipped.clone()]), "the only layer is left out");
@@ -59,9 +60,9 @@ proptest! {
         let finding = |&(case, verdict): &(usize, usize)| {
             let name = ["a", "b", "c"][case];
             let compared = u64::from(!matches!(verdicts[verdict], LeftOut | Missing));
-            Finding { compared, ..Finding::noted(name, "m", verdicts[verdict], "why") }
+            GateFinding { compared, ..GateFinding::noted(name, "m", verdicts[verdict], "why") }
         };
-        let findings: Vec<Finding> = drawn.iter().map(finding).collect();
+        let findings: Vec<GateFinding> = drawn.iter().map(finding).collect();
         let cases = ["a", "b", "c"].map(str::to_owned).to_vec();
         let layer = Layer { findings: findings.clone(), ..Layer::new(LayerName::Memory, cases) };
         if let End::Holds(total) = report(vec![layer]).end() {
@@ -76,14 +77,14 @@ proptest! {
 
     #[test]
     fn findings_about_values_satisfy_the_invariants(values: [u32; 2], tolerance in 0.0..20.0f64) {
-        let exact = Finding::exact("a", "m", values.map(u64::from), tolerance, Verdict::Unchanged);
-        let other = Finding { case: "b".into(), ..exact.clone() };
+        let exact = GateFinding::exact("a", "m", values.map(u64::from), tolerance, Verdict::Unchanged);
+        let other = GateFinding { case: "b".into(), ..exact.clone() };
         report(vec![layer(&[exact, other])]).check_invariants();
     }
 }
 
-fn planted(fault: impl FnOnce(&mut Finding)) {
-    let mut wrong = Finding::exact("a", "rays", [10, 12], 0.0, Verdict::Changed);
+fn planted(fault: impl FnOnce(&mut GateFinding)) {
+    let mut wrong = GateFinding::exact("a", "rays", [10, 12], 0.0, Verdict::Changed);
     fault(&mut wrong);
     report(vec![layer(&[wrong, equal("b")])]).check_invariants();
 }
@@ -104,7 +105,7 @@ fn a_regression_towards_less_is_noticed() {
 #[should_panic(expected = "nothing was compared")]
 fn a_missing_quantity_that_counts_is_noticed() {
     planted(|finding| {
-        *finding = Finding { compared: 1, ..Finding::noted("a", "m", Verdict::Missing, "") }
+        *finding = GateFinding { compared: 1, ..GateFinding::noted("a", "m", Verdict::Missing, "") }
     });
 }
 
@@ -119,7 +120,7 @@ fn a_record_and_a_report_read_back() {
     let mut measures = Measures::of_program(Measured { named: "m".into(), ..Measured::default() });
     measures.case("cube").exact.insert("rays".into(), u64::MAX);
     assert_eq!(Measures::parse(measures.json().as_bytes()).unwrap(), measures);
-    let text = serde_json::to_vec(&Report::new(None, measures.clone())).unwrap();
+    let text = serde_json::to_vec(&GateReport::new(None, measures.clone())).unwrap();
     assert_eq!(Measures::parse(&text).unwrap(), measures);
     assert!(Measures::parse(b"{\"cells\": 1}").is_err());
     let other = measures.json().replace("measures/1", "measures/9");

@@ -1,14 +1,14 @@
 //! The rules that concern single figures.
 
-use super::{Finding, Verdict};
+use super::{Ruling, Verdict};
 use crate::figure::{Body, Figure, Provenance};
 
 /// The findings about a figure.
-pub fn findings(f: &Figure) -> Vec<Finding> {
+pub fn findings(f: &Figure) -> Vec<Ruling> {
     let mut out = Vec::new();
     let mut check = |rule, holds: bool, kept: &str, broken: &str| {
         let (verdict, why) = if holds { (Verdict::Kept, kept) } else { (Verdict::Broken, broken) };
-        out.push(Finding::new(rule, &f.id, verdict, why));
+        out.push(Ruling::new(rule, &f.id, verdict, why));
     };
     if f.claims.shows_ratios {
         let base_case = f.claims.base_case.as_deref();

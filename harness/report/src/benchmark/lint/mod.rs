@@ -18,7 +18,7 @@ pub enum Verdict {
 
 /// A rule applied to a figure or to the record.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct Ruling {
     /// Number of the rule, 1 to 12.
     pub rule: usize,
     /// Identifier of the figure; "record" or "all figures" for findings about these.
@@ -29,7 +29,7 @@ pub struct Finding {
     pub why: String,
 }
 
-impl Finding {
+impl Ruling {
     fn new(rule: usize, about: &str, verdict: Verdict, why: impl Into<String>) -> Self {
         Self { rule, about: about.to_owned(), verdict, why: why.into() }
     }
@@ -67,10 +67,10 @@ const KEPT: [(usize, &str); 5] = [
 ];
 
 /// Applies the rules to every figure and to the record, ordered by rule.
-pub fn lint(figures: &[Figure], lines: &[Line]) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = figures.iter().flat_map(figure::findings).collect();
+pub fn lint(figures: &[Figure], lines: &[Line]) -> Vec<Ruling> {
+    let mut findings: Vec<Ruling> = figures.iter().flat_map(figure::findings).collect();
     findings.extend(record::findings(lines));
-    findings.extend(KEPT.map(|(rule, why)| Finding::new(rule, "all figures", Verdict::Kept, why)));
+    findings.extend(KEPT.map(|(rule, why)| Ruling::new(rule, "all figures", Verdict::Kept, why)));
     findings.sort_by_key(|f| f.rule);
     findings
 }

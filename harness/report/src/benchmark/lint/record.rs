@@ -1,17 +1,17 @@
 //! The rules that concern the record.
 
-use super::{Finding, Verdict};
+use super::{Ruling, Verdict};
 use bench::experiments::entry::{Entry, Line};
 
 /// The findings about a record.
-pub fn findings(lines: &[Line]) -> Vec<Finding> {
+pub fn findings(lines: &[Line]) -> Vec<Ruling> {
     let mut out = setup(lines);
     out.push(completeness(lines));
     out
 }
 
 /// Rule 9: machine and software are documented.
-fn setup(lines: &[Line]) -> Vec<Finding> {
+fn setup(lines: &[Line]) -> Vec<Ruling> {
     let session = |line: &'_ Line| match &line.entry {
         Entry::Session(session) => Some((**session).clone()),
         _ => None,
@@ -24,20 +24,20 @@ fn setup(lines: &[Line]) -> Vec<Finding> {
                 && m.memory_bytes > 0
         });
     let mut out = vec![match is_documented {
-        true => Finding::new(
+        true => Ruling::new(
             9,
             "record",
             Verdict::Kept,
             "the record has processor, memory, kernel, compiler and commit",
         ),
-        false => Finding::new(
+        false => Ruling::new(
             9,
             "record",
             Verdict::Broken,
             "machine, compiler or commit are missing in the record",
         ),
     }];
-    let mut broken = |why: String| out.push(Finding::new(9, "record", Verdict::Broken, why));
+    let mut broken = |why: String| out.push(Ruling::new(9, "record", Verdict::Broken, why));
     if sessions.iter().any(|s| s.machine.commit.ends_with("-dirty")) {
         broken("a session ran with files that differ from its commit".to_owned());
     }
@@ -51,7 +51,7 @@ fn setup(lines: &[Line]) -> Vec<Finding> {
 }
 
 /// Rule 2: no run is missing without a reason.
-fn completeness(lines: &[Line]) -> Finding {
+fn completeness(lines: &[Line]) -> Ruling {
     let failures = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
     let oversubscribed =
         lines.iter().any(|l| matches!(&l.entry, Entry::Run(r) if r.oversubscribed));
@@ -59,11 +59,11 @@ fn completeness(lines: &[Line]) -> Finding {
     match failures {
         0 => {
             let why = format!("the record has every run that was started, on all cores{suffix}");
-            Finding::new(2, "record", Verdict::Kept, why)
+            Ruling::new(2, "record", Verdict::Kept, why)
         }
         n => {
             let why = format!("{n} runs failed and are missing in the figures{suffix}");
-            Finding::new(2, "record", Verdict::Broken, why)
+            Ruling::new(2, "record", Verdict::Broken, why)
         }
     }
 }
