@@ -40,22 +40,24 @@ pub struct Style {
 }
 
 /// Width of the numbers of cells, faces and points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Label {
-    /// 32 bits, OpenFOAM's default.
+    /// OpenFOAM's default
     #[default]
+    #[value(name = "32")]
     Bits32,
-    /// 64 bits.
+    /// For more than about 169 million cells
+    #[value(name = "64")]
     Bits64,
 }
 
 /// What becomes of cells that faces do not connect with the largest region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Regions {
-    /// They are exported.
+    /// They are exported
     #[default]
     All,
-    /// They are left out. Most solvers accept only one region.
+    /// They are left out: most solvers accept only one region
     Largest,
 }
 

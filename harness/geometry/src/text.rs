@@ -115,7 +115,7 @@ impl Diagnosis {
 
 fn more(f: &mut fmt::Formatter<'_>, listed: u64, count: u64) -> fmt::Result {
     if listed > 0 && listed < count {
-        writeln!(f, "          and {} more (--first)", count - listed)?;
+        writeln!(f, "          and {} more (--limit)", count - listed)?;
     }
     Ok(())
 }
@@ -227,7 +227,7 @@ mod tests {
         let expected = "facets    30, with 17 distinct vertices\n\
             solids    2\n          \"wing\": 20 facets from number 3\n\
             shells    3, 2 closed\n          16 facets from number 0, closed\n          8 facets from number 16, open\n          \
-            and 1 more (--first)\n\
+            and 1 more (--limit)\n\
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
             cell      0.250 at the surface\n\n\
@@ -240,10 +240,10 @@ mod tests {
             slivers                                 1  none\n\n\
             openings: Meaning of Openings.\n  \
             at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells), 2.50 across (10.0 cells), 4 edges; facets 1, 2\n          \
-            and 1 more (--first)\n\n\
-            edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--first)\n\n\
+            and 1 more (--limit)\n\n\
+            edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--limit)\n\n\
             intersecting pairs of facets: Meaning of Intersections.\n  \
-            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--first)\n\n\
+            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--limit)\n\n\
             facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide, wider than 5 % of the area; facets 1, 2\n\n\
             slivers: Meaning of Slivers.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
             findings that can change the mesh's region";

@@ -17,12 +17,32 @@ pub struct Component {
     pub leaves: Vec<u32>,
     /// The side that seeds or, without seeds, rays determine.
     pub side: Side,
-    /// Whether the rays of no candidate agreed.
-    pub ambiguous: bool,
+    /// What decides its side.
+    pub decision: Decision,
     /// The first candidate.
     pub first: Octant,
     /// Whether it is outside and yet deleted, because the far field does not reach it.
     pub enclosed: bool,
+}
+
+/// What decides the side of a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// The seed with this index lies in it.
+    Seed(usize),
+    /// No seed lies in it.
+    NoSeed,
+    /// The six rays of this candidate agree, and those of the given number of candidates before it do not.
+    Rays(Octant, usize),
+    /// The rays of no candidate agree. The majority of the rays of this many candidates, and how many of them are odd.
+    Majority(usize, usize),
+}
+
+impl Component {
+    /// Whether the rays of no candidate agreed.
+    pub fn is_ambiguous(&self) -> bool {
+        matches!(self.decision, Decision::Majority(..))
+    }
 }
 
 /// The components of sorted leaves that tile the root.
@@ -91,12 +111,20 @@ pub fn in_root(point: [i64; 3]) -> bool {
     point.iter().all(|q| (0..UNITS_PER_EDGE).contains(q))
 }
 
-/// The indices of the leaves that contain seeds, ascending.
-pub fn seeded_leaves(words: &[u64], terms: &Terms) -> Vec<u32> {
-    let leaves = terms.seeds.iter().filter_map(|&seed| leaf_at(words, seed));
-    let mut seeded: Vec<u32> = leaves.map(|i| i as u32).collect();
+/// The indices of the leaves that contain seeds, ascending, with the index of the first seed in each.
+pub fn seeded_leaves(words: &[u64], terms: &Terms) -> Vec<(u32, usize)> {
+    let seeds = terms.seeds.iter().enumerate();
+    let leaves = seeds.filter_map(|(seed, &at)| Some((leaf_at(words, at)? as u32, seed)));
+    let mut seeded: Vec<(u32, usize)> = leaves.collect();
     seeded.sort_unstable();
+    seeded.dedup_by_key(|(leaf, _)| *leaf);
     seeded
+}
+
+/// The first seed in some leaves, given the leaves with seeds.
+pub fn seed_in(leaves: &[u32], seeded: &[(u32, usize)]) -> Option<usize> {
+    let seed = |leaf: &u32| seeded.binary_search_by_key(leaf, |(seeded, _)| *seeded).ok();
+    leaves.iter().filter_map(seed).map(|at| seeded[at].1).min()
 }
 
 fn crossing(word: u64) -> bool {
@@ -116,34 +144,37 @@ fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usi
     })
 }
 
-fn component(leaves: Vec<u32>, words: &[u64], side: Side, ambiguous: bool) -> Component {
+fn component(leaves: Vec<u32>, words: &[u64], side: Side, decision: Decision) -> Component {
     let first = word::octant(words[leaves[0] as usize]);
-    Component { leaves, side, ambiguous, first, enclosed: false }
+    Component { leaves, side, decision, first, enclosed: false }
 }
 
 /// A component with a seed is flow; any other has the other side.
-fn by_seeds(leaves: Vec<u32>, words: &[u64], seeded: &[u32], terms: &Terms) -> Component {
+fn by_seeds(leaves: Vec<u32>, words: &[u64], seeded: &[(u32, usize)], terms: &Terms) -> Component {
     let flow = terms.side_of_flow();
     let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
-    let has_seed = leaves.iter().any(|i| seeded.binary_search(i).is_ok());
-    component(leaves, words, if has_seed { flow } else { other }, false)
+    match seed_in(&leaves, seeded) {
+        Some(seed) => component(leaves, words, flow, Decision::Seed(seed)),
+        None => component(leaves, words, other, Decision::NoSeed),
+    }
 }
 
 /// The first candidate whose rays agree decides. Without one, the majority of all rays decides.
 fn by_rays(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
-    let (mut rays, mut inside) = (0, 0);
+    let (mut candidates, mut inside) = (0, 0);
     for &i in leaves.iter().take(CANDIDATES_MAX) {
-        let votes = parity.inside(word::octant(words[i as usize]).centre());
+        let candidate = word::octant(words[i as usize]);
+        let votes = parity.inside(candidate.centre());
         let odd = votes.iter().filter(|&&v| v).count();
         if odd == 0 || odd == 6 {
             let side = if odd == 6 { Side::Inside } else { Side::Outside };
-            return component(leaves, words, side, false);
+            return component(leaves, words, side, Decision::Rays(candidate, candidates));
         }
-        rays += 6;
+        candidates += 1;
         inside += odd;
     }
-    let side = if 2 * inside > rays { Side::Inside } else { Side::Outside };
-    component(leaves, words, side, true)
+    let side = if inside > 3 * candidates { Side::Inside } else { Side::Outside };
+    component(leaves, words, side, Decision::Majority(candidates, inside))
 }
 
 /// Disjoint sets. The root of each is its smallest index.
@@ -282,9 +313,9 @@ mod tests {
             assert!(found.len() == 2 && component.leaves.len() > CANDIDATES_MAX);
             let side = if twice < 3 { Side::Inside } else { Side::Outside };
             let ambiguous = (1..6).contains(&twice);
-            assert_eq!((component.side, component.ambiguous), (side, ambiguous), "{twice}");
+            assert_eq!((component.side, component.is_ambiguous()), (side, ambiguous), "{twice}");
             let other = found.iter().find(|c| c.first != component.first).unwrap();
-            assert_eq!((other.side, other.ambiguous), (Side::Outside, false), "{twice}");
+            assert_eq!((other.side, other.is_ambiguous()), (Side::Outside, false), "{twice}");
         }
     }
 

@@ -20,8 +20,10 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let Some(case) = subject.case else { return result.lacks(NO_GEOMETRY) };
-    let mesh = Mesh::new(subject.manifest, subject.tree(), subject.inputs.clone(), Some(case));
+    let Some(body) = subject.facets().zip(subject.truth()) else {
+        return result.lacks(NO_GEOMETRY);
+    };
+    let mesh = Mesh::new(subject.manifest, subject.tree(), subject.inputs.clone(), Some(body));
     let found = match mesh.unneeded(FINDINGS_LISTED) {
         Ok(found) => found,
         Err(why) => return result.lacks(&why),

@@ -76,10 +76,10 @@ impl<'a> Survey<'a> {
         let Some(component) = self.truth.component_at(&octant) else {
             return Position::Near;
         };
-        let &Component { side, ambiguous, enclosed, .. } = component;
+        let &Component { side, enclosed, .. } = component;
         let inside = side == Side::Inside;
         let agree = || self.parity.inside(octant.centre()) == [inside; 6];
-        match ambiguous || self.terms.seeds.is_empty() && !agree() {
+        match component.is_ambiguous() || self.terms.seeds.is_empty() && !agree() {
             true => Position::Undecided,
             false => Position::On(side, self.terms.keeps(side as Kind) && !enclosed),
         }

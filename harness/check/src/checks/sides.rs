@@ -50,7 +50,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         of_components("T0: ", tree, truth, subject, result);
         ambiguous("T0: ", &base.manifest, &truth.components, terms, result);
     }
-    let undecided = truth.components.iter().filter(|c| c.ambiguous).count();
+    let undecided = truth.components.iter().filter(|c| c.is_ambiguous()).count();
     result.note = format!("{} components, {undecided} ambiguous", truth.components.len());
 }
 
@@ -123,7 +123,7 @@ fn ambiguous(
     result: &mut CheckResult,
 ) {
     let Ambiguous { count, example } = manifest.components_ambiguous;
-    let found: Vec<_> = components.iter().filter(|c| c.ambiguous).collect();
+    let found: Vec<_> = components.iter().filter(|c| c.is_ambiguous()).collect();
     if count != found.len() as u64 {
         let total = found.len();
         result.report(format!(

@@ -24,7 +24,8 @@ pub struct Truth {
     pub components: Vec<Component>,
     /// The component of each leaf.
     component_of: Vec<Option<u32>>,
-    tree: Tree,
+    /// The leaves as a tree, in which a deleted leaf of an enclosed component has a kind of its own.
+    pub tree: Tree,
 }
 
 /// A part of a mesh: a leaf, a hole, or an octant that has leaves of one kind only, whole or within one leaf of T0.

@@ -11,14 +11,13 @@
 mod tests;
 
 pub mod fields;
-mod region;
-pub mod rule;
-mod witness;
+mod rule;
 
 use std::fmt;
 use std::path::Path;
 
 use crate::checks::Terms;
+use crate::why::{self, Body};
 use contract::case::Case;
 use contract::leafset::ReadError;
 use contract::manifest::{Manifest, Sides, Tally};
@@ -55,12 +54,9 @@ pub struct DiffReport {
     pub octants: Vec<Octant>,
     /// The first difference of the leaves, with the leaves of both meshes.
     pub leaf: Option<String>,
-    /// The rules of the definition that decide which mesh is right.
-    pub rules: Vec<String>,
+    /// The rule of the definition that decides which mesh is right, or why none does.
+    pub rule: Option<String>,
 }
-
-/// Maximum number of leaves of both meshes together for which rules are sought: the search needs both in memory.
-const LEAVES_RULED: u64 = 200_000_000;
 
 impl DiffReport {
     /// Whether the leaf words are the same.
@@ -75,7 +71,7 @@ impl DiffReport {
 
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
-        let Self { octants, leaf, rules, fields, roots_differ, .. } = self;
+        let Self { octants, leaf, rule, fields, roots_differ, .. } = self;
         let key = |octant: &Octant| word::key_of(octant.corner);
         assert!(
             octants.iter().all(|octant| octant.level == 3)
@@ -86,7 +82,7 @@ impl DiffReport {
             leaf.is_none() || !octants.is_empty(),
             "equal leaves have a first difference: {leaf:?}"
         );
-        assert!(rules.is_empty() || leaf.is_some(), "rules without a difference: {rules:?}");
+        assert!(rule.is_none() || leaf.is_some(), "a rule without a difference: {rule:?}");
         let is_listed = fields.iter().any(|field| field.starts_with("root: "));
         assert!(
             *roots_differ == is_listed,
@@ -129,7 +125,7 @@ impl fmt::Display for DiffReport {
         match &self.leaf {
             Some(leaf) => {
                 write!(f, "\n{leaf}")?;
-                self.rules.iter().try_for_each(|rule| write!(f, "\n  rule: {rule}"))
+                self.rule.iter().try_for_each(|rule| write!(f, "\n  rule: {rule}"))
             }
             None => {
                 write!(f, "\nbut the leaves in them are the same: a manifest contradicts its files")
@@ -173,7 +169,7 @@ pub fn diff(
             let sides_known = without_sides.is_none();
             report.leaf = Some(rule::leaves(x, y, sides_known, &a.manifest.root));
             if sides_known {
-                report.rules = rules(&a, &b, case, x, y)?;
+                report.rule = Some(rule(&a, &b, case, (x, y))?);
             }
             break;
         }
@@ -254,30 +250,27 @@ fn first_difference(
     Ok(Some((words_a.get(first).copied(), words_b.get(first).copied())))
 }
 
-/// The rules that decide which mesh is right.
-fn rules(
-    a: &Mesh,
-    b: &Mesh,
-    case: Option<&Case>,
-    x: Option<u64>,
-    y: Option<u64>,
-) -> Result<Vec<String>, ReadError> {
-    let undecided = |why: &str| Ok(vec![why.to_owned()]);
+/// The rule that decides which mesh is right, or why none does.
+fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> Result<String, ReadError> {
+    let undecided = |why: &str| Ok(why.to_owned());
     if a.manifest.tree != b.manifest.tree {
         return undecided("none: one is a base tree, the other a final mesh");
     }
-    if Terms::of_manifest(&a.manifest) != Terms::of_manifest(&b.manifest) {
+    let terms = &Terms::of_manifest(&a.manifest);
+    if *terms != Terms::of_manifest(&b.manifest) {
         return undecided("none: the inputs differ as listed above, so both meshes may be right");
     }
-    if a.manifest.leaves + b.manifest.leaves > LEAVES_RULED {
-        return undecided("unknown: the meshes are too large to be held in memory");
-    }
-    let words = |mesh: &Mesh| -> Result<Vec<u64>, ReadError> {
-        let mut all = Vec::new();
-        mesh.visit(&mut |words| all.extend_from_slice(words))?;
-        Ok(all)
+    let (body, caveat) = match case.map(|case| Body::of(case, &a.manifest)).transpose() {
+        Ok(body) => (body, String::new()),
+        Err(why) => (None, format!("without the case, because {why}: ")),
     };
-    let (words_a, words_b) = (words(a)?, words(b)?);
-    let terms = Terms::of_manifest(&a.manifest);
-    Ok(rule::Dispute { a: &words_a, b: &words_b, terms: &terms, case }.rule(x, y))
+    let trees = match (a.tree(), b.tree()) {
+        (Err(ReadError::TooLarge(_)), _) | (_, Err(ReadError::TooLarge(_))) => {
+            return undecided("unknown: the meshes are too large to be held in memory");
+        }
+        (of_a, of_b) => [of_a?, of_b?],
+    };
+    let [a, b] = [(a, &trees[0]), (b, &trees[1])]
+        .map(|(mesh, tree)| why::Mesh::of(&mesh.manifest, tree, body.as_ref()).distrusting());
+    Ok(caveat + &rule::Dispute { a, b, terms }.rule(x, y))
 }

@@ -1,132 +1,72 @@
-//! The rule of reference/DEFINITION.md that decides which of two meshes is right at their first difference.
+//! The rule of reference/DEFINITION.md that decides which of two meshes is right at their first difference, as [`crate::why`] finds it.
 //!
-//! If one mesh has a leaf that the other has split, something must require the split: a facet or a box (section
-//! 3), or a finer leaf nearby (section 6), which is the witness. If both meshes have the witness, it decides.
-//! If only the mesh with the split has it, the witness itself is disputed, and the search continues there.
-//! Gradation goes from fine to coarse, so the search ends at the first difference in the order of the
-//! definition.
-//!
-//! Crossing leaves that were deleted after gradation are in neither mesh and cannot be witnesses. The text
-//! mentions this where it is possible.
-
-#[cfg(test)]
-mod tests;
+//! A split needs a cause: a facet or a box (section 3), or a chain of finer leaves to one (section 6), in which a needless split justifies no
+//! other. Sides, and leaves that only one mesh has, are those of T0 of the case (sections 4, 5 and 7).
 
 use crate::checks::Terms;
 use crate::checks::identical::describe;
-use contract::case::Case;
-use contract::manifest::Keep;
+use crate::why::Mesh;
+use crate::why::answer::SideReason;
+use contract::lattice::Root;
 use contract::octant::Octant;
-use contract::parity::Parity;
 use contract::tree::Kind;
-use contract::triangle::Triangle;
 use contract::word::{self, Leaf, Side};
 
-/// Maximum number of disputed witnesses: refinement needs at most one step per level.
-const STEPS_MAX: usize = 20;
-
-/// Two meshes with their inputs.
-pub struct Dispute<'a> {
-    /// Words of mesh A, sorted.
-    pub a: &'a [u64],
-    /// Words of mesh B, sorted.
-    pub b: &'a [u64],
-    /// Their common requirements.
+/// Two meshes with their common inputs.
+pub(super) struct Dispute<'a> {
+    /// The meshes, in which needless splits justify nothing.
+    pub a: Mesh<'a>,
+    pub b: Mesh<'a>,
     pub terms: &'a Terms,
-    /// Their common case, if it is known.
-    pub case: Option<&'a Case>,
 }
 
-/// One of the two meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mesh {
-    A,
-    B,
-}
-
-impl Mesh {
-    pub(super) fn name(self) -> char {
-        if self == Self::A { 'A' } else { 'B' }
-    }
-
-    pub(super) fn other(self) -> Self {
-        if self == Self::A { Self::B } else { Self::A }
-    }
-}
-
-/// The reason why an octant must be split, as text.
-enum Reason {
-    /// The inputs or a leaf of both meshes require the split.
-    Decided(String),
-    /// This leaf requires the split, but only the mesh with the split has it.
-    Disputed(String, Octant),
-    /// Nothing requires the split.
-    None,
-}
+/// A mesh with its name.
+type Named<'a> = (&'static str, &'a Mesh<'a>);
 
 impl Dispute<'_> {
-    /// The rules that decide at the first difference, given by the words of both meshes.
-    pub fn rule(&self, a: Option<u64>, b: Option<u64>) -> Vec<String> {
+    /// The rule at the first difference, given by the words of both meshes.
+    pub(super) fn rule(&self, x: Option<u64>, y: Option<u64>) -> String {
         let leaf = |word: u64| word::decode(word).expect("the words that are compared are leaves");
-        match (a.map(leaf), b.map(leaf)) {
-            (Some(a), Some(b)) if a.octant == b.octant => vec![self.side(&a, &b)],
-            (Some(a), Some(b)) if a.octant.contains(&b.octant) => self.split(Mesh::A, a),
-            (Some(a), Some(b)) if b.octant.contains(&a.octant) => self.split(Mesh::B, b),
-            (Some(a), Some(b)) if word::encode(&a) > word::encode(&b) => {
-                vec![self.absence(Mesh::B, &b)]
-            }
-            (Some(a), _) => vec![self.absence(Mesh::A, &a)],
-            (None, Some(b)) => vec![self.absence(Mesh::B, &b)],
-            (None, None) => Vec::new(),
+        let (a, b) = (("A", &self.a), ("B", &self.b));
+        match (x.map(leaf), y.map(leaf)) {
+            (Some(x), Some(y)) if x.octant == y.octant => self.side(&x, &y),
+            (Some(x), Some(y)) if x.octant.contains(&y.octant) => split(&x.octant, a, b),
+            (Some(x), Some(y)) if y.octant.contains(&x.octant) => split(&y.octant, b, a),
+            (Some(x), Some(y)) if word::encode(&x) > word::encode(&y) => self.absence(&y, b, a),
+            (Some(x), _) => self.absence(&x, a, b),
+            (None, Some(y)) => self.absence(&y, b, a),
+            (None, None) => "none: the leaves are the same".to_owned(),
         }
     }
 
     /// The rule for an octant that has different sides.
-    fn side(&self, a: &Leaf, b: &Leaf) -> String {
-        let crossing = a.side == Side::Crossing || b.side == Side::Crossing;
-        if !crossing && let Some((side, why)) = self.side_by_seeds(Mesh::A, a) {
-            return format!("{why}: {} is right", if a.side == side { "A" } else { "B" });
-        }
-        let Some(case) = self.case else {
-            return "section 4 (side): give the case file (--case) to decide it".into();
+    fn side(&self, x: &Leaf, y: &Leaf) -> String {
+        let centre = self.terms.root.to_user(x.octant.centre());
+        let answer = self.a.at(centre).expect("the centre of an octant is in the root");
+        let (side, why) = match answer.side_decided_by {
+            SideReason::Facets { facets, .. } => {
+                (Side::Crossing, format!("facet {} crosses it", facets[0]))
+            }
+            SideReason::Component { side, decision, .. } => (side, decision),
+            SideReason::Unknown => {
+                return "section 4 (side): give the case file (--case) to decide it".to_owned();
+            }
         };
-        if let Some(facet) = crossed_by(&a.octant, case) {
-            let right = if a.side == Side::Crossing { "A" } else { "B" };
-            return format!(
-                "section 4: facet {facet} crosses it, so it is crossing: {right} is right"
-            );
-        }
-        if !self.terms.seeds.is_empty() {
-            return "section 4: no facet crosses it, so the seeds decide".into();
-        }
-        let rays = Parity::new(&case.facets_lattice).inside(a.octant.centre());
-        let inside = rays.iter().filter(|&&inside| inside).count();
-        let text = format!("section 4: no facet crosses it, and {inside} of its 6 rays are inside");
-        let side = match inside {
-            0 => Side::Outside,
-            6 => Side::Inside,
-            _ => return format!("{text}: another candidate of its component decides"),
-        };
-        // The first candidate whose rays agree determines the side of the component. The rays of other leaves
-        // can differ only if the body is not watertight.
-        let right = [(a, "A"), (b, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
-        match right {
-            Some((_, name)) => format!("{text}: {name} is right, if the body is watertight"),
-            None => format!("{text}: neither is right, if the body is watertight"),
-        }
+        let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
+        let right = right.map_or("neither", |(_, name)| name);
+        format!("section 4: {why}, so it is {side}: {right} is right")
     }
 
     /// The rule for a leaf that the other mesh does not have in any form.
-    fn absence(&self, mesh: Mesh, leaf: &Leaf) -> String {
-        let (has, lacks, side) = (mesh.name(), mesh.other().name(), leaf.side);
-        let kept = self.terms.keeps(side as Kind);
-        let keep = format!("{:?}", self.terms.keep).to_lowercase();
-        if side != Side::Crossing
-            && let Some(rule) = self.kept_or_deleted(mesh, leaf)
-        {
-            return rule;
+    fn absence(&self, leaf: &Leaf, (has, _): Named, (lacks, mesh): Named) -> String {
+        let centre = self.terms.root.to_user(leaf.octant.centre());
+        let answer = mesh.at(centre).expect("the centre of an octant is in the root");
+        if let Some(deletion) = answer.deleted_by {
+            let right = if deletion.is_lost() { has } else { lacks };
+            return format!("section {}: {}: {right} is right", deletion.section, deletion.rule);
         }
-        match (side, kept) {
+        let (keep, side) = (format!("{:?}", self.terms.keep).to_lowercase(), leaf.side);
+        match (side, self.terms.keeps(side as Kind)) {
             (Side::Crossing, false) => {
                 format!("section 7: keep_crossing is false, so {has} must not have a crossing leaf")
             }
@@ -139,114 +79,27 @@ impl Dispute<'_> {
             ),
         }
     }
-
-    /// The rules for a leaf that the other mesh has split, one for each disputed witness.
-    fn split(&self, mut mesh: Mesh, mut leaf: Leaf) -> Vec<String> {
-        let mut rules = Vec::new();
-        let mut visited = vec![leaf.octant];
-        for _ in 0..STEPS_MAX {
-            let (coarse, fine) = (mesh.name(), mesh.other().name());
-            let what = format!("{coarse} has the leaf {}, {fine} has split it", leaf.octant);
-            let (why, witness) = match self.reason(mesh, &leaf) {
-                Reason::Disputed(why, witness) => (why, witness),
-                Reason::Decided(why) => {
-                    rules.push(format!("{what}: {why}: {fine} is right"));
-                    return rules;
-                }
-                Reason::None => {
-                    rules.push(format!(
-                        "{what}: nothing in either mesh requires the split, and refinement is minimal (sections 3 and 6): \
-                         {coarse} is right{}",
-                        self.caveat()
-                    ));
-                    return rules;
-                }
-            };
-            rules.push(format!("{what}: {why}, which {coarse} does not have"));
-            let Some((next_mesh, next)) = self.disputed_leaf(mesh, &witness) else {
-                rules.push(format!(
-                    "{coarse} has no leaf at {witness}: section 5 decides, or a leaf was lost"
-                ));
-                return rules;
-            };
-            if visited.contains(&next.octant) {
-                return rules;
-            }
-            visited.push(next.octant);
-            (mesh, leaf) = (next_mesh, next);
-        }
-        rules
-    }
-
-    /// The leaf that one mesh has split and the other has not, at a witness that mesh `mesh` does not have: a
-    /// coarser leaf of `mesh`, or a coarser leaf of the other mesh where `mesh` has finer ones.
-    fn disputed_leaf(&self, mesh: Mesh, witness: &Octant) -> Option<(Mesh, Leaf)> {
-        if let Some(leaf) = self.ancestor_leaf(mesh, witness) {
-            return Some((mesh, leaf));
-        }
-        let leaf = self.ancestor_leaf(mesh.other(), witness)?;
-        self.has_within(mesh, witness).then_some((mesh.other(), leaf))
-    }
-
-    /// A restriction of the statement that nothing requires a split.
-    fn caveat(&self) -> &'static str {
-        match (self.terms.keep_crossing, self.case) {
-            (false, _) => ", unless a crossing leaf that was deleted afterwards does",
-            (_, None) if self.terms.keep != Keep::All => {
-                ", unless a facet does (give the case file: --case)"
-            }
-            _ => "",
-        }
-    }
-
-    /// The reason why this leaf of one mesh must be split.
-    fn reason(&self, mesh: Mesh, leaf: &Leaf) -> Reason {
-        let octant = &leaf.octant;
-        if octant.level < self.terms.level_surface {
-            let d = self.terms.level_surface;
-            if let Some(facet) = self.case.and_then(|case| crossed_by(octant, case)) {
-                return Reason::Decided(format!(
-                    "section 3: facet {facet} crosses it, so it has level >= D = {d}"
-                ));
-            }
-            if self.case.is_none() && leaf.side == Side::Crossing {
-                return Reason::Decided(format!(
-                    "section 3: it is crossing, so it has level >= D = {d}"
-                ));
-            }
-        }
-        if let Some(b) = self.terms.box_that_splits(octant) {
-            return Reason::Decided(format!(
-                "section 3: it meets the box {:?} to {:?}, so it has level >= {}",
-                b.min, b.max, b.level
-            ));
-        }
-        let Some((word, undisputed)) = self.witness(mesh, octant) else { return Reason::None };
-        let source = word::octant(word);
-        let why =
-            format!("{}, by the leaf {source}", self.requires(&source, octant).unwrap_or_default());
-        match undisputed {
-            true => Reason::Decided(format!("{why}, which both have")),
-            false => Reason::Disputed(why, source),
-        }
-    }
 }
 
-/// Index of the first facet that crosses an octant.
-fn crossed_by(octant: &Octant, case: &Case) -> Option<usize> {
-    case.facets_lattice.iter().position(|facet| {
-        let (low, high) = octant.bounds();
-        Triangle::new(facet).meets(low, high)
-    })
+/// The rule for a leaf of a mesh that the other one has split.
+fn split(octant: &Octant, (coarse, _): Named, (fine, mesh): Named) -> String {
+    let what = format!("{coarse} has the leaf {octant}, {fine} has split it");
+    let clauses = mesh.split(octant).clauses();
+    if !clauses.is_empty() {
+        return format!("{what} {}: {fine} is right", clauses.join("; "));
+    }
+    let caveat = match mesh.knows_surface() {
+        true => "",
+        false => ", unless a facet does (give the case file: --case)",
+    };
+    format!(
+        "{what}: no facet, box, layer or balance requires the split, and refinement is minimal (sections 3 and 6): {coarse} \
+         is right{caveat}"
+    )
 }
 
 /// The leaves of both meshes at the first difference, as text.
-pub fn leaves(
-    a: Option<u64>,
-    b: Option<u64>,
-    sides_known: bool,
-    root: &contract::lattice::Root,
-) -> String {
+pub(super) fn leaves(a: Option<u64>, b: Option<u64>, sides_known: bool, root: &Root) -> String {
     let text = |word: Option<u64>| match word {
         None => "no more leaves".to_owned(),
         Some(word) if sides_known => describe(word, root),
@@ -254,3 +107,6 @@ pub fn leaves(
     };
     format!("first difference:\n  A has {}\n  B has {}", text(a), text(b))
 }
+
+#[cfg(test)]
+mod tests;

@@ -28,7 +28,7 @@ fn without_the_sides_of_one_mesh_the_cells_are_compared() {
     assert!(same.to_string().starts_with("the sides of B are unknown"), "{same}");
     unknown(leaf_set(vec![words[1..].to_vec()]));
     let other = compare();
-    assert!(!other.same_leaves() && other.rules.is_empty(), "{other}");
+    assert!(!other.same_leaves() && other.rule.is_none(), "{other}");
     let leaf = other.leaf.expect("the first difference");
     assert!(!leaf.contains("outside") && !leaf.contains("inside"), "{leaf}");
 }
@@ -38,11 +38,11 @@ fn the_octants_that_differ_are_listed_up_to_eight() {
     let octants: Vec<Octant> = (0..8).map(level_3).collect();
     let mut report =
         DiffReport { octants, leaf: Some("a leaf".to_owned()), ..DiffReport::default() };
-    report.rules = vec!["one".to_owned(), "two".to_owned()];
+    report.rule = Some("one".to_owned());
     report.fields = vec!["a field".to_owned()];
     let eight = "0.0.0, 0.0.1, 0.0.2, 0.0.3, 0.0.4, 0.0.5, 0.0.6, 0.0.7";
     let expected = format!(
-        "a field\nthe leaves differ in 8 of 512 level-3 octants: {eight}\na leaf\n  rule: one\n  rule: two"
+        "a field\nthe leaves differ in 8 of 512 level-3 octants: {eight}\na leaf\n  rule: one"
     );
     assert_eq!(report.to_string(), expected);
     report.octants.push(level_3(511));
@@ -78,7 +78,10 @@ fn the_first_difference_is_found_in_any_octant_and_part() {
                 "first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}"
             );
             assert_eq!(found.leaf, Some(text));
-            assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
+            assert_eq!(
+                found.rule.unwrap(),
+                "section 4 (side): give the case file (--case) to decide it"
+            );
             assert_eq!(found.contradictions, [""; 0]);
         }
     }
@@ -89,16 +92,6 @@ fn the_first_difference_is_found_in_any_octant_and_part() {
 }
 
 #[test]
-fn leaves_of_both_meshes_decide_about_a_split() {
-    // Leaves of level 3 in octant 0.1 touch octant 1.
-    let refined = |o: &Octant| o.level == 0 || "0.1".starts_with(&o.path());
-    let (a, b) = (written(words_of(refined)), written(words_of(|o| refined(o) || o.path() == "1")));
-    let found = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
-    let [rule] = &found.rules[..] else { panic!("{found}") };
-    assert!(rule.contains("step 3 (balance)") && rule.ends_with("B is right"), "{rule}");
-}
-
-#[test]
 fn meshes_of_other_inputs_or_trees_are_not_judged() {
     let words = words_of(|o| o.level < 1);
     let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
@@ -106,7 +99,7 @@ fn meshes_of_other_inputs_or_trees_are_not_judged() {
         let mut set = leaf_set(vec![words.iter().map(|word| word | 1).collect()]);
         change(&mut set.manifest);
         set.write(b.path()).unwrap();
-        diff(a.path(), b.path(), None, Trust::Leaves).unwrap().rules.concat()
+        diff(a.path(), b.path(), None, Trust::Leaves).unwrap().rule.unwrap()
     };
     assert!(rules(|_| ()).starts_with("section 4"));
     assert!(
@@ -176,7 +169,7 @@ fn a_part_larger_than_the_buffer_is_read_to_its_end() {
     assert_eq!((same.same_leaves(), same.leaves), (true, words.len() as u64));
     let found = compared(b.path());
     assert_eq!((found.octants, found.contradictions.len()), (vec![level_3(511)], 0));
-    assert_eq!(found.rules, ["section 4 (side): give the case file (--case) to decide it"]);
+    assert_eq!(found.rule.unwrap(), "section 4 (side): give the case file (--case) to decide it");
 }
 
 proptest! {
@@ -247,7 +240,7 @@ fn a_report_that_contradicts_itself_is_a_bug() {
     ];
     for (i, fault) in faults.iter().enumerate() {
         let mut wrong = correct.clone();
-        wrong.rules.push("a rule".to_owned());
+        wrong.rule = Some("a rule".to_owned());
         fault(&mut wrong);
         assert!(
             std::panic::catch_unwind(|| wrong.check_invariants()).is_err(),

@@ -1,4 +1,4 @@
-//! The answer to a question about a point; JSON of the schema `octree-why/2` when serialised.
+//! The answer to a question about a point; JSON of the schema `octree-why/3` when serialised.
 //!
 //! Invariants: the leaf and the leaf of T0 contain the point; every ancestor of the leaf has its split, in order. A chain begins
 //! with the octant that is split; each leaf is finer and near enough for its rule; each further octant is the parent of
@@ -6,9 +6,9 @@
 //! in a deleted part.
 
 use super::Mesh;
-use super::base::{Cause, Surface};
-use super::chain::{Chain, Link, Rule};
-use super::side::Decision;
+use super::base::Cause;
+use super::chain::{Link, Rule};
+use crate::checks::components::{Component, Decision};
 use contract::lattice::Root;
 use contract::manifest::{self, Keep};
 use contract::octant::{Octant, UNITS_PER_CELL};
@@ -16,7 +16,7 @@ use contract::word::Side;
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-why/2";
+pub const SCHEMA: &str = "octree-why/3";
 
 /// Facets that are listed for a cause; further ones are counted only.
 const FACETS_LISTED: usize = 8;
@@ -144,12 +144,8 @@ pub enum SideReason {
         rays_odd: Option<[bool; 6]>,
         /// The index of the seed that decides.
         seed: Option<usize>,
-        /// Number of leaves of the component that were visited.
-        leaves_visited: u64,
-        /// Whether these are all.
-        is_complete: bool,
-        /// Whether leaves that were not visited cannot change the decision.
-        is_proven: bool,
+        /// Number of leaves of the component.
+        leaves: u64,
     },
     /// The facets are not known.
     Unknown,
@@ -162,6 +158,16 @@ pub struct Deletion {
     pub section: &'static str,
     /// The rule in words.
     pub rule: String,
+}
+
+/// The rule in place of one that deletes a leaf.
+const LOST: &str = "no rule deletes it: the mesh has lost a leaf";
+
+impl Deletion {
+    /// Whether no rule deletes the leaf.
+    pub fn is_lost(&self) -> bool {
+        self.rule == LOST
+    }
 }
 
 impl Answer {
@@ -259,7 +265,7 @@ impl Mesh<'_> {
         })?;
         let cell = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
         let leaf = self.leaves.leaf_at(cell);
-        let base = (!matches!(self.surface, Surface::Unknown)).then(|| self.base_leaf_at(cell));
+        let base = self.knows_surface().then(|| self.base_leaf_at(cell));
         let octant = leaf.map(|(octant, _)| octant).or(base);
         let mut answer = Answer {
             schema: SCHEMA,
@@ -287,18 +293,21 @@ impl Mesh<'_> {
         let cause = of_base.checked_sub(1).and_then(|level| {
             self.base_cause(&octant.ancestor(level as u8)).map(|cause| self.cause(&cause))
         });
-        let split = |ancestor: Octant| {
-            let octant = self.place(&ancestor);
-            if usize::from(ancestor.level) < of_base {
-                return Split { octant, links: Vec::new(), cause: cause.clone() };
+        let split = |ancestor: Octant| match usize::from(ancestor.level) < of_base {
+            true => {
+                Split { octant: self.place(&ancestor), links: Vec::new(), cause: cause.clone() }
             }
-            let Some(Chain { links, cause }) = self.chain(&ancestor) else {
-                return Split { octant, links: Vec::new(), cause: None };
-            };
-            let links = links.iter().map(|link| self.link(link)).collect();
-            Split { octant, links, cause: Some(self.cause(&cause)) }
+            false => self.split(&ancestor),
         };
         ancestors.map(split).collect()
+    }
+
+    /// An octant that is split, with the chain to a cause.
+    pub(crate) fn split(&self, octant: &Octant) -> Split {
+        let chain = self.chain(octant);
+        let links = chain.iter().flat_map(|chain| &chain.links).map(|link| self.link(link));
+        let cause = chain.as_ref().map(|chain| self.cause(&chain.cause));
+        Split { octant: self.place(octant), links: links.collect(), cause }
     }
 
     fn link(&self, link: &Link) -> LinkRecord {
@@ -330,9 +339,7 @@ impl Mesh<'_> {
 
     /// Adds what decides the side of the leaf of T0 and, if it was deleted, the rule for that.
     fn explain_side(&self, base: Option<Octant>, answer: &mut Answer) {
-        let Some(base) = base.filter(|_| matches!(self.surface, Surface::Facets(_))) else {
-            return;
-        };
+        let Some((base, (_, truth))) = base.zip(self.body) else { return };
         let facets = self.facets_of(&base);
         if !facets.is_empty() {
             answer.side_decided_by = SideReason::Facets {
@@ -344,33 +351,28 @@ impl Mesh<'_> {
                     false => {
                         "keep_crossing is false, so crossing leaves are deleted after gradation"
                     }
-                    true => "no rule deletes it: the mesh has lost a leaf",
+                    true => LOST,
                 };
                 answer.deleted_by = Some(Deletion { section: "7", rule: rule.to_owned() });
             }
             return;
         }
-        let component = self.component(&base);
-        let Some((decision, side)) = self.decide(&component) else { return };
+        let Some(component) = truth.component_at(&base) else { return };
+        let side = component.side;
         if answer.leaf.is_none() {
-            answer.deleted_by = Some(self.deletion(side, &component));
+            answer.deleted_by = Some(self.deletion(component));
         }
         let (mut candidate, mut rays_odd, mut seed) = (None, None, None);
-        let is_proven = match &decision {
-            Decision::Seed(_) => true,
-            Decision::NoSeed | Decision::Majority(..) => component.is_complete,
-            Decision::Rays(octant, ..) => self.knows_candidates_before(octant, &component),
-        };
-        let text = match decision {
+        let text = match component.decision {
             Decision::Seed(index) => {
                 seed = Some(index);
                 format!("seed {index} lies in its component")
             }
-            Decision::NoSeed if component.is_complete => "no seed lies in its component".to_owned(),
-            Decision::NoSeed => "no seed was found in its component".to_owned(),
-            Decision::Rays(octant, before, odd) => {
-                (candidate, rays_odd) = (Some(self.place(&octant)), Some(odd));
-                let parity = if odd[0] { "an odd" } else { "an even" };
+            Decision::NoSeed => "no seed lies in its component".to_owned(),
+            Decision::Rays(octant, before) => {
+                let is_odd = side == Side::Inside;
+                (candidate, rays_odd) = (Some(self.place(&octant)), Some([is_odd; 6]));
+                let parity = if is_odd { "an odd" } else { "an even" };
                 let skipped = match before {
                     0 => String::new(),
                     n => format!(", after {n} candidates whose rays disagree"),
@@ -391,14 +393,12 @@ impl Mesh<'_> {
             candidate,
             rays_odd,
             seed,
-            leaves_visited: component.leaves.len() as u64,
-            is_complete: component.is_complete,
-            is_proven,
+            leaves: component.leaves.len() as u64,
         };
     }
 
     /// The rule that deletes the leaves of a component.
-    fn deletion(&self, side: Side, component: &super::side::Component) -> Deletion {
+    fn deletion(&self, &Component { side, enclosed, .. }: &Component) -> Deletion {
         let terms = &self.terms;
         let keep = match terms.keep {
             Keep::Outside => "outside",
@@ -407,11 +407,11 @@ impl Mesh<'_> {
         };
         let rule = if !terms.keeps(side as u8) {
             format!("keep is {keep}, so leaves that are {side} are deleted")
-        } else if terms.deletes_enclosed() && !component.is_at_boundary {
+        } else if enclosed {
             "enclosed is delete, and no leaf of its component has a face on the root's boundary"
                 .to_owned()
         } else {
-            "no rule deletes it: the mesh has lost a leaf".to_owned()
+            LOST.to_owned()
         };
         Deletion { section: "5", rule }
     }
@@ -419,27 +419,14 @@ impl Mesh<'_> {
     /// Adds what the answer lacks, and why.
     fn leave_out(&self, answer: &mut Answer) {
         let mut add = |what: &str| answer.left_out.push(what.to_owned());
-        match self.surface {
-            Surface::Facets(_) => {}
-            Surface::Leaves => {
-                add("facet numbers and the decision on the side: give the case with --case");
-            }
-            Surface::Unknown => {
-                add(
+        if self.body.is_none() {
+            add(match self.knows_surface() {
+                true => "facet numbers and the decision on the side: give the case with --case",
+                false => {
                     "everything that depends on facets or on crossing leaves, which the mesh does not contain: give \
-                     the case with --case",
-                );
-            }
-        }
-        let enclosed = answer.deleted_by.as_ref().is_some_and(|d| d.rule.starts_with("enclosed"));
-        if let SideReason::Component { is_complete: false, is_proven, leaves_visited, .. } =
-            answer.side_decided_by
-            && (!is_proven || enclosed)
-        {
-            add(&format!(
-                "the rest of the component: {leaves_visited} leaves were visited, coarse ones first, so an earlier \
-                 candidate, a seed or a face on the root's boundary may have been missed"
-            ));
+                     the case with --case"
+                }
+            });
         }
         if self.manifest.tree == manifest::Tree::Base {
             add("gradation: the mesh is a base tree");

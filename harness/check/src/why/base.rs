@@ -1,23 +1,11 @@
-//! T0, octant by octant.
+//! T0: of the case or, without one, where the crossing leaves of the mesh show it.
 //!
 //! If section 3 requires the split of an octant, it requires the split of its ancestors. So the leaf of T0 at a
-//! point is the first octant on the way down that no rule splits, and no other part of T0 is needed.
+//! point is the first octant on the way down that no rule splits.
 
 use super::Mesh;
-use super::crossings::Crossings;
-use super::leaves::id;
 use contract::octant::{LEVEL_MAX, Octant};
-
-/// What is known of the surface.
-#[derive(Debug)]
-pub enum Surface<'a> {
-    /// The facets.
-    Facets(Crossings<'a>),
-    /// The crossing leaves, which the mesh keeps. An octant coarser than D contains one iff a facet crosses it.
-    Leaves,
-    /// Nothing: the facets are not given and the mesh has no crossing leaves.
-    Unknown,
-}
+use contract::word::Side;
 
 /// The causes of an octant in the inputs. Each alone is sufficient.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,28 +19,27 @@ pub struct Cause {
 }
 
 impl Mesh<'_> {
-    /// Whether the surface crosses an octant. Without facets the answer holds for octants coarser than D only.
+    /// Whether the surface crosses an octant that is a leaf of T0 or contains some. Without facets the answer holds for octants coarser
+    /// than D only: such an octant contains a crossing leaf iff a facet crosses it.
     pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
-        let id = id(octant);
-        if let Some(&known) = self.known.crossed.borrow().get(&id) {
-            return known;
+        match self.body {
+            Some((_, truth)) => {
+                truth.tree.kinds(truth.tree.at(octant)) & 1 << Side::Crossing as u8 != 0
+            }
+            None => self.leaves.has_crossing(octant),
         }
-        let crossed = match &self.surface {
-            Surface::Facets(crossings) => crossings.any(octant),
-            Surface::Leaves => self.leaves.has_crossing(octant),
-            Surface::Unknown => false,
-        };
-        self.known.crossed.borrow_mut().insert(id, crossed);
-        crossed
     }
 
     /// Whether T0 splits an octant.
     pub(super) fn base_splits(&self, octant: &Octant) -> bool {
-        if octant.level == LEVEL_MAX {
-            return false;
+        match self.body {
+            Some((_, truth)) => truth.tree.at(octant).is_node(),
+            None => {
+                octant.level < LEVEL_MAX
+                    && (self.terms.box_that_splits(octant).is_some()
+                        || octant.level < self.terms.level_surface && self.is_crossed(octant))
+            }
         }
-        self.terms.box_that_splits(octant).is_some()
-            || octant.level < self.terms.level_surface && self.is_crossed(octant)
     }
 
     /// The facets and boxes that require an octant to be split; `None` if none does.
@@ -73,10 +60,8 @@ impl Mesh<'_> {
 
     /// The facets that cross an octant, ascending; empty if facets are not known.
     pub(super) fn facets_of(&self, octant: &Octant) -> Vec<u32> {
-        match &self.surface {
-            Surface::Facets(crossings) => crossings.all(octant),
-            _ => Vec::new(),
-        }
+        let (low, high) = octant.bounds();
+        self.body.map_or(Vec::new(), |(facets, _)| facets.meeting(&facets.all(), low, high))
     }
 
     /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.
@@ -88,9 +73,15 @@ impl Mesh<'_> {
         Some(octant.ancestor(split_above.map_or(0, |level| level + 1)))
     }
 
+    /// The leaf of T0 that contains a level-19 cell.
+    pub(super) fn base_leaf_at(&self, cell: [u32; 3]) -> Octant {
+        let cell = Octant { corner: cell, level: LEVEL_MAX };
+        self.base_leaf(&cell).expect("level 19 is never split")
+    }
+
     /// Whether crossing leaves were deleted after gradation and are known from the facets.
     pub(super) fn has_deleted_crossing(&self) -> bool {
-        !self.terms.keep_crossing && matches!(self.surface, Surface::Facets(_))
+        !self.terms.keep_crossing && self.body.is_some()
     }
 
     /// A crossing leaf of T0 that by touching an octant forces it to split: the extra layer of section 6.

@@ -1,9 +1,8 @@
 //! Why a leaf has its size and its side, and which splits of a mesh have no cause.
 //!
-//! - [`leaves`]: the leaves by octant; [`crossings`]: the facets of an octant;
-//! - [`base`](mod@base): T0 where it is needed, octant by octant (section 3 of reference/DEFINITION.md);
+//! - [`leaves`]: the leaves by octant; [`base`](mod@base): T0 and its causes (section 3 of reference/DEFINITION.md);
 //! - [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`chain`]: a chain of them to a cause of T0; [`side`]: the rays or the seed of a component (section 4);
+//! - [`chain`]: a chain of them to a cause of T0;
 //! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
@@ -19,21 +18,45 @@ use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
 use crate::checks::Terms;
+use crate::checks::facets::Facets;
+use crate::checks::truth::Truth;
 use crate::diff::fields::differing_inputs;
 
 pub mod answer;
 pub mod base;
 pub mod chain;
-pub mod crossings;
 pub mod gradation;
 pub mod leaves;
-pub mod side;
 pub mod text;
 pub mod unneeded;
 
-use base::Surface;
-use crossings::Crossings;
 use leaves::Leaves;
+
+/// The body of a case: its facets, and T0 with the sides of its leaves.
+#[derive(Debug)]
+pub struct Body {
+    facets: Facets,
+    truth: Truth,
+}
+
+impl Body {
+    /// The body of the case from which a mesh was made.
+    ///
+    /// # Errors
+    /// One sentence, if the case is not that of the mesh, or if its T0 is too large.
+    pub fn of(case: &Case, manifest: &Manifest) -> Result<Self, String> {
+        let (terms, geometry) = (Terms::of_case(case), Geometry::of(&case.facets_lattice));
+        if terms != Terms::of_manifest(manifest) || manifest.geometry.is_some_and(|g| g != geometry)
+        {
+            return Err(other_inputs(manifest, case));
+        }
+        let facets = Facets::new(&case.facets_lattice);
+        let truth = Truth::new(&facets, &case.facets_lattice, &terms).ok_or_else(|| {
+            format!("T0 of the case has more than {} leaves: omit --case", Truth::LEAVES_MAX)
+        })?;
+        Ok(Self { facets, truth })
+    }
+}
 
 /// A mesh with the inputs that explain it.
 #[derive(Debug)]
@@ -41,7 +64,8 @@ pub struct Mesh<'a> {
     manifest: &'a Manifest,
     leaves: Leaves<'a>,
     terms: Terms,
-    surface: Surface<'a>,
+    /// The facets and T0, if the case is known.
+    body: Option<(&'a Facets, &'a Truth)>,
     /// Whether the leaves are those of T0, which precedes gradation.
     is_base: bool,
     /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
@@ -55,30 +79,15 @@ pub struct Mesh<'a> {
 /// Answers by [`leaves::id`].
 #[derive(Debug, Default)]
 struct Known {
-    crossed: RefCell<FxHashMap<u64, bool>>,
     deep: RefCell<FxHashMap<u64, bool>>,
     justified: RefCell<FxHashMap<u64, bool>>,
 }
 
 impl<'a> Mesh<'a> {
-    /// A mesh of this case. Without its case, facets are not known.
-    ///
-    /// # Errors
-    /// One sentence, if the case is not that of the mesh.
-    pub fn of(
-        manifest: &'a Manifest,
-        tree: &'a Tree,
-        case: Option<&'a Case>,
-    ) -> Result<Self, String> {
-        let terms = Terms::of_manifest(manifest);
-        let is_other = |case: &&Case| {
-            let geometry = || Geometry::of(&case.facets_lattice);
-            Terms::of_case(case) != terms || manifest.geometry.is_some_and(|g| g != geometry())
-        };
-        match case.filter(is_other) {
-            Some(case) => Err(other_inputs(manifest, case)),
-            None => Ok(Self::new(manifest, tree, terms, case)),
-        }
+    /// A mesh of this body. Without it, facets are not known.
+    pub fn of(manifest: &'a Manifest, tree: &'a Tree, body: Option<&'a Body>) -> Self {
+        let body = body.map(|Body { facets, truth }| (facets, truth));
+        Self::new(manifest, tree, Terms::of_manifest(manifest), body)
     }
 
     /// A mesh of these inputs.
@@ -86,26 +95,26 @@ impl<'a> Mesh<'a> {
         manifest: &'a Manifest,
         tree: &'a Tree,
         mut terms: Terms,
-        case: Option<&'a Case>,
+        body: Option<(&'a Facets, &'a Truth)>,
     ) -> Self {
         let is_base = manifest.tree == manifest::Tree::Base;
         if is_base {
             (terms.keep, terms.keep_crossing) = (manifest::Keep::All, true);
         }
-        let surface = match case {
-            Some(case) => Surface::Facets(Crossings::new(&case.facets_lattice)),
-            None if terms.keep_crossing => Surface::Leaves,
-            None => Surface::Unknown,
-        };
         let level_deepest = tree.finest_level(tree.root(), 0).max(required(&terms));
         let (leaves, known) = (Leaves::new(tree), Known::default());
-        Self { manifest, leaves, terms, surface, is_base, distrusts: false, level_deepest, known }
+        Self { manifest, leaves, terms, body, is_base, distrusts: false, level_deepest, known }
     }
 
     /// The same mesh, in which needless splits justify nothing.
-    fn distrusting(self) -> Self {
+    pub(crate) fn distrusting(self) -> Self {
         let level_deepest = required(&self.terms);
         Self { distrusts: true, level_deepest, ..self }
+    }
+
+    /// Whether it is known where the surface is: from the facets, or from the crossing leaves of the mesh.
+    pub(crate) fn knows_surface(&self) -> bool {
+        self.body.is_some() || self.terms.keep_crossing
     }
 
     /// An octant as text, with its bounds in the user's units.

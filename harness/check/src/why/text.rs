@@ -53,10 +53,10 @@ impl Answer {
         let graded = &self.splits[of_base..];
         for (i, split) in graded.iter().enumerate() {
             writeln!(f, "  level {}: {} is split", split.octant.level, user_place(&split.octant))?;
-            let Some(cause) = &split.cause else {
+            if split.cause.is_none() {
                 writeln!(f, "    no rule that is known requires it (harness why --unneeded)")?;
                 continue;
-            };
+            }
             // Chains of successive levels often end alike.
             let continued = |other: &&Split| {
                 other.links.get(1..) == split.links.get(1..) && other.cause == split.cause
@@ -67,7 +67,7 @@ impl Answer {
                     writeln!(f, "    {}", sentence(link))?;
                     writeln!(f, "    its parent is split as in the chain of level {level}")?;
                 }
-                _ => links(split, cause, f)?,
+                _ => split.clauses().iter().try_for_each(|c| writeln!(f, "    {c}"))?,
             }
             let links = split.links.len();
             let noun = if links == 1 { "leaf" } else { "leaves" };
@@ -112,20 +112,12 @@ impl Answer {
                     _ => Ok(()),
                 }
             }
-            SideReason::Component {
-                side,
-                decision,
-                candidate,
-                leaves_visited,
-                is_complete,
-                ..
-            } => {
+            SideReason::Component { side, decision, candidate, leaves, .. } => {
                 write!(f, "side\n  {side} by section 4: {decision}")?;
                 if let Some(candidate) = candidate {
                     write!(f, "\n  candidate: {}", user_place(candidate))?;
                 }
-                let part = if *is_complete { "has" } else { "has at least" };
-                write!(f, "\n  the component {part} {leaves_visited} leaves of T0")?;
+                write!(f, "\n  the component has {leaves} leaves of T0")?;
                 match self.side {
                     Some(found) if found != *side => {
                         write!(f, "\n  but the mesh has the side {found} here")
@@ -138,17 +130,22 @@ impl Answer {
     }
 }
 
-/// The links of a chain and the cause at its end.
-fn links(split: &Split, cause: &CauseRecord, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    for (i, link) in split.links.iter().enumerate() {
-        let subject = if i == 0 { "" } else { "its parent is split " };
-        writeln!(f, "    {subject}{}", sentence(link))?;
+impl Split {
+    /// The clauses of the chain, from what forces the split to the cause; empty if no rule requires the split.
+    pub(crate) fn clauses(&self) -> Vec<String> {
+        let Some(cause) = &self.cause else { return Vec::new() };
+        let clause = |(i, link): (usize, &LinkRecord)| match i {
+            0 => sentence(link),
+            _ => format!("its parent is split {}", sentence(link)),
+        };
+        let subject = match self.links.last() {
+            None => "by section 3",
+            Some(link) if link.rule == "extra_layer" => "it is crossing by section 4",
+            Some(_) => "its parent is split by section 3",
+        };
+        let end = format!("{subject}: {}", what(cause));
+        self.links.iter().enumerate().map(clause).chain([end]).collect()
     }
-    let subject = match split.links.last() {
-        Some(link) if link.rule == "extra_layer" => "it is crossing by section 4",
-        _ => "its parent is split by section 3",
-    };
-    writeln!(f, "    {subject}: {}", what(cause))
 }
 
 /// A link as a clause.

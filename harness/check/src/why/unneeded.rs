@@ -13,7 +13,6 @@ use std::fs;
 
 use super::Mesh;
 use super::answer::{Place, user_place};
-use super::base::Surface;
 use contract::octant::Octant;
 use serde::Serialize;
 
@@ -60,7 +59,7 @@ impl Mesh<'_> {
     /// # Errors
     /// One sentence, if the mesh is invalid, its surface is not known, or it is too large for the memory that is available.
     pub fn unneeded(self, first: usize) -> Result<Unneeded, String> {
-        if matches!(self.surface, Surface::Unknown) {
+        if !self.knows_surface() {
             return Err("the mesh has no crossing leaves, so the surface is not known; give its case with --case"
                 .to_owned());
         }
@@ -173,7 +172,7 @@ impl fmt::Display for Unneeded {
             writeln!(f, "  {}, {} leaves", user_place(&subtree.octant), subtree.leaves)?;
         }
         if (self.first.len() as u64) < *subtrees {
-            writeln!(f, "  and {} more (--first)", subtrees - self.first.len() as u64)?;
+            writeln!(f, "  and {} more (--limit)", subtrees - self.first.len() as u64)?;
         }
         match &self.largest {
             Some(largest) => {

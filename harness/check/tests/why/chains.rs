@@ -77,10 +77,7 @@ proptest! {
             let side = word::side(*word.unwrap());
             match &answer.side_decided_by {
                 SideReason::Facets { .. } => prop_assert_eq!(side, Side::Crossing),
-                SideReason::Component { side: decided, is_complete, .. } => {
-                    prop_assert!(*is_complete);
-                    prop_assert_eq!(side, *decided);
-                }
+                SideReason::Component { side: decided, .. } => prop_assert_eq!(side, *decided),
                 SideReason::Unknown => prop_assert!(false, "{answer}"),
             }
             if let Some(deletion) = &answer.deleted_by {
@@ -180,8 +177,7 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     assert!(why.contains("outside the root"), "{why}");
     let mut other = correct.case.clone();
     other.layer_cells_min += 1;
-    let tree = Tree::of_words(&correct.mesh.words);
-    let why = Mesh::of(&correct.mesh.manifest, &tree, Some(&other)).unwrap_err();
+    let why = Body::of(&other, &correct.mesh.manifest).unwrap_err();
     let n = other.layer_cells_min;
     let expected = format!(
         "the mesh was made from other inputs than the case (layer_cells_min: {} in the mesh; {n} in the case); give the case \
@@ -190,6 +186,6 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     );
     assert_eq!(why, expected);
     correct.mesh.manifest.sides = contract::manifest::Sides::Unknown;
-    let why = Mesh::of(&correct.mesh.manifest, &tree, Some(&correct.case)).unwrap_err();
+    let why = Body::of(&correct.case, &correct.mesh.manifest).unwrap_err();
     assert!(why.contains("than the case (the sides of the mesh are unknown); give"), "{why}");
 }

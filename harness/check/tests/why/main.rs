@@ -12,7 +12,7 @@ mod unneeded;
 
 use check::selftest::CASES;
 use check::selftest::SelftestCase;
-use check::why::Mesh;
+use check::why::{Body, Mesh};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::testing::assert_text;
@@ -23,7 +23,8 @@ use proptest::prelude::*;
 
 fn with_mesh<T>(set: &LeafSet, case: Option<&Case>, examine: impl FnOnce(Mesh) -> T) -> T {
     let tree = Tree::of_words(&set.words);
-    examine(Mesh::of(&set.manifest, &tree, case).unwrap())
+    let body = case.map(|case| Body::of(case, &set.manifest).unwrap());
+    examine(Mesh::of(&set.manifest, &tree, body.as_ref()))
 }
 
 /// Final mesh and T0 of facets and the text of a case.

@@ -4,8 +4,6 @@ use super::*;
 use check::checks::Terms;
 use check::checks::components;
 use check::why::answer::{Answer, SideReason};
-use contract::manifest::Tree;
-use contract::testing::words_of;
 use contract::word::{self, Side};
 
 /// Two nested spheres: the far field, a wall and a cavity.
@@ -52,8 +50,8 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
     let mut seeds = Vec::new();
     for answer in explain(&correct) {
         match answer.side_decided_by {
-            SideReason::Component { side, seed, is_complete, rays_odd, .. } => {
-                assert!(is_complete && rays_odd.is_none());
+            SideReason::Component { side, seed, rays_odd, .. } => {
+                assert!(rays_odd.is_none());
                 assert_eq!((Some(side), seed.is_some()), (answer.side, side == Side::Outside));
                 seeds.push(seed);
             }
@@ -137,14 +135,13 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
         let correct = made(&text, &body);
         let answer =
             with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
-        let SideReason::Component { side, decision, leaves_visited, .. } = answer.side_decided_by
-        else {
+        let SideReason::Component { side, decision, leaves, .. } = answer.side_decided_by else {
             panic!("no facet crosses the leaf")
         };
         let expected = if twice < 3 { Side::Inside } else { Side::Outside };
         assert_eq!((side, answer.side), (expected, Some(expected)), "{twice}: {decision}");
         if (1..6).contains(&twice) {
-            let candidates = leaves_visited.min(32) as usize;
+            let candidates = leaves.min(32) as usize;
             let text = format!(
                 "the component is ambiguous: the rays of no candidate agree, and {} of the {} rays of {candidates} \
                  candidates are odd",
@@ -156,42 +153,4 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
             assert!(decision.starts_with("each of the six rays"), "{twice}: {decision}");
         }
     }
-}
-
-/// A thin wall divides the root but for an opening, and the component around it has too many leaves for a search.
-#[test]
-fn a_decision_about_part_of_a_component_is_proven_only_if_no_candidate_before_it_is_unknown() {
-    let wall = cuboid([[0.1, 0.3], [-8.0, 7.0], [-8.0, 8.0]]);
-    let whole = "[[box]]\nmin = [-8.0, -8.0, -8.0]\nmax = [8.0, 8.0, 8.0]\nspacing = 0.25\n";
-    let explain_with = |wall: &[Facet], seeds: &str, point: [f64; 3]| {
-        let text = format!(
-            "spacing_min = 0.25\nlayer_cells_min = 1\nkeep = 'all'\nseeds = {seeds}\n{ROOT}{whole}"
-        );
-        let case = Case::from_parts(&text, wall.to_vec()).unwrap();
-        let manifest = case.manifest(Tree::Base, "test".to_owned());
-        let set = LeafSet::new(manifest, vec![]).with_parts(vec![words_of(|o| o.level < 6)]);
-        let answer = with_mesh(&set, Some(&case), |mesh| mesh.at(point).unwrap());
-        match answer.side_decided_by {
-            SideReason::Component { decision, candidate, is_complete, is_proven, .. } => {
-                assert!(!is_complete, "{decision}");
-                let is_rest = |what: &String| what.starts_with("the rest of the component: ");
-                assert_eq!(answer.left_out.iter().any(is_rest), !is_proven, "{decision}");
-                (candidate.map(|place| place.octant.path()), is_proven, decision)
-            }
-            _ => panic!("{answer}"),
-        }
-    };
-    let explain = |seeds: &str, point| explain_with(&wall, seeds, point);
-    let (candidate, is_proven, _) = explain("[]", [-4.0; 3]);
-    assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.0"), true));
-    let (candidate, is_proven, _) = explain("[]", [4.0, -4.0, -4.0]);
-    assert_eq!((candidate.as_deref(), is_proven), (Some("1.0.0.0.1.0"), false));
-    // Crossing leaves are no candidates.
-    let first = cuboid([[-7.95, -7.85], [-7.95, -7.85], [-7.95, -7.85]]);
-    let (candidate, is_proven, _) = explain_with(&first, "[]", [-4.0; 3]);
-    assert_eq!((candidate.as_deref(), is_proven), (Some("0.0.0.0.0.1"), true));
-    let (_, is_proven, decision) = explain("[[7.9, 7.9, 7.9]]", [-4.0; 3]);
-    assert_eq!((decision.as_str(), is_proven), ("no seed was found in its component", false));
-    let (_, is_proven, decision) = explain("[[-7.9, -7.9, -7.9]]", [-4.0; 3]);
-    assert_eq!((decision.as_str(), is_proven), ("seed 0 lies in its component", true));
 }

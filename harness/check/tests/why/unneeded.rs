@@ -201,7 +201,7 @@ fn the_report_lists_as_many_octants_as_wanted_and_the_largest() {
     assert!(lines[3].starts_with("the largest: ") && lines[3].ends_with(", 15 leaves"), "{both}");
     assert_eq!(lines.len(), 4, "{both}");
     let one = report(words, 1);
-    assert_eq!(one.lines().nth(2), Some("  and 1 more (--first)"), "{one}");
+    assert_eq!(one.lines().nth(2), Some("  and 1 more (--limit)"), "{one}");
 }
 
 #[test]

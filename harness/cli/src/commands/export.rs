@@ -1,20 +1,18 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
 use super::foam::FoamArguments;
+use super::progress::Progress;
 use super::selection::SelectionArguments;
 use super::values::Input;
 use crate::failure::Failure;
 use clap::Args;
 use export::format::{self, FORMATS};
 use export::mesh::Mesh;
-use export::options::{Options, Summary, Watch};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use run::engine::interrupt;
+use export::options::{Options, Summary};
 use run::verify::report::EXIT_HOLDS;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
-use std::time::Duration;
 
 /// `harness export`.
 #[derive(Args, Debug)]
@@ -78,37 +76,11 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
-    let progress = Progress::new();
+    let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %");
     let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
     let written = (format.write)(&mesh, &selection, file, &options);
-    progress.0.finish_and_clear();
+    progress.finish();
     Ok(written?)
-}
-
-/// A line on standard error, only if that is a terminal.
-struct Progress(ProgressBar);
-
-impl Progress {
-    fn new() -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{spinner} [{elapsed}] {wide_bar} {percent} %");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        if !bar.is_hidden() {
-            bar.enable_steady_tick(Duration::from_millis(200));
-        }
-        Self(bar)
-    }
-}
-
-impl Watch for Progress {
-    fn progress(&self, done: u64, total: u64) {
-        self.0.set_length(total);
-        self.0.set_position(done);
-    }
-
-    fn is_interrupted(&self) -> bool {
-        interrupt::requested()
-    }
 }
 
 #[cfg(test)]

@@ -13,11 +13,11 @@ pub struct FoamArguments {
     /// Write text; default: binary
     #[arg(long)]
     ascii: bool,
-    /// Bits of a label, 32 or 64 [default: 32]
-    #[arg(long, value_name = "BITS", value_parser = label)]
+    /// Bits of a label [default: 32]
+    #[arg(long, value_name = "BITS")]
     label: Option<Label>,
-    /// Regions of cells that no face connects: all, or the largest one only [default: all]
-    #[arg(long, value_name = "all|largest", value_parser = regions)]
+    /// Regions of cells that no face connects [default: all]
+    #[arg(long)]
     regions: Option<Regions>,
     /// Write directories processor0 to processorN-1 instead: N equal intervals of the Morton curve, or `ranks` of the mesher
     #[arg(long, value_name = "N|ranks", value_parser = processors)]
@@ -59,22 +59,6 @@ impl FoamArguments {
             processors: self.processors,
             case,
         }
-    }
-}
-
-fn label(bits: &str) -> Result<Label, String> {
-    match bits {
-        "32" => Ok(Label::Bits32),
-        "64" => Ok(Label::Bits64),
-        _ => Err("labels have 32 or 64 bits".to_owned()),
-    }
-}
-
-fn regions(regions: &str) -> Result<Regions, String> {
-    match regions {
-        "all" => Ok(Regions::All),
-        "largest" => Ok(Regions::Largest),
-        _ => Err("choose all or largest".to_owned()),
     }
 }
 

@@ -38,7 +38,7 @@ pub struct Arguments {
     no_intersections: bool,
     /// Places to list for each kind of finding
     #[arg(long, value_name = "N", default_value = "5")]
-    first: NonZero<usize>,
+    limit: NonZero<usize>,
 }
 
 /// Diagnoses, prints and writes; returns the exit code.
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
     let input = Input::read(&arguments.file, &Requested { spacing_min, root, root_scale })?;
     let options =
-        Options { intersections: !arguments.no_intersections, first: arguments.first.get() };
+        Options { intersections: !arguments.no_intersections, first: arguments.limit.get() };
     let diagnosis = diagnose(&input, &options);
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {

@@ -1,6 +1,7 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use super::programs::ProgramArguments;
+use super::progress::Progress;
 use super::values::{Output, Point, cell_count, with_extension};
 use crate::failure::Failure;
 use clap::Args;
@@ -11,7 +12,6 @@ use contract::manifest::Keep;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
 use geometry::leak::{LeakError, Leaks, Watch};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::json::pretty;
 use report::leak::{picture, polyline};
 use run::base_tree::BaseTrees;
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
-    let progress = Progress::new();
+    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}");
     let (mut first, ends) = match arguments.from {
         Some(Point(from)) => (None, vec![(from, arguments.to)]),
         None => {
@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress).map_err(failed)?;
     let answers = leaks.answers(&ends).map_err(failed)?;
-    progress.0.finish_and_clear();
+    progress.finish();
     let widest = answers.examined.iter().filter_map(|report| report.passage.as_ref());
     let widest = widest.max_by(|a, b| a.narrowest.width.total_cmp(&b.narrowest.width));
     let picture = widest.map(|passage| (passage, leaks.words(passage)));
@@ -199,31 +199,6 @@ fn write(
     let files: Vec<_> = all.filter_map(|(file, fill)| Some((file.as_deref()?, fill))).collect();
     write_together(&files, |path, error| Failure::from(named(path, &error)))?;
     if files.is_empty() && interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) }
-}
-
-/// A line on standard error that names the current step, only if that is a terminal.
-struct Progress(ProgressBar);
-
-impl Progress {
-    fn new() -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{spinner} [{elapsed}] {wide_msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        if !bar.is_hidden() {
-            bar.enable_steady_tick(Duration::from_millis(200));
-        }
-        Self(bar)
-    }
-}
-
-impl Watch for Progress {
-    fn step(&self, what: &str) {
-        self.0.set_message(what.to_owned());
-    }
-
-    fn is_interrupted(&self) -> bool {
-        interrupt::requested()
-    }
 }
 
 fn target(text: &str) -> Result<Target, String> {

@@ -5,10 +5,10 @@ use super::paper;
 use super::selection::SelectionArguments;
 use super::view::{command, write_view};
 use crate::failure::Failure;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use contract::octant::LEVEL_MAX;
 use export::mesh::Mesh;
-use report::picture::colour;
+use report::picture::colour::Colour;
 use report::picture::format::{Format, write};
 use report::picture::scene::Scene;
 use report::picture::{Picture, Request};
@@ -64,30 +64,6 @@ pub struct Arguments {
     /// Which cells are drawn.
     #[command(flatten)]
     selection: SelectionArguments,
-}
-
-/// The quantity that colours show.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Colour {
-    /// Level of a cell
-    Level,
-    /// Rank that made a cell
-    Rank,
-    /// Outside, inside or crossing
-    Side,
-    /// Edge of a cell
-    Spacing,
-}
-
-impl From<Colour> for colour::Colour {
-    fn from(colour: Colour) -> Self {
-        match colour {
-            Colour::Level => Self::Level,
-            Colour::Rank => Self::Rank,
-            Colour::Side => Self::Side,
-            Colour::Spacing => Self::Spacing,
-        }
-    }
 }
 
 /// Draws; returns the exit code.
@@ -157,7 +133,7 @@ fn request<'a>(
     Ok(Request {
         selection: arguments.selection.of(mesh)?,
         body: meshed.case.as_ref().map(|case| &case.facets[..]),
-        colour: arguments.colour.into(),
+        colour: arguments.colour,
         zoom: arguments.zoom,
         level_max: LEVEL_MAX,
         command: command(),

@@ -4,7 +4,7 @@ use super::files::put;
 use super::meshed::MeshArguments;
 use super::values::{Output, Point};
 use crate::failure::Failure;
-use check::why::Mesh;
+use check::why::{Body, Mesh};
 use clap::Args;
 use contract::mesh;
 use report::json::pretty;
@@ -43,7 +43,7 @@ pub struct Arguments {
     json: Option<Output>,
     /// Octants to list with --unneeded
     #[arg(long, value_name = "N", default_value = "10")]
-    first: NonZero<usize>,
+    limit: NonZero<usize>,
 }
 
 /// Explains or audits, prints and writes; returns the exit code.
@@ -54,13 +54,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let made = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    let mesh = Mesh::of(&disk.manifest, &tree, made.case.as_ref())
-        .map_err(|why| format!("{}: {why}", made.dir.display()))?;
+    let body = made.case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
+    let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
+    let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
     if let Some(Point(point)) = arguments.point {
         print(&mesh.at(point)?, arguments.json.as_deref())?;
         return Ok(EXIT_HOLDS);
     }
-    let found = mesh.unneeded(arguments.first.get())?;
+    let found = mesh.unneeded(arguments.limit.get())?;
     print(&found, arguments.json.as_deref())?;
     Ok(if found.unneeded == 0 { EXIT_HOLDS } else { EXIT_FAILED })
 }

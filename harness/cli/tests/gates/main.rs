@@ -27,7 +27,7 @@ fn a_failure_on_three_ranks_is_shrunk_to_its_two_facets() {
     );
     // The expected mesh has one leaf.
     assert!(
-        outcome.printed.contains("nothing in either mesh requires the split")
+        outcome.printed.contains("balance requires the split")
             || outcome.printed.contains("section 3"),
         "{}",
         outcome.printed

@@ -45,7 +45,7 @@ impl Faces {
         let mut all = Self::default();
         let mut of_patches = vec![Self::default(); patches.names.len()];
         let (mut of_cell, mut owned) = (Vec::new(), Vec::new());
-        leaves.walk(points.near(), options, &mut |cell, around| {
+        leaves.walk(options, &mut |cell, around| {
             squares(leaves, around, &mut of_cell);
             owned.clear();
             for (i, square) in of_cell.iter().enumerate() {
@@ -54,14 +54,14 @@ impl Faces {
                     Some(across) => owned.extend(square.is_high.then_some((across, i))),
                     None => {
                         let patch = &mut of_patches[patches.of(square)];
-                        square.polygon(around, &mut patch.vertices);
+                        points.polygon(square, &mut patch.vertices);
                         patch.end(cell);
                     }
                 }
             }
             owned.sort_unstable();
             for &(across, i) in &owned {
-                of_cell[i].polygon(around, &mut all.vertices);
+                points.polygon(&of_cell[i], &mut all.vertices);
                 all.end(cell);
                 all.neighbour.push(across);
             }

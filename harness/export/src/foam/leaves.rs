@@ -107,22 +107,21 @@ impl Leaves {
     ///
     /// # Errors
     /// The first error of `visit`, or the user's interrupt.
-    pub fn walk<P: Follow>(
+    pub fn walk(
         &self,
-        more: P,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around<P>) -> Result<(), ExportError>,
+        visit: &mut impl FnMut(u32, &Around) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         let content = self.content(0, self.words.len(), 0);
         let across = [[Content::Outside; 2]; 3];
-        self.descend(&Around { octant: Octant::ROOT, more, content, across }, options, visit)
+        self.descend(&Around { octant: Octant::ROOT, content, across }, options, visit)
     }
 
-    fn descend<P: Follow>(
+    fn descend(
         &self,
-        around: &Around<P>,
+        around: &Around,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around<P>) -> Result<(), ExportError>,
+        visit: &mut impl FnMut(u32, &Around) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         if let Content::Cell(number) = around.content {
             options.check_at(u64::from(number))?;
@@ -142,7 +141,6 @@ impl Leaves {
             };
             let child = Around {
                 octant: around.octant.child(digit as u8),
-                more: around.more.child(level, digit),
                 content: own[digit],
                 across: std::array::from_fn(|axis| [across(axis, 0), across(axis, 1)]),
             };
@@ -152,23 +150,11 @@ impl Leaves {
     }
 }
 
-/// What a walk finds for an octant from what it found for the parent.
-pub trait Follow: Copy {
-    /// The same for a child, which has this level.
-    fn child(self, level: u8, digit: usize) -> Self;
-}
-
-impl Follow for () {
-    fn child(self, _: u8, _: usize) {}
-}
-
 /// An octant with its content and that of the octants of the same level across its faces.
 #[derive(Clone, Copy, Debug)]
-pub struct Around<P> {
+pub struct Around {
     /// The octant.
     pub octant: Octant,
-    /// What else the walk follows.
-    pub more: P,
     content: Content,
     /// On the low and on the high side of each axis.
     pub across: [[Content; 2]; 3],

@@ -36,7 +36,7 @@ impl Regions {
         // Sets of cells, which are represented by their first cells.
         let mut sets: Vec<u32> = (0..leaves.count()).collect();
         let mut of_cell = Vec::new();
-        leaves.walk((), options, &mut |cell, around| {
+        leaves.walk(options, &mut |cell, around| {
             squares(leaves, around, &mut of_cell);
             let high = of_cell.iter().filter(|square| square.is_high);
             for across in high.filter_map(|square| square.across.as_cell()) {

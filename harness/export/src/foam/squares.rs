@@ -7,8 +7,8 @@
 
 use contract::octant::CELLS_PER_EDGE;
 
-use super::leaves::{Around, Content, Follow, Leaves};
-use super::points::{Near, Point};
+use super::leaves::{Around, Content, Leaves};
+use super::points::Point;
 
 /// A square that a cell shares with another cell or with a boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub struct Square {
 }
 
 /// Replaces `squares` by those of a cell.
-pub fn squares<P: Follow>(leaves: &Leaves, around: &Around<P>, squares: &mut Vec<Square>) {
+pub fn squares(leaves: &Leaves, around: &Around, squares: &mut Vec<Square>) {
     squares.clear();
     let (edge, level) = (around.octant.edge(), around.octant.level);
     for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
@@ -77,15 +77,5 @@ impl Square {
             corner[v] += j * edge;
             corner
         })
-    }
-
-    /// Appends the numbers of the vertices, around a normal that points away from the cell, the minimum corner first.
-    pub fn polygon(&self, around: &Around<Near>, polygon: &mut Vec<u32>) {
-        let mut face = around.more.on_face(self.axis, self.is_high);
-        for level in around.octant.level + 1..=self.level {
-            let bit = |a: usize| usize::from(self.corner[a % 3] & CELLS_PER_EDGE >> level != 0);
-            face = face.quarter(level, bit(self.axis + 1) | bit(self.axis + 2) << 1);
-        }
-        face.polygon(self.level, !self.is_high, polygon);
     }
 }

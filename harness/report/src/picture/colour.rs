@@ -11,15 +11,15 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 /// The quantity that colours show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Colour {
-    /// The level of a leaf.
+    /// Level of a cell
     Level,
-    /// The rank that wrote a leaf.
+    /// Rank that made a cell
     Rank,
-    /// The side of a leaf.
+    /// Outside, inside or crossing
     Side,
-    /// The edge of a leaf in the user's units.
+    /// Edge of a cell
     Spacing,
 }
 

@@ -78,7 +78,7 @@ impl Found<'_> {
     /// Every component of flow has a seed.
     fn check_seeds(&self, result: &mut CheckResult) {
         let seeded = components::seeded_leaves(&self.octants, self.terms);
-        let has_seed = |group: &[u32]| group.iter().any(|i| seeded.binary_search(i).is_ok());
+        let has_seed = |group: &[u32]| components::seed_in(group, &seeded).is_some();
         for group in self.of_side(self.terms.side_of_flow()).filter(|group| !has_seed(group)) {
             result.report_with(|| {
                 format!("no seed lies in a component of flow, that of {}", self.describe(group))

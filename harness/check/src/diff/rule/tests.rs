@@ -1,251 +1,146 @@
 use super::*;
-use contract::lattice::Root;
-use contract::manifest::Enclosed;
+use crate::checks::facets::Facets;
+use crate::checks::truth::Truth;
+use crate::why::Body;
+use contract::case::Case;
+use contract::manifest;
+use contract::tree::Tree;
 
-fn terms(n: u32) -> Terms {
-    let root = Root { origin: [0.0; 3], edge: 8.0 };
-    Terms {
-        root,
-        level_surface: 3,
-        layer_cells_min: n,
-        keep: Keep::All,
-        keep_crossing: true,
-        boxes: vec![],
-        seeds: vec![],
-        enclosed: Enclosed::Delete,
-        sides: Default::default(),
-    }
+const ROOT: &str = "root = { origin = [-4.0, -4.0, -4.0], edge = 8.0 }";
+/// In octant 0.7.0, which has the level of the surface.
+const FACET: [[f32; 3]; 3] = [[-1.5, -1.5, -1.5], [-1.2, -1.5, -1.5], [-1.5, -1.2, -1.5]];
+
+fn case(keys: &str, facets: &[[[f32; 3]; 3]]) -> Case {
+    Case::from_parts(&format!("spacing_min = 1.0\n{keys}\n{ROOT}"), facets.to_vec()).unwrap()
 }
 
-/// Sorted words of octants that are given by their paths, all with side outside.
-fn mesh(paths: &[&[u8]]) -> Vec<u64> {
-    let octant =
-        |path: &&[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
-    let leaf = |path| word::encode(&Leaf { octant: octant(path), side: Side::Outside });
-    let mut words: Vec<u64> = paths.iter().map(leaf).collect();
-    words.sort_unstable();
+fn octant(path: &[u8]) -> Octant {
+    path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit))
+}
+
+/// The word of an outside leaf.
+fn leaf(path: &[u8]) -> u64 {
+    word::encode(&Leaf { octant: octant(path), side: Side::Outside })
+}
+
+/// The rule at the first difference of two meshes, whose case is given with `--case` or not.
+fn rule(case: &Case, is_given: bool, a: &[u64], b: &[u64]) -> String {
+    let manifest = case.manifest(manifest::Tree::Final, "test".to_owned());
+    let body = is_given.then(|| Body::of(case, &manifest).unwrap());
+    let trees = [a, b].map(Tree::of_words);
+    let [of_a, of_b] =
+        trees.each_ref().map(|tree| Mesh::of(&manifest, tree, body.as_ref()).distrusting());
+    let terms = Terms::of_manifest(&manifest);
+    let first = a.iter().zip(b).take_while(|(x, y)| x == y).count();
+    let dispute = Dispute { a: of_a, b: of_b, terms: &terms };
+    dispute.rule(a.get(first).copied(), b.get(first).copied())
+}
+
+/// T0 with these leaves split.
+fn split(case: &Case, paths: &[&[u8]]) -> Vec<u64> {
+    let facets = Facets::new(&case.facets_lattice);
+    let truth = Truth::new(&facets, &case.facets_lattice, &Terms::of_case(case)).unwrap();
+    let mut words = truth.words;
+    for path in paths {
+        let i = words.iter().position(|&w| word::octant(w) == octant(path)).expect("a leaf");
+        let side = word::side(words[i]);
+        let child = |digit| word::encode(&Leaf { octant: octant(path).child(digit), side });
+        words.splice(i..=i, (0..8).map(child));
+    }
     words
 }
 
-fn rule(a: &[u64], b: &[u64], n: u32) -> String {
-    let first = a.iter().zip(b).take_while(|(x, y)| x == y).count();
-    let terms = terms(n);
-    let dispute = Dispute { a, b, terms: &terms, case: None };
-    dispute.rule(a.get(first).copied(), b.get(first).copied()).join("\n")
-}
-
-/// Two meshes with the octant `fine`, one with the octant 1 as a leaf, and one with three of its children
-/// instead.
-fn pair(fine: &[u8]) -> (Vec<u64>, Vec<u64>) {
-    let unsplit = mesh(&[fine, &[1]]);
-    let split = mesh(&[fine, &[1, 0], &[1, 1], &[1, 2]]);
-    (unsplit, split)
-}
-
 #[test]
-fn rules_of_layer_and_balance_name_their_witness() {
-    let (unsplit, split) = pair(&[0, 1]);
-    let text = rule(&unsplit, &split, 2);
-    assert!(
-        text.contains("step 2 (layer)")
-            && text.ends_with("by the leaf octant 0.1 (level 2), which both have: B is right"),
-        "{text}"
-    );
-    let text = rule(&unsplit, &split, 1);
-    assert!(
-        text.contains("nothing in either mesh requires") && text.contains("A is right"),
-        "{text}"
-    );
-    let (unsplit, split) = pair(&[0, 1, 1]);
-    let text = rule(&split, &unsplit, 1);
-    assert!(text.contains("step 3 (balance)") && text.contains("A is right"), "{text}");
-}
-
-#[test]
-fn the_search_continues_at_a_disputed_witness() {
-    // Octant 1.2 is needlessly split in B only. Its children require the split of octant 3.
-    let a = mesh(&[&[1, 2], &[3]]);
-    let b = mesh(&[&[1, 2, 2], &[3, 0], &[3, 1]]);
-    let (first_a, first_b) = (mesh(&[&[3]])[0], mesh(&[&[3, 0]])[0]);
-    let terms = terms(1);
-    let text =
-        Dispute { a: &a, b: &b, terms: &terms, case: None }.rule(Some(first_a), Some(first_b));
-    assert_eq!(text.len(), 2, "{text:?}");
-    assert!(text[0].contains("octant 1.2.2 (level 3), which A does not have"), "{text:?}");
-    assert!(
-        text[1].contains("leaf octant 1.2 (level 2)") && text[1].contains("A is right"),
-        "{text:?}"
-    );
-}
-
-#[test]
-fn a_leaf_requires_a_split_up_to_the_distance_of_its_rule() {
-    let octant = |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
-    let requires = |n: u32, source: &[u8], target: &[u8]| {
-        let terms = terms(n);
-        let dispute = Dispute { a: &[], b: &[], terms: &terms, case: None };
-        dispute.requires(&octant(source), &octant(target))
-    };
-    // Octant 0.0.1 of level 3 is two of its cells away from octant 1, 0.1.0 one, and 0.1.1 touches it.
-    for (source, touching, cells) in
-        [(&[0, 0, 1], false, 2), (&[0, 1, 0], false, 1), (&[0, 1, 1], true, 0)]
-    {
-        for n in 1..=4 {
-            let text = requires(n, source, &[1]);
-            if cells + 1 < n {
-                let expected = format!(
-                    "section 6, step 2 (layer): it is nearer than n - 1 = {} cells of level 3, so it has level >= 3",
-                    n - 1
-                );
-                assert_eq!(text, Some(expected), "{n} cells, {cells} away");
-            } else if touching {
-                let expected = "section 6, step 3 (balance): it touches a leaf of level 3, so it has level >= 2";
-                assert_eq!(text.as_deref(), Some(expected), "{n} cells");
-            } else {
-                assert_eq!(text, None, "{n} cells, {cells} away");
-            }
+fn a_split_that_facets_layers_or_balance_require_is_right() {
+    for given in [true, false] {
+        for (n, expected) in [
+            (1, "by section 6, step 3 (balance): it touches the leaf octant 0.7.1 (level 3)"),
+            (2, "by section 6, step 2 (layer): it touches the leaf octant 0.7.1 (level 3)"),
+        ] {
+            let case = case(&format!("keep = 'all'\nlayer_cells_min = {n}"), &[FACET]);
+            let text = rule(&case, given, &split(&case, &[]), &split(&case, &[&[1]]));
+            assert!(
+                text.starts_with("A has the leaf octant 1 (level 1), B has split it"),
+                "{text}"
+            );
+            assert!(text.contains(expected) && text.ends_with("B is right"), "{text}");
+            let end =
+                if given { "section 3: facet 0 crosses it" } else { "the surface crosses it" };
+            assert!(text.contains(end), "{text}");
         }
     }
-    // One level finer than a leaf that it touches, as fine, coarser, and within it.
-    for (source, target) in
-        [(&[0, 1][..], &[1][..]), (&[0], &[1]), (&[0], &[1, 0]), (&[1, 0, 0], &[1])]
-    {
-        assert_eq!(requires(1, source, target), None);
-    }
-    for (source, target) in [(&[0][..], &[1][..]), (&[0], &[1, 0]), (&[1, 0, 0], &[1])] {
-        assert_eq!(requires(9, source, target), None);
-    }
+    let case = case("keep = 'all'", &[FACET]);
+    let text = rule(&case, true, &[leaf(&[0])], &[leaf(&[0, 0])]);
+    assert!(text.ends_with("split it by section 3: facet 0 crosses it: B is right"), "{text}");
 }
 
 #[test]
-fn searches_at_an_octant_find_strict_ancestors_and_leaves_within() {
-    let words = mesh(&[&[0], &[1, 0], &[1, 7], &[3]]);
-    let terms = terms(1);
-    let dispute = Dispute { a: &words, b: &[], terms: &terms, case: None };
-    let octant = |path: &[u8]| path.iter().fold(Octant::ROOT, |octant, &digit| octant.child(digit));
-    let ancestor =
-        |path: &[u8]| dispute.ancestor_leaf(Mesh::A, &octant(path)).map(|leaf| leaf.octant);
-    let within = |path: &[u8]| dispute.has_within(Mesh::A, &octant(path));
-    assert_eq!(ancestor(&[0, 0]), Some(octant(&[0])));
-    assert_eq!(ancestor(&[0, 7, 7]), Some(octant(&[0])));
-    assert_eq!(ancestor(&[3, 7]), Some(octant(&[3])));
-    for path in [&[0][..], &[1], &[1, 0], &[2, 0], &[7]] {
-        assert_eq!(ancestor(path), None, "{path:?}");
+fn a_split_that_nothing_requires_is_wrong_also_where_it_makes_others_necessary() {
+    let case = case("keep = 'all'\nlayer_cells_min = 1", &[FACET]);
+    let graded: Vec<Vec<u8>> = (1..8).map(|digit| vec![digit]).collect();
+    let mut paths: Vec<&[u8]> = graded.iter().map(Vec::as_slice).collect();
+    let correct = split(&case, &paths);
+    // The children of 1.7.7 require the split of 2 other octants; nothing requires that of 1.7.
+    paths.extend([&[1, 7][..], &[1, 7, 7]]);
+    let wrong = split(&case, &paths);
+    for (a, b, right) in [(&correct, &wrong, "A"), (&wrong, &correct, "B")] {
+        let text = rule(&case, true, a, b);
+        assert!(
+            text.contains("balance requires the split") && text.contains("octant 1.7"),
+            "{text}"
+        );
+        assert!(text.ends_with(&format!("{right} is right")), "{text}");
     }
-    for (path, expected) in [
-        (&[0][..], true),
-        (&[1], true),
-        (&[1, 0], true),
-        (&[1, 1], false),
-        (&[1, 6], false),
-        (&[2], false),
-        (&[7], false),
-        (&[], true),
-    ] {
-        assert_eq!(within(path), expected, "{path:?}");
-    }
-    assert!(!dispute.has_within(Mesh::B, &Octant::ROOT));
-    assert_eq!(dispute.ancestor_leaf(Mesh::B, &octant(&[0, 0])), None);
+    // A leaf of the surface's level that a facet crosses need not be split.
+    let text = rule(&case, true, &[leaf(&[0, 7, 0])], &[leaf(&[0, 7, 0, 0])]);
+    assert!(text.contains("refinement is minimal"), "{text}");
+    let hidden = super::tests::case("keep = 'all'\nkeep_crossing = false", &[FACET]);
+    let text = rule(&hidden, false, &[leaf(&[1])], &[leaf(&[1, 0])]);
+    assert!(
+        text.ends_with("A is right, unless a facet does (give the case file: --case)"),
+        "{text}"
+    );
 }
 
 #[test]
-fn a_leaf_of_one_mesh_only_is_judged_by_its_side_and_what_is_kept() {
-    let leaf = |side| Leaf { octant: Octant::ROOT.child(1), side };
-    let absence = |mesh, side, keep, keep_crossing| {
-        let terms = Terms { keep, keep_crossing, ..terms(1) };
-        let words = [word::encode(&leaf(side))];
-        Dispute { a: &words, b: &words, terms: &terms, case: None }.absence(mesh, &leaf(side))
-    };
+fn facets_and_rays_of_the_case_decide_on_sides() {
+    let case = case("keep = 'all'", &[FACET]);
+    let (at, far) = (leaf(&[0, 7, 0]), leaf(&[7]));
+    let of = |a: u64, b: u64| rule(&case, true, &[a], &[b]);
+    assert_eq!(of(at | 2, at), "section 4: facet 0 crosses it, so it is crossing: A is right");
+    assert!(of(at, at | 2).ends_with("crossing: B is right"));
+    assert!(of(far | 1, far).ends_with("an even number of facets, so it is outside: B is right"));
+    assert!(of(far | 1, far | 2).ends_with("so it is outside: neither is right"));
+    let text = rule(&case, false, &[far | 1], &[far]);
+    assert_eq!(text, "section 4 (side): give the case file (--case) to decide it");
+}
+
+#[test]
+fn a_leaf_of_one_mesh_only_is_right_if_no_rule_deletes_it() {
+    let [a, b, c, d] = [[-3.0f32; 3], [3.5, -3.0, -3.0], [-3.0, 3.5, -3.0], [-3.0, -3.0, 3.5]];
+    let body = [[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
+    // Octant 0.7.0 is inside, and 7.7.7 outside.
+    let (inside, outside) = (leaf(&[0, 7, 0]) | 1, leaf(&[7, 7, 7]));
+    for (keep, right) in [("outside", "B"), ("inside", "A")] {
+        let case = case(&format!("keep = '{keep}'"), &body);
+        let text = rule(&case, true, &[inside, outside], &[outside]);
+        assert!(text.ends_with(&format!("{right} is right")), "{keep}: {text}");
+        let text = rule(&case, true, &[inside], &[inside, outside]);
+        let right = if right == "A" { "A" } else { "B" };
+        assert!(text.ends_with(&format!("{right} is right")), "{keep}: {text}");
+    }
+    let case = case("keep = 'outside'\nkeep_crossing = false", &body);
+    let without = |word: u64| rule(&case, false, &[word], &[]);
     assert_eq!(
-        absence(Mesh::A, Side::Crossing, Keep::All, false),
+        without(inside + 1),
         "section 7: keep_crossing is false, so A must not have a crossing leaf"
     );
     assert_eq!(
-        absence(Mesh::B, Side::Inside, Keep::Outside, true),
-        "section 5: keep is outside, so B must not have a leaf that is inside"
+        without(inside),
+        "section 5: keep is outside, so A must not have a leaf that is inside"
     );
-    let lost = "is kept; B lost the leaf, or gave its component another side (section 4)";
-    for (side, keep) in
-        [(Side::Crossing, Keep::Inside), (Side::Inside, Keep::Inside), (Side::Outside, Keep::All)]
-    {
-        let keep_name = format!("{keep:?}").to_lowercase();
-        let expected = format!("section 5: keep is {keep_name}, so a leaf that is {side} {lost}");
-        assert_eq!(absence(Mesh::A, side, keep, true), expected);
-    }
-}
-
-#[test]
-fn a_needless_split_has_a_caveat_where_a_deleted_leaf_or_a_facet_may_require_it() {
-    let case = Case::from_parts(
-        "spacing_min = 1.0\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n",
-        vec![[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]],
-    )
-    .unwrap();
-    let caveat = |keep, keep_crossing, case| {
-        let terms = Terms { keep, keep_crossing, ..terms(1) };
-        Dispute { a: &[], b: &[], terms: &terms, case }.caveat()
-    };
-    for case in [None, Some(&case)] {
-        assert!(caveat(Keep::All, false, case).contains("deleted afterwards"));
-    }
-    assert_eq!(
-        caveat(Keep::Outside, true, None),
-        ", unless a facet does (give the case file: --case)"
-    );
-    assert_eq!((caveat(Keep::All, true, None), caveat(Keep::Outside, true, Some(&case))), ("", ""));
-}
-
-#[test]
-fn sides_missing_leaves_and_invalid_words_have_their_sections() {
-    let outside = mesh(&[&[0], &[1]]);
-    let inside = vec![outside[0] | 1, outside[1]];
-    assert!(rule(&outside, &inside, 1).starts_with("section 4"));
-    assert!(rule(&outside[1..], &outside, 1).starts_with("section 5: keep is all"));
-}
-
-#[test]
-fn with_a_case_facets_and_rays_decide() {
-    let cube = "spacing_min = 1.0\nkeep = 'all'\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n";
-    let facet = [[-1.5, -1.5, -1.5], [-1.2, -1.5, -1.5], [-1.5, -1.2, -1.5]];
-    let case = Case::from_parts(cube, vec![facet]).unwrap();
-    let terms = Terms::of_case(&case);
-    let rule = |a: &[u64], b: &[u64]| {
-        Dispute { a, b, terms: &terms, case: Some(&case) }
-            .rule(a.first().copied(), b.first().copied())
-            .join("")
-    };
-    let (coarse, fine) = (mesh(&[&[0]]), mesh(&[&[0, 0]]));
-    assert!(rule(&coarse, &fine).contains("section 3: facet 0 crosses it"));
-    assert!(rule(&[coarse[0] | 2], &coarse).contains("crossing: A is right"));
-    // A crossed leaf of the surface's level need not be split.
-    let (coarse, fine) = (mesh(&[&[0, 7, 0]]), mesh(&[&[0, 7, 0, 0]]));
-    assert!(rule(&coarse, &fine).contains("nothing in either mesh requires the split"));
-    let coarse = mesh(&[&[0]]);
-    let far = mesh(&[&[7]]);
-    assert!(rule(&[far[0] | 1], &far).contains("0 of its 6 rays are inside: B is right"));
     assert!(
-        rule(&[far[0] | 1], &[far[0] | 2]).contains("0 of its 6 rays are inside: neither is right")
+        without(outside)
+            .starts_with("section 5: keep is outside, so a leaf that is outside is kept; B lost")
     );
-    assert!(rule(&coarse, &[coarse[0] | 2]).contains("crossing: B is right"));
-}
-
-#[test]
-fn a_leaf_within_a_closed_body_is_inside() {
-    let [a, b, c, d] = [[1.0f32; 3], [7.5, 1.0, 1.0], [1.0, 7.5, 1.0], [1.0, 1.0, 7.5]];
-    let keys = "spacing_min = 1.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
-    let body = vec![[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
-    let case = Case::from_parts(keys, body.clone()).unwrap();
-    let outside = mesh(&[&[0, 7, 0]])[0];
-    let rule = |case: &Case, a: u64, b: u64| {
-        let terms = Terms::of_case(case);
-        Dispute { a: &[], b: &[], terms: &terms, case: Some(case) }.rule(Some(a), Some(b)).join("")
-    };
-    let text = rule(&case, outside, outside | 1);
-    assert!(text.contains("6 of its 6 rays are inside: B is right, if"), "{text}");
-    let text = rule(&case, outside | 1, outside);
-    assert!(text.contains("6 of its 6 rays are inside: A is right, if"), "{text}");
-    // Without the facet across the diagonal, the rays towards it leave the body where it is open.
-    let open = Case::from_parts(keys, body[..3].to_vec()).unwrap();
-    let text = rule(&open, outside, outside | 1);
-    assert!(text.contains("3 of its 6 rays are inside: another candidate"), "{text}");
 }

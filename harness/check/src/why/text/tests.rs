@@ -171,24 +171,22 @@ fn a_side_is_decided_by_facets_or_by_the_component() {
     assert_eq!(ends(&crossing).1, "  crossing by section 4: facet 3 crosses the leaf");
 
     let mut component = answer(vec![]);
-    let reason = |side, candidate, is_complete| SideReason::Component {
+    let reason = |side, candidate| SideReason::Component {
         side,
         decision: "the decision".to_owned(),
         candidate,
         rays_odd: None,
         seed: None,
-        leaves_visited: 5,
-        is_complete,
-        is_proven: true,
+        leaves: 5,
     };
-    component.side_decided_by = reason(Side::Outside, None, true);
+    component.side_decided_by = reason(Side::Outside, None);
     assert_eq!(
         ends(&component).1,
         "  outside by section 4: the decision\n  the component has 5 leaves of T0"
     );
-    component.side_decided_by = reason(Side::Inside, Some(place(&[2])), false);
+    component.side_decided_by = reason(Side::Inside, Some(place(&[2])));
     let side = "  inside by section 4: the decision\n  candidate: octant 2 (level 1), (0, 8, 0) to (8, 16, 8)\n  \
-            the component has at least 5 leaves of T0\n  but the mesh has the side outside here";
+            the component has 5 leaves of T0\n  but the mesh has the side outside here";
     let terms = "\n  component: the leaves of T0 that no facet crosses and that shared faces join; all have one side\n  \
             candidate: the leaf of the component from whose centre rays count facets";
     assert_eq!(ends(&component).1, format!("{side}{TERMS}{terms}"));

@@ -100,14 +100,14 @@ impl Mesh<'_> {
 }
 
 impl Leaves {
-    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Around<()>, &[Square])) {
+    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Around, &[Square])) {
         let mut of_cell = Vec::new();
-        let visit = &mut |cell, around: &Around<()>| {
+        let visit = &mut |cell, around: &Around| {
             squares(self, around, &mut of_cell);
             each(cell, around, &of_cell);
             Ok(())
         };
-        self.walk((), options, visit).unwrap();
+        self.walk(options, visit).unwrap();
     }
 }
 
