@@ -45,7 +45,7 @@ pub fn against(name: &str, case: &CaseReport, baseline: &Known) -> GateFinding {
         }
         (None, Some(check)) => {
             let note = format!("neither program makes a mesh: {}", first(check));
-            return Finding::noted(name, CHECKS, Verdict::Missing, note);
+            return GateFinding::noted(name, CHECKS, Verdict::Missing, note);
         }
         (None, None) if candidate == *baseline => (Verdict::Unchanged, counts),
         (None, None) => (Verdict::Improvement, counts),
