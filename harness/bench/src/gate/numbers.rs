@@ -46,12 +46,10 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer:
             break;
         }
         let case_name = &case.rule.name;
-        match bench.measured(&bench.candidate, case, name) {
+        let findings = match bench.measured(&bench.candidate, case, name) {
             Err(why) if why.is_interrupt() => break,
             Err(why) => {
-                let finding =
-                    GateFinding::noted(case_name, "runs", Verdict::Regression, why.to_string());
-                layer.findings.push(finding);
+                vec![GateFinding::noted(case_name, "runs", Verdict::Regression, why.to_string())]
             }
             Ok(mut candidate) => {
                 let entry = measures.case(case_name);
@@ -62,17 +60,13 @@ pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer:
                 }
                 match old(bench, baseline, case, name) {
                     Err(why) => {
-                        layer.findings.push(GateFinding::noted(
-                            case_name,
-                            "baseline",
-                            Verdict::Missing,
-                            why,
-                        ));
+                        vec![GateFinding::noted(case_name, "baseline", Verdict::Missing, why)]
                     }
-                    Ok(old) => layer.findings.extend(compare(bench, case, name, old, candidate)),
+                    Ok(old) => compare(bench, case, name, old, candidate),
                 }
             }
-        }
+        };
+        layer.findings.extend(findings);
         if name != LayerName::Instructions {
             layer.findings.extend(bench.ranks_left_out(case));
         }

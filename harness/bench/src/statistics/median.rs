@@ -23,6 +23,13 @@ pub struct Median {
     pub count: usize,
 }
 
+impl Median {
+    /// Returns the median of a quantity that falls as this one rises.
+    pub fn falling(self, of: impl Fn(f64) -> f64) -> Self {
+        Self { value: of(self.value), low: of(self.high), high: of(self.low), ..self }
+    }
+}
+
 /// Returns the median with its interval, or `None` for no values.
 pub fn median(values: &[f64]) -> Option<Median> {
     let mut sorted = values.to_vec();

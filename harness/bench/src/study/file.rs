@@ -138,26 +138,19 @@ pub struct Series {
     pub repeats: usize,
 }
 
-/// What determines the partition of a run.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Choice {
-    /// `unit`, `area` or `rebalance`; empty to leave the choice to the program.
-    pub weights: String,
-    /// `metis` or `morton`; empty to leave the choice to the program.
-    pub partitioner: String,
-    /// Cells that an exposed face weighs; `None`: they are not counted.
-    pub weight_exposed: Option<u32>,
-}
+/// Weights and partitioner of a run, empty to leave the choice to the program, and how many cells an exposed face weighs, if these faces
+/// are counted.
+pub(super) type Choice = (&'static str, &'static str, Option<u32>);
 
-/// Weights and partitioners of the experiment on them, which counts exposed faces. `rebalance` with METIS is identical to `area`;
+/// The choices of the experiment on weights, which counts exposed faces. `rebalance` with METIS is identical to `area`;
 /// in the last row an exposed face weighs as much as ten cells.
-const CHOICES: [(&str, &str, u32); 6] = [
-    ("unit", "metis", 0),
-    ("unit", "morton", 0),
-    ("area", "metis", 0),
-    ("area", "morton", 0),
-    ("rebalance", "morton", 0),
-    ("rebalance", "morton", 10),
+const CHOICES: [Choice; 6] = [
+    ("unit", "metis", Some(0)),
+    ("unit", "morton", Some(0)),
+    ("area", "metis", Some(0)),
+    ("area", "morton", Some(0)),
+    ("rebalance", "morton", Some(0)),
+    ("rebalance", "morton", Some(10)),
 ];
 
 impl Series {
@@ -170,16 +163,11 @@ impl Series {
     }
 
     /// Returns the partitions that are compared.
-    pub fn choices(&self) -> Vec<Choice> {
-        if self.experiment != Experiment::Weights {
-            return vec![Choice::default()];
+    pub(super) fn choices(&self) -> &'static [Choice] {
+        match self.experiment {
+            Experiment::Weights => &CHOICES,
+            _ => &[("", "", None)],
         }
-        let choice = |&(weights, partitioner, exposed): &(&str, &str, u32)| Choice {
-            weights: weights.to_owned(),
-            partitioner: partitioner.to_owned(),
-            weight_exposed: Some(exposed),
-        };
-        CHOICES.iter().map(choice).collect()
     }
 
     /// Returns the ranks on which an engine is run: those of the series that it offers. A serial run replaces ranks on MPI that
@@ -528,7 +516,7 @@ mod tests {
         assert!(of(&weak, &serial, false).is_empty());
         let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
         assert!(of(&weights, &parallel, false).is_empty());
-        assert_eq!((weights.choices().len(), strong.choices()), (6, vec![Choice::default()]));
+        assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "", None)][..]));
     }
 
     #[test]

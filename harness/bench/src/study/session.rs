@@ -2,7 +2,7 @@
 //!
 //! Repetitions are the outer loop, so that a drift of the machine affects all setups equally.
 
-use super::file::{Choice, EXPERIMENT, Experiment, Mesh, Row, RunSpec, Series, Study};
+use super::file::{EXPERIMENT, Experiment, Mesh, Row, RunSpec, Series, Study};
 use super::judge::{judge, unjudged};
 use super::row;
 use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
@@ -153,13 +153,21 @@ impl Session<'_> {
                             self.bench.leave_out(setup, why)?;
                             continue;
                         }
-                        points.extend(series.choices().into_iter().map(|choice| Planned {
-                            setup: chosen(setup.clone(), choice),
-                            case: case.clone(),
-                            repeats: self.options.repeats(series.repeats),
-                            warm_up: true,
-                            audit: false,
-                            failed: false,
+                        let choices = series.choices().iter();
+                        points.extend(choices.map(|&(weights, partitioner, weight_exposed)| {
+                            Planned {
+                                setup: Setup {
+                                    weights: weights.to_owned(),
+                                    partitioner: partitioner.to_owned(),
+                                    weight_exposed,
+                                    ..setup.clone()
+                                },
+                                case: case.clone(),
+                                repeats: self.options.repeats(series.repeats),
+                                warm_up: true,
+                                audit: false,
+                                failed: false,
+                            }
                         }));
                     }
                 }
@@ -366,11 +374,6 @@ fn warmers(points: &[Planned]) -> Vec<usize> {
         }
     }
     best
-}
-
-fn chosen(setup: Setup, choice: Choice) -> Setup {
-    let Choice { weights, partitioner, weight_exposed } = choice;
-    Setup { weights, partitioner, weight_exposed, ..setup }
 }
 
 /// Returns a case file for a geometry that was given without one.

@@ -7,7 +7,6 @@ use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
-use bench::statistics::Median;
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -134,11 +133,8 @@ fn cases(all: &[&Group]) -> String {
 fn rate(groups: &Groups) -> Option<Figure> {
     let all = measured(groups, |s| s.experiment == "spacing");
     let value = |g: &Group| {
-        let t = g.time_s;
         let rate = |time_s: f64| g.cells() as f64 / time_s / g.setup.ranks as f64 / 1e6;
-        // The interval of the rate is that of the time.
-        let median = Median { value: rate(t.value), low: rate(t.high), high: rate(t.low), ..t };
-        point(g.cells() as f64, median)
+        point(g.cells() as f64, g.time_s.falling(rate))
     };
     let mut series = series(&all, value);
     let rates = paper::RUNS.iter().map(|r| (r.cells, r.cells / r.time_s / r.ranks as f64 / 1e6));

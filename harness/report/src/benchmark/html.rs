@@ -3,7 +3,7 @@
 use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
-use super::lint::{RULES, Ruling, Verdict};
+use super::lint::{Broken, RULES};
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
@@ -29,7 +29,7 @@ pub struct Drawn<'a> {
 pub fn page(
     groups: &Groups,
     drawn: &[Drawn],
-    findings: &[Ruling],
+    broken: &[Broken],
     lines: &[Line],
     trend: Option<&str>,
 ) -> String {
@@ -49,7 +49,7 @@ pub fn page(
             pre { (trend) }
         }
         h2 id="rules" { "The twelve rules of Hoefler and Belli" }
-        (rules(findings))
+        (rules(broken))
         h2 id="machine" { "Machine and commands" }
         (machine(lines))
     };
@@ -93,25 +93,23 @@ fn figure(drawn: &Drawn) -> Markup {
     page_figure(&f.id, &f.title, &drawn.svg, &caption)
 }
 
-fn rules(findings: &[Ruling]) -> Markup {
+fn rules(broken: &[Broken]) -> Markup {
     let mut rows = Vec::new();
-    for (i, rule) in RULES.iter().enumerate() {
-        for verdict in [Verdict::Broken, Verdict::Kept] {
-            let of_rule = findings.iter().filter(|f| f.rule == i + 1 && f.verdict == verdict);
-            let row = |(why, findings): (&str, Vec<&Ruling>)| {
-                let places: Vec<&str> = findings.iter().map(|f| f.about.as_str()).collect();
-                let places = match places.len() {
-                    n if n > 3 => format!("{n} figures"),
-                    _ => places.join(", "),
-                };
-                vec![
-                    html! { (i + 1) ". " (rule) },
-                    html! { @if verdict == Verdict::Kept { "kept" } @else { strong { "broken" } } },
-                    html! { (places) },
-                    html! { (why) },
-                ]
+    for (number, (rule, kept)) in (1..).zip(RULES) {
+        let row = |verdict: Markup, places: &str, why: &str| {
+            vec![html! { (number) ". " (rule) }, verdict, html! { (places) }, html! { (why) }]
+        };
+        let of_rule: Vec<&Broken> = broken.iter().filter(|b| b.rule == number).collect();
+        if of_rule.is_empty() {
+            rows.push(row(html! { "kept" }, "", kept));
+        }
+        for (why, of_why) in by_key(of_rule, |b| &b.why) {
+            let places: Vec<&str> = of_why.iter().map(|b| b.about.as_str()).collect();
+            let places = match places.len() {
+                n if n > 3 => format!("{n} figures"),
+                _ => places.join(", "),
             };
-            rows.extend(by_key(of_rule, |f| f.why.as_str()).into_iter().map(row));
+            rows.push(row(html! { strong { "broken" } }, &places, why));
         }
     }
     table(Some("words"), &["rule", "verdict", "figures", "reason"], &rows)

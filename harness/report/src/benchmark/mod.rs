@@ -25,7 +25,7 @@ use bench::track::analyse;
 use bench::track::history::Record;
 use contract::files::{named, write_atomically};
 use html::Drawn;
-use lint::{Ruling, Verdict};
+use lint::Broken;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ pub struct Written {
     /// Number of figures.
     pub figures: usize,
     /// The rules that are broken.
-    pub broken: Vec<Ruling>,
+    pub broken: Vec<Broken>,
 }
 
 /// Writes figures, page, LaTeX fragment and artifact description of a record into `directory`, with the trend of a
@@ -62,12 +62,11 @@ pub fn report(directory: &Path, lines: &[Line], history: &[Record]) -> io::Resul
     fs::create_dir_all(&place)?;
     let drawn: Vec<Drawn> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
-    let findings = lint::lint(&figures, lines);
+    let broken = lint::lint(&figures, lines);
     let page = directory.join("index.html");
-    write(&page, html::page(&groups, &drawn, &findings, lines, trend.as_deref()))?;
+    write(&page, html::page(&groups, &drawn, &broken, lines, trend.as_deref()))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     write(&directory.join("artifact.md"), latex::artifact(&figures, lines))?;
-    let broken = findings.into_iter().filter(|f| f.verdict == Verdict::Broken).collect();
     Ok(Written { page, figures: figures.len(), broken })
 }
 

@@ -4,7 +4,6 @@ use super::groups::{point, repetitions};
 use crate::figure::{Axis, Body, Claims, Figure, Point, Provenance, Series, svg};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::programs::Comparison;
-use bench::statistics::Median;
 
 /// CPU time, rate and memory over cells of every comparison.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -36,10 +35,7 @@ fn time(comparison: &Comparison) -> Figure {
 
 fn rate(comparison: &Comparison) -> Figure {
     let all = series(comparison, |g| {
-        let (t, rate) = (g.cpu_s()?, |time_s: f64| cells(g) / time_s / 1e6);
-        // The interval of the rate is that of the time.
-        let median = Median { value: rate(t.value), low: rate(t.high), high: rate(t.low), ..t };
-        Some(point(cells(g), median))
+        Some(point(cells(g), g.cpu_s()?.falling(|time_s| cells(g) / time_s / 1e6)))
     });
     let axis = Axis::log("million cells / (s core)");
     figure(comparison, "rate", "Cells per second and core", axis, all)

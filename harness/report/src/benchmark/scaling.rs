@@ -9,7 +9,6 @@ use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, messages_s};
 use bench::order::{by_key, distinct};
-use bench::statistics::Median;
 
 /// Maximum number of phases that have a segment of their own.
 const PHASES_SHOWN: usize = 6;
@@ -66,10 +65,8 @@ fn speedup(groups: &Groups, subject: Subject, mesh: &[&Group]) -> Figure {
     let kinds = [Provenance::Measured, Provenance::Oversubscribed, Provenance::Projected];
     for (style, kind) in kinds.into_iter().enumerate() {
         let speedup = |g: &&Group| {
-            let (base, t) = (groups.reference(g).time_s.value, g.time_s);
-            let median =
-                Median { value: base / t.value, low: base / t.high, high: base / t.low, ..t };
-            point(g.setup.ranks as f64, median)
+            let base = groups.reference(g).time_s.value;
+            point(g.setup.ranks as f64, g.time_s.falling(|time_s| base / time_s))
         };
         let points: Vec<Point> = with_provenance(mesh, kind).iter().map(speedup).collect();
         if !points.is_empty() {
