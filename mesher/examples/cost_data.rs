@@ -5,13 +5,14 @@
 
 use bricks::kept::Kept;
 use cpu_time::ThreadTime;
-use mesher::case::Case;
 use mesher::error::Error;
+use mesher::input::case::Case;
+use mesher::input::{ingest, quantise};
 use mesher::partition::cost::Counts;
 use mesher::partition::initial::{self, Partition};
 use mesher::partition::repartition;
-use mesher::voxelise::BinnedFacets;
-use mesher::{Options, grade, ingest, quantise, refine, sides};
+use mesher::refine::voxelise::BinnedFacets;
+use mesher::{Options, grade, refine, sides};
 use ranks::{Comm, sim};
 use std::path::Path;
 
@@ -33,7 +34,7 @@ fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let (sides, _) = sides::decide(&tree, &ownership, &facets, &rules, &options, true, comm)?;
     let time_sides = start.elapsed();
     let start = ThreadTime::now();
-    let kept = Kept::new(&sides.deleted);
+    let kept = Kept::new(sides.deleted());
     grade::grade(tree.split, &tree.crossing, &kept, &rules, &ownership, comm);
     Ok((counts, [time_sides, start.elapsed()].map(|t| t.as_nanos() as u64)))
 }

@@ -8,8 +8,8 @@
 //! simulated ranks. `tests/library/walkthrough.rs` fails when a committed drawing differs from what this program draws.
 
 use bricks::octant::{LEVEL_MAX, Side};
-use mesher::case::Case;
-use mesher::ingest;
+use mesher::input::case::Case;
+use mesher::input::ingest;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::{Options, words};
 use ranks::sim;

@@ -10,16 +10,16 @@ pub mod base;
 pub mod graded;
 pub mod sides;
 
-use crate::case::Case;
-use crate::ingest::Slice;
-use crate::lattice::{Root, Rules};
-use crate::leaves::Totals;
+use crate::input::case::Case;
+use crate::input::ingest::Slice;
+use crate::input::lattice::{Root, Rules};
+use crate::input::quantise::Quantised;
 use crate::mesh::{Mesh, Options};
+use crate::output::leaves::Totals;
+use crate::output::stream::Counts;
+use crate::output::write::Written;
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
-use crate::quantise::Quantised;
 use crate::sides::Sides;
-use crate::stream::Counts;
-use crate::write::Written;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
@@ -132,7 +132,7 @@ pub fn base_tree(
 /// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` and seeds ask for them; results are the same on all ranks.
 pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn Comm) {
     sides.check_invariants(tree);
-    replicas(&[&sides.inside, &sides.deleted], ownership, comm);
+    replicas(&[&sides.stored], ownership, comm);
     same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", comm);
     sides::seeds(sides, tree, rules, ownership);
 }
@@ -141,16 +141,16 @@ pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, c
 pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     check_split(split);
-    for sets in [crossing, &sides.deleted] {
+    for sets in [crossing, sides.deleted()] {
         check_existing(split, sets, "has no split parent");
     }
     for (l, set) in split.iter().enumerate() {
         let mut cursor = set.cursor();
-        for b in sides.deleted[l].bricks() {
+        for b in sides.deleted()[l].bricks() {
             assert_eq!(b.bits & cursor.get(b.key), 0, "level {l}: deleted leaves must not split");
         }
     }
-    replicas(&[split, crossing, &sides.inside, &sides.deleted], ownership, comm);
+    replicas(&[split, crossing, &sides.stored], ownership, comm);
     is_complete(split, ownership, comm);
 }
 
@@ -158,7 +158,7 @@ pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
 pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     let mut sum = 0u64;
-    for (number, set) in [split, crossing, &sides.inside, &sides.deleted].into_iter().enumerate() {
+    for (number, set) in [split, crossing, &sides.stored].into_iter().enumerate() {
         for (l, b) in (0..).zip(set).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
             if ownership.owns(l, b.key) {
                 sum = sum.wrapping_add(hash(&(number, l, b.key, b.bits)));
@@ -273,7 +273,7 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, written: &Written, comm: &dyn Comm) 
         }
     };
     if !mesh.is_base {
-        add(&mesh.sides.deleted);
+        add(mesh.sides.deleted());
         if !mesh.rules.keep_crossing {
             add(&mesh.crossing);
         }

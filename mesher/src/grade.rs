@@ -7,7 +7,7 @@
 //! of level `l` and grandparents instead of parents makes the balance. An octant that is split needs
 //! split ancestors. They are added when the sweep comes to their level, before anything reads it.
 //!
-//! Invariants of the result, which [`check::graded`](crate::check::graded) executes:
+//! Invariants of the result, which [`check::graded`](fn@crate::check::graded) executes:
 //! - it contains all splits of the base tree, and the parent of every split octant is split;
 //! - no deleted leaf is split;
 //! - kept leaves that share a face, an edge or a corner differ by at most one level.
@@ -44,7 +44,9 @@
 //! part of the segment may then begin in a crossing leaf coarser than `l`: a whole group would act
 //! through a deleted body. Hence only leaves are sources there.
 
-use crate::lattice::Rules;
+pub mod exposed;
+
+use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;

@@ -2,17 +2,18 @@
 
 use crate::check;
 use crate::error::Error;
+use crate::grade::{self, exposed};
+use crate::input::lattice::Keep;
+use crate::input::quantise::Quantised;
 use crate::job::Job;
-use crate::lattice::Keep;
 use crate::mesh::Mesh;
+use crate::output::report::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
-use crate::partition::repartition::{self, LeafCounts, Sets};
-use crate::quantise::Quantised;
-use crate::report::warnings;
+use crate::partition::repartition::{self, LeafCounts};
+use crate::refine;
+use crate::refine::voxelise::{BinnedFacets, Work};
 use crate::sides::{self, leaks, openness};
-use crate::voxelise::{BinnedFacets, Work};
-use crate::{exposed, grade, refine};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::tree::Tree;
@@ -134,7 +135,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     let base = is_whole.then(|| mesh.split.clone());
     let (split, work) = job.phase("grade", |comm| {
         let split = std::mem::take(&mut mesh.split);
-        let kept = Kept::new(&mesh.sides.deleted);
+        let kept = Kept::new(mesh.sides.deleted());
         grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
     });
     mesh.split = split;
@@ -178,14 +179,14 @@ fn repartition_by_leaves(
     weighted: Option<&(Vec<exposed::InBrick>, u32)>,
     comm: &dyn Comm,
 ) {
-    let (inside, deleted) = (&mut mesh.sides.inside, &mut mesh.sides.deleted);
-    let sets = Sets { split: &mut mesh.split, crossing: &mut mesh.crossing, inside, deleted };
-    let with_crossing = mesh.rules.keep_crossing;
-    let mut counts = LeafCounts::new(&sets, &mesh.ownership, mesh.level_base, with_crossing);
+    let gone = [mesh.sides.deleted(), &mesh.crossing];
+    let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
+    let mut counts = LeafCounts::new(&mesh.split, gone, &mesh.ownership, mesh.level_base);
     if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
         let weights =
             faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
         counts.add(weights, &mesh.ownership, mesh.level_base);
     }
+    let sets = &mut [&mut mesh.split, &mut mesh.crossing, &mut mesh.sides.stored];
     mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
 }

@@ -1,8 +1,8 @@
 //! A run on one rank: what its phases share.
 
 use crate::mesh::Options;
+use crate::output::report::Counters;
 use crate::record::Recorder;
-use crate::report::Counters;
 use ranks::{Comm, uncounted};
 
 /// A run on one rank.

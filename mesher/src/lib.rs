@@ -8,44 +8,34 @@
 
 #![deny(missing_docs)]
 
-pub mod agreement;
-pub mod case;
 pub mod check;
 pub mod error;
-pub mod exposed;
 pub mod grade;
 mod grow;
-pub mod htg;
-pub mod ingest;
+pub mod input;
 mod job;
-pub mod lattice;
-pub mod leaves;
-pub mod manifest;
 mod mesh;
+pub mod output;
 pub mod partition;
-pub mod quantise;
 pub mod record;
 pub mod refine;
-pub mod report;
 pub mod sides;
-pub mod stl;
-pub mod stream;
-pub mod voxelise;
-pub mod write;
 
 pub use grow::grow;
 pub use job::Job;
 pub use mesh::{Mesh, Options};
 
-use case::Case;
 use error::Error;
 use files::interrupt::stop_at;
-use manifest::LeakEntry;
-use quantise::Quantised;
+use input::case::Case;
+use input::quantise::Quantised;
+use input::{ingest, quantise};
+use output::manifest::LeakEntry;
+use output::report::Report;
+use output::write::OutDir;
+use output::{htg, leaves};
 use ranks::Comm;
 use record::Recorder;
-use report::Report;
-use write::OutDir;
 
 /// Meshes a case: all ten phases. The recorder keeps this rank's times; the report is the same on all ranks. Collective.
 ///

@@ -1,13 +1,13 @@
 //! The options of a run, and the mesh as the phases pass it on.
 
-use crate::lattice::Rules;
+use crate::input::lattice::Rules;
+use crate::input::quantise::FacetCounts;
+use crate::output::stream::Leaves;
+use crate::output::write::Output;
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner};
-use crate::quantise::FacetCounts;
 use crate::sides::Sides;
 use crate::sides::leaks::Leaks;
-use crate::stream::Leaves;
-use crate::write::Output;
 use bricks::octant::Level;
 use bricks::tree::PerLevel;
 
@@ -22,7 +22,7 @@ pub struct Options {
     pub out: Option<Output>,
     /// Check invariants after each phase, which debug builds do in any case.
     pub check: bool,
-    /// Count the [exposed faces](crate::exposed), each of which weighs as much as this many leaves in the last repartition.
+    /// Count the [exposed faces](crate::grade::exposed), each of which weighs as much as this many leaves in the last repartition.
     pub weight_exposed: Option<u32>,
     /// Fail if the geometry leaks.
     pub strict: bool,

@@ -85,18 +85,6 @@ impl Recorder {
         }
     }
 
-    /// Whether this rank shows the user what it does.
-    pub fn shows_progress(&self) -> bool {
-        self.progress
-    }
-
-    /// Shows the user the plan of the run, in one line.
-    pub fn report_plan(&self, plan: &str) {
-        if self.progress {
-            let _ = writeln!(std::io::stderr(), "\r\x1b[Kplan: {plan}");
-        }
-    }
-
     /// The phases so far.
     pub fn phases(&self) -> &[Phase] {
         &self.phases
@@ -148,7 +136,6 @@ mod tests {
             assert!(a.time_cpu_s + b.time_cpu_s <= all_s + 1e-9, "{a:?} {b:?} {all_s}");
             assert!(a.time_wall_s >= a.time_cpu_s * 0.99 && b.time_wall_s >= b.time_cpu_s * 0.99);
             assert_eq!(std::fs::read_to_string(&status).expect("a status"), "a\n");
-            assert!(!record.shows_progress() && Recorder::new(true).shows_progress());
         });
         let peak = peak_rss_bytes();
         assert!(

@@ -5,9 +5,11 @@
 //!
 //! Invariant: a rank has every facet whose extent reaches an octant that it owns, once.
 
-use crate::lattice::{ExtentBox, Rules};
+pub mod voxelise;
+
+use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::ownership::Ownership;
-use crate::voxelise::{self, BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
+use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge};
 use bricks::tree::Tree;

@@ -1,7 +1,7 @@
 //! Many whole cases without libFuzzer, each drawn from its number: several times as many in a second of CPU time.
 
 use crate::targets::whole_case::{self, Tried};
-use mesher::lattice::Keep;
+use mesher::input::lattice::Keep;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::panic::catch_unwind;

@@ -9,15 +9,16 @@ use bricks::facet::{Facet, crossed};
 use bricks::kept::Kept;
 use bricks::octant::ROOT_BITS;
 use bricks::tree::{PerLevel, Tree};
-use mesher::case::{Case, RootSpec};
-use mesher::ingest::{Slice, Source, read};
-use mesher::lattice::{Bounds, Enclosed, Keep, Rules};
+use mesher::input::case::{Case, RootSpec};
+use mesher::input::ingest::{Slice, Source, read};
+use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
+use mesher::input::stl;
+use mesher::output::stream::Leaves;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
+use mesher::refine::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use mesher::sides::{Sides, decide};
-use mesher::stream::Leaves;
-use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
-use mesher::{Options, grade, stl};
+use mesher::{Options, grade};
 use ranks::Solo;
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -83,7 +84,7 @@ impl Phases {
         let depth = Depth { surface: rules.level_surface, boxes: vec![] };
         let (tree, _) = refine(&binned, &depth, &[SubtreeRoot { level: 0, code: 0 }]);
         let sides = sides(&tree, &ownership, &facets, &rules);
-        let kept = Kept::new(&sides.deleted);
+        let kept = Kept::new(sides.deleted());
         let (graded, _) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
         Self { given, facets, rules, ownership, binned, depth, tree, sides, graded }
@@ -149,7 +150,7 @@ pub fn kernels() -> Vec<Kernel> {
             "grade",
             leaves,
             Box::new(|| {
-                let kept = Kept::new(&p.sides.deleted);
+                let kept = Kept::new(p.sides.deleted());
                 grade::grade(
                     p.tree.split.clone(),
                     &p.tree.crossing,

@@ -1,6 +1,6 @@
 //! One source for several vector widths; the widest that the processor supports is chosen at run time.
 //!
-//! [`widest`] compiles an `#[inline(always)]` function once for each width and calls the right one. All widths
+//! [`widest`](crate::widest) compiles an `#[inline(always)]` function once for each width and calls the right one. All widths
 //! thus compute the same by construction; tests still run each of them.
 
 use std::cell::Cell;

@@ -1,7 +1,7 @@
 //! The plan of a run: its cells, time, memory and files, estimated before it is made; and the refusal of a run that would not fit.
 //!
 //! First the cells are estimated roughly, from the extents and areas of facets and from the volumes of boxes. A run whose memory
-//! is far from every [limit](Limit) needs no more. Otherwise [pilot runs](pilot) of the same case at coarser spacings are
+//! is far from every [limit](Limit) is made without a plan. Otherwise pilot runs (`pilot`) of the same case at coarser spacings are
 //! extrapolated: two of them, of which the finer has at most a 64th of the cells. A case with few cells is its own pilot.
 //!
 //! The memory of a rank is what it has resident after the pilots, with its facets, plus the growth of its sets. Nothing here is
@@ -31,17 +31,18 @@ pub use shared::Tightest;
 use bricks::facet::Facet;
 use bricks::octant::{Level, ROOT_EDGE, edge};
 use bricks::tree::Tree;
-use mesher::case::Case;
 use mesher::error::Error;
-use mesher::lattice::{Bounds, Rules};
+use mesher::input::case::Case;
+use mesher::input::lattice::{Bounds, Rules};
+use mesher::input::quantise::Quantised;
+use mesher::output::leaves;
+use mesher::output::report::Report;
+use mesher::output::write::Output;
 use mesher::partition::area;
 use mesher::partition::cost::Counts;
 use mesher::partition::ownership::Ownership;
-use mesher::quantise::Quantised;
 use mesher::record::Recorder;
-use mesher::report::Report;
-use mesher::write::Output;
-use mesher::{Job, Options, grow, leaves};
+use mesher::{Job, Options, grow};
 use pilot::{Amounts, Collector, Pilots};
 use ranks::{Comm, gather, uncounted};
 use serde::Serialize;
@@ -56,8 +57,6 @@ struct Problem<'a> {
     bounds: &'a Bounds,
     /// This rank's slice of the facets.
     facets: &'a [Facet],
-    /// Number of facets on all ranks.
-    facets_total: u64,
     /// The spacing at the surface that the case gives.
     spacing_min: f64,
     /// The parts of the boxes.
@@ -81,8 +80,6 @@ pub enum Source {
     Mesh,
     /// Two pilot runs were extrapolated.
     Pilots,
-    /// The areas of facets and the volumes of boxes: a guess.
-    Areas,
 }
 
 /// One pilot run.
@@ -109,8 +106,8 @@ pub struct Plan {
     pub pilots: Vec<PilotEntry>,
     /// Leaves of the mesh.
     pub cells: u64,
-    /// CPU time over all ranks, in seconds, at the rate of the pilot runs; none without any.
-    pub time_cpu_s: Option<f64>,
+    /// CPU time over all ranks, in seconds, at the rate of the pilot runs.
+    pub time_cpu_s: f64,
     /// Peak resident memory by rank, in bytes.
     pub memory_peak_bytes: Vec<u64>,
     /// Size of the leaf words (`--write words`) by rank, in bytes.
@@ -131,12 +128,8 @@ pub struct Plan {
 const CELLS_SMALL: f64 = 64e6;
 /// Bytes per cell of a rough estimate; a quarter of it is usual.
 const BYTES_ROUGH: f64 = 2.0;
-/// Bytes per cell that are usual.
-const BYTES_USUAL: f64 = 0.6;
 /// A pilot run has at most this fraction of the cells, so that two take about 2 % of the time.
 const PART_OF_CELLS: f64 = 64.0;
-/// Cells per facet below which pilot runs would take more than that, because their time does not fall with the cells.
-const CELLS_PER_FACET: f64 = 2048.0;
 /// Cells of a pilot run that takes a moment, a fraction of a second.
 const CELLS_MOMENT: f64 = 8.4e6;
 /// Greatest number of cells of a pilot run: layers of many cells fill the far field, and only a large pilot shows how that grows.
@@ -159,7 +152,6 @@ impl<'a> Problem<'a> {
             rules: &quantised.rules,
             bounds: &quantised.bounds,
             facets: &quantised.facets,
-            facets_total: quantised.counts.total,
             spacing_min: case.spacing_min,
             volumes,
             output: job.options.out.as_ref(),
@@ -180,6 +172,13 @@ impl<'a> Problem<'a> {
             })
             .product();
         2.0 * (cells + self.volumes.cells()) < CELLS_SMALL
+    }
+
+    /// A rough estimate of the cells, and the part of the tightest limit that their mesh takes at most. Collective.
+    fn rough(&self) -> ([f64; 2], f64) {
+        let cells = self.cells_rough();
+        let ranks = Ranks::gather(self.comm, Amounts::default(), 0);
+        (cells, used(&ranks, cells.iter().sum()))
     }
 
     /// A rough estimate of the cells: around facets, and in boxes. Collective.
@@ -205,10 +204,7 @@ pub fn mesh(
         let volumes = Volumes::new(&quantised.rules.boxes);
         let problem = Problem::new(quantised, case, &volumes, job);
         let pilot = &mut |shift| pilot(quantised, &volumes, shift, options, comm);
-        if let Some(plan) = before_run(&problem, is_forced, job.record.shows_progress(), pilot)? {
-            job.record.report_plan(&plan.line());
-        }
-        Ok(())
+        if is_forced { Ok(()) } else { before_run(&problem, pilot) }
     })
 }
 
@@ -261,38 +257,21 @@ fn pilot(
     }
 }
 
-/// The plan of a run that is about to be made: only if it `is_shown` or might not fit. Collective.
+/// Refuses a run that would not fit. Collective.
 ///
 /// # Errors
-/// If the run would not fit and is not forced; the same on all ranks.
-fn before_run(
-    problem: &Problem,
-    is_forced: bool,
-    is_shown: bool,
-    pilot: Pilot,
-) -> Result<Option<Plan>, Error> {
-    let comm = problem.comm;
-    let is_shown = uncounted(comm, || comm.max(u64::from(is_shown))) == 1;
-    if !is_shown && (is_forced || problem.is_small()) {
-        return Ok(None);
+/// If it would not; the same on all ranks.
+fn before_run(problem: &Problem, pilot: Pilot) -> Result<(), Error> {
+    if problem.is_small() {
+        return Ok(());
     }
-    uncounted(comm, || {
-        let rough = problem.cells_rough();
-        let cells: f64 = rough.iter().sum();
-        let ranks = Ranks::gather(comm, Amounts::default(), 0);
-        let used = used(&ranks, cells);
-        let is_close = !is_forced && used > 0.5;
-        let is_cheap =
-            cells >= CELLS_SMALL && cells >= CELLS_PER_FACET * problem.facets_total as f64;
-        if !is_close && !is_cheap {
-            let amounts = Amounts { cells, ..Amounts::default() };
-            let more = vec![cells * BYTES_USUAL / ranks.count() as f64; ranks.count()];
-            let plan = Plan::new(Source::Areas, &ranks, amounts, more);
-            plan.check_invariants();
-            return Ok(is_shown.then_some(plan));
+    uncounted(problem.comm, || {
+        let (rough, used) = problem.rough();
+        if used <= 0.5 {
+            return Ok(());
         }
-        let plan = from_pilots(problem, rough, cells_max(cells, used, 0.0), pilot)?;
-        if is_forced || plan.fits { Ok(Some(plan)) } else { Err(plan.refusal()) }
+        let plan = from_pilots(problem, rough, cells_max(rough, used, 0.0), pilot)?;
+        if plan.fits { Ok(()) } else { Err(plan.refusal()) }
     })
 }
 
@@ -302,10 +281,8 @@ fn before_run(
 /// If a pilot run fails.
 fn of_case(problem: &Problem, pilot: Pilot) -> Result<Plan, Error> {
     uncounted(problem.comm, || {
-        let rough = problem.cells_rough();
-        let cells: f64 = rough.iter().sum();
-        let used = used(&Ranks::gather(problem.comm, Amounts::default(), 0), cells);
-        from_pilots(problem, rough, cells_max(cells, used, CELLS_MOMENT), pilot)
+        let (rough, used) = problem.rough();
+        from_pilots(problem, rough, cells_max(rough, used, CELLS_MOMENT), pilot)
     })
 }
 
@@ -317,7 +294,8 @@ fn used(ranks: &Ranks, cells: f64) -> f64 {
 }
 
 /// Greatest number of cells of a pilot run; `least` of them in any case. Where there is no doubt that the run does not fit, few.
-fn cells_max(cells: f64, used: f64, least: f64) -> f64 {
+fn cells_max(rough: [f64; 2], used: f64, least: f64) -> f64 {
+    let cells: f64 = rough.iter().sum();
     if used > 100.0 {
         CELLS_MOMENT / 4.0
     } else {
@@ -365,7 +343,7 @@ fn from_pilots(
     let written = |o: &Output| [o.words, o.tree].map(|is| f64::from(u8::from(is)));
     let written = problem.output.map_or([0.0; 2], written);
     let per_cell: f64 = written.iter().zip(TIMES_WRITTEN_S).map(|(is, time)| is * time).sum();
-    plan.time_cpu_s = Some(before + pilots.at(0).time_cpu_s() + per_cell * pilots.at(0).cells);
+    plan.time_cpu_s = before + pilots.at(0).time_cpu_s() + per_cell * pilots.at(0).cells;
     plan.check_invariants();
     if !plan.fits {
         let fitting = (1..=coarsest).find(|&shift| at(shift).fits).map(factor);
@@ -401,12 +379,11 @@ impl Plan {
         assert_eq!(factor.is_some(), self.spacing_min_fits.is_some(), "a factor and its spacing");
         assert!(factor.is_none_or(|f| !fits && f > 1.0), "{factor:?} for a plan that fits");
         let time = self.time_cpu_s;
-        assert!(time.is_none_or(|t| t.is_finite() && t >= 0.0), "{time:?} of CPU time");
+        assert!(time.is_finite() && time >= 0.0, "{time} s of CPU time");
         let factors = |p: &[PilotEntry]| p[0].spacing_factor > p[1].spacing_factor;
         assert!(self.pilots.windows(2).all(factors), "pilots must become finer");
         let last = self.pilots.last().map(|p| (p.spacing_factor == 1.0, p.cells));
         match self.source {
-            Source::Areas => assert_eq!(last, None, "a rough estimate takes no pilot"),
             Source::Pilots => assert!(last.is_some_and(|l| !l.0), "a pilot must be coarser"),
             Source::Mesh => assert_eq!(last, Some((true, self.cells)), "the run is its own plan"),
         }
@@ -424,7 +401,7 @@ impl Plan {
             source,
             pilots: Vec::new(),
             cells: amounts.cells as u64,
-            time_cpu_s: None,
+            time_cpu_s: 0.0,
             memory_peak_bytes: ranks.peaks(&more),
             words_bytes: vec![words; count],
             tree_bytes: (amounts.cells * TREE_BYTES_PER_CELL) as u64,

@@ -8,11 +8,10 @@
 
 use crate::volumes::Volumes;
 use bricks::brickset::ones;
-use bricks::kept::Kept;
 use bricks::octant::{Level, corner, edge};
 use bricks::tree::{PerLevel, Tree};
 use bytemuck::{Pod, Zeroable};
-use mesher::lattice::{ExtentBox, Rules};
+use mesher::input::lattice::{ExtentBox, Rules};
 use mesher::partition::cost::Counts;
 use mesher::{Job, Mesh};
 
@@ -113,8 +112,7 @@ impl Collector {
     /// The amounts of a finished pilot.
     pub fn finish(self, mesh: &Mesh, cells: u64, job: &Job, volumes: &Volumes) -> Amounts {
         let bricks = |sets: &PerLevel| sets.iter().map(|s| s.len() as f64).sum::<f64>();
-        let stored =
-            bricks(&mesh.crossing) + bricks(&mesh.sides.deleted) + bricks(&mesh.sides.inside);
+        let stored = bricks(&mesh.crossing) + bricks(&mesh.sides.stored);
         let time = |of: &[&str]| -> f64 {
             let phases = job.record.phases().iter();
             phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
@@ -142,10 +140,9 @@ fn deleted_in(volumes: &Volumes, mesh: &Mesh) -> f64 {
     if volumes.is_empty() {
         return 0.0;
     }
-    let kept = Kept::new(&mesh.sides.deleted);
     let mut cells = 0.0;
-    for l in 0..mesh.sides.deleted.len() as Level {
-        for brick in kept.deleted(l).bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
+    for (l, deleted) in (0..).zip(mesh.sides.deleted()) {
+        for brick in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
             if !volumes.meet(corner(l, brick.key << 6), 4 * edge(l)) {
                 continue;
             }

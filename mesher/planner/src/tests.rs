@@ -1,6 +1,6 @@
 use super::*;
 use crate::cases::{case, options, rules as plain_rules};
-use mesher::lattice::{ExtentBox, Keep, Root};
+use mesher::input::lattice::{ExtentBox, Keep, Root};
 use ranks::{Solo, sim};
 
 const ROUGH: f64 = 268_435_456.0;
@@ -22,7 +22,6 @@ fn with_problem<T>(
         rules: &rules(level_surface),
         bounds: &Bounds { lo: [-1.0; 3], hi: [1.0; 3] },
         facets: &facets,
-        facets_total: 1,
         spacing_min: 0.5,
         volumes: &Volumes::new(boxes),
         time_cpu_s: 2.0,
@@ -52,7 +51,7 @@ fn planned(cells: f64, bytes: f64) -> (Plan, Vec<Level>) {
             asked.push(shift);
             Ok(amounts(cells, bytes, shift))
         };
-        from_pilots(problem, rough, cells_max(ROUGH, 1.0, 0.0), &mut pilot)
+        from_pilots(problem, rough, cells_max(rough, 1.0, 0.0), &mut pilot)
     });
     (plan.expect("the pilots succeed"), asked)
 }
@@ -65,7 +64,7 @@ fn the_finer_pilot_has_a_64th_of_the_cells() {
     let cells: Vec<(f64, u64)> = plan.pilots.iter().map(|p| (p.spacing_factor, p.cells)).collect();
     assert_eq!(cells, [(16.0, 1 << 20), (8.0, 1 << 22)]);
     assert_eq!((plan.source, plan.fits, plan.spacing_factor_fits), (Source::Pilots, true, None));
-    assert_eq!((plan.time_cpu_s, plan.pilots[0].time_cpu_s), (Some(5.0), 3.0));
+    assert_eq!((plan.time_cpu_s, plan.pilots[0].time_cpu_s), (5.0, 3.0));
     let words = ROUGH as u64 * 8 + WORDS_HEADER;
     assert!(plan.words_bytes[0].abs_diff(words) <= 8, "{:?}", plan.words_bytes);
     assert!(plan.tree_bytes.abs_diff((ROUGH * TREE_BYTES_PER_CELL) as u64) <= 1);
@@ -75,7 +74,7 @@ fn the_finer_pilot_has_a_64th_of_the_cells() {
         &|p| p.spacing_factor_fits = Some(2.0),
         &|p| _ = p.memory_peak_bytes.pop(),
         &|p| p.words_bytes[0] /= 3,
-        &|p| p.time_cpu_s = Some(f64::NAN),
+        &|p| p.time_cpu_s = f64::NAN,
         &|p| p.pilots.reverse(),
         &|p| p.source = Source::Mesh,
     ];
@@ -91,7 +90,7 @@ fn the_finer_pilot_has_a_64th_of_the_cells() {
     let written = with_problem(13, &[], |problem| {
         of_case(&Problem { output: Some(&output), ..copy(problem) }, pilot)
     });
-    let more = written.unwrap().time_cpu_s.unwrap() - plan.time_cpu_s.unwrap();
+    let more = written.unwrap().time_cpu_s - plan.time_cpu_s;
     assert!((more - 6.5e-9 * ROUGH).abs() < 1e-6, "{more}");
     // Fewer cells than the areas suggest: the next pilots are finer, and the mesh itself if it is small.
     assert_eq!(planned(ROUGH / 16.0, 1.0).1, [4, 2, 1]);
@@ -116,35 +115,24 @@ fn the_least_factor_that_fits_is_found() {
 }
 
 #[test]
-fn only_runs_that_may_not_fit_or_are_shown_are_planned() {
+fn only_runs_that_may_not_fit_are_planned_and_refused() {
     let unasked = &mut |_| panic!("no pilot is needed");
-    let before = |problem: &Problem, is_forced, is_shown, pilot: Pilot| {
-        before_run(problem, is_forced, is_shown, pilot)
-    };
     // The extent makes it large, but not its area.
     with_problem(10, &[], |problem| {
         assert!(!problem.is_small());
-        assert_eq!(before(problem, false, false, unasked), Ok(None));
-        let plan = before(problem, false, true, unasked).unwrap().expect("a plan");
-        assert_eq!((plan.source, plan.cells), (Source::Areas, 1 << 22));
-        let used = |plan: &Plan| plan.tightest.expect("memory is limited").needed_bytes;
-        assert_eq!(used(&plan), ((1 << 22) as f64 * BYTES_USUAL) as u64);
+        assert_eq!(before_run(problem, unasked), Ok(()));
     });
-    let few = &mut |shift| Ok(amounts(ROUGH, 1.0, shift));
-    let many = &mut |shift| Ok(amounts(ROUGH, 1e18, shift));
-    with_problem(13, &[], |problem| {
-        assert_eq!(before(problem, true, false, unasked), Ok(None));
-        let source = |plan: Result<Option<Plan>, Error>| plan.unwrap().expect("a plan").source;
-        assert_eq!(source(before(problem, false, true, few)), Source::Pilots);
-        assert_eq!(source(before(problem, true, true, many)), Source::Pilots);
-        assert!(matches!(before(problem, false, true, many), Err(Error::Memory(_))));
-        // Pilots of many facets take long.
-        let facets_total = (ROUGH / CELLS_PER_FACET) as u64;
-        let shown = |facets_total: u64, pilot: Pilot| {
-            source(before(&Problem { facets_total, ..copy(problem) }, false, true, pilot))
+    // Level 19: 4096 times as many cells as at level 13 take more than half of any memory.
+    with_problem(19, &[], |problem| {
+        let mut pilots = 0;
+        let few = &mut |shift| {
+            pilots += 1;
+            Ok(amounts(ROUGH, 1.0, shift))
         };
-        assert_eq!(shown(facets_total, few), Source::Pilots);
-        assert_eq!(shown(facets_total + 1, unasked), Source::Areas);
+        assert_eq!(before_run(problem, few), Ok(()));
+        assert!(pilots > 1);
+        let many = &mut |shift| Ok(amounts(ROUGH, 1e18, shift));
+        assert!(matches!(before_run(problem, many), Err(Error::Memory(_))));
     });
     // A small case is meshed.
     let plan =
@@ -182,11 +170,11 @@ fn extents_and_boxes_decide_whether_a_run_is_small() {
 
 #[test]
 fn pilots_of_runs_that_cannot_fit_are_short() {
-    assert_eq!(cells_max(6.4e9, 100.0, 0.0), 1e8);
-    assert_eq!(cells_max(2e11, 100.0, 0.0), 1e9);
-    assert_eq!(cells_max(6.4e9, 101.0, 0.0), 2.1e6);
-    assert_eq!(cells_max(6.4e8, 1.0, 0.0), 1e7);
-    assert_eq!(cells_max(6.4e8, 1.0, 2e7), 2e7);
+    assert_eq!(cells_max([6.4e9, 0.0], 100.0, 0.0), 1e8);
+    assert_eq!(cells_max([2e11, 0.0], 100.0, 0.0), 1e9);
+    assert_eq!(cells_max([6.4e9, 0.0], 101.0, 0.0), 2.1e6);
+    assert_eq!(cells_max([6.4e8, 0.0], 1.0, 0.0), 1e7);
+    assert_eq!(cells_max([6.4e8, 0.0], 1.0, 2e7), 2e7);
     let ranks = Ranks::gather(&Solo, Amounts::default(), 0);
     let left = ranks.tightest(&[1.0]).expect("memory is limited").left_bytes as f64;
     assert!((used(&ranks, left) - BYTES_ROUGH).abs() < 1e-6);

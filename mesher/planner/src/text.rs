@@ -2,23 +2,10 @@
 
 use super::{Limit, Plan, Source};
 use mesher::error::Error;
-use mesher::report::grouped;
+use mesher::output::report::grouped;
 use std::fmt;
 
 impl Plan {
-    /// The plan in one line.
-    pub fn line(&self) -> String {
-        let time =
-            self.time_cpu_s.map_or(String::new(), |s| format!(", {} of CPU time", seconds(s)));
-        let ranks = if self.ranks > 1 { " per rank" } else { "" };
-        format!(
-            "{} cells{time}, {} of memory{ranks}, leaf words of {}{ranks}",
-            self.about(),
-            bytes(self.memory_max()),
-            bytes(self.words_bytes[0] as f64)
-        )
-    }
-
     /// The error that refuses a run that does not fit.
     pub fn refusal(&self) -> Error {
         let Some(tightest) = self.tightest else { return Error::memory("the run does not fit") };
@@ -48,7 +35,6 @@ impl Plan {
         match self.source {
             Source::Mesh => grouped(self.cells),
             Source::Pilots => format!("about {:.1e}", self.cells as f64),
-            Source::Areas => format!("very roughly {:.0e}", self.cells as f64),
         }
     }
 
@@ -69,13 +55,11 @@ impl fmt::Display for Plan {
             writeln!(f, "pilot          {spacings}: {cells} cells, {time} of CPU time")?;
         }
         writeln!(f, "cells          {}", self.about())?;
-        if let Some(time) = self.time_cpu_s {
-            let ranks = match self.ranks {
-                1 => "on one rank".to_owned(),
-                ranks => format!("over {ranks} ranks"),
-            };
-            writeln!(f, "time           {} of CPU time {ranks}", seconds(time))?;
-        }
+        let ranks = match self.ranks {
+            1 => "on one rank".to_owned(),
+            ranks => format!("over {ranks} ranks"),
+        };
+        writeln!(f, "time           {} of CPU time {ranks}", seconds(self.time_cpu_s))?;
         let all: u64 = self.memory_peak_bytes.iter().sum();
         writeln!(
             f,
@@ -163,7 +147,7 @@ mod tests {
             source: Source::Pilots,
             pilots: vec![pilot(4.0), pilot(1.0)],
             cells: 1_234_567,
-            time_cpu_s: Some(12.6),
+            time_cpu_s: 12.6,
             memory_peak_bytes: vec![2_000_000, 3_500_000],
             words_bytes: vec![4_100_000; 2],
             tree_bytes: 1234,
@@ -181,10 +165,6 @@ mod tests {
     #[test]
     fn a_plan_says_all_that_a_run_takes() {
         let mut plan = plan();
-        assert_eq!(
-            plan.line(),
-            "about 1.2e6 cells, 13 s of CPU time, 3.5 MB of memory per rank, leaf words of 4.1 MB per rank"
-        );
         let fits = |plan: &Plan| plan.to_string().lines().last().map(str::to_owned);
         assert_eq!(
             plan.to_string(),
@@ -209,11 +189,9 @@ mod tests {
         }
         plan.tightest = None;
         assert_eq!(fits(&plan).as_deref(), Some("limit          none is known"));
-        let one = Plan { ranks: 1, source: Source::Areas, time_cpu_s: None, ..plan };
-        assert_eq!(one.line(), "very roughly 1e6 cells, 3.5 MB of memory, leaf words of 4.1 MB");
-        let mesh = Plan { source: Source::Mesh, ..one };
-        assert!(mesh.line().starts_with("1,234,567 cells, 3.5 MB"), "{}", mesh.line());
-        assert!(!mesh.to_string().contains("time "), "{mesh}");
+        let mesh = Plan { ranks: 1, source: Source::Mesh, ..plan };
+        let shown = ["cells          1,234,567\n", "time           13 s of CPU time on one rank\n"];
+        assert!(shown.iter().all(|line| mesh.to_string().contains(line)), "{mesh}");
     }
 
     #[test]

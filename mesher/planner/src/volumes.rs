@@ -1,7 +1,7 @@
 //! The cells that extent boxes ask for: their volumes, where boxes overlap by the finest of them.
 
 use bricks::octant::{Level, edge};
-use mesher::lattice::ExtentBox;
+use mesher::input::lattice::ExtentBox;
 
 /// Boxes above this number are not intersected with each other, which takes the cube of their number.
 const INTERSECTED_MAX: usize = 24;

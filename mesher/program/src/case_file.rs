@@ -1,10 +1,10 @@
 //! The case file: all programs of this workspace read the same files.
 
 use geometries::Generator;
-use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::error::Error;
-use mesher::ingest::Source;
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::ingest::Source;
+use mesher::input::lattice::{Enclosed, Keep, Root};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -44,10 +44,25 @@ struct RootTable {
 /// # Errors
 /// If the file cannot be read or is malformed.
 pub fn read(path: &Path) -> Result<Case, Error> {
+    parse(&read_text(path)?, path)
+}
+
+/// The text of a case file.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    files::read_text(path)
+        .map_err(|e| Error::input(format!("{}: {e}: give a readable case file", path.display())))
+}
+
+/// The case of a file with this text.
+///
+/// # Errors
+/// If the text is malformed.
+pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
     let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
-    let unreadable = |e| fail(&format!("{e}: give a readable case file"));
-    let text = files::read_text(path).map_err(unreadable)?;
-    let file: File = toml::from_str(&text).map_err(|e| fail(&explain(&text, &e)))?;
+    let file: File = toml::from_str(text).map_err(|e| fail(&explain(text, &e)))?;
     let folder = path.parent().unwrap_or(Path::new("."));
     file.into_case(folder).map_err(|e| fail(&e))
 }
@@ -139,15 +154,13 @@ fn key(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<Case, String> {
-        let mut f = tempfile::NamedTempFile::new().unwrap();
-        std::io::Write::write_all(&mut f, text.as_bytes()).unwrap();
-        read(f.path()).map_err(|e| e.to_string())
+    fn parsed(text: &str) -> Result<Case, String> {
+        parse(text, Path::new("case.toml")).map_err(|e| e.to_string())
     }
 
     #[test]
     fn defaults_are_the_documented_ones() {
-        let c = parse("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
+        let c = parsed("geometry = \"a.stl\"\nspacing_min = 0.5\n").unwrap();
         assert_eq!(
             (c.layer_cells_min, c.keep, c.keep_crossing, c.root),
             (4, Keep::Outside, true, RootSpec::Scale(10.0))
@@ -186,10 +199,10 @@ mod tests {
             ("geometry = a/b.stl", "put the path in single quotes"),
             ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
         ] {
-            let e = parse(text).unwrap_err();
+            let e = parsed(text).unwrap_err();
             assert!(e.contains(expected), "{e}");
         }
-        let whole = parse("geometry = \"a.stl\"\n").unwrap_err();
+        let whole = parsed("geometry = \"a.stl\"\n").unwrap_err();
         assert!(whole.contains("missing field") && !whole.contains("line"), "{whole}");
     }
 }

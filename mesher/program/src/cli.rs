@@ -2,14 +2,15 @@
 
 use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
 use clap_complete::Shell;
-use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::error::Error;
-use mesher::ingest::Source;
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::ingest::Source;
+use mesher::input::lattice::{Enclosed, Keep, Root};
+use mesher::output::write::Output;
 use mesher::partition::{Partitioner, Weights};
-use mesher::write::Output;
 use program::case_file::{self, LAYER_CELLS_MIN, ROOT_SCALE};
-use ranks::launch;
+use ranks::{Comm, agree, launch, text_of_first, uncounted};
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
@@ -83,7 +84,7 @@ pub struct Args {
     #[arg(short, long)]
     pub quiet: bool,
     #[command(flatten)]
-    body: Body,
+    body: Option<Body>,
 }
 
 /// Files of a mesh, besides the manifest.
@@ -211,8 +212,8 @@ fn command() -> Command {
 ///
 /// # Errors
 /// In one sentence, as all other errors.
-pub fn parse() -> Result<Args, Error> {
-    let parsed = command().try_get_matches().and_then(|mut m| {
+pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> Result<Args, Error> {
+    let parsed = command().try_get_matches_from(words).and_then(|mut m| {
         if let Some(&shell) = m.get_one::<Shell>("completions") {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut command(), "mesher", &mut script);
@@ -267,32 +268,34 @@ fn is_case_file(args: &Args) -> bool {
     args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
-/// The case that the command line describes.
-pub fn case(args: &Args) -> Result<Case, Error> {
-    let b = &args.body;
+/// The case that the command line describes; a case file is read on rank 0. Collective.
+///
+/// # Errors
+/// The same on all ranks.
+pub fn case(args: &Args, comm: &dyn Comm) -> Result<Case, Error> {
     if is_case_file(args) {
-        let given = b.spacing_min.is_some()
-            || b.layer_cells_min.is_some()
-            || b.keep.is_some()
-            || b.drop_crossing;
-        let given = given || b.root_scale.is_some() || b.root.is_some() || !b.boxes.is_empty();
-        if given || !b.seeds.is_empty() || b.enclosed.is_some() {
+        if args.body.is_some() {
             return Err(Error::input(format!(
                 "{} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line",
                 args.input.display()
             )));
         }
-        return case_file::read(&args.input);
+        let text = match comm.rank() {
+            0 => case_file::read_text(&args.input),
+            _ => Ok(String::new()),
+        };
+        let text = uncounted(comm, || agree(comm, text).map(|text| text_of_first(comm, &text)))?;
+        return case_file::parse(&text, &args.input);
     }
-    let spacing_min = b.spacing_min.ok_or_else(|| {
-        Error::input(format!(
+    let Some(b @ Body { spacing_min: Some(spacing_min), .. }) = &args.body else {
+        return Err(Error::input(format!(
             "{} is read as an STL file: give --spacing-min, or a case file (.toml)",
             args.input.display()
-        ))
-    })?;
+        )));
+    };
     Ok(Case {
         source: Source::Stl(args.input.clone()),
-        spacing_min,
+        spacing_min: *spacing_min,
         layer_cells_min: b.layer_cells_min.unwrap_or(LAYER_CELLS_MIN),
         keep: b.keep.unwrap_or(Keep::Outside),
         keep_crossing: !b.drop_crossing,

@@ -9,16 +9,15 @@ mod heap;
 use cli::{Args, CommChoice, UNPRINTED, case, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::Options;
-use mesher::agreement;
-use mesher::case::Case;
 use mesher::error::Error;
-use mesher::ingest::Source;
+use mesher::input::agreement;
+use mesher::input::ingest::Source;
+use mesher::output::report::Report;
+use mesher::output::write::write_json;
 use mesher::partition::Division;
 use mesher::record::Recorder;
-use mesher::report::Report;
-use mesher::write::write_json;
 use planner::Plan;
-use ranks::{Comm, STALLED, Solo, agree, launch, sim};
+use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
@@ -41,7 +40,7 @@ const LINGER: Duration = Duration::from_millis(300);
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     heap::fix_thresholds();
-    let args = parse();
+    let args = parse(std::env::args_os());
     let message = match (launch::is_first(), stderr().is_terminal()) {
         (false, _) => "",
         (true, false) => "mesher: interrupted\n",
@@ -171,18 +170,41 @@ fn print(outcome: &Outcome) -> i32 {
     }
 }
 
+/// The command line of rank 0, which all ranks follow, if it differs from this rank's. Collective.
+fn args_of_first(comm: &dyn Comm) -> Option<Result<Args, Error>> {
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
+    let mine = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
+    let mine = mine.join("\0");
+    let of_first = text_of_first(comm, &mine);
+    let version = |text: &str| text.split('\0').next().unwrap_or_default().to_owned();
+    let is_same = agree(
+        comm,
+        match version(&of_first) == version(&mine) {
+            true => Ok(()),
+            false => Err(Error::input(format!(
+                "rank {} is a mesher of version {}, rank 0 of {}: start the same program on all ranks",
+                comm.rank(),
+                version(&mine),
+                version(&of_first)
+            ))),
+        },
+    );
+    match is_same {
+        Err(e) => Some(Err(e)),
+        Ok(()) if of_first == mine => None,
+        Ok(()) => Some(parse(of_first.split('\0'))),
+    }
+}
+
 /// One rank's run; returns the exit code, the same on all ranks.
 fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    let understood = args.as_ref().map(drop).map_err(Error::clone);
-    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
-    let words = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
-    let agreed = agreement::on_options(understood, &words, comm);
-    let args = match agreed.and_then(|()| args.as_ref().map_err(Error::clone)) {
+    let of_first = uncounted(comm, || args_of_first(comm));
+    let args = match of_first.as_ref().map_or(args, |of_first| of_first) {
         Ok(args) => args,
         Err(e) => {
             interrupt::decided();
-            return fail(&e, first);
+            return fail(e, first);
         }
     };
     if let Some(limit) = args.stall_limit {
@@ -228,13 +250,10 @@ fn end_within(limit: Duration) {
     let _ = std::thread::Builder::new().spawn(end);
 }
 
-/// A case whose geometry is known to be an input: no output of the run may be that file.
-fn registered(case: Case) -> Result<Case, Error> {
-    if let Source::Stl(path) = &case.source {
-        files::register_input(path)
-            .map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
-    }
-    Ok(case)
+/// Makes the geometry known as an input: no output of the run may be that file.
+fn registered(source: &Source) -> Result<(), Error> {
+    let Source::Stl(path) = source else { return Ok(()) };
+    files::register_input(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
 }
 
 fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
@@ -245,8 +264,9 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         agree(comm, json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
     on_json("choose another --json", &check_writable)?;
-    let case = agree(comm, case(args).and_then(registered))?;
-    agreement::on_case(&case, comm)?;
+    let case = case(args, comm)?;
+    agree(comm, registered(&case.source))?;
+    agreement::on_geometry(&case.source, comm)?;
     if let Some(dir) = &args.status {
         // Not before the inputs are known, which these files must not replace.
         let path = dir.join(format!("rank-{:05}.txt", comm.rank()));

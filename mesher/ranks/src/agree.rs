@@ -1,4 +1,4 @@
-//! Errors that all ranks agree on.
+//! Errors and texts that all ranks agree on.
 
 use crate::Comm;
 
@@ -24,6 +24,16 @@ where
             Err(E::from((words[0] as i32, String::from_utf8_lossy(&sentence).into_owned())))
         }
     }
+}
+
+/// The text of rank 0. Collective.
+pub fn text_of_first(comm: &dyn Comm, text: &str) -> String {
+    let mut packed = Vec::new();
+    if comm.rank() == 0 {
+        pack_bytes(text.as_bytes(), &mut packed);
+    }
+    let (bytes, _) = unpack_bytes(comm.all_gather(&packed).words());
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// Appends bytes to a message, after their number.

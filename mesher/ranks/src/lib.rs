@@ -18,7 +18,7 @@ mod mpi;
 mod reduced;
 pub mod sim;
 
-pub use agree::{agree, pack_bytes, unpack_bytes};
+pub use agree::{agree, pack_bytes, text_of_first, unpack_bytes};
 pub use message_buffer::MessageBuffer;
 pub use metered::{Metered, Traffic};
 pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, split_by_reducer};

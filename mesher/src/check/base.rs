@@ -1,7 +1,7 @@
 //! T0 by its definition, octant by octant from the root. The test of facets against octants and the descent share no code with
 //! refinement, routing and extent boxes.
 
-use crate::lattice::Rules;
+use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
 use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge, path, start57};

@@ -21,7 +21,7 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
     let gather = |l: Level, set: BrickSet| to_owners(set, l, ownership, comm);
     // The kept leaves among some octants of level l.
     let leaves = |l: Level, octants: BrickSet| {
-        octants.without(&split[l as usize]).without(&sides.deleted[l as usize])
+        octants.without(&split[l as usize]).without(&sides.deleted()[l as usize])
     };
     let deepest = rules.level_deepest();
     assert!(
@@ -52,7 +52,7 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
         }
         for code in asked.without(above).codes() {
             assert!(
-                is_in_leaf(&sides.deleted, l - 1, code),
+                is_in_leaf(sides.deleted(), l - 1, code),
                 "octant {} of level {} must be split for a layer or balance",
                 path(l - 1, code),
                 l - 1

@@ -2,7 +2,7 @@
 //! with the phase.
 
 use super::{face_neighbours, is_in_leaf, to_owners};
-use crate::lattice::{Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
 use crate::sides::enclosed::Region;
 use crate::sides::nodes::open_bricks;
@@ -20,7 +20,7 @@ const COMPONENTS_MAX: usize = 64;
 
 /// Leaves that share part of a face are on one side, whichever ranks own them. Collective.
 pub fn agree_over_faces(sides: &Sides, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) {
-    let stored = sides.stored();
+    let stored = &sides.stored;
     let mut others: PerLevel = per_level();
     for l in 0..LEVELS as Level {
         let mut on_side = stored[l as usize].cursor();
@@ -62,7 +62,7 @@ pub fn components(
             Keep::Inside => !is_inside,
             Keep::All => is_inside,
         };
-        let is_here = ownership.owns(l, code >> 6) && sides.stored()[l as usize].contains(code);
+        let is_here = ownership.owns(l, code >> 6) && sides.stored[l as usize].contains(code);
         let holders = comm.sum(u64::from(is_here));
         let place = path(l, code);
         assert_eq!(holders, u64::from(is_stored), "octant {place} of level {l}: its side");
@@ -100,7 +100,7 @@ pub fn seeds(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership) {
             l += 1;
         }
         if ownership.owns(l, code >> 6) {
-            let is_stored = sides.stored()[l as usize].contains(code);
+            let is_stored = sides.stored[l as usize].contains(code);
             let is_crossing = tree.crossing[l as usize].contains(code);
             let wanted = sides.keep == Keep::All && rules.keep == Keep::Inside;
             let place = path(l, code);

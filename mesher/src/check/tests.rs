@@ -1,10 +1,11 @@
 use super::*;
-use crate::case::{BoxSpec, Case, RootSpec};
-use crate::ingest::{self, Source};
-use crate::lattice::{Bounds, Enclosed, ExtentBox, Keep, Seed};
+use crate::input::case::{BoxSpec, Case, RootSpec};
+use crate::input::ingest::{self, Source};
+use crate::input::lattice::{Bounds, Enclosed, ExtentBox, Keep, Seed};
+use crate::output::leaves as finished;
 use crate::partition::ownership::Placement;
 use crate::record::Recorder;
-use crate::{leaves as finished, refine};
+use crate::refine;
 use bricks::octant::Side;
 use geometries::{Generator, Shape};
 use ranks::{Solo, sim};
@@ -162,7 +163,7 @@ fn check_lattice(corrupt: impl Fn(&mut Quantised)) {
     let case = Case { boxes: vec![box_spec], seeds: vec![[0.7, 0.0, 0.0]], ..case() };
     let slice = ingest::read(&case.source, &Solo).expect("a good case");
     let given = slice.facets.clone();
-    let mut quantised = crate::quantise::quantise(&case, slice, &Solo).expect("a good case");
+    let mut quantised = crate::input::quantise::quantise(&case, slice, &Solo).expect("a good case");
     corrupt(&mut quantised);
     lattice(&given, &case, &quantised);
 }
@@ -298,13 +299,7 @@ fn leaves_that_overlap_a_coarser_one_are_found() {
 #[test]
 #[should_panic(expected = "has a side, but is no leaf off the surface")]
 fn a_crossing_leaf_that_is_deleted_is_found() {
-    run(true, |m| m.sides.inside = m.crossing.clone(), check_sides);
-}
-
-#[test]
-#[should_panic(expected = "is in the set that this choice of sides leaves empty")]
-fn leaves_stored_as_inside_and_as_deleted_are_found() {
-    run(true, |m| m.sides.deleted = m.sides.inside.clone(), check_sides);
+    run(true, |m| m.sides.stored = m.crossing.clone(), check_sides);
 }
 
 #[test]
@@ -317,8 +312,8 @@ fn different_numbers_of_components_are_found() {
 #[should_panic(expected = "deleted leaves must not split")]
 fn a_deleted_leaf_that_is_split_is_found() {
     let corrupt = |m: &mut Mesh| {
-        let l = deepest(&m.sides.deleted);
-        let code = m.sides.deleted[l].codes().next().expect("a deleted leaf");
+        let l = deepest(&m.sides.stored);
+        let code = m.sides.stored[l].codes().next().expect("a deleted leaf");
         add(&mut m.split[l], code);
     };
     run(false, corrupt, check_graded);
@@ -381,7 +376,7 @@ fn every_corruption_of_one_graded_octant_is_found() {
     let mut corrupted = 0;
     for l in 1..=deepest(&mesh.split) {
         let leaves = BrickSet::from_unsorted(Tree::exists(&mesh.split, l as Level).collect());
-        let kept = leaves.without(&mesh.split[l]).without(&mesh.sides.deleted[l]);
+        let kept = leaves.without(&mesh.split[l]).without(&mesh.sides.stored[l]);
         let fresh = mesh.split[l].clone().without(&base[l]);
         for code in kept.codes().step_by(997).chain(fresh.codes().step_by(97)) {
             toggle(&mut mesh.split[l], code);
@@ -418,14 +413,14 @@ fn a_tree_without_gradation_is_not_balanced() {
 fn a_side_that_differs_between_ranks_is_found() {
     let corrupt = |m: &mut Mesh| {
         // All that rank 1 owns changes sides; replicas agree.
-        for l in 0..m.sides.inside.len() {
+        for l in 0..m.sides.stored.len() {
             let all = Tree::exists(&m.split, l as Level).collect();
             let open = BrickSet::from_unsorted(all).without(&m.split[l]).without(&m.crossing[l]);
-            let mut flipped = open.without(&m.sides.inside[l]);
+            let mut flipped = open.without(&m.sides.stored[l]);
             let local = |b: &Brick| m.ownership.placement(l as Level, b.key) == Placement::Local;
             flipped.retain(|b| if local(&b) { b.bits } else { 0 });
-            m.sides.inside[l].retain(|b| if local(&b) { 0 } else { b.bits });
-            m.sides.inside[l] = std::mem::take(&mut m.sides.inside[l]).union(flipped);
+            m.sides.stored[l].retain(|b| if local(&b) { 0 } else { b.bits });
+            m.sides.stored[l] = std::mem::take(&mut m.sides.stored[l]).union(flipped);
         }
     };
     run(true, corrupt, check_sides);
@@ -491,9 +486,9 @@ fn a_leaf_counted_twice_is_found() {
 #[should_panic(expected = "leaves and deleted leaves must tile the root")]
 fn a_deleted_octant_that_is_no_leaf_is_found() {
     let corrupt = |m: &mut Mesh| {
-        let l = deepest(&m.sides.deleted);
-        let code = m.sides.deleted[l].codes().find(|c| m.ownership.owns(l as Level, c >> 6));
-        add(&mut m.sides.deleted[l + 1], code.expect("a deleted leaf") << 3);
+        let l = deepest(&m.sides.stored);
+        let code = m.sides.stored[l].codes().find(|c| m.ownership.owns(l as Level, c >> 6));
+        add(&mut m.sides.stored[l + 1], code.expect("a deleted leaf") << 3);
     };
     check_leaves(corrupt, 0);
 }

@@ -4,7 +4,7 @@
 //! the components of its unit normal, as cells are cubes. So area is measured in that norm, in units of a face of a finest
 //! cell. A facet larger than the octants of interest is split in four until it is not.
 
-use crate::lattice::{ExtentBox, Rules};
+use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::curve::Bin;
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
@@ -189,7 +189,7 @@ fn centre(f: &Facet) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::Keep;
+    use crate::input::lattice::Keep;
     use crate::partition::curve;
     use crate::tests::rules as plain_rules;
     use ranks::Solo;

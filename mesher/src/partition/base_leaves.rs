@@ -8,7 +8,7 @@ mod heaviest;
 pub use heaviest::Heaviest;
 
 use crate::error::Error;
-use crate::lattice::Rules;
+use crate::input::lattice::Rules;
 use crate::partition::curve::assign_morton;
 #[cfg(feature = "metis")]
 use crate::partition::metis;

@@ -8,7 +8,7 @@
 //! METIS, weights of 1 and a given `level_base` need base leaves: see [`base_leaves`].
 
 use crate::error::Error;
-use crate::lattice::{ExtentBox, Rules};
+use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::area::{self, FRACTIONS};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::Ownership;

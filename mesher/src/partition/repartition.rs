@@ -65,36 +65,21 @@ fn estimate_level(tree: &Tree, l: Level, stride: usize, work: &mut Weighted) {
     }
 }
 
-/// The sets of octants that make up a mesh, by level.
-pub struct Sets<'a> {
-    /// Split octants of the graded tree.
-    pub split: &'a mut PerLevel,
-    /// Crossing leaves of T0.
-    pub crossing: &'a mut PerLevel,
-    /// Leaves of T0 that are inside.
-    pub inside: &'a mut PerLevel,
-    /// Deleted leaves of T0.
-    pub deleted: &'a mut PerLevel,
-}
-
 /// The number of leaves that this rank owns, by octants of one level.
 pub struct LeafCounts(Vec<Bin>);
 
 impl LeafCounts {
-    /// Counts the leaves of a mesh by octants of `level`, crossing leaves included if `with_crossing`.
-    pub fn new(sets: &Sets, ownership: &Ownership, level: Level, with_crossing: bool) -> Self {
+    /// Counts the leaves of a tree by octants of `level`, without those that are `gone`.
+    pub fn new(split: &PerLevel, gone: &[&PerLevel], ownership: &Ownership, level: Level) -> Self {
         let mut counts = Weighted::new(ownership, level);
-        counts.coarse = sets.split.iter().map(BrickSet::len).sum::<usize>() >= BRICKS_MANY;
+        counts.coarse = split.iter().map(BrickSet::len).sum::<usize>() >= BRICKS_MANY;
         let mut add = |l: Level, sets: &PerLevel, each: i64| {
             counts.add_set(l, &sets[l as usize], each, |key| ownership.owns(l, key));
         };
         for l in 0..LEVELS as Level {
             // A split replaces one leaf by eight.
-            add(l, sets.split, 7);
-            add(l, sets.deleted, -1);
-            if !with_crossing {
-                add(l, sets.crossing, -1);
-            }
+            add(l, split, 7);
+            gone.iter().for_each(|gone| add(l, gone, -1));
         }
         Self(counts.bins())
     }
@@ -114,15 +99,19 @@ impl LeafCounts {
 
     /// Moves the boundaries until ranks have nearly the same number of leaves, and sends the bricks of `sets` to the ranks that hold
     /// them then. Returns the new partition. Collective.
-    pub fn after_gradation(self, sets: Sets, ownership: &Ownership, comm: &dyn Comm) -> Ownership {
+    pub fn after_gradation(
+        self,
+        sets: &mut [&mut PerLevel],
+        ownership: &Ownership,
+        comm: &dyn Comm,
+    ) -> Ownership {
         let first_own = ownership.intervals().next().map_or(0, |own| own.start);
         let Some(boundaries) = curve::repartition(&self.0, first_own, TOLERANCE_LEAVES, comm)
         else {
             return ownership.clone();
         };
         let new = Ownership::along(comm.rank(), comm.size(), boundaries);
-        let mut sets = [sets.split, sets.crossing, sets.inside, sets.deleted];
-        for set in &mut sets {
+        for set in &mut *sets {
             for (l, bricks) in
                 (0..).zip(set.iter_mut()).filter(|(l, _)| ownership.is_replicated(*l))
             {
@@ -130,7 +119,7 @@ impl LeafCounts {
                 bricks.retain(|b| if ownership.owns(l, b.key) { b.bits } else { 0 });
             }
         }
-        new.synchronise_replicas(&mut sets, comm);
+        new.synchronise_replicas(sets, comm);
         new
     }
 }
@@ -234,16 +223,9 @@ mod tests {
     }
 
     /// The greatest difference between cumulative counts of leaves by bins and by octants.
-    fn error_max(mut split: PerLevel) -> u64 {
+    fn error_max(split: PerLevel) -> u64 {
         let exact = exact(&split);
-        let [mut crossing, mut inside, mut deleted] = [per_level(), per_level(), per_level()];
-        let sets = Sets {
-            split: &mut split,
-            crossing: &mut crossing,
-            inside: &mut inside,
-            deleted: &mut deleted,
-        };
-        let counts = LeafCounts::new(&sets, &Ownership::solo(), LEVEL, true);
+        let counts = LeafCounts::new(&split, &[], &Ownership::solo(), LEVEL);
         let (mut found, mut want, mut error) = (0, 0u64, 0);
         let mut bins = counts.0.iter().peekable();
         for (bin, leaves) in (0..).zip(exact) {

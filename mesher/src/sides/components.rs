@@ -11,9 +11,10 @@ use bricks::brick;
 use bricks::brickset::ones;
 use bricks::octant::{Level, neighbour};
 
-/// A union-find over local components, and the faces whose other side only another rank sees.
+/// Merged local components, and the faces whose other side only another rank sees.
 pub struct LocalMerge {
-    parent: Vec<Component>,
+    /// The sets of components that are merged.
+    pub merged: UnionFind,
     /// What other ranks must merge: octants in their bricks that a component of this rank faces, and
     /// components in replicas of bricks that another rank owns.
     pub faces: Vec<FacedOctants>,
@@ -45,21 +46,29 @@ pub struct FacedOctants {
     pub bits: u64,
 }
 
-impl LocalMerge {
-    /// The representative of all components merged with `c`: the one with the lowest number.
+/// Sets of numbers from 0. The least number represents a set.
+pub struct UnionFind(Vec<u32>);
+
+impl UnionFind {
+    /// Numbers below `count`, each in a set of its own.
+    pub fn new(count: u32) -> Self {
+        Self((0..count).collect())
+    }
+
+    /// The representative of a number.
     #[inline]
-    pub fn find(&mut self, mut c: Component) -> Component {
-        while self.parent[c as usize] != c {
-            let up = self.parent[self.parent[c as usize] as usize];
-            self.parent[c as usize] = up;
+    pub fn find(&mut self, mut c: u32) -> u32 {
+        while self.0[c as usize] != c {
+            let up = self.0[self.0[c as usize] as usize];
+            self.0[c as usize] = up;
             c = up;
         }
         c
     }
 
-    /// Numbers the merged components.
+    /// Numbers the sets.
     pub fn numbered(self) -> MergedComponents {
-        let mut merged = self.parent;
+        let mut merged = self.0;
         let mut count = 0;
         for c in 0..merged.len() {
             // A parent in the union-find has a lower number than its child, so it is numbered already.
@@ -70,15 +79,15 @@ impl LocalMerge {
         MergedComponents { of: merged, count }
     }
 
-    /// Merges two components.
+    /// Unites the sets of two numbers.
     #[inline]
-    pub fn unite(&mut self, a: Component, b: Component) {
-        // Most pairs have been merged before and have the same parent.
-        if self.parent[a as usize] == self.parent[b as usize] {
+    pub fn unite(&mut self, a: u32, b: u32) {
+        // Most pairs have been united before and have the same parent.
+        if self.0[a as usize] == self.0[b as usize] {
             return;
         }
         let (a, b) = (self.find(a), self.find(b));
-        self.parent[a.max(b) as usize] = a.min(b);
+        self.0[a.max(b) as usize] = a.min(b);
     }
 }
 
@@ -120,7 +129,7 @@ pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
         nodes,
         ownership,
         local: LocalMerge {
-            parent: (0..nodes.component_count()).collect(),
+            merged: UnionFind::new(nodes.component_count()),
             faces: Vec::new(),
             // Enough for most meshes, so that it does not grow in many steps.
             at_boundary: Vec::with_capacity(1 << 12),
@@ -221,7 +230,7 @@ impl Walk<'_> {
                 if up == 1 {
                     for (d, bits) in nodes.components(l, n) {
                         if bits & faced != 0 {
-                            self.local.unite(c, d);
+                            self.local.merged.unite(c, d);
                         }
                     }
                 }
@@ -274,7 +283,7 @@ impl Walk<'_> {
             if faced & exists != 0 {
                 for (d, bits) in self.nodes.components(m, node) {
                     if bits & faced != 0 {
-                        self.local.unite(c, d);
+                        self.local.merged.unite(c, d);
                     }
                 }
                 faced &= !exists;

@@ -7,7 +7,7 @@
 use super::global::Label;
 use super::vote::FirstLeaf;
 use super::{EnclosedComponents, Verdict};
-use crate::lattice::{Enclosed, Keep, Rules};
+use crate::input::lattice::{Enclosed, Keep, Rules};
 use ranks::{Comm, all_gather_reduced};
 use std::collections::HashSet;
 

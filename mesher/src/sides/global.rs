@@ -5,13 +5,12 @@
 //! with the components' labels. Where labels differ across a face, the pair is an edge of a graph; only
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
-use super::components::{self, FacedOctants, MergedComponents};
+use super::components::{self, FacedOctants, MergedComponents, UnionFind};
 use super::nodes::{Component, Nodes};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
-use ranks::{Comm, MessageBuffer};
-use std::collections::HashMap;
+use ranks::{Comm, MessageBuffer, gather};
 
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
@@ -32,22 +31,20 @@ pub fn labels(
     }
     let mut pairs = label_replicated(&mut labels, nodes, tree, ownership, merged);
     pairs.extend(across_ranks(nodes, faces, merged, &labels, comm));
-    let mut unions = UnionFind::default();
-    for &[a, b] in comm.all_gather(&group_forest(pairs, comm)).words().as_chunks().0 {
-        unions.unite(a, b);
-    }
+    let mut unions = Unions::of(&gather(comm, &group_forest(pairs, comm)));
     labels.iter().map(|&n| unions.find(n)).collect()
 }
 
 /// A spanning forest of the pairs of all ranks in a group, on the group's first rank, and none on the others.
 /// Both sides of a face yield the same pair, and consecutive ranks are often neighbours; so a group's
 /// forest is much smaller than all its pairs. Collective.
-fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<u64> {
-    let mine: Vec<u64> = UnionFind::of(&pairs).spanning_forest();
+fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
-    let received = comm.sparse_all_to_all([(first, mine)].into_iter().collect());
-    UnionFind::of(received.words().as_chunks().0).spanning_forest()
+    let mut messages = MessageBuffer::default();
+    messages.write_values(first, &Unions::of(&pairs).spanning_forest());
+    let received: Vec<_> = comm.sparse_all_to_all(messages).values().collect();
+    Unions::of(&received).spanning_forest()
 }
 
 /// Labels the merged components that have a part in a fully replicated brick by the number of this part's
@@ -63,7 +60,7 @@ fn label_replicated(
 ) -> Vec<[Label; 2]> {
     let non_owning_view = ownership.non_owning_view();
     let replicated = Nodes::new(&ownership.fully_replicated(tree), &non_owning_view);
-    let of_replicated = components::merge(&replicated, &non_owning_view).numbered().of;
+    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered().of;
     let of_nodes = replicated_components(nodes);
     assert_eq!(
         of_nodes.len(),
@@ -128,45 +125,37 @@ fn replicated_components(nodes: &Nodes) -> Vec<Component> {
     out
 }
 
-/// A union-find over labels, in which the least label represents a set.
-#[derive(Default)]
-struct UnionFind {
-    parent: HashMap<Label, Label>,
+/// The sets into which pairs unite labels. The least label represents a set.
+struct Unions {
+    /// All labels of the pairs, ascending.
+    labels: Vec<Label>,
+    /// By the positions of the labels.
+    sets: UnionFind,
 }
 
-impl UnionFind {
-    fn of<'a>(pairs: impl IntoIterator<Item = &'a [Label; 2]>) -> Self {
-        let mut unions = Self::default();
-        pairs.into_iter().for_each(|&[a, b]| unions.unite(a, b));
-        unions
+impl Unions {
+    fn of(pairs: &[[Label; 2]]) -> Self {
+        let mut labels = pairs.as_flattened().to_vec();
+        labels.sort_unstable();
+        labels.dedup();
+        let mut sets = UnionFind::new(labels.len() as u32);
+        let at = |label| labels.partition_point(|l| *l < label) as u32;
+        pairs.iter().for_each(|&[a, b]| sets.unite(at(a), at(b)));
+        Self { labels, sets }
+    }
+
+    fn find(&mut self, label: Label) -> Label {
+        match self.labels.binary_search(&label) {
+            Ok(at) => self.labels[self.sets.find(at as u32) as usize],
+            Err(_) => label,
+        }
     }
 
     /// A spanning forest: each label with the representative of its set, if that is another one.
-    fn spanning_forest(&self) -> Vec<u64> {
-        let mut pairs: Vec<[Label; 2]> = self.parent.keys().map(|&n| [n, self.find(n)]).collect();
-        pairs.sort_unstable();
-        pairs.into_flattened()
-    }
-
-    fn find(&self, mut n: Label) -> Label {
-        while let Some(&parent) = self.parent.get(&n) {
-            n = parent;
-        }
-        n
-    }
-
-    fn unite(&mut self, a: Label, b: Label) {
-        let (ra, rb) = (self.find(a), self.find(b));
-        let root = ra.min(rb);
-        // Path compression on both sides.
-        for mut n in [a, b] {
-            while n != root {
-                match self.parent.insert(n, root) {
-                    Some(parent) => n = parent,
-                    None => break,
-                }
-            }
-        }
+    fn spanning_forest(&mut self) -> Vec<[Label; 2]> {
+        let labels = self.labels.clone();
+        let pairs = labels.into_iter().map(|label| [label, self.find(label)]);
+        pairs.filter(|[label, first]| label != first).collect()
     }
 }
 
@@ -176,11 +165,9 @@ mod tests {
 
     #[test]
     fn labels_unite_through_chains() {
-        let mut j = UnionFind::default();
-        for (a, b) in [(9, 8), (5, 6), (8, 6), (1, 2), (7, 9)] {
-            j.unite(a, b);
-        }
+        let mut j = Unions::of(&[[9, 8], [5, 6], [8, 6], [1, 2], [7, 9]]);
         assert!([5, 6, 7, 8, 9].iter().all(|&n| j.find(n) == 5));
         assert_eq!((j.find(2), j.find(1), j.find(3)), (1, 1, 3));
+        assert_eq!(j.spanning_forest(), [[2, 1], [6, 5], [7, 5], [8, 5], [9, 5]]);
     }
 }

@@ -16,7 +16,7 @@ use super::global::Label;
 use super::nodes::{Component, Nodes};
 use super::vote::{self, Candidate};
 use super::{Components, seeds};
-use crate::lattice::{Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;

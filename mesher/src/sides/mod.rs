@@ -9,9 +9,8 @@
 //! does not reach are found last ([`enclosed`]), and what is closed at a coarser spacing only ([`leaks`]).
 //!
 //! Invariants of [`Sides`]:
-//! - `inside` and `deleted` hold non-crossing leaves of the base tree;
-//! - `deleted` is empty if everything is kept, and `inside` is empty otherwise: only the set that the
-//!   following phases need is stored;
+//! - `stored` holds non-crossing leaves of the base tree: the inside ones if everything is kept, and otherwise
+//!   those that are deleted, as the following phases need;
 //! - leaves that share part of a face are on the same side, and all kept or all deleted.
 
 pub mod components;
@@ -26,18 +25,19 @@ pub mod vote;
 
 use crate::check;
 use crate::error::Error;
-use crate::lattice::{Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::mesh::Options;
 use crate::partition::ownership::Ownership;
 use bricks::brick::Brick;
 use bricks::facet::Facet;
 use bricks::octant::Level;
-use bricks::tree::{LEVELS, PerLevel, Tree, assert_none, per_level};
+use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
 use enclosed::Region;
 use global::Label;
 use nodes::{Component, Nodes};
 use ranks::{Comm, uncounted};
 use std::collections::HashSet;
+use std::sync::LazyLock;
 use vote::{FirstLeaf, FirstLeaves};
 
 /// Sides of the base tree's leaves.
@@ -45,10 +45,8 @@ use vote::{FirstLeaf, FirstLeaves};
 pub struct Sides {
     /// The side that is kept. Everything is kept if the mesh is the base tree.
     pub keep: Keep,
-    /// Non-crossing leaves that are inside, if everything is kept.
-    pub inside: PerLevel,
-    /// Non-crossing leaves that are not kept.
-    pub deleted: PerLevel,
+    /// Non-crossing leaves: those that are inside if everything is kept, and otherwise those that are deleted.
+    pub stored: PerLevel,
     /// The components, in numbers.
     pub summary: Summary,
     /// Rays cast, over all ranks.
@@ -125,7 +123,7 @@ impl Components {
         let mut local = components::merge(&nodes, ownership);
         let faces = std::mem::take(&mut local.faces);
         let at_boundary = std::mem::take(&mut local.at_boundary);
-        let merged = local.numbered();
+        let merged = local.merged.numbered();
         let labels = global::labels(&nodes, tree, ownership, faces, &merged, comm);
         let candidates = vote::candidates(&nodes, tree, &merged.of, &labels, ownership);
         let all = vote::all_components(&candidates, comm);
@@ -190,8 +188,7 @@ pub fn decide(
     drop(merged);
     let mut sides = Sides {
         keep: if options.ungraded { Keep::All } else { rules.keep },
-        inside: per_level(),
-        deleted: per_level(),
+        stored: per_level(),
         summary: Summary {
             outside: (all.len() - verdict.inside.len()) as u64,
             inside: verdict.inside.len() as u64,
@@ -239,13 +236,12 @@ impl Sides {
                         Class::Enclosed => enclosed |= part,
                     }
                 }
-                let (inside, deleted) = match self.keep {
-                    Keep::All => (within, 0),
-                    Keep::Outside => (0, within | enclosed),
-                    Keep::Inside => (0, open & !within),
+                let stored = match self.keep {
+                    Keep::All => within,
+                    Keep::Outside => within | enclosed,
+                    Keep::Inside => open & !within,
                 };
-                self.inside[l as usize].push(key, inside);
-                self.deleted[l as usize].push(key, deleted);
+                self.stored[l as usize].push(key, stored);
                 if enclosed != 0 && ownership.owns(l, key) {
                     leaves_enclosed += u64::from(enclosed.count_ones());
                 }
@@ -254,37 +250,19 @@ impl Sides {
         leaves_enclosed
     }
 
-    /// The set that is stored, and the one that is empty.
-    fn sets(&self) -> [&PerLevel; 2] {
-        match self.keep {
-            Keep::All => [&self.inside, &self.deleted],
-            Keep::Outside | Keep::Inside => [&self.deleted, &self.inside],
-        }
+    /// The deleted leaves: none if everything is kept.
+    pub fn deleted(&self) -> &PerLevel {
+        static NONE: LazyLock<PerLevel> = LazyLock::new(per_level);
+        if self.keep == Keep::All { &NONE } else { &self.stored }
     }
 
-    /// The inside leaves if everything is kept, and otherwise the deleted ones.
-    pub fn stored(&self) -> &PerLevel {
-        self.sets()[0]
-    }
-
-    /// Checks the first two invariants on the bricks that this rank holds;
-    /// [`check::sides`] executes the last.
+    /// Checks the first invariant on the bricks that this rank holds;
+    /// [`check::sides`](fn@check::sides) executes the last.
     ///
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
     pub fn check_invariants(&self, tree: &Tree) {
-        let [stored, empty] = self.sets();
-        tree.check_open_leaves(stored, "has a side, but is no leaf off the surface");
-        for l in 0..LEVELS as Level {
-            for b in empty[l as usize].bricks() {
-                assert_none(
-                    l,
-                    b.key,
-                    b.bits,
-                    "is in the set that this choice of sides leaves empty",
-                );
-            }
-        }
+        tree.check_open_leaves(&self.stored, "has a side, but is no leaf off the surface");
     }
 }
 
@@ -310,15 +288,7 @@ mod tests {
     #[should_panic(expected = "octant 0.0.0 of level 3 has a side, but is no leaf off the surface")]
     fn a_side_of_a_crossing_leaf_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
-        sides.deleted[3] = set(&[0]);
-        sides.check_invariants(&tree);
-    }
-
-    #[test]
-    #[should_panic(expected = "octant 2 of level 1 is in the set that this choice of sides leaves")]
-    fn an_inside_leaf_of_a_mesh_that_keeps_the_outside_is_found() {
-        let (tree, mut sides) = decided(Keep::Outside);
-        sides.inside[1] = set(&[2]);
+        sides.stored[3] = set(&[0]);
         sides.check_invariants(&tree);
     }
 
@@ -326,7 +296,7 @@ mod tests {
     #[should_panic(expected = "level 1 is on another side than a leaf across a face")]
     fn a_component_with_two_sides_is_found() {
         let (tree, mut sides) = decided(Keep::All);
-        sides.inside[1] = set(&[1]);
+        sides.stored[1] = set(&[1]);
         check::sides::agree_over_faces(&sides, &tree, &Ownership::solo(), &Solo);
     }
 }

@@ -6,7 +6,7 @@ use super::global::Label;
 use super::nodes::{Component, Nodes, open_bricks};
 use super::vote::{Candidate, FirstLeaf};
 use crate::error::Error;
-use crate::lattice::{Keep, Rules, Seed};
+use crate::input::lattice::{Keep, Rules, Seed};
 use crate::partition::ownership::Ownership;
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};

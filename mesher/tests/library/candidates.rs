@@ -3,10 +3,10 @@
 
 use crate::support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 use bricks::octant::{LEVEL_MAX, corner, edge, neighbour};
-use mesher::lattice::{Bounds, Enclosed, Keep, Root};
+use mesher::input::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::partition::ownership::Ownership;
+use mesher::refine::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use mesher::sides::{components, global, nodes::Nodes, vote};
-use mesher::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
 use proptest::prelude::*;
 use ranks::Solo;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ fn by_mesher(case: &Small) -> Firsts {
     let nodes = Nodes::new(&tree, &ownership);
     let mut local = components::merge(&nodes, &ownership);
     let faces = std::mem::take(&mut local.faces);
-    let merged = local.numbered();
+    let merged = local.merged.numbered();
     let labels = global::labels(&nodes, &tree, &ownership, faces, &merged, &Solo);
     let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &ownership);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()

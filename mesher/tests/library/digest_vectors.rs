@@ -3,9 +3,9 @@
 use bricks::digest::{Digests, digest, hex, mix, of_facets};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Side, corner, morton, position, start57, word};
-use mesher::case::{BoxSpec, Case, RootSpec};
-use mesher::ingest::Source;
-use mesher::lattice::{Bounds, Enclosed, Keep, Root};
+use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::ingest::Source;
+use mesher::input::lattice::{Bounds, Enclosed, Keep, Root};
 use serde_json::Value;
 
 fn vectors(name: &str) -> Vec<Value> {

@@ -2,8 +2,8 @@
 
 use crate::support::{Run, Small, config, cuboid, division, leaky_on_rays, run, small, soup, thin};
 use bricks::octant::position;
-use mesher::case::BoxSpec;
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::case::BoxSpec;
+use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
 

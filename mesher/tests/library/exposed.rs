@@ -116,14 +116,14 @@ fn weights_move_boundaries_towards_equal_numbers_of_faces() {
     let facets = crate::support::cuboid([20.0; 3], [44.0; 3]);
     let case = Small {
         facets,
-        root: mesher::lattice::Root { origin: [0.0; 3], edge: 64.0 },
+        root: mesher::input::lattice::Root { origin: [0.0; 3], edge: 64.0 },
         spacing_min: 1.0,
         layer_cells_min: 4,
-        keep: mesher::lattice::Keep::Outside,
+        keep: mesher::input::lattice::Keep::Outside,
         keep_crossing: false,
         boxes: vec![],
         seeds: Vec::new(),
-        enclosed: mesher::lattice::Enclosed::Delete,
+        enclosed: mesher::input::lattice::Enclosed::Delete,
     };
     let spread = |weight| {
         let (ranks, _) = counted(&case, &Run { ranks: 5, ..Run::SOLO }, Some(weight));

@@ -1,7 +1,7 @@
 //! Regions that are closed at a coarser spacing and open at that of the mesh.
 
 use crate::support::{Facet, Run, Small, closed, config, division, run, slit, small};
-use mesher::lattice::Keep;
+use mesher::input::lattice::Keep;
 use mesher::partition::Partitioner;
 use proptest::prelude::*;
 

@@ -4,7 +4,7 @@ use crate::support::symmetry::Symmetry;
 use crate::support::{
     Facet, Run, Small, closed, config, cuboid, first_difference, run, small, soup,
 };
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 
@@ -200,7 +200,7 @@ proptest! {
 fn crooked() -> Small {
     let mut facets = cuboid([9.0, 17.0, 30.0], [21.5, 40.0, 33.0]);
     facets.extend(cuboid([20.0, 18.25, 10.5], [50.0, 22.0, 31.0]));
-    let boxed = |min, max, spacing| mesher::case::BoxSpec { min, max, spacing };
+    let boxed = |min, max, spacing| mesher::input::case::BoxSpec { min, max, spacing };
     Small {
         facets,
         root: Root { origin: [0.0; 3], edge: 64.0 },

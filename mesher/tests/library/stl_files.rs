@@ -2,8 +2,8 @@
 
 use crate::support::{Facet, config, cuboid};
 use mesher::error::Error;
-use mesher::ingest::{self, Source};
-use mesher::{case::Case, lattice::Bounds, stl};
+use mesher::input::ingest::{self, Source};
+use mesher::input::{case::Case, lattice::Bounds, stl};
 use proptest::prelude::*;
 use ranks::{Solo, sim};
 use std::io::Write;
@@ -187,12 +187,12 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         source: Source::Stl(path.to_owned()),
         spacing_min: longest / 4.0,
         layer_cells_min: 2,
-        keep: mesher::lattice::Keep::All,
+        keep: mesher::input::lattice::Keep::All,
         keep_crossing: true,
-        root: mesher::case::RootSpec::Scale(1.5),
+        root: mesher::input::case::RootSpec::Scale(1.5),
         boxes: vec![],
         seeds: Vec::new(),
-        enclosed: mesher::lattice::Enclosed::Delete,
+        enclosed: mesher::input::lattice::Enclosed::Delete,
     };
     let options = crate::support::options(crate::support::Run::SOLO.division, false);
     match mesher::words(&case, &options, &Solo) {
@@ -200,8 +200,8 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
     }
     // A root that most facets are outside.
-    let root = mesher::lattice::Root { origin: [0.0; 3], edge: 1.0 };
-    (case.root, case.spacing_min) = (mesher::case::RootSpec::Exact(root), 0.25);
+    let root = mesher::input::lattice::Root { origin: [0.0; 3], edge: 1.0 };
+    (case.root, case.spacing_min) = (mesher::input::case::RootSpec::Exact(root), 0.25);
     if let Err(e) = mesher::words(&case, &options, &Solo) {
         prop_assert!(matches!(e, Error::Input(_)), "{}", e);
     }

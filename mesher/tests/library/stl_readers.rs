@@ -5,7 +5,7 @@
 
 use crate::stl_inputs::{Random, input};
 use geometries::Facet;
-use mesher::ingest::{self, Source};
+use mesher::input::ingest::{self, Source};
 use ranks::Solo;
 use std::fs::File;
 use std::io::Write;

@@ -6,9 +6,9 @@ use bricks::brickset::BrickSet;
 use bricks::tree::Tree;
 use geometries::{Generator, Shape};
 use mesher::Options;
-use mesher::case::{BoxSpec, Case, RootSpec};
-use mesher::ingest::Source;
-use mesher::lattice::{Enclosed, Keep, Root, Rules};
+use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::ingest::Source;
+use mesher::input::lattice::{Enclosed, Keep, Root, Rules};
 
 pub fn case() -> Case {
     let extent = BoxSpec { min: [-0.2; 3], max: [0.9, 0.2, 0.2], spacing: 0.03 };

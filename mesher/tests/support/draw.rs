@@ -1,8 +1,8 @@
 //! Random bodies, facet soups, cases and run configurations.
 
 use super::{Facet, Run, Small};
-use mesher::case::BoxSpec;
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::case::BoxSpec;
+use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 

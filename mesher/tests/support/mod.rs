@@ -2,11 +2,11 @@
 #![allow(dead_code, missing_docs)]
 
 use bricks::octant::position;
-use mesher::case::{BoxSpec, Case, RootSpec};
 use mesher::error::Error;
-use mesher::ingest::Source;
-use mesher::lattice::{Enclosed, Keep, Root};
-use mesher::manifest::LeakEntry;
+use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::ingest::Source;
+use mesher::input::lattice::{Enclosed, Keep, Root};
+use mesher::output::manifest::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};

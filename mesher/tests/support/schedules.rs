@@ -4,9 +4,9 @@
 use super::draw::{leaky_on_rays, soup, thin};
 use super::fibres::Fibres;
 use super::{Outcome, Run, Small, options, small};
-use mesher::case::Case;
 use mesher::error::Error;
-use mesher::manifest::LeakEntry;
+use mesher::input::case::Case;
+use mesher::output::manifest::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
 use mesher::{Options, mesh, words};

@@ -3,8 +3,8 @@
 //! The file is in a directory with `body.stl`, a tetrahedron.
 
 use crate::Scratch;
-use mesher::ingest::{self, Source};
-use mesher::lattice::Bounds;
+use mesher::input::ingest::{self, Source};
+use mesher::input::lattice::Bounds;
 use ranks::Solo;
 
 const BODY: &[u8] = b"solid

@@ -5,7 +5,7 @@ mod inputs;
 
 use crate::Scratch;
 use geometries::Facet;
-use mesher::ingest::{self, Source};
+use mesher::input::ingest::{self, Source};
 use ranks::Solo;
 
 /// Any bytes.

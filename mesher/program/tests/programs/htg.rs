@@ -3,9 +3,9 @@
 use crate::process::{INPUT, Workspace, refused, run};
 use crate::support::{Run, Small, closed, config, first_difference, small, soup, thin};
 use contract::htg::{SIDE, TreeFile};
+use mesher::output::write::{Output, TREE};
 use mesher::partition::Partitioner;
 use mesher::record::Recorder;
-use mesher::write::{Output, TREE};
 use mesher::{Options, mesh};
 use proptest::prelude::*;
 use ranks::sim;
@@ -67,14 +67,14 @@ fn a_tree_of_many_windows_does_not_depend_on_ranks_and_partitioner() {
     let facets = crate::support::cuboid([20.0, 21.0, 22.0], [41.0, 42.5, 40.0]);
     let case = Small {
         facets,
-        root: mesher::lattice::Root { origin: [0.0; 3], edge: 64.0 },
+        root: mesher::input::lattice::Root { origin: [0.0; 3], edge: 64.0 },
         spacing_min: 0.26,
         layer_cells_min: 6,
-        keep: mesher::lattice::Keep::Outside,
+        keep: mesher::input::lattice::Keep::Outside,
         keep_crossing: true,
         boxes: Vec::new(),
         seeds: Vec::new(),
-        enclosed: mesher::lattice::Enclosed::Delete,
+        enclosed: mesher::input::lattice::Enclosed::Delete,
     };
     let place = tempfile::tempdir().expect("a directory");
     let serial = tree_of(&case, &Run::SOLO, false, place.path());

@@ -3,7 +3,7 @@
 use crate::process::{Workspace, read_json, run};
 use crate::support::schedules::write;
 use crate::support::{Small, slit};
-use mesher::lattice::Keep;
+use mesher::input::lattice::Keep;
 use serde_json::{Value, json};
 
 /// Runs the mesher on a case; returns its warnings and the leaks in report and manifest. With `--strict`, a warning is an error and leaves no mesh.

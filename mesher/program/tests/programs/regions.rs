@@ -3,7 +3,7 @@
 use crate::process::{Workspace, run};
 use crate::support::{Facet, Run, Small, config, cuboid, small, soup};
 use bricks::octant::position;
-use mesher::lattice::{Enclosed, Keep, Root};
+use mesher::input::lattice::{Enclosed, Keep, Root};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 

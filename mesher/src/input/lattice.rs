@@ -11,7 +11,7 @@ use bricks::widest;
 use bytemuck::{Pod, Zeroable};
 
 /// The root cube, in the unit of the geometry.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Root {
     /// Minimum corner.
     pub origin: [f64; 3],
@@ -177,7 +177,7 @@ fn quantise_lanes(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f6
 }
 
 /// An extent box on the lattice, clamped to the root.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct ExtentBox {
     /// Minimum corner.
     pub min: [i64; 3],

@@ -125,7 +125,7 @@ impl Search<'_> {
     /// The octants of a brick that are neither split, nor in a crossing leaf, nor deleted.
     fn on_a_side(&self, l: Level, key: u64) -> u64 {
         let l = l as usize;
-        let deleted = &self.mesh.sides.deleted[l];
+        let deleted = &self.mesh.sides.deleted()[l];
         !(self.mesh.split[l].get(key) | self.crossing[l].get(key) | deleted.get(key))
     }
 

@@ -1,12 +1,12 @@
 //! The manifest of a mesh, `mesh.json`: its inputs, counts, digests and files.
 
-use crate::lattice::{Enclosed, Keep, Root};
+use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
+use crate::input::quantise::FacetCounts;
 use crate::mesh::Mesh;
-use crate::quantise::FacetCounts;
+use crate::output::stream::Counts;
+use crate::output::write::{Output, TREE, Written, part_name};
 use crate::sides::Summary;
 use crate::sides::leaks::Leak;
-use crate::stream::Counts;
-use crate::write::{Output, TREE, Written, part_name};
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
 use ranks::Comm;
@@ -18,12 +18,12 @@ pub struct Manifest {
     schema: &'static str,
     program: String,
     tree: &'static str,
-    root: RootEntry,
+    root: Root,
     level_surface: u32,
     layer_cells_min: u32,
     keep: Keep,
     keep_crossing: bool,
-    boxes: Vec<BoxEntry>,
+    boxes: Vec<ExtentBox>,
     geometry: Geometry,
     leaks: Vec<LeakEntry>,
     leaves: u64,
@@ -82,19 +82,6 @@ impl LeakEntry {
         };
         mesh.leaks.0.iter().map(entry).collect()
     }
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct RootEntry {
-    origin: [f64; 3],
-    edge: f64,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct BoxEntry {
-    min: [i64; 3],
-    max: [i64; 3],
-    level: u32,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -174,16 +161,12 @@ impl Manifest {
             schema: "octree-leaf-set/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
             tree: if mesh.is_base { "base" } else { "final" },
-            root: RootEntry { origin: rules.root.origin, edge: rules.root.edge },
+            root: rules.root,
             level_surface: rules.level_surface,
             layer_cells_min: rules.layer_cells_min,
             keep: rules.keep,
             keep_crossing: rules.keep_crossing,
-            boxes: rules
-                .boxes
-                .iter()
-                .map(|b| BoxEntry { min: b.min, max: b.max, level: b.level })
-                .collect(),
+            boxes: rules.boxes.clone(),
             geometry: Geometry::of(&mesh.facets),
             leaks: LeakEntry::of(mesh),
             leaves: counts.total(),

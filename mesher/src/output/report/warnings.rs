@@ -1,8 +1,8 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
-use crate::lattice::Keep;
-use crate::manifest::LeakEntry;
+use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
+use crate::output::manifest::LeakEntry;
 use crate::sides::Summary;
 
 /// A sentence for each warning: what was found, and what to try.

@@ -8,7 +8,7 @@
 //! - it is *complete*: the leaves emitted and the leaves left out (deleted, or
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::lattice::{Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
 use bricks::brick;
@@ -83,8 +83,7 @@ pub struct LevelCursors<'a> {
     keep: Keep,
     split: Cursor<'a>,
     crossing: Cursor<'a>,
-    inside: Cursor<'a>,
-    deleted: Cursor<'a>,
+    stored: Cursor<'a>,
 }
 
 /// The split octants of a brick, and the sides that its octants have or inherit from the leaves of T0 that contain them.
@@ -107,24 +106,21 @@ impl<'a> LevelCursors<'a> {
             keep: of.sides.keep,
             split: of.split[l].cursor(),
             crossing: of.crossing[l].cursor(),
-            inside: of.sides.inside[l].cursor(),
-            deleted: of.sides.deleted[l].cursor(),
+            stored: of.sides.stored[l].cursor(),
         }
     }
 
     /// Reads a brick, to which the octants above pass on that they cross or are inside. Keys must ascend.
     #[inline]
     pub fn read(&mut self, key: u64, crossing: u64, inside: u64) -> Octants {
-        Octants {
-            split: self.split.get(key),
-            crossing: self.crossing.get(key) | crossing,
-            inside: match self.keep {
-                Keep::Outside => 0,
-                Keep::Inside => u64::MAX,
-                Keep::All => self.inside.get(key) | inside,
-            },
-            deleted: self.deleted.get(key),
-        }
+        let stored = self.stored.get(key);
+        let (inside, deleted) = match self.keep {
+            Keep::Outside => (0, stored),
+            Keep::Inside => (u64::MAX, stored),
+            Keep::All => (stored | inside, 0),
+        };
+        let crossing = self.crossing.get(key) | crossing;
+        Octants { split: self.split.get(key), crossing, inside, deleted }
     }
 }
 

@@ -6,7 +6,7 @@
 //! Invariant: the slices of the ranks are contiguous, in the order of the ranks, and add up to all facets.
 
 use crate::error::Error;
-use crate::stl;
+use crate::input::stl;
 use geometries::{Facet, Generator};
 use ranks::{Comm, MessageBuffer, agree};
 use std::path::PathBuf;

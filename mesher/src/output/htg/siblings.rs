@@ -2,7 +2,7 @@
 
 use super::numbering::{Interval, Numbering};
 use crate::mesh::Mesh;
-use crate::stream::{LevelCursors, Octants};
+use crate::output::stream::{LevelCursors, Octants};
 use bricks::brick::{byte, children};
 use bricks::brickset::{BrickSet, ChildBricks};
 use bricks::octant::Level;

@@ -1,4 +1,4 @@
-//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the [manifest](crate::manifest).
+//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the [manifest](crate::output::manifest).
 //!
 //! Invariants of the output directory:
 //! - one run alone writes to it ([`Claim`]);
@@ -101,7 +101,7 @@ impl OutDir {
         };
         let file = begin().map_err(|e| output(&self.path, &e))?;
         let path = self.path.join(name);
-        Ok(Part { path, file, digests: Digests::default(), leaves: 0 })
+        Ok(Part { path, file })
     }
 
     /// Begins the file of the tree. On one rank only.
@@ -173,11 +173,9 @@ impl TreeFile {
 pub struct Part {
     path: PathBuf,
     file: BufWriter<Draft>,
-    digests: Digests,
-    leaves: u64,
 }
 
-/// Contents of a part.
+/// The leaves of a rank.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
     /// Number of leaves.
@@ -186,14 +184,20 @@ pub struct Written {
     pub digests: Digests,
 }
 
+impl Written {
+    /// Counts words.
+    pub fn add(&mut self, words: &[u64]) {
+        self.digests.add(words);
+        self.leaves += words.len() as u64;
+    }
+}
+
 impl Part {
     /// Appends words.
     ///
     /// # Errors
     /// If they cannot be written.
     pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
-        self.digests.add(words);
-        self.leaves += words.len() as u64;
         // The words' bytes in memory: to write word by word takes longer than meshing.
         let written = match cfg!(target_endian = "little") {
             true => self.file.write_all(bytemuck::cast_slice(words)),
@@ -202,20 +206,19 @@ impl Part {
         written.map_err(|e| output(&self.path, &e))
     }
 
-    /// Completes the file and gives it its final name.
+    /// Completes the file of `leaves` words and gives it its final name.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(self) -> Result<Written, Error> {
-        let Self { path, file, digests, leaves } = self;
+    pub fn finish(self, leaves: u64) -> Result<(), Error> {
+        let Self { path, file } = self;
         let close = || -> io::Result<()> {
             let mut file = file.into_inner()?;
             file.seek(SeekFrom::Start(0))?;
             file.write_all(&header(leaves))?;
             file.publish()
         };
-        close().map_err(|e| output(&path, &e))?;
-        Ok(Written { leaves, digests })
+        close().map_err(|e| output(&path, &e))
     }
 }
 
@@ -242,7 +245,7 @@ mod tests {
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = out.part(3).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());
-            assert_eq!(part.finish().unwrap().leaves, n as u64);
+            part.finish(n as u64).unwrap();
             let bytes = std::fs::read(out.path.join(part_name(3))).unwrap();
             let file = npyz::NpyFile::new(&bytes[..]).unwrap();
             assert_eq!(file.shape(), [n as u64]);

@@ -1,8 +1,8 @@
 //! A case: the geometry to mesh and the resolution.
 
 use crate::error::Error;
-use crate::ingest::Source;
-use crate::lattice::{Bounds, Enclosed, ExtentBox, Keep, Root, Rules, Seed};
+use crate::input::ingest::Source;
+use crate::input::lattice::{Bounds, Enclosed, ExtentBox, Keep, Root, Rules, Seed};
 use bricks::octant::ROOT_EDGE;
 use serde::Deserialize;
 

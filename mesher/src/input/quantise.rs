@@ -1,9 +1,9 @@
 //! Quantisation: the rules of a case and its facets on the lattice of the root.
 
-use crate::case::Case;
 use crate::error::Error;
-use crate::ingest::Slice;
-use crate::lattice::{Bounds, Rules};
+use crate::input::case::Case;
+use crate::input::ingest::Slice;
+use crate::input::lattice::{Bounds, Rules};
 use bricks::digest;
 use bricks::facet::Facet;
 use bricks::octant::ROOT_EDGE;

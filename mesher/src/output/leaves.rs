@@ -1,11 +1,11 @@
 //! The leaves of the finished mesh: digests, files and the manifest.
 
 use crate::error::Error;
-use crate::manifest::{self, Manifest};
 use crate::mesh::Mesh;
+use crate::output::manifest::{self, Manifest};
+use crate::output::stream::Counts;
+use crate::output::write::{OutDir, Written};
 use crate::partition::base_leaves::Heaviest;
-use crate::stream::Counts;
-use crate::write::{OutDir, Written};
 use bricks::digest::Digests;
 use files::interrupt::stop_at;
 use ranks::{Comm, agree};
@@ -30,25 +30,17 @@ pub fn emit(
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
     let mut heaviest = Heaviest::new(&mesh.base_starts, level);
-    let mut work = || match out.filter(|out| out.output.words) {
-        None => {
-            let mut written = Written::default();
-            let counts = mesh.leaves().emit(|words| {
-                written.leaves += words.len() as u64;
-                heaviest.add(words);
-                written.digests.add(words);
-                Ok::<(), Error>(())
-            })?;
-            Ok((counts, written))
-        }
-        Some(out) => {
-            let mut part = out.part(comm.rank())?;
-            let counts = mesh.leaves().emit(|words| {
-                heaviest.add(words);
-                part.add(words)
-            })?;
-            Ok((counts, part.finish()?))
-        }
+    let mut work = || {
+        let begin = |out: &OutDir| out.part(comm.rank());
+        let mut part = out.filter(|out| out.output.words).map(begin).transpose()?;
+        let mut written = Written::default();
+        let counts = mesh.leaves().emit(|words| {
+            heaviest.add(words);
+            written.add(words);
+            part.as_mut().map_or(Ok(()), |part| part.add(words))
+        })?;
+        part.map_or(Ok(()), |part| part.finish(written.leaves))?;
+        Ok((counts, written))
     };
     let result: Result<_, Error> = work();
     let (counts, written) = agree(comm, result)?;

@@ -16,7 +16,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::lattice::{ExtentBox, box_mask};
+use crate::input::lattice::{ExtentBox, box_mask};
 use bricks::brick;
 use bricks::brickset::ones;
 use bricks::facet::{Facet, crossed};

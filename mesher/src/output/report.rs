@@ -11,14 +11,15 @@ pub(crate) mod warnings;
 
 pub use text::grouped;
 
+use crate::grade;
 use crate::job::Job;
-use crate::leaves::Totals;
-use crate::manifest::{Geometry, LeakEntry};
 use crate::mesh::Mesh;
+use crate::output::leaves::Totals;
+use crate::output::manifest::{Geometry, LeakEntry};
 use crate::partition::Partitioner;
 use crate::record::{Phase, peak_rss_bytes};
+use crate::refine::voxelise;
 use crate::sides::Summary;
-use crate::{grade, voxelise};
 use bricks::digest::hex;
 use bricks::octant::{LEVEL_MAX, Level};
 use ranks::{Comm, Traffic, matrix};

@@ -10,7 +10,7 @@ mod siblings;
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::write::{OutDir, TreeFile};
+use crate::output::write::{OutDir, TreeFile};
 use numbering::Numbering;
 use ranks::{Comm, MessageBuffer, pack_bytes, unpack_bytes};
 use siblings::{OwnSiblings, root};
