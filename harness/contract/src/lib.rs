@@ -9,6 +9,7 @@
 pub mod case;
 pub mod catalogue;
 pub mod digest;
+mod directory;
 pub mod files;
 pub mod htg;
 pub mod import;

@@ -1,7 +1,7 @@
 //! The components of T0's leaves, their sides, and which of them are enclosed (reference/DEFINITION.md,
 //! sections 4 and 5).
 
-use super::Terms;
+use super::terms::Terms;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::parity::Parity;

@@ -6,14 +6,11 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word::{self, KEY_END};
 use rustc_hash::FxHashMap;
 
-use super::leaves::Leaves;
+use super::leaves::{Leaves, Point};
 use super::squares::{Square, squares};
 use crate::error::ExportError;
 use crate::near_body::polygons::hanging;
 use crate::options::Options;
-
-/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
-pub type Point = [u32; 3];
 
 /// Number of points that can be distinguished.
 const POINTS_MAX: usize = u32::MAX as usize;
