@@ -37,23 +37,18 @@ impl Failure {
     }
 }
 
-impl From<String> for Failure {
-    fn from(why: String) -> Self {
-        Self::input(why)
-    }
+/// Errors that are always those of the input.
+macro_rules! inputs {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::input(error)
+            }
+        }
+    )*};
 }
 
-impl From<CaseError> for Failure {
-    fn from(error: CaseError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<ReadError> for Failure {
-    fn from(error: ReadError) -> Self {
-        Self::input(error)
-    }
-}
+inputs!(String, CaseError, ReadError);
 
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {

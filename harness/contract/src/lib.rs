@@ -4,11 +4,12 @@
 //!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
-//!   [`triangle`] (exact facet-octant test).
+//!   [`triangle`] (exact facet-octant test), [`sets`] (disjoint sets).
 
 pub mod case;
 pub mod catalogue;
 pub mod digest;
+mod directory;
 pub mod files;
 pub mod htg;
 pub mod import;
@@ -22,6 +23,7 @@ pub mod octant;
 pub mod parity;
 pub mod plain;
 mod seed;
+pub mod sets;
 pub mod stl;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -2,12 +2,12 @@
 
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::CELLS_PER_EDGE;
+use contract::sets::Sets;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::junctions::{Segment, uncancelled};
-use super::shells::{find, unite};
 use super::width;
 
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
@@ -78,12 +78,12 @@ fn rims(input: &Input, edges: &Edges) -> Rims {
 
 /// The segments by component.
 fn components(rims: &Rims) -> Vec<Vec<Segment>> {
-    let mut parents: Vec<u32> = (0..rims.points.len() as u32).collect();
+    let mut sets = Sets::new(rims.points.len());
     for segment in &rims.segments {
-        unite(&mut parents, segment.ends[0], segment.ends[1]);
+        sets.union(segment.ends[0], segment.ends[1]);
     }
     let mut labelled: Vec<(u32, Segment)> =
-        rims.segments.iter().map(|s| (find(&mut parents, s.ends[0]), *s)).collect();
+        rims.segments.iter().map(|s| (sets.root(s.ends[0]), *s)).collect();
     labelled.sort_by_key(|(label, segment)| (*label, segment.ends));
     let component = |same: &[(u32, Segment)]| same.iter().map(|(_, segment)| *segment).collect();
     labelled.chunk_by(|a, b| a.0 == b.0).map(component).collect()

@@ -1,6 +1,7 @@
 //! Shells: components of facets that are connected by shared edges.
 
 use contract::lattice::FacetLattice;
+use contract::sets::Sets;
 use serde::Serialize;
 
 use super::edges::Edges;
@@ -81,19 +82,19 @@ pub struct Shells {
 impl Shells {
     /// Connects the facets that share edges.
     pub fn new(edges: &Edges, lattice: &[FacetLattice]) -> Self {
-        let mut parents: Vec<u32> = (0..edges.corners.len() as u32).collect();
+        let mut sets = Sets::new(edges.corners.len());
         for (_, mut uses) in edges.iter() {
             let Some(first) = uses.next() else { continue };
-            uses.for_each(|other| unite(&mut parents, first.facet, other.facet));
+            uses.for_each(|other| sets.union(first.facet, other.facet));
         }
         let mut all: Vec<Shell> = Vec::new();
-        let mut of = vec![u32::MAX; parents.len()];
+        let mut of = vec![u32::MAX; edges.corners.len()];
         for (facet, &[a, b, c]) in edges.corners.iter().enumerate() {
             if a == b || b == c || c == a {
                 continue;
             }
             // The representative is the lowest facet, so its shell exists before those of its other facets.
-            let first = find(&mut parents, facet as u32);
+            let first = sets.root(facet as u32);
             if first as usize == facet {
                 of[facet] = all.len() as u32;
                 all.push(Shell::new(first));
@@ -140,20 +141,4 @@ impl Shells {
         }
         findings
     }
-}
-
-/// The representative of a set; halves the path to it.
-pub(crate) fn find(parents: &mut [u32], mut of: u32) -> u32 {
-    while parents[of as usize] != of {
-        let above = parents[parents[of as usize] as usize];
-        parents[of as usize] = above;
-        of = above;
-    }
-    of
-}
-
-/// Unites the sets of two members under the lower representative.
-pub(crate) fn unite(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(parents, a), find(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
 }

@@ -1,9 +1,9 @@
 //! Data for the tests of this crate and of those that depend on it.
 
 use crate::engine::layout::{Layout, Ranks};
-use crate::verify::case::{RUNS, ended_well};
 use crate::verify::options::Options;
 use crate::verify::outcome::{Check, Outcome};
+use crate::verify::outcome::{RUNS, ended_well};
 use crate::verify::report::{Asked, CaseReport, Missing, Report, Run, SCHEMA};
 
 /// A report with one entry of every kind, also for the tests of the output formats.

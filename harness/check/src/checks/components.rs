@@ -1,10 +1,11 @@
 //! The components of T0's leaves, their sides, and which of them are enclosed (reference/DEFINITION.md,
 //! sections 4 and 5).
 
-use super::Terms;
+use super::terms::Terms;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::parity::Parity;
+use contract::sets::Sets;
 use contract::word::{self, Side};
 
 /// Number of candidates whose rays are computed before the majority decides.
@@ -175,29 +176,6 @@ fn by_rays(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
     }
     let side = if inside > 3 * candidates { Side::Inside } else { Side::Outside };
     component(leaves, words, side, Decision::Majority(candidates, inside))
-}
-
-/// Disjoint sets. The root of each is its smallest index.
-struct Sets(Vec<u32>);
-
-impl Sets {
-    fn new(len: usize) -> Self {
-        Self((0..u32::try_from(len).expect("fewer than 2^32 leaves")).collect())
-    }
-
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            let grandparent = self.0[self.0[i as usize] as usize];
-            self.0[i as usize] = grandparent;
-            i = grandparent;
-        }
-        i
-    }
-
-    fn union(&mut self, i: u32, j: u32) {
-        let (a, b) = (self.root(i), self.root(j));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub mod sides;
 pub mod spacing;
 mod subject;
 mod surface;
-mod terms;
+pub mod terms;
 pub mod trail;
 pub mod truth;
 

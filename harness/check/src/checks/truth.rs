@@ -4,9 +4,9 @@
 //! Invariants: the words are sorted and tile the root; a leaf is crossing iff a facet crosses it; every other leaf belongs to
 //! one component and has its side.
 
-use super::Terms;
 use super::components::{self, Component};
 use super::facets::Facets;
+use super::terms::Terms;
 use contract::lattice::FacetLattice;
 use contract::octant::Octant;
 use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};

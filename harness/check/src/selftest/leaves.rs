@@ -8,13 +8,6 @@ use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Tree};
 use contract::word::{self, Side};
 
-// Corruptions that change every leaf. At scale they are applied part by part (`scale/global.rs`).
-pub(super) const SHIFTED_BY_CELL: &str = "all leaves shifted by one finest cell";
-pub(super) const SHIFTED_BY_HALF: &str = "all leaves shifted by half the root";
-pub(super) const MIRRORED: &str = "mesh mirrored";
-pub(super) const OCTANT_EMPTIED: &str = "octant emptied";
-pub(super) const TRUNCATED: &str = "all leaves after the first half removed";
-
 pub(super) const MUTANTS: &[Mutant] = &[
     audited("leaf duplicated", "linear", duplicated),
     audited("leaf duplicated with another side", "linear", duplicated_other_side),
@@ -23,14 +16,14 @@ pub(super) const MUTANTS: &[Mutant] = &[
     audited("leaf deeper than the deepest level", "linear", too_deep),
     audited("side that does not exist", "linear", no_side),
     audited("leaf not aligned to its level", "linear", misaligned),
-    audited(SHIFTED_BY_CELL, "linear", shifted_by_cell),
+    audited("all leaves shifted by one finest cell", "linear", shifted_by_cell),
     audited("part not sorted", "linear", unsorted),
-    informed(SHIFTED_BY_HALF, "crossing", shifted_by_half),
-    informed(MIRRORED, "identical", mirrored),
+    informed("all leaves shifted by half the root", "crossing", shifted_by_half),
+    informed("mesh mirrored", "identical", mirrored),
     audited("leaf removed away from the surface", "complete", removed_away),
     informed("crossing leaf removed", "complete", removed_crossing),
-    audited(OCTANT_EMPTIED, "complete", emptied),
-    informed(TRUNCATED, "complete", truncated),
+    audited("octant emptied", "complete", emptied),
+    informed("all leaves after the first half removed", "complete", truncated),
     informed("deleted leaf restored", "complete", restored),
     informed("leaf of T0 merged with its siblings", "complete", coarser_than_base),
     informed("leaf split needlessly", "identical", split_needlessly),

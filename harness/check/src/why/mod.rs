@@ -17,8 +17,8 @@ use contract::octant::Octant;
 use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
-use crate::checks::Terms;
 use crate::checks::facets::Facets;
+use crate::checks::terms::Terms;
 use crate::checks::truth::Truth;
 use crate::diff::fields::differing_inputs;
 

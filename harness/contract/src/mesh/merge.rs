@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::Part;
-use crate::leafset::ReadError;
+use crate::directory::ReadError;
 use crate::npy::PartFile;
 
 /// Words per read: large enough for streaming, small enough for thousands of parts.

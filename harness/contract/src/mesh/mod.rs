@@ -10,15 +10,13 @@ use std::path::{Path, PathBuf};
 
 pub use part::{Part, Readers};
 
-use crate::leafset::{self, ReadError};
+pub use crate::directory::NODES_MAX;
+use crate::directory::{self, ReadError};
 use crate::manifest::Manifest;
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::tree::{Builder, Tree};
 use crate::word;
-
-/// Maximum number of distinct nodes of a tree in memory. A node needs up to 120 bytes while the tables grow.
-pub const NODES_MAX: usize = 32_000_000;
 
 /// A leaf-set directory whose manifest and files were opened. No leaf has been read.
 #[derive(Debug)]
@@ -36,9 +34,9 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(dir: &Path) -> Result<Self, ReadError> {
-        let manifest = leafset::read_manifest(dir)?;
+        let manifest = directory::read_manifest(dir)?;
         let tree = match manifest.parts.is_empty() {
-            true => leafset::open_tree(dir, &manifest)?,
+            true => directory::open_tree(dir, &manifest)?,
             false => None,
         };
         let mut parts = Vec::new();
@@ -50,7 +48,7 @@ impl Mesh {
                     let file = PartFile::open(&path);
                     parts.push(Part::Words(file.map_err(|e| ReadError::Part { path, source: e })?));
                 }
-                leafset::refuse_extra_parts(dir, &manifest)?;
+                directory::refuse_extra_parts(dir, &manifest)?;
             }
         }
         Ok(Self { dir: dir.to_owned(), manifest, parts })

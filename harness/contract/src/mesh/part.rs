@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::path::Path;
 
+use crate::directory::ReadError;
 use crate::htg::{Cursor, Index, TreeError, TreeFile};
-use crate::leafset::ReadError;
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::word::{self, KEY_END};

@@ -9,9 +9,9 @@
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
-use super::leaves::Leaves;
+use super::leaves::{Leaves, Point};
 use super::patches::Patches;
-use super::points::{Point, Points};
+use super::points::Points;
 use super::squares::squares;
 use crate::error::ExportError;
 use crate::options::Options;

@@ -10,6 +10,9 @@ use contract::word;
 use crate::error::ExportError;
 use crate::options::Options;
 
+/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
+pub type Point = [u32; 3];
+
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
 /// Number of cells that can be distinguished.

@@ -6,13 +6,11 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word::{self, KEY_END};
 use rustc_hash::FxHashMap;
 
-use super::leaves::Leaves;
+use super::leaves::{Leaves, Point};
 use super::squares::{Square, squares};
 use crate::error::ExportError;
+use crate::near_body::polygons::hanging;
 use crate::options::Options;
-
-/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
-pub type Point = [u32; 3];
 
 /// Number of points that can be distinguished.
 const POINTS_MAX: usize = u32::MAX as usize;
@@ -93,20 +91,7 @@ impl Points {
         }
         for (i, &corner) in corners.iter().enumerate() {
             polygon.push(self.number(corner).expect("the corners of a face are points"));
-            self.between(corner, corners[(i + 1) % 4], polygon);
-        }
-    }
-
-    /// Appends the points that bisect an edge, or bisect a half of it, and so on.
-    fn between(&self, from: Point, to: Point, polygon: &mut Vec<u32>) {
-        let middle = std::array::from_fn(|a| from[a].midpoint(to[a]));
-        if middle == from || middle == to {
-            return;
-        }
-        if let Some(number) = self.number(middle) {
-            self.between(from, middle, polygon);
-            polygon.push(number);
-            self.between(middle, to, polygon);
+            hanging(corner, corners[(i + 1) % 4], &|point| self.number(point), polygon);
         }
     }
 }

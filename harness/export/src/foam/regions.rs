@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 
+use contract::sets::Sets;
 use contract::word;
 
 use super::leaves::Leaves;
@@ -34,35 +35,25 @@ impl Regions {
     /// If the user interrupts.
     pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, ExportError> {
         // Sets of cells, which are represented by their first cells.
-        let mut sets: Vec<u32> = (0..leaves.count()).collect();
+        let mut sets = Sets::new(leaves.count() as usize);
         let mut of_cell = Vec::new();
         leaves.walk(options, &mut |cell, around| {
             squares(leaves, around, &mut of_cell);
             let high = of_cell.iter().filter(|square| square.is_high);
             for across in high.filter_map(|square| square.across.as_cell()) {
-                let (a, b) = (first(&mut sets, cell), first(&mut sets, across));
-                sets[a.max(b) as usize] = a.min(b);
+                sets.union(cell, across);
             }
             Ok(())
         })?;
-        (0..leaves.count()).for_each(|cell| sets[cell as usize] = first(&mut sets, cell));
-        let mut sizes = vec![Size::default(); sets.len()];
-        for (&set, word) in sets.iter().zip(leaves.cells()) {
+        let of_cells: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
+        let mut sizes = vec![Size::default(); of_cells.len()];
+        for (&set, word) in of_cells.iter().zip(leaves.cells()) {
             sizes[set as usize].volume += word::span(word::level(word));
             sizes[set as usize].cells += 1;
         }
         let mut sizes: Vec<(u32, Size)> =
             (0..).zip(sizes).filter(|(_, size)| size.cells > 0).collect();
         sizes.sort_by_key(|&(_, size)| Reverse(size));
-        Ok(Self { sizes, of_cell: sets })
+        Ok(Self { sizes, of_cell: of_cells })
     }
-}
-
-/// The first cell of a cell's set.
-fn first(sets: &mut [u32], mut cell: u32) -> u32 {
-    while sets[cell as usize] != cell {
-        sets[cell as usize] = sets[sets[cell as usize] as usize];
-        cell = sets[cell as usize];
-    }
-    cell
 }

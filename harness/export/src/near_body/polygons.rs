@@ -36,7 +36,8 @@ impl Polygons {
             let corners = face.corners();
             for (i, &from) in corners.iter().enumerate() {
                 polygons.corners.push(indices[&from]);
-                hanging(from, corners[(i + 1) % 4], &indices, &mut polygons.corners);
+                let index = |point| indices.get(&point).copied();
+                hanging(from, corners[(i + 1) % 4], &index, &mut polygons.corners);
             }
             polygons.ends.push(polygons.corners.len() as u64);
         }
@@ -50,19 +51,20 @@ impl Polygons {
     }
 }
 
-/// Adds the points within an edge, in order. Squares are aligned with the oct-tree, so where there are any, one is the middle.
-fn hanging(
+/// Adds the points within an edge, in order: those that bisect it, or bisect a half of it, and so on. Squares are aligned with the
+/// oct-tree, so where there are any, one is the middle.
+pub(crate) fn hanging(
     from: [u32; 3],
     to: [u32; 3],
-    indices: &FxHashMap<[u32; 3], u32>,
+    index_of: &impl Fn([u32; 3]) -> Option<u32>,
     corners: &mut Vec<u32>,
 ) {
     let middle = std::array::from_fn(|a| u32::midpoint(from[a], to[a]));
-    match indices.get(&middle) {
-        Some(&index) if middle != from && middle != to => {
-            hanging(from, middle, indices, corners);
+    match index_of(middle) {
+        Some(index) if middle != from && middle != to => {
+            hanging(from, middle, index_of, corners);
             corners.push(index);
-            hanging(middle, to, indices, corners);
+            hanging(middle, to, index_of, corners);
         }
         _ => {}
     }

@@ -1,7 +1,7 @@
 //! The independent check of balance: with n = 1 and all leaves kept, the mesh equals the base tree as balanced by
 //! p4est.
 
-use super::case::CaseRun;
+use super::case::{CaseRun, P4EST};
 use super::report::{Check, Outcome};
 use super::run::{Program, Request};
 use super::serial::Base;
@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 /// Its subject.
-pub const SUBJECT: &str = "p4est";
+const SUBJECT: &str = P4EST.0;
 /// Name of the check.
-pub const NAME: &str = "balance";
+const NAME: &str = P4EST.1;
 
 impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves

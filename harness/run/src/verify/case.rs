@@ -2,9 +2,9 @@
 
 use super::needs::Needs;
 use super::options::Options;
+pub use super::outcome::RUNS;
 use super::progress::Progress;
 use super::report::{CaseReport, Check, Outcome};
-use super::{balance, oracles};
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
@@ -181,10 +181,15 @@ impl<'a> CaseRun<'a> {
     }
 }
 
+/// Subject and name of the check of sides by the oracles.
+pub const ORACLES: (&str, &str) = ("sides", "oracles");
+/// Subject and name of the check of the balance by p4est.
+pub const P4EST: (&str, &str) = ("p4est", "balance");
+
 /// Subject and name of the checks by other programs, which need the definition.
 pub fn steps(promises: &Promises) -> &'static [(&'static str, &'static str)] {
     match promises.definition {
-        true => &[(oracles::SUBJECT, oracles::NAME), (balance::SUBJECT, balance::NAME)],
+        true => &[ORACLES, P4EST],
         false => &[],
     }
 }
@@ -209,12 +214,4 @@ fn quoted(word: &str) -> String {
         true => word.to_owned(),
         false => format!("'{}'", word.replace('\'', "'\\''")),
     }
-}
-
-/// Name of the check that a program runs to its end and that its run report is true.
-pub const RUNS: &str = "runs";
-
-/// The outcome of [`RUNS`] for a run whose number of cells and digest are those of its mesh.
-pub fn ended_well() -> Outcome {
-    Outcome::held(2)
 }

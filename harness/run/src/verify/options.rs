@@ -26,13 +26,7 @@ pub enum Need {
 
 impl fmt::Display for Need {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Mpi => "mpi",
-            Self::Oracles => "oracles",
-            Self::P4est => "p4est",
-            Self::Geometries => "geometries",
-            Self::Checks => "checks",
-        })
+        f.write_str(&format!("{self:?}").to_lowercase())
     }
 }
 

@@ -1,6 +1,6 @@
 //! The sides of the base tree's leaves, compared with those that the oracles give.
 
-use super::case::CaseRun;
+use super::case::{CaseRun, ORACLES};
 use super::report::{Check, Outcome};
 use super::serial::Base;
 use crate::engine::failure::{End, Failure};
@@ -17,9 +17,9 @@ use std::fs;
 use std::time::Instant;
 
 /// Name of the check.
-pub const NAME: &str = "oracles";
+const NAME: &str = ORACLES.1;
 /// Its subject.
-pub const SUBJECT: &str = "sides";
+const SUBJECT: &str = ORACLES.0;
 
 /// On a small case the oracles classify every leaf, up to this many.
 const POINTS_OF_SMALL: usize = 400_000;

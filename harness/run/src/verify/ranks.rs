@@ -1,7 +1,8 @@
 //! Ranks, partitions and threads: every layout gives the mesh of the serial run, leaf by leaf, if the engine promises
 //! that, and else a mesh that keeps the engine's other promises.
 
-use super::case::{CaseRun, RUNS, ended_well};
+use super::case::CaseRun;
+use super::outcome::{RUNS, ended_well};
 use super::report::{Check, Outcome};
 use super::run::{Program, Request};
 use crate::engine::failure::{End, Failure};

@@ -8,7 +8,7 @@
 //! - a run whose mesh is `identical` to the serial one has its digest and number of cells;
 //! - a green report has a check of a mesh that holds, of every case that was named, and misses nothing required.
 
-use super::case::RUNS;
+use super::outcome::RUNS;
 pub use super::outcome::{Check, Outcome, Tally};
 use crate::engine::layout::Layout;
 use check::checks::identical;

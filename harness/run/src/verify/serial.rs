@@ -1,6 +1,7 @@
 //! The serial meshes, with which all others are compared: base tree and final mesh, of mesher and reference.
 
-use super::case::{CaseRun, RUNS, ended_well};
+use super::case::CaseRun;
+use super::outcome::{RUNS, ended_well};
 use super::report::{Check, Outcome};
 use super::run::{Meshed, Program, Request};
 use crate::engine::failure::{CODE_INPUT, End};

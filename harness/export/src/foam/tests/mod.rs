@@ -18,8 +18,7 @@ use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
 
-use super::leaves::Around;
-use super::points::Point;
+use super::leaves::{Around, Point};
 use super::squares::{Square, squares};
 use super::*;
 use crate::mesh::Mesh as OnDisk;
