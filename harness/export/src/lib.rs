@@ -5,10 +5,12 @@
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
 //! - [`foam`]: meshes for OpenFOAM;
+//! - [`brick`]: lattice points in groups of neighbours;
 //! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
 
 #![deny(missing_docs)]
 
+pub mod brick;
 pub mod error;
 pub mod foam;
 pub mod format;

@@ -1,7 +1,7 @@
 //! Cells as VTK's unstructured grids: `.vtu`, and `.pvtu` with files of its own.
 //!
 //! Each leaf is a hexahedron. The mesh is written in pieces of at most [`PIECE`] leaves, one per thread at a time, so memory does
-//! not depend on the size of the mesh: about 80 MB per thread. A file depends on mesh and selection alone, and not on the
+//! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
 //! - `header`: the XML, and which arrays exist; `piece`: the arrays; `points`: their numbers; `zlib`: their compression;
