@@ -36,6 +36,9 @@ const STARTS: [[f64; 3]; 4] = [
 struct Hit {
     width: f64,
     area: f64,
+    /// The facet where it starts.
+    from: u32,
+    /// That facet and the one that it met, in order.
     facets: [u32; 2],
     middle: Point,
 }
@@ -55,7 +58,8 @@ pub fn sheets(
         };
         let mut hits = hits(tree, edges, side, cell / unit, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
-        let mut of_sheets: Vec<u32> = hits.iter().flat_map(|hit| hit.facets).collect();
+        // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.
+        let mut of_sheets: Vec<u32> = hits.iter().map(|hit| hit.from).collect();
         of_sheets.sort_unstable();
         of_sheets.dedup();
         let place = |(quantile, hit): (f64, &Hit)| {
@@ -105,6 +109,7 @@ fn hits(
                 hits.push(Hit {
                     width,
                     area,
+                    from: facet,
                     facets: [facet.min(other), facet.max(other)],
                     middle,
                 });
