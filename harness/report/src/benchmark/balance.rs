@@ -48,7 +48,7 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
         title: format!("Useful time per rank: {subject}, {ranks} ranks"),
         caption: format!(
             "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
-             the load on 16, 32 and 64 ranks at 100 million cells. Load imbalance λ = max/mean: {lambda:.3} by time, {cells:.3} by cells. {}.",
+             the load on 16, 32 and 64 ranks at 100 million cells around its UAV. Load imbalance λ = max/mean: {lambda:.3} by time, {cells:.3} by cells. {}.",
             grouped(run.cells),
             group.rank_times_caption()
         ),
@@ -117,7 +117,7 @@ fn imbalance(
         ),
         caption: format!(
             "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {} cells on {ranks} simulated ranks, by the partitioner of the base \
-             tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), but its base tree has depth 7; here the depth is \
+             tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), of a base tree with a typical depth of 7; here the depth is \
              automatic. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly.",
             grouped(cells)
         ),

@@ -74,7 +74,7 @@ fn time_over_cells(groups: &Groups) -> Vec<Figure> {
             caption: format!(
                 "Run time of {} over the number of cells of {case} at n = {} (the paper's Figure 17). The spacing is halved from \
                  point to point. {}. Lines join meshes of one family of spacings. The points of the paper are from its text: 50 million cells \
-                 in 22 min on 1 rank and in 117 s on 32 ranks, 1e9 cells in under 45 min on 64 ranks, on hardware of 2013 and for another geometry.",
+                 in 22 min on 1 rank and in 117 s on 32 ranks, 1e9 cells in under 45 min on 64 ranks, on Intel X5355 CPUs and for another geometry.",
                 engines(&all),
                 all[0].setup.layer_cells_min,
                 repetitions(&all)
@@ -101,7 +101,7 @@ fn time_over_layers(groups: &Groups) -> Vec<Figure> {
             title: format!("Run time over cells, by layer thickness: {case}"),
             caption: format!(
                 "Run time of {} over the number of cells of {case} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to \
-                 right (the paper's Figure 18, whose curve bends upward). {}. Lines join consecutive values of n. The largest mesh in \
+                 right (the paper's Figure 18, which is not linear). {}. Lines join consecutive values of n. The largest mesh in \
                  the text of the paper, 1.6e9 cells in 132 min, was made with thicker layers on \"the same hardware\".",
                 engines(&all),
                 all[0].setup.spacing_min,

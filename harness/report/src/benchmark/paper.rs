@@ -1,4 +1,4 @@
-//! Measurements in the text of O'Connell and Karman, made on hardware of 2013.
+//! Measurements in the text of O'Connell and Karman, made on Intel X5355 CPUs with 4 GB of memory each.
 //!
 //! The paper does not state the number of facets of its UAV. Its largest mesh (1.6e9 cells in 132 min) has no number of
 //! ranks either and is not among the runs here: it was made with thicker layers on "the same hardware".
