@@ -131,7 +131,8 @@ fn only_runs_that_may_not_fit_are_planned_and_refused() {
         };
         assert_eq!(before_run(problem, few), Ok(()));
         assert!(pilots > 1);
-        let many = &mut |shift| Ok(amounts(ROUGH, 1e18, shift));
+        // More cells than a pilot may have: it would be the mesh itself.
+        let many = &mut |shift| Ok(amounts(CELLS_PILOT * 64.0, 1e18, shift));
         assert!(matches!(before_run(problem, many), Err(Error::Memory(_))));
     });
     // A small case is meshed.
