@@ -29,6 +29,10 @@ use std::collections::HashSet;
 /// Number of coarser spacings that are compared with that of the mesh.
 const COARSER: Level = 2;
 
+/// Most crossing leaves of the surface level with which T0/1 is always searched. It takes as long as a quarter of the sides, so in larger
+/// meshes it is searched only where T0/2 has leaked or nothing is inside T0.
+const MOST_FOR_T0_1: u64 = 1 << 24;
+
 /// A region that has leaked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Leak {
@@ -73,6 +77,21 @@ impl Region {
         };
         sides.iter().map(region).collect()
     }
+
+    /// T0 cut at a level at or above that of the walls. Collective.
+    fn tree(&self, tree: &Tree, level: Level, ownership: &Ownership, comm: &dyn Comm) -> Tree {
+        let cut = level as usize;
+        let mut walls = self.walls.clone();
+        for l in (cut + 1..LEVELS).rev() {
+            let finer = std::mem::take(&mut walls[l]);
+            walls[l - 1] = std::mem::take(&mut walls[l - 1]).union(finer.coarsen());
+        }
+        // A rank knows the walls in its own part of a brick that others have part of, too.
+        ownership.synchronise_replicas(&mut [&mut walls], comm);
+        let mut split = tree.split[..cut].to_vec();
+        split.resize(LEVELS, BrickSet::default());
+        Tree { split, crossing: walls }
+    }
 }
 
 /// Crossing leaves and those of components that are walls, cut at level `cut`: a deeper one makes the octant of that level a wall. Walks
@@ -103,10 +122,11 @@ fn walls(tree: &Tree, nodes: &Nodes, cut: Level, is_wall: impl Fn(Component) -> 
     walls
 }
 
-/// The leaks in all regions of T0. `facets` are this rank's slice of the geometry. Messages are not counted: the mesh does not depend on
-/// them. Collective; the same on all ranks.
+/// The leaks in all regions of T0, which `has_inside`. `facets` are this rank's slice of the geometry. Messages are not counted: the mesh
+/// does not depend on them. Collective; the same on all ranks.
 pub fn find(
     regions: Vec<Region>,
+    has_inside: bool,
     tree: &Tree,
     ownership: &Ownership,
     facets: &[Facet],
@@ -115,21 +135,18 @@ pub fn find(
 ) -> Leaks {
     let mut leaks = Vec::new();
     uncounted(comm, || {
-        for Region { is_inside, mut walls } in regions {
-            for k in 1..=COARSER.min(rules.level_surface) {
-                let level = rules.level_surface - k;
-                if k > 1 {
-                    let finer = std::mem::take(&mut walls[level as usize + 1]);
-                    let own = std::mem::take(&mut walls[level as usize]);
-                    walls[level as usize] = own.union(finer.coarsen());
+        let is_large = || crossing_leaves(tree, ownership, rules, comm) > MOST_FOR_T0_1;
+        let skips = has_inside && !regions.is_empty() && is_large();
+        for region in regions {
+            let before = leaks.len();
+            for k in (1..=COARSER.min(rules.level_surface)).rev() {
+                if k > 1 || !skips || leaks.len() > before {
+                    let level = rules.level_surface - k;
+                    let coarse = region.tree(tree, level, ownership, comm);
+                    let of_level =
+                        of_tree(&coarse, level, region.is_inside, ownership, facets, rules, comm);
+                    leaks.extend(of_level);
                 }
-                // A rank knows the walls in its own part of a brick that others have part of, too.
-                ownership.synchronise_replicas(&mut [&mut walls], comm);
-                let mut split = tree.split[..level as usize].to_vec();
-                split.resize(LEVELS, BrickSet::default());
-                let coarse = Tree { split, crossing: walls };
-                leaks.extend(of_tree(&coarse, level, is_inside, ownership, facets, rules, comm));
-                walls = coarse.crossing;
             }
         }
     });
@@ -137,6 +154,14 @@ pub fn find(
     let leaks = Leaks(leaks);
     leaks.check_invariants(rules);
     leaks
+}
+
+/// Number of crossing leaves of the surface level. Collective; the same on all ranks.
+fn crossing_leaves(tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn Comm) -> u64 {
+    let level = rules.level_surface;
+    let owned = tree.crossing[level as usize].bricks().filter(|b| ownership.owns(level, b.key));
+    let mine: u64 = owned.map(|b| u64::from(b.bits.count_ones())).sum();
+    comm.all_gather(&[mine]).words().iter().sum()
 }
 
 /// The components of T0/k without seeds whose side by rays is not that of their region.

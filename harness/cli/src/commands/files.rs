@@ -1,6 +1,7 @@
 //! Writing files.
 
 use contract::files::{named, write_atomically};
+use rustix::fs::{Access, access};
 use std::path::Path;
 use std::{fs, io};
 
@@ -16,7 +17,8 @@ pub fn prepare(path: &Path) -> io::Result<()> {
             return Err(io::Error::other("it is a directory: give a file"));
         }
         fs::create_dir_all(directory)?;
-        tempfile::NamedTempFile::new_in(directory).map(drop)
+        // A trial file would remain if a signal arrived at that moment.
+        Ok(access(directory, Access::WRITE_OK | Access::EXEC_OK)?)
     };
     writable().map_err(|error| named(path, &error))
 }
