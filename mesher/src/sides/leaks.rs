@@ -13,7 +13,6 @@
 //! - the leaks of one k do not overlap: together they are no larger than the root.
 
 use super::global::Label;
-use super::nodes::{Component, Nodes};
 use super::vote::{self, Candidate};
 use super::{Components, seeds};
 use crate::input::lattice::{Keep, Rules};
@@ -25,6 +24,7 @@ use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
 use ranks::{Comm, all_gather_reduced, uncounted};
 use std::collections::HashSet;
+use std::mem::take;
 
 /// Number of coarser spacings that are compared with that of the mesh.
 const COARSER: Level = 2;
@@ -50,32 +50,57 @@ pub struct Leak {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Leaks(pub Vec<Leak>);
 
-/// One side of T0, cut at the level above the surface level.
+/// One side of T0, cut at the level above the surface level. It is filled level by level from the deepest one, so that no set deeper
+/// than the cut is stored.
 pub struct Region {
     is_inside: bool,
-    /// Octants that a facet crosses or that lie on the other side.
+    cut: Level,
+    /// Octants that a facet crosses, that lie on the other side, or, at the cut, one of whose descendants does.
     walls: PerLevel,
+    /// What the leaves of the present level add.
+    added: BrickSet,
+    /// Octants of the present level that have a wall among their descendants.
+    from_below: BrickSet,
 }
 
 impl Region {
-    /// The regions in which leaks are looked for; `is_inside` returns the side of a local component.
-    pub fn of(
-        tree: &Tree,
-        nodes: &Nodes,
-        rules: &Rules,
-        is_inside: impl Fn(Component) -> bool,
-    ) -> Vec<Self> {
+    /// The regions in which leaks are looked for.
+    pub fn of(rules: &Rules) -> Vec<Self> {
         let sides: &[bool] = match rules.keep {
             _ if rules.level_surface == 0 => &[],
             Keep::Inside if rules.seeds.is_empty() => &[false, true],
             Keep::Inside => &[true],
             Keep::Outside | Keep::All => &[false],
         };
-        let region = |&side: &bool| {
-            let walls = walls(tree, nodes, rules.level_surface - 1, |c| is_inside(c) != side);
-            Self { is_inside: side, walls }
+        let region = |&is_inside: &bool| Self {
+            is_inside,
+            cut: rules.level_surface - 1,
+            walls: per_level(),
+            added: BrickSet::default(),
+            from_below: BrickSet::default(),
         };
         sides.iter().map(region).collect()
+    }
+
+    /// Adds the leaves of a brick of level `l`: those that cross, those that do not, and which of these are inside.
+    #[inline]
+    pub fn push(&mut self, l: Level, key: u64, crossing: u64, open: u64, inside: u64) {
+        let walls = crossing | if self.is_inside { open & !inside } else { inside };
+        if l > self.cut {
+            self.added.push(key >> 3, u64::from(brick::parents(walls)) << (8 * (key & 7)));
+        } else {
+            self.added.push(key, walls);
+        }
+    }
+
+    /// Ends level `l`.
+    pub fn end_level(&mut self, l: Level) {
+        let (added, below) = (take(&mut self.added), take(&mut self.from_below));
+        if l > self.cut {
+            self.from_below = added.union(below.coarsen());
+        } else {
+            self.walls[l as usize] = added.union(below);
+        }
     }
 
     /// T0 cut at a level at or above that of the walls. Collective.
@@ -83,8 +108,8 @@ impl Region {
         let cut = level as usize;
         let mut walls = self.walls.clone();
         for l in (cut + 1..LEVELS).rev() {
-            let finer = std::mem::take(&mut walls[l]);
-            walls[l - 1] = std::mem::take(&mut walls[l - 1]).union(finer.coarsen());
+            let finer = take(&mut walls[l]);
+            walls[l - 1] = take(&mut walls[l - 1]).union(finer.coarsen());
         }
         // A rank knows the walls in its own part of a brick that others have part of, too.
         ownership.synchronise_replicas(&mut [&mut walls], comm);
@@ -92,34 +117,6 @@ impl Region {
         split.resize(LEVELS, BrickSet::default());
         Tree { split, crossing: walls }
     }
-}
-
-/// Crossing leaves and those of components that are walls, cut at level `cut`: a deeper one makes the octant of that level a wall. Walks
-/// upwards, so that no set deeper than the cut is stored.
-fn walls(tree: &Tree, nodes: &Nodes, cut: Level, is_wall: impl Fn(Component) -> bool) -> PerLevel {
-    let mut walls = per_level();
-    let mut below = BrickSet::default();
-    for l in (0..LEVELS as Level).rev() {
-        let (mut crossing, mut deeper) = (tree.crossing[l as usize].cursor(), below.cursor());
-        let mut set = BrickSet::default();
-        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
-            let of_wall = nodes.components(l, n).filter(|(c, _)| is_wall(*c));
-            let bits =
-                of_wall.fold(crossing.get(key) | deeper.get(key), |all, (_, bits)| all | bits);
-            if l > cut {
-                set.push(key >> 3, u64::from(brick::parents(bits)) << (8 * (key & 7)));
-            } else {
-                set.push(key, bits);
-            }
-        }
-        if l > cut {
-            below = set;
-        } else {
-            below = BrickSet::default();
-            walls[l as usize] = set;
-        }
-    }
-    walls
 }
 
 /// The leaks in all regions of T0, which `has_inside`. `facets` are this rank's slice of the geometry. Messages are not counted: the mesh

@@ -199,7 +199,8 @@ pub fn decide(
         },
         rays: verdict.rays,
     };
-    let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership);
+    let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
+    let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership, &mut regions);
     sides.summary.enclosed = region.summary(&all, leaves_enclosed, comm);
     if options.checks() {
         let decided = (&verdict, &region);
@@ -208,24 +209,23 @@ pub fn decide(
         };
         uncounted(comm, check);
     }
-    let is_inside = |c: Component| of_local[c as usize] == Class::Inside;
-    let regions =
-        if is_closed { Vec::new() } else { leaks::Region::of(tree, &nodes, rules, is_inside) };
     Ok((sides, regions))
 }
 
 impl Sides {
     /// Stores the leaves of all bricks by the classes of their local components. Returns the number of enclosed
-    /// leaves that this rank owns.
+    /// leaves that this rank owns. Fills the regions in which leaks are looked for.
     fn store(
         &mut self,
         tree: &Tree,
         nodes: &Nodes,
         of_local: &[Class],
         ownership: &Ownership,
+        regions: &mut [leaks::Region],
     ) -> u64 {
         let mut leaves_enclosed = 0;
-        for l in 0..LEVELS as Level {
+        for l in (0..LEVELS as Level).rev() {
+            let mut crossing = tree.crossing[l as usize].cursor();
             for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
                 let (mut open, mut within, mut enclosed) = (0, 0, 0);
                 for (c, part) in nodes.components(l, n) {
@@ -242,10 +242,14 @@ impl Sides {
                     Keep::Inside => open & !within,
                 };
                 self.stored[l as usize].push(key, stored);
+                for region in &mut *regions {
+                    region.push(l, key, crossing.get(key), open, within);
+                }
                 if enclosed != 0 && ownership.owns(l, key) {
                     leaves_enclosed += u64::from(enclosed.count_ones());
                 }
             }
+            regions.iter_mut().for_each(|region| region.end_level(l));
         }
         leaves_enclosed
     }

@@ -1,4 +1,4 @@
-//! Ranks on two hosts with a network between them, which is cut during the run. The hosts are network namespaces, joined by a pair of virtual
+//! Ranks on two hosts with a network between them, which is cut while a rank has stopped itself at a point (`STOP_AT`). The hosts are network namespaces, joined by a pair of virtual
 //! interfaces; a script in place of a remote shell starts OpenMPI's daemon in the second one.
 
 use crate::place::{HANGS, Place};
@@ -11,8 +11,8 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// A mesh that takes many seconds.
-const CASE: &str = "spacing_min = 0.0012\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
+/// A mesh with all phases.
+const CASE: &str = "spacing_min = 0.02\nlayer_cells_min = 6\nroot_scale = 2.0\nkeep = \"all\"\n
 [generator]\nshape = \"sphere\"\nfacets = 5120\n";
 /// Time for a job with a network that is cut: until the ranks notice, and then the launcher.
 const LIMIT: Duration = HANGS;
@@ -26,7 +26,7 @@ const HOSTS: [&str; 2] = ["198.18.77.1", "198.18.77.2"];
 const OPTIONS: &str = "--mca btl self,tcp --mca btl_tcp_if_include NETWORK --mca oob_tcp_if_include NETWORK \
     --mca oob_tcp_keepalive_time 1 --mca oob_tcp_keepalive_intvl 1 --mca oob_tcp_keepalive_probes 2";
 
-/// The network is cut on either side, at several times.
+/// The network is cut on either side, at several points.
 pub fn family() {
     let mesher = match mpi() {
         Ok(mesher) => mesher,
@@ -38,53 +38,36 @@ pub fn family() {
     };
     let place = Place::new();
     place.write("case.toml", CASE);
-    let short = CASE.replace("0.0012", "0.02");
-    place.write("short.toml", short);
     let before = place.files();
     let mut table = Table::new();
 
-    let ended = place.run(hosts.job(&place, &mesher, "short.toml"), LIMIT);
+    let ended = place.run(hosts.job(&place, &mesher, "none"), LIMIT);
     let is_right = ended.code == Some(0) && place.path().join("out/mesh.json").exists();
     let mut row = Row::new("mesher on 2 hosts", "none");
     let wrong = ended.wrong.clone().or_else(|| (!is_right).then(|| format!("{ended:?}")));
     row.add(ended.code, ended.seconds, "all output", wrong);
     table.push(row);
 
-    let times = if is_full() { &[0, 150, 300, 600, 1000][..] } else { &[300] };
-    for &delay_ms in times {
+    let phases = if is_full() { &["refine", "sides", "grade", "leaves"][..] } else { &["grade"] };
+    for phase in phases {
         for host in if is_full() { &[0, 1][..] } else { &[1] } {
             place.reset(&before);
             (0..2).for_each(|host| hosts.link(host, "up"));
-            let job = hosts.job(&place, &mesher, "case.toml");
-            let is_cut = std::thread::scope(|scope| {
-                let cut = scope.spawn(|| {
-                    let start = Instant::now();
-                    while !place.path().join("out/mesh.json.draft").exists()
-                        && start.elapsed() < LIMIT
-                    {
-                        sleep(Duration::from_millis(2));
-                    }
-                    sleep(Duration::from_millis(delay_ms));
-                    let is_running = place.path().join("out/mesh.json.draft").exists();
-                    hosts.link(*host, "down");
-                    is_running
-                });
+            let job = hosts.job(&place, &mesher, &format!("{phase}:{host}"));
+            let (is_cut, ended) = std::thread::scope(|scope| {
+                let cut = scope.spawn(|| hosts.cut(&place, *host));
                 let mut ended = place.run(job, LIMIT);
-                let is_cut = cut.join().unwrap();
                 // The daemon of the other host is not reached by the launcher, and ends when the test removes the host.
                 ended.wrong = ended.wrong.filter(|why| !why.starts_with("processes"));
-                (is_cut, ended)
+                (cut.join().unwrap(), ended)
             });
-            let (is_cut, ended) = is_cut;
             let after = place.files();
             let named = ended.err.lines().filter(|line| line.starts_with("mesher: ")).count();
             let left =
                 if after.keys().any(|path| path.starts_with("out")) { "files" } else { "nothing" };
             let wrong = match () {
                 () if ended.wrong.is_some() => ended.wrong.clone(),
-                () if !is_cut => {
-                    Some("the run had not begun or was over when the network was cut".to_owned())
-                }
+                () if !is_cut => Some("no rank stopped, so the network was not cut".to_owned()),
                 () if ended.code.is_none_or(|code| code == 0) => Some("it succeeded".to_owned()),
                 () if named == 0
                     && !LOST.iter().any(|lost| {
@@ -96,10 +79,7 @@ pub fn family() {
                 () if left != "nothing" => Some("files were left".to_owned()),
                 () => None,
             };
-            let what = format!(
-                "host {host} is cut off {:.1} s after the claim",
-                f64::from(delay_ms as u32) / 1000.0
-            );
+            let what = format!("host {host} is cut off before {phase}");
             let mut row = Row::new("mesher on 2 hosts, --stall-limit 5", what);
             row.add(ended.code, ended.seconds, left, wrong.map(|why| format!("{why}: {ended:?}")));
             table.push(row);
@@ -149,8 +129,26 @@ impl Hosts {
         ip(&format!("-n {} link set {} {state}", self.names[host], self.interfaces[host])).unwrap();
     }
 
-    /// A job with a rank on each host.
-    fn job(&self, place: &Place, mesher: &Path, case: &str) -> Command {
+    /// Cuts a host off as soon as a rank has stopped, and lets the rank continue. Returns whether one stopped in time.
+    fn cut(&self, place: &Place, host: usize) -> bool {
+        let start = Instant::now();
+        while start.elapsed() < LIMIT {
+            let is_stopped = |id: &u32| {
+                let state = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+                state.rsplit(") ").next().is_some_and(|state| state.starts_with('T'))
+            };
+            if let Some(id) = place.processes().into_iter().find(is_stopped) {
+                self.link(host, "down");
+                let _ = Command::new("kill").args(["-s", "CONT", &id.to_string()]).status();
+                return true;
+            }
+            sleep(Duration::from_millis(2));
+        }
+        false
+    }
+
+    /// A job with a rank on each host, of which one stops at a point.
+    fn job(&self, place: &Place, mesher: &Path, point: &str) -> Command {
         let agent = place.beside("agent");
         let script = "#!/bin/sh\nwhile [ \"${1#-}\" != \"$1\" ]; do shift; done\nshift\nexec ip netns exec HOST sh -c \"$*\"\n";
         fs::write(&agent, script.replace("HOST", &self.names[1])).unwrap();
@@ -165,8 +163,9 @@ impl Hosts {
         }
         job.args(["--mca", "plm_rsh_agent"]).arg(agent);
         job.args(OPTIONS.replace("NETWORK", NETWORK).split_whitespace());
+        job.env("STOP_AT", point).args(["-x", "STOP_AT"]);
         job.args(["--host", &HOSTS.map(|host| format!("{host}:1")).join(",")]).arg(mesher);
-        job.args([case, "--out", "out", "--quiet", "--stall-limit", "5"]);
+        job.args(["case.toml", "--out", "out", "--quiet", "--stall-limit", "5"]);
         job
     }
 }

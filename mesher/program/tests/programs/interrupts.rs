@@ -75,7 +75,6 @@ fn a_signal_at_any_point_leaves_no_files_or_a_complete_mesh() {
             // Every third time a second signal, which ends the run in any case.
             let signals: Vec<&str> =
                 next.by_ref().take(1 + usize::from(i % 3 == 0)).copied().collect();
-            let is_complete = LAST[1..].contains(&name);
             let workspace = workspace();
             let mut before = vec!["case.toml"];
             if i % 2 == 0 {
@@ -86,10 +85,14 @@ fn a_signal_at_any_point_leaves_no_files_or_a_complete_mesh() {
             signal(&signals, run.stopped());
             let finished = run.finish();
             let what = format!("{comm} {name} {signals:?} {finished:?}");
-            let goes_on = is_complete && signals.len() == 1;
+            let was_complete = LAST[1..].contains(&name);
+            let is_complete = workspace.path().join("mesh/mesh.json").exists();
+            // Of several threads another one may take the signals: the run may end in the meantime.
+            let is_late = comm != "solo" && is_complete && finished.code == Some(0);
+            assert!(is_late || is_complete == was_complete, "{what}");
+            let goes_on = is_late || is_complete && signals.len() == 1;
             assert_eq!(finished.code, Some(if goes_on { 0 } else { 130 }), "{what}");
             assert_eq!(finished.stderr.contains("mesher: interrupted"), !goes_on, "{what}");
-            assert_eq!(workspace.path().join("mesh/mesh.json").exists(), is_complete, "{what}");
             assert!(!goes_on || workspace.path().join("run.json").exists(), "{what}");
             assert_all_or_nothing(&workspace, &before, &finished);
         }
