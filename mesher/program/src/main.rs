@@ -83,6 +83,9 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
+/// Time for rank 0 to end the job.
+const PATIENCE: Duration = Duration::from_secs(10);
+
 /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
 const ADDRESS_SPACE_MPI: f64 = 384e6;
 
@@ -94,7 +97,11 @@ fn run_mpi(args: &Result<Args, Error>) {
             left / 1e6,
             (ADDRESS_SPACE_MPI - left) / 1e6
         ));
-        exit(fail(&e, launch::is_first()));
+        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
+        if !launch::is_first() {
+            sleep(PATIENCE);
+        }
+        exit(fail(&e, true));
     }
     // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
     let comm = interrupt::uninterrupted(launch::join);
