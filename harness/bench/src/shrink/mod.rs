@@ -102,7 +102,6 @@ pub fn shrink(
     check: Option<&str>,
     budget: &Budget,
 ) -> Result<Result<Shrunk, usize>, Unknown> {
-    let start = Instant::now();
     let case = PlainCase::read(case).map_err(Unknown::Error)?;
     let given = Trial { case, ranks: probe.ranks() };
     let first = match verdict(&given, probe, check)? {
@@ -110,15 +109,24 @@ pub fn shrink(
         Verdict::Holds(count) => return Ok(Err(count)),
     };
     crate::announce(&format!("harness shrink: the case fails {first}"));
-    let facets_before = given.case.facets.len();
+    smallest(given, &first, budget, |trial| probe.judge(trial, None)).map(Ok)
+}
+
+/// The smallest trial that fails as the given one does.
+fn smallest(
+    given: Trial,
+    first: &Failure,
+    budget: &Budget,
+    judge: impl Fn(&Trial) -> Result<Vec<Judged>, Unknown>,
+) -> Result<Shrunk, Unknown> {
+    let start = Instant::now();
     let mut trials = 1;
     let spent = |trials| {
         trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested()
     };
     let same = |trial: &Trial| -> Result<Option<Failure>, Unknown> {
-        let judged = probe.judge(trial, None)?;
-        let mut failures = judged.into_iter().filter_map(|one| one.failure);
-        Ok(failures.find(|failure| failure.is_same_as(&first)))
+        let mut failures = judge(trial)?.into_iter().filter_map(|one| one.failure);
+        Ok(failures.find(|failure| failure.is_same_as(first)))
     };
     let mut fails = |trial: &Trial| {
         if spent(trials) {
@@ -136,15 +144,19 @@ pub fn shrink(
         let why = "the failure does not repeat: it depends on more than the case";
         Unknown::Error(why.to_owned())
     })?;
+    let facets_before = given.case.facets.len();
     let shrunk = Shrunk { trial, failure, facets_before, trials, minimal };
-    shrunk.check_invariants(&given, &first, budget);
-    Ok(Ok(shrunk))
+    shrunk.check_invariants(&given, first, budget);
+    Ok(shrunk)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::case::Facet;
+    use proptest::prelude::*;
     use run::engine::layout::Ranks;
+    use std::collections::BTreeSet;
 
     fn judged() -> Vec<Judged> {
         vec![
@@ -186,5 +198,59 @@ mod tests {
         assert!(refused(|s| s.failure.check = "sides".into()) && refused(|s| s.trials = 6));
         assert!(refused(|s| s.facets_before = 3) && refused(|s| s.trial.ranks = Ranks::Mpi(4)));
         assert!(refused(|s| s.trial.case.facets.push([[1.0; 3]; 3])));
+    }
+
+    fn facet(number: u16) -> Facet {
+        [[f32::from(number); 3]; 3]
+    }
+
+    /// A trial with so many facets, seeds and ranks.
+    fn trial(facets: u16, seeds: u8, ranks: usize) -> Trial {
+        let seeds = (0..seeds).map(|x| vec![f64::from(x); 3]);
+        let mut table = toml::toml! { spacing_min = 0.1 };
+        table.insert("seeds".into(), toml::Value::try_from(seeds.collect::<Vec<_>>()).unwrap());
+        let facets = (0..facets).map(facet).collect();
+        Trial { case: PlainCase { table, facets }, ranks: Ranks::Mpi(ranks) }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, cases: 64, ..ProptestConfig::default() })]
+
+        /// A check fails where some facets and so many ranks are, and another one where they are not. The answer satisfies its
+        /// invariants, has what the failure needs, and, unless the budget is exhausted, nothing else. A larger or another answer is refused.
+        #[test]
+        fn answers_for_drawn_failures_satisfy_the_invariants(
+            (facets, needed) in (1u16..60).prop_flat_map(|n| (Just(n), prop::collection::btree_set(0..n, 0..4))),
+            (seeds, ranks, least, budget) in (0u8..4, 2usize..17, 2usize..17, 1usize..400),
+            wrong in 0usize..6,
+        ) {
+            let given = trial(facets, seeds, ranks);
+            let least = least.min(ranks);
+            let judge = |trial: &Trial| {
+                let is_needed = |number: &u16| trial.case.facets.contains(&facet(*number));
+                let fails = needed.iter().all(is_needed) && trial.ranks.count() >= least;
+                let name = if fails { "balance" } else { "sides" };
+                let failure = Some(Failure::of(name, &format!("{} findings", trial.case.facets.len())));
+                Ok(vec![Judged { check: name, failure }])
+            };
+            let first = Failure::of("balance", "7 findings");
+            let budget = Budget { trials: budget, time: Duration::MAX };
+            let mut shrunk = smallest(given.clone(), &first, &budget, judge).map_err(|_| TestCaseError::fail("an error"))?;
+            let left: BTreeSet<_> = shrunk.trial.case.facets.iter().map(|f| f[0][0] as u16).collect();
+            prop_assert!(needed.is_subset(&left) && shrunk.trial.ranks.count() >= least);
+            if shrunk.minimal {
+                prop_assert_eq!((&left, shrunk.trial.ranks.count()), (&needed, least));
+            }
+            match wrong {
+                0 => shrunk.failure = Failure::of("sides", "1 finding"),
+                1 => shrunk.trials = budget.trials + 1,
+                2 => shrunk.facets_before += 1,
+                3 => shrunk.trial.ranks = Ranks::Mpi(ranks + 1),
+                4 => shrunk.trial.case.facets = (0..=facets).map(facet).collect(),
+                _ => shrunk.trial = trial(0, seeds + 1, 2),
+            }
+            let check = || shrunk.check_invariants(&given, &first, &budget);
+            prop_assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err());
+        }
     }
 }

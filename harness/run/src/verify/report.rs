@@ -269,6 +269,7 @@ impl Report {
 mod tests {
     use super::*;
     use crate::testing::report;
+    use proptest::prelude::*;
 
     #[test]
     fn a_failed_check_takes_precedence_over_a_report_that_cannot_be_written() {
@@ -336,6 +337,71 @@ mod tests {
             (report.interrupted, report.asked.cases) = (true, vec!["plate".into()]);
         };
         assert!(refusal(stranger).contains("cube_small"));
+    }
+
+    /// A report of drawn cases, in which every rank count has a run and its checks.
+    fn drawn() -> impl Strategy<Value = Report> {
+        let ranks = prop::collection::btree_set(1usize..65, 1..4);
+        let cases = prop::collection::vec((1u64..1_000_000, any::<u128>(), 0u64..3), 1..4);
+        (ranks, cases).prop_map(|(ranks, cases)| {
+            let mut all = report();
+            all.missing.clear();
+            let (name, of_case) = (|i| format!("case-{i}"), all.cases.pop().unwrap());
+            let case = |(i, (cells, digest, failures)): (usize, (u64, u128, u64))| {
+                let of = Run { cells, digest: format!("{digest:032x}"), ..of_case.runs[0].clone() };
+                let layouts: Vec<_> = ranks
+                    .iter()
+                    .map(|&n| Layout::on(crate::engine::layout::Ranks::Mpi(n)))
+                    .collect();
+                let on_ranks =
+                    layouts.iter().map(|l| Run { layout: Some(l.clone()), ..of.clone() });
+                let runs = std::iter::once(of.clone()).chain(on_ranks).collect();
+                let of_layout = |l| {
+                    [RUNS, identical::NAME]
+                        .map(|name| Check::of_layout(l, name, Outcome::held(cells)))
+                };
+                let mut checks: Vec<_> = layouts.iter().flat_map(of_layout).collect();
+                checks.extend(
+                    (0..failures).map(|_| Check::new("serial", "balance", Outcome::fail("one"))),
+                );
+                checks.push(Check::new("p4est", "balance", Outcome::held(cells)));
+                CaseReport { name: name(i), runs, checks, ..of_case.clone() }
+            };
+            all.cases = cases.into_iter().enumerate().map(case).collect();
+            all.asked = Asked {
+                cases: all.cases.iter().map(|case| case.name.clone()).collect(),
+                named: true,
+                ranks: ranks.iter().copied().collect(),
+                subjects: vec!["p4est".into()],
+            };
+            all
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, cases: 128, ..ProptestConfig::default() })]
+
+        /// A drawn report satisfies the invariants, and each of these changes to one of its cases violates one.
+        #[test]
+        fn drawn_reports_are_accepted_and_changed_ones_refused(report in drawn(), at in any::<prop::sample::Index>(), wrong in 0usize..8) {
+            report.check_invariants();
+            let mut changed = report.clone();
+            let at = at.index(report.cases.len());
+            let case = &mut changed.cases[at];
+            let is_on_ranks = |check: &Check| check.ranks.is_some();
+            match wrong {
+                0 => drop(changed.cases.remove(at)),
+                1 => case.checks.clear(),
+                2 => case.checks.retain(|check| !is_on_ranks(check)),
+                3 => case.checks.retain(|check| check.subject != "p4est"),
+                4 => case.runs[1].digest = "other".into(),
+                5 => case.runs[0].cells += 1,
+                6 => drop(case.runs.pop()),
+                _ => changed.asked.ranks.push(65),
+            }
+            let refused = std::panic::catch_unwind(move || changed.check_invariants()).is_err();
+            prop_assert!(refused, "change {wrong} of {report:?}");
+        }
     }
 
     #[test]
