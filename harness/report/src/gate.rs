@@ -68,11 +68,6 @@ pub fn junit(report: &GateReport) -> String {
     to_text(&xml)
 }
 
-/// The report as JSON.
-pub fn json(report: &GateReport) -> String {
-    crate::json::pretty(report)
-}
-
 fn test(finding: &GateFinding) -> TestCase {
     let status = match finding.verdict {
         Verdict::Regression => {
@@ -151,7 +146,7 @@ fn summary(layer: &Layer) -> String {
 
 /// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.
 fn is_shown(layer: &Layer, finding: &GateFinding) -> bool {
-    use bench::gate::report::LayerName::{Correctness, Time};
+    use bench::gate::measures::LayerName::{Correctness, Time};
     finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
 }
 
@@ -178,18 +173,20 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::gate::measures::{Measured, Measures};
-    use bench::gate::report::LayerName;
+    use bench::gate::measures::{LayerName, Measured, Measures};
 
     fn sample() -> GateReport {
         let measured = |named: &str| Measured { named: named.into(), ..Measured::default() };
         let mut report =
             GateReport::new(Some(measured("main")), Measures::of_program(measured(".")));
         let cases = || vec!["cube".to_owned()];
+        let values = |metric: &str, verdict, values, note: &str| {
+            GateFinding::of_values("cube", metric, verdict, values, note.to_owned())
+        };
         let mut counters = Layer::new(LayerName::Counters, cases());
         counters.findings = vec![
-            GateFinding::exact("cube", "rays", [6, 7], 0.0, Verdict::Changed),
-            GateFinding::exact("cube", "messages", [6, 6], 0.0, Verdict::Changed),
+            values("rays", Verdict::Regression, [6.0, 7.0], "exceeds the tolerance of 0 %"),
+            values("messages", Verdict::Unchanged, [6.0, 6.0], ""),
             GateFinding::noted("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
         ];
         let left_out = Some("no valgrind".into());

@@ -26,6 +26,16 @@ pub struct Line {
     pub entry: Entry,
 }
 
+impl Line {
+    /// Returns the session that the line begins, if it begins one.
+    pub fn session(&self) -> Option<&Session> {
+        match &self.entry {
+            Entry::Session(session) => Some(session),
+            _ => None,
+        }
+    }
+}
+
 /// The content of a line, by kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]

@@ -2,6 +2,7 @@
 
 use super::entry::Machine;
 use contract::digest::mix;
+use std::fmt;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -25,6 +26,22 @@ impl Machine {
     pub fn label(&self) -> String {
         let Self { cpu, cores, memory_bytes, kernel, mpi, .. } = self;
         format!("{cpu}, {cores} cores, {} MiB, {kernel}, {mpi}", memory_bytes >> 20)
+    }
+}
+
+impl fmt::Display for Machine {
+    /// All that is known of it.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { cpu, cores, memory_bytes, kernel, mpi, compiler, commit } = self;
+        let gib = *memory_bytes as f64 / f64::from(1 << 30);
+        let or = |text: &str, none: &str| {
+            if text.is_empty() { none.to_owned() } else { text.to_owned() }
+        };
+        let (mpi, commit) = (or(mpi, "no MPI"), or(commit, "unknown"));
+        write!(
+            f,
+            "{cpu}, {cores} cores, {gib:.1} GiB, {kernel}, {mpi}, {compiler}, commit {commit}"
+        )
     }
 }
 

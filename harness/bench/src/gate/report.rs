@@ -8,7 +8,7 @@
 //! [`End::Holds`] carries the number of comparisons, which is not 0: a report that compared nothing of a case that it was asked for
 //! cannot hold.
 
-use super::measures::{Measured, Measures};
+use super::measures::{LayerName, Measured, Measures};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::fmt;
@@ -16,34 +16,6 @@ use std::num::NonZeroU64;
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "octree-gate/1";
-
-/// The layers, in the order in which they are run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum LayerName {
-    /// The checks of the candidate's meshes.
-    Correctness,
-    /// Deterministic counters.
-    Counters,
-    /// Peak memory.
-    Memory,
-    /// Instructions and allocations, counted by valgrind.
-    Instructions,
-    /// Run times of baseline and candidate in one session.
-    Time,
-}
-
-impl LayerName {
-    /// All layers.
-    pub const ALL: [Self; 5] =
-        [Self::Correctness, Self::Counters, Self::Memory, Self::Instructions, Self::Time];
-}
-
-impl fmt::Display for LayerName {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(&crate::name_of(self))
-    }
-}
 
 /// The assessment of a finding, best first after those without a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -126,31 +98,6 @@ impl GateFinding {
         }
     }
 
-    /// Returns the finding for a number with a tolerance in percent, below which `less` is the verdict on growth.
-    pub fn exact(
-        case: &str,
-        metric: &str,
-        values: [u64; 2],
-        tolerance: f64,
-        less: Verdict,
-    ) -> Self {
-        let [baseline, candidate] = values.map(|value| value as f64);
-        let change = change_percent(baseline, candidate);
-        let verdict = match values[1].cmp(&values[0]) {
-            Ordering::Equal => Verdict::Unchanged,
-            // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
-            _ if change.is_some_and(|by| by.abs() <= tolerance + 1e-9) => less,
-            Ordering::Less => Verdict::Improvement,
-            Ordering::Greater => Verdict::Regression,
-        };
-        let note = match verdict {
-            Verdict::Regression => format!("exceeds the tolerance of {tolerance} %"),
-            Verdict::Changed => format!("within the tolerance of {tolerance} %"),
-            _ => String::new(),
-        };
-        Self::of_values(case, metric, verdict, [baseline, candidate], note)
-    }
-
     fn check_invariants(&self) {
         if let (Some(baseline), Some(candidate)) = (self.baseline, self.candidate) {
             let expected = change_percent(baseline, candidate);
@@ -160,12 +107,9 @@ impl GateFinding {
                 Verdict::Improvement => Some(Ordering::Less),
                 _ => None,
             };
-            let is_right =
-                expected.is_none_or(|sign| candidate.partial_cmp(&baseline) == Some(sign));
-            assert!(
-                is_right || self.metric == CHECKS,
-                "the verdict has the sign of the change: {self:?}"
-            );
+            let found = candidate.partial_cmp(&baseline);
+            let is_right = self.metric == CHECKS || expected.is_none_or(|_| found == expected);
+            assert!(is_right, "the verdict has the sign of the change: {self:?}");
         }
         let is_empty = matches!(self.verdict, Verdict::LeftOut | Verdict::Missing);
         assert!(!is_empty || self.compared == 0, "nothing was compared: {self:?}");
@@ -175,7 +119,8 @@ impl GateFinding {
 /// Metric of the checks, of which one may fail that did not although fewer fail.
 pub const CHECKS: &str = "checks";
 
-fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
+/// Returns the change in percent; `None` of a baseline of 0.
+pub(super) fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
     match (baseline == candidate, baseline == 0.0) {
         (true, _) => Some(0.0),
         (_, true) => None,

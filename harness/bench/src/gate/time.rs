@@ -6,9 +6,10 @@
 //! [`adjusted`] controls the rate of false discoveries.
 
 use super::Bench;
+use super::measures::LayerName;
 use super::numbers::prefix;
 use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, certainty, size};
-use super::report::{GateFinding, Layer, LayerName, Verdict};
+use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
 use crate::statistics::comparison::{Comparison, Round, compare};
@@ -30,8 +31,8 @@ struct Timed<'a> {
 }
 
 /// Compares the times of candidate and baseline.
-pub fn layer(bench: &Bench, baseline: &Baseline, layer: &mut Layer) {
-    let why = match baseline {
+pub fn layer(bench: &Bench, layer: &mut Layer) {
+    let why = match &bench.baseline {
         Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
         Baseline::Record(..) => {
             "a record cannot be run, and times of different sessions are not comparable"
@@ -45,8 +46,7 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     let mut measured = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
         let name = &case.rule.name;
-        let real = bench.ranks_on_mpi(case).into_iter().map(Ranks::Mpi);
-        for ranks in std::iter::once(Ranks::Serial).chain(real) {
+        for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
             if interrupt::requested() {
                 break;
             }
@@ -54,14 +54,11 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
                 Ok(quantities) => measured.push(Timed { case: name, ranks, quantities }),
                 Err(failure) if failure.is_interrupt() => break,
                 Err(why) => {
-                    let metric = format!("{}time", prefix(ranks));
-                    let finding =
-                        GateFinding::noted(name, &metric, Verdict::Missing, why.to_string());
-                    layer.findings.push(finding);
+                    let (metric, why) = (format!("{}time", prefix(ranks)), why.to_string());
+                    layer.findings.push(GateFinding::noted(name, &metric, Verdict::Missing, why));
                 }
             }
         }
-        layer.findings.extend(bench.ranks_left_out(case));
     }
     layer.findings.extend(judged(bench, &mut measured));
 }
@@ -78,10 +75,7 @@ fn rounds(
     case: &Selected,
     ranks: Ranks,
 ) -> Result<Vec<Quantity>, Failure> {
-    let unusable = |why: String| baseline.unusable(why);
-    let path = case.path.clone().map_err(unusable)?;
-    let place = bench.enter("time").map_err(unusable)?;
-    let path = baseline.prepare(&path, &place.join("case")).map_err(unusable)?;
+    let path = bench.prepare(baseline, case, "time")?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run reads program and geometry from disk and is not counted.
     let first = run(bench, baseline, &path, ranks)?;
@@ -116,7 +110,7 @@ fn rounds(
 }
 
 fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
-    let place = bench.enter("time/run").map_err(|why| engine.unusable(why))?;
+    let place = bench.enter(engine, "time/run")?;
     engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit()))
 }
 

@@ -11,10 +11,10 @@
 //! if false)}`.
 
 use super::unit;
-use crate::gate::measures::{CaseMeasures, Measures};
+use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::phases::{CPU, WALL};
-use crate::gate::report::{GateReport, LayerName};
+use crate::gate::report::GateReport;
 use crate::jsonl::{self, Line};
 use crate::origin::Origins;
 use serde::{Deserialize, Serialize};

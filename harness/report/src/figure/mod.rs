@@ -219,30 +219,12 @@ pub struct Figure {
     pub body: Body,
     /// Height in units of which the width has [`canvas::WIDTH`].
     pub height: u32,
-    /// Facts that the rules for figures are checked against.
-    pub claims: Claims,
-}
-
-/// Facts about a figure that the rules for figures are checked against.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Claims {
-    /// The base case of the ratios shown, with its absolute performance.
-    pub base_case: Option<String>,
-    /// The figure shows ratios.
-    pub shows_ratios: bool,
-    /// The figure shows scaling over ranks.
-    pub shows_scaling: bool,
-    /// The figure compares alternatives.
-    pub compares: bool,
-    /// The values repeat exactly.
-    pub deterministic: bool,
 }
 
 impl Figure {
-    /// All points with their provenance.
-    pub fn points(&self) -> Vec<(Provenance, Point)> {
-        let Body::Points { series, .. } = &self.body else { return Vec::new() };
-        series.iter().flat_map(|s| s.points.iter().map(|p| (s.provenance, *p))).collect()
+    /// A figure of the usual height.
+    pub fn new(id: String, title: String, caption: String, [x, y]: [Axis; 2], body: Body) -> Self {
+        Self { id, title, caption, x, y, body, height: svg::HEIGHT }
     }
 }
 
@@ -296,7 +278,6 @@ pub(crate) mod samples {
             y: Axis::log("speedup"),
             body,
             height: svg::HEIGHT,
-            claims: Claims::default(),
         }
     }
 
@@ -321,7 +302,6 @@ pub(crate) mod samples {
             caption: "On 3 simulated ranks, without collective calls.".into(),
             x: Axis::linear("to rank"),
             y: Axis::linear("from rank"),
-            claims: Claims { deterministic: true, ..Claims::default() },
             ..figure(Body::HeatMap(map))
         }
     }
