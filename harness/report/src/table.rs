@@ -46,16 +46,11 @@ impl Table {
         let all = || head.iter().chain(&self.rows);
         let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        // Numbers are to the right.
-        let is_number = |field: &String| {
-            field.trim_start_matches(['+', '-']).starts_with(|first: char| first.is_ascii_digit())
-        };
-        let right =
-            |column: usize| column > 0 && self.rows.iter().any(|row| is_number(&row[column]));
-        let aligned = |(column, field): (usize, &String)| match (right(column), widths[column]) {
-            (false, width) => format!("{field:<width$}"),
-            (true, width) => format!("{field:>width$}"),
-        };
+        let aligned =
+            |(column, field): (usize, &String)| match (self.is_number(column), widths[column]) {
+                (false, width) => format!("{field:<width$}"),
+                (true, width) => format!("{field:>width$}"),
+            };
         let line = |row: &Vec<String>| {
             let fields: Vec<String> = row.iter().enumerate().map(aligned).collect();
             fields.join("  ").trim_end().to_owned()
@@ -65,10 +60,18 @@ impl Table {
         lines.map(|line| line + "\n").collect()
     }
 
-    /// The table as Markdown, with the columns of this range to the right.
-    pub fn markdown(&self, right: std::ops::Range<usize>) -> String {
+    /// Whether a column has numbers, which are to the right.
+    fn is_number(&self, column: usize) -> bool {
+        let is_number = |field: &String| {
+            field.trim_start_matches(['+', '-']).starts_with(|first: char| first.is_ascii_digit())
+        };
+        column > 0 && self.rows.iter().any(|row| is_number(&row[column]))
+    }
+
+    /// The table as Markdown.
+    pub fn markdown(&self) -> String {
         let line = |fields: Vec<String>| format!("| {} |\n", fields.join(" | "));
-        let rule = |i: usize| if right.contains(&i) { "---:" } else { "---" }.to_owned();
+        let rule = |i: usize| if self.is_number(i) { "---:" } else { "---" }.to_owned();
         let mut text = line(self.columns.iter().map(|title| escaped(title)).collect());
         text += &line((0..self.columns.len()).map(rule).collect());
         let rows =
@@ -110,7 +113,7 @@ mod tests {
     #[test]
     fn fields_cannot_become_markup() {
         let expected = "| a\\|b | two words | n / s |\n| --- | --- | ---: |\n| a | &lt;x&gt; | 7 |\n| long | \\_y\\_ | -12 |\n";
-        assert_eq!(sample().markdown(2..3), expected);
+        assert_eq!(sample().markdown(), expected);
         assert!(sample().html().into_string().contains("<td>&lt;x&gt;</td>"));
     }
 }

@@ -20,7 +20,7 @@ pub fn text(rows: &[Judged]) -> String {
 /// The table as Markdown, below a line about the machine and the counts of the verdicts.
 pub fn markdown(rows: &[Judged], machine: &str) -> String {
     let head = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
-    head + &table(rows).markdown(0..0)
+    head + &table(rows).markdown()
 }
 
 fn count(rows: &[Judged]) -> String {

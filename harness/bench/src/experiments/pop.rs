@@ -39,6 +39,9 @@ pub struct Efficiency {
     pub time_s: f64,
 }
 
+/// A factor of efficiency, or a product of factors.
+pub type Factor = fn(&Efficiency) -> f64;
+
 impl Efficiency {
     /// Serialisation and transfer together.
     pub fn communication(&self) -> f64 {
@@ -171,7 +174,7 @@ pub fn above_one(all: &[Efficiency], experiment: &str) -> Option<String> {
     let scaling = format!(
         "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: {scaling}."
     );
-    let factors: [(fn(&Efficiency) -> f64, &str); 3] = [
+    let factors: [(Factor, &str); 3] = [
         (|e| e.computation_scaling, &scaling),
         (
             |e| e.serialisation,
@@ -182,7 +185,7 @@ pub fn above_one(all: &[Efficiency], experiment: &str) -> Option<String> {
             "Transfer is above 1 where ranks do not wait at the end of every phase, or where the clocks disagree.",
         ),
     ];
-    let exceeds = |factor: fn(&Efficiency) -> f64| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
+    let exceeds = |factor: Factor| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
     let reasons = factors.iter().filter(|(factor, _)| exceeds(*factor)).map(|(_, why)| *why);
     let reasons: Vec<&str> = reasons.collect();
     let above = all.iter().find(|e| e.is_above_one());

@@ -1,7 +1,8 @@
 //! A measurement session: makes runs, checks that equal meshes have equal digests, and appends to the record.
 
 use super::entry::{Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
-use super::execute::{Failed, Runner};
+pub use super::execute::BenchError;
+use super::execute::Runner;
 use super::record::Record;
 use super::{machine, network};
 use check::promises::Independence;
@@ -38,17 +39,6 @@ impl SessionOptions {
     pub(crate) fn repeats(&self, of_file: usize) -> usize {
         self.repeat.map_or(of_file, usize::from)
     }
-}
-
-/// Why a session ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// Invalid input.
-    #[error("{0}")]
-    Input(String),
-    /// Ctrl-C; the record contains all results so far.
-    #[error("interrupted: the record contains all results so far")]
-    Interrupted,
 }
 
 /// A run to be repeated.
@@ -173,8 +163,8 @@ impl<'a> Bench<'a> {
         };
         match entry {
             Ok(entry) => self.append(entry),
-            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
-            Err(Failed::Reason(why)) => {
+            Err(BenchError::Interrupted) => Err(BenchError::Interrupted),
+            Err(BenchError::Input(why)) => {
                 (self.progress)(&format!("failed: {why}"));
                 point.failed = true;
                 let setup = point.setup.clone();
@@ -184,14 +174,19 @@ impl<'a> Bench<'a> {
         }
     }
 
-    fn timed(&mut self, point: &Planned, repeat: usize, warm_up: bool) -> Result<Entry, Failed> {
+    fn timed(
+        &mut self,
+        point: &Planned,
+        repeat: usize,
+        warm_up: bool,
+    ) -> Result<Entry, BenchError> {
         let run = self.runner.run(&point.setup, &point.case, repeat, warm_up)?;
-        self.check_mesh(point, &run).map_err(Failed::Reason)?;
+        self.check_mesh(point, &run)?;
         Ok(Entry::Run(Box::new(run)))
     }
 
     /// Writes a mesh to the record's file system and audits it.
-    fn audited(&mut self, point: &Planned) -> Result<Entry, Failed> {
+    fn audited(&mut self, point: &Planned) -> Result<Entry, BenchError> {
         let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
         let disk = disk.unwrap_or(Path::new("."));
         Ok(Entry::Audit(self.runner.audit(&point.setup, &point.case, disk)?))

@@ -5,7 +5,7 @@
 use super::file::{EXPERIMENT, Experiment, Mesh, Row, Series, Study};
 use super::judge::{judge, unjudged};
 use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
-use crate::experiments::execute::{Failed, has_message_matrix};
+use crate::experiments::execute::has_message_matrix;
 use crate::experiments::feasible;
 use crate::experiments::session::{Bench, BenchError, Planned, SessionOptions};
 use crate::experiments::sizing::Sizes;
@@ -41,8 +41,7 @@ pub fn measure(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
-    let place =
-        place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))?;
+    let place = place.map_err(|error| format!("no temporary directory: {error}"))?;
     let bench = Bench::open(options, record, study.engines(), programs, place.path(), progress)?;
     let (bases, made, warm) = Default::default();
     let mut session = Session { bench, study, options, bases, made, warm };
@@ -99,11 +98,7 @@ impl Session<'_> {
         for cells in series.sizes() {
             let mut points = Vec::new();
             for engine in &series.engines {
-                let planned = self.points(series, engine, cells);
-                points.extend(planned.map_err(|failed| match failed {
-                    Failed::Interrupted => BenchError::Interrupted,
-                    Failed::Reason(why) => BenchError::Input(format!("{}: {why}", series.case)),
-                })?);
+                points.extend(self.points(series, engine, cells)?);
             }
             self.make(&mut points)?;
         }
@@ -116,7 +111,7 @@ impl Session<'_> {
         series: &Series,
         engine: &str,
         cells: Option<f64>,
-    ) -> Result<Vec<Planned>, Failed> {
+    ) -> Result<Vec<Planned>, BenchError> {
         let description = self.bench.runner.programs.labelled(engine).description().clone();
         let layouts = series.layouts(&description, self.mpi_left_out().is_some());
         if layouts.is_empty() {
@@ -132,7 +127,7 @@ impl Session<'_> {
             for &(comm, ranks) in &layouts {
                 for spacing in self.spacings(&key, series.experiment, cells, ranks)? {
                     let base = &self.bases[&key].0;
-                    let path = base.variant(spacing, n).map_err(Failed::Reason)?;
+                    let path = base.variant(spacing, n)?;
                     let setup = Setup {
                         experiment: series.experiment.to_string(),
                         engine: engine.to_owned(),
@@ -140,11 +135,9 @@ impl Session<'_> {
                         comm,
                         ..Setup::serial(&base.name, spacing, n)
                     };
-                    let case = Case::read(&path);
-                    let case = case.map_err(|error| Failed::Reason(error.to_string()))?;
+                    let case = Case::read(&path).map_err(|error| error.to_string())?;
                     if let Some(why) = description.declines(&case) {
-                        let left_out = self.bench.leave_out(setup, why);
-                        left_out.map_err(|error| Failed::Reason(error.to_string()))?;
+                        self.bench.leave_out(setup, why)?;
                         continue;
                     }
                     points.extend(series.choices().iter().map(|&choice| {
@@ -168,7 +161,7 @@ impl Session<'_> {
         experiment: Experiment,
         cells: Option<f64>,
         ranks: usize,
-    ) -> Result<Vec<f64>, Failed> {
+    ) -> Result<Vec<f64>, BenchError> {
         let base = &self.bases[key].0;
         let (Some(cells), n) = (cells, base.layer_cells_min) else {
             return Ok(vec![base.spacing_min]);
@@ -184,7 +177,7 @@ impl Session<'_> {
     }
 
     /// Returns the spacing that gives about this number of cells.
-    fn spacing(&mut self, key: &str, n: u32, cells: f64) -> Result<f64, Failed> {
+    fn spacing(&mut self, key: &str, n: u32, cells: f64) -> Result<f64, BenchError> {
         let (base, sizes) = self.bases.get_mut(key).expect("the geometry was read");
         let runner = &self.bench.runner;
         sizes.entry(n).or_default().spacing(cells, base.coarse(), |s| runner.count(base, s, n))
@@ -204,8 +197,8 @@ impl Session<'_> {
             }
             match self.point(name) {
                 Ok(point) => points.push(point),
-                Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
-                Err(Failed::Reason(why)) => {
+                Err(BenchError::Interrupted) => return Err(BenchError::Interrupted),
+                Err(BenchError::Input(why)) => {
                     let why = format!("mesh {}: {why}", study.run[name].mesh);
                     return Ok(unjudged(row, Verdict::Failed, why));
                 }
@@ -217,7 +210,7 @@ impl Session<'_> {
     }
 
     /// Plans the run of this name, and writes its case.
-    fn point(&mut self, name: &str) -> Result<Planned, Failed> {
+    fn point(&mut self, name: &str) -> Result<Planned, BenchError> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
         let key = self.base(&spec.mesh, mesh)?;
@@ -244,7 +237,7 @@ impl Session<'_> {
             ..Setup::serial(&spec.mesh, spacing, n)
         };
         let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);
-        let case = case.map_err(Failed::Reason)?;
+        let case = case?;
         Ok(Planned { setup, case, repeats, warm_up, audit: spec.audit, failed: false })
     }
 
@@ -284,7 +277,7 @@ impl Session<'_> {
     }
 
     /// Writes the geometry of a mesh as a binary STL file, once; returns its key.
-    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, Failed> {
+    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, BenchError> {
         let Mesh { case, geometry, generator, root_scale, .. } = mesh;
         let key = format!("{case:?} {geometry:?} {generator:?} {root_scale:?}");
         if self.bases.contains_key(&key) {
@@ -296,7 +289,7 @@ impl Session<'_> {
             Some(case) => self.bench.runner.programs.paths.catalogue.case_file(case, directory),
             None => given_case(mesh, directory, place.join(format!("{name}-given.toml"))),
         };
-        let base = path.and_then(|path| Base::read(&path, place)).map_err(Failed::Reason)?;
+        let base = path.and_then(|path| Base::read(&path, place))?;
         self.bases.insert(key.clone(), (base, BTreeMap::new()));
         Ok(key)
     }

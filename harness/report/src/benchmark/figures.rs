@@ -33,8 +33,8 @@ fn at(group: &Group, value: Median) -> Point {
 
 /// Million cells per second and core.
 fn rate(group: &Group, time_s: Median) -> Point {
-    let cells = group.cells() as f64 / group.setup.ranks as f64 / 1e6;
-    at(group, time_s.falling(|time_s| cells / time_s))
+    let (cells, ranks) = (group.cells() as f64, group.setup.ranks as f64);
+    at(group, time_s.falling(|time_s| cells / time_s / ranks / 1e6))
 }
 
 /// A series per program, number and kind of ranks, and per case if there are several, by cells. Programs and cases stay in the order

@@ -6,7 +6,7 @@ use crate::figure::{Axis, Bars, Body, Figure, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
-use bench::experiments::pop::{Efficiency, above_one, phase_s};
+use bench::experiments::pop::{Efficiency, Factor, above_one, phase_s};
 use bench::order::{by_key, distinct};
 
 /// Maximum number of phases that have a segment of their own.
@@ -127,7 +127,7 @@ impl Study<'_> {
         let Self { subject, experiment, .. } = self;
         let simulated = self.with(Provenance::Projected);
         let last = simulated.last().filter(|_| simulated.len() > 1)?;
-        let factors: [(&str, fn(&Efficiency) -> f64); 5] = [
+        let factors: [(&str, Factor); 5] = [
             ("global", Efficiency::global),
             ("parallel", Efficiency::parallel),
             ("load balance", |e| e.load_balance),
@@ -173,14 +173,16 @@ impl Study<'_> {
         let time = |g: &Group, name: &str| {
             let phase = g.typical.phases.iter().find(|p| p.name == name);
             let time_s = phase.map_or(0.0, |p| phase_s(&g.typical, p, &groups.network));
-            let cells = if weak { g.cells() as f64 / 1e6 } else { 1.0 };
-            time_s * g.setup.ranks as f64 / cells
+            time_s * g.setup.ranks as f64
         };
         let mut names: Vec<&str> = last.phases.iter().map(|p| p.name.as_str()).collect();
         let time_max = |name: &str| simulated.iter().map(|g| time(g, name)).fold(0.0, f64::max);
         names.sort_by(|a, b| time_max(b).total_cmp(&time_max(a)));
         let segment = |label: &str, names: &[&str]| {
-            let value = |g: &&Group| names.iter().map(|name| time(g, name)).sum();
+            let value = |g: &&Group| {
+                let sum: f64 = names.iter().map(|name| time(g, name)).sum();
+                if weak { sum / (g.cells() as f64 / 1e6) } else { sum }
+            };
             (format!("{}: {label}", subject.engine), simulated.iter().map(value).collect())
         };
         let (shown, rest) = names.split_at(names.len().min(PHASES_SHOWN));

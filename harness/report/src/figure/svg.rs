@@ -43,10 +43,6 @@ const BESIDE_TICKS: f64 = 100.0;
 const RIGHT: f64 = 40.0;
 /// Space below the data, for ticks and label.
 const BELOW: f64 = 130.0;
-/// Width of a symbol in the legend.
-const SYMBOL: f64 = 80.0;
-/// Distance of lines of text.
-const LINE: f64 = SIZE + 8.0;
 
 /// Space at the left of data on this axis.
 pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
@@ -54,19 +50,10 @@ pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
     labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
 }
 
-/// Draws the legend in as many rows as it needs, and returns its lower end.
-fn legend(canvas: &Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
-    let (mut x, mut y) = (left, 36.0);
-    for (name, symbol) in entries {
-        let entry = SYMBOL + width(name) + 50.0;
-        if x > left && x + entry > f64::from(WIDTH) {
-            (x, y) = (left, y + LINE);
-        }
-        draw_symbol(canvas, (x, y), symbol);
-        canvas.text(name, (x + SYMBOL, y), Anchor::Start);
-        x += entry;
-    }
-    y + 40.0
+/// Draws the legend, and returns its lower end.
+fn legend(canvas: &mut Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
+    let names: Vec<&str> = entries.iter().map(|entry| entry.0).collect();
+    canvas.legend([left; 2], &names, |canvas, at, i| draw_symbol(canvas, at, &entries[i].1))
 }
 
 fn draw_symbol(canvas: &Canvas, (x, y): At, symbol: &Symbol) {
@@ -200,7 +187,7 @@ fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
     }
 }
 
-fn draw_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
+fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
     let segments = bars.segments.iter().enumerate();
     let references = bars.references.iter().enumerate();
     let entries: Vec<(&str, Symbol)> = segments
