@@ -154,23 +154,6 @@ impl Layer {
         let worst = self.findings.iter().map(|finding| finding.verdict).max();
         worst.unwrap_or(Verdict::LeftOut)
     }
-
-    /// Returns the number of comparisons of a case.
-    fn compared(&self, case: &str) -> Option<NonZeroU64> {
-        let of_case = self.findings.iter().filter(|finding| finding.case == case);
-        NonZeroU64::new(of_case.map(|finding| finding.compared).sum())
-    }
-
-    /// Returns why nothing of a case was compared, and whether a missing prerequisite excuses that.
-    fn reason(&self, case: &str) -> (bool, String) {
-        let of_case = || self.findings.iter().filter(|finding| finding.case == case);
-        let excused = self.left_out.is_some()
-            || of_case().next().is_some() && of_case().all(|f| f.verdict == Verdict::LeftOut);
-        let unmet = of_case().find(|f| matches!(f.verdict, Verdict::Missing | Verdict::LeftOut));
-        let note = unmet.map(|finding| finding.note.clone());
-        let why = self.left_out.clone().or(note).unwrap_or_else(|| "it has no quantity".to_owned());
-        (excused, format!("{} of {case}: nothing was compared: {why}", self.name))
-    }
 }
 
 /// How a gate ends.
@@ -233,17 +216,23 @@ impl GateReport {
         if self.layers.iter().any(|layer| layer.verdict() == Verdict::Regression) {
             return End::Regression;
         }
-        let mut total = None;
+        let mut total = 0;
         for layer in &self.layers {
             for case in &layer.cases {
-                match layer.compared(case) {
-                    Some(some) => {
-                        total = Some(some.saturating_add(total.map_or(0, NonZeroU64::get)))
-                    }
-                    None => match layer.reason(case) {
-                        (true, _) if !self.require_layers => {}
-                        (_, why) => return End::Incomplete(why),
-                    },
+                let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
+                let compared: u64 = of_case().map(|finding| finding.compared).sum();
+                total += compared;
+                let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
+                let is_excused = layer.left_out.is_some()
+                    || of_case().next().is_some() && of_case().all(is_left_out);
+                if compared == 0 && (self.require_layers || !is_excused) {
+                    let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
+                    let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));
+                    let why = why.map_or("it has no quantity", String::as_str);
+                    let name = layer.name;
+                    return End::Incomplete(format!(
+                        "{name} of {case}: nothing was compared: {why}"
+                    ));
                 }
             }
             let mut missing = layer.findings.iter().filter(|f| f.verdict == Verdict::Missing);
@@ -254,10 +243,8 @@ impl GateReport {
                 return End::Incomplete(format!("the rules have no case for {}", layer.name));
             }
         }
-        match total {
-            Some(total) => End::Holds(total),
-            None => End::Incomplete("nothing was compared".to_owned()),
-        }
+        let none = || End::Incomplete("nothing was compared".to_owned());
+        NonZeroU64::new(total).map_or_else(none, End::Holds)
     }
 
     /// Executes the invariants at the head of this file.

@@ -4,6 +4,7 @@
 //! Invariants: every value states its provenance; points are joined only where interpolation between them is
 //! meaningful; captions state the confidence intervals.
 
+pub(crate) mod axes;
 pub mod canvas;
 pub mod check;
 pub mod csv;
@@ -202,6 +203,9 @@ impl Body {
     }
 }
 
+/// Usual height of a figure.
+const HEIGHT: u32 = 1040;
+
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
@@ -224,7 +228,7 @@ pub struct Figure {
 impl Figure {
     /// A figure of the usual height.
     pub fn new(id: String, title: String, caption: String, [x, y]: [Axis; 2], body: Body) -> Self {
-        Self { id, title, caption, x, y, body, height: svg::HEIGHT }
+        Self { id, title, caption, x, y, body, height: HEIGHT }
     }
 }
 
@@ -277,7 +281,7 @@ pub(crate) mod samples {
             x: Axis::log("ranks").with_ticks(vec![1.0, 2.0, 4.0]),
             y: Axis::log("speedup"),
             body,
-            height: svg::HEIGHT,
+            height: HEIGHT,
         }
     }
 

@@ -3,9 +3,9 @@
 use super::Picture;
 use super::squares::Square;
 use crate::figure::Axis;
+use crate::figure::axes;
 use crate::figure::canvas::{Anchor, Canvas, INK, SYMBOL, WIDTH, document, width};
 use crate::figure::palette::hex;
-use crate::figure::svg as axes;
 use crate::section::Planar;
 use std::collections::BTreeSet;
 
