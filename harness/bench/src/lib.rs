@@ -16,10 +16,21 @@ pub mod study;
 pub mod testing;
 pub mod track;
 
+use std::path::Path;
+use std::process::Command;
+
 /// Returns the name of a variant, as files have it.
 fn name_of(variant: &impl serde::Serialize) -> String {
     let name = serde_json::to_value(variant).expect("a variant without data is a string");
     name.as_str().unwrap_or_default().to_owned()
+}
+
+/// Returns what git prints in a directory, without the end of the last line; `None` if it fails.
+fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
+    let mut git = Command::new("git");
+    let output = git.arg("-C").arg(directory).args(arguments).output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).trim_end().to_owned();
+    output.status.success().then_some(text)
 }
 
 /// Prints what a long command does on standard error. If that cannot be written, the command goes on.

@@ -1,5 +1,6 @@
 //! Why a command has no result: the exit code and the one sentence that `main` prints.
 
+use bench::gate::GateError;
 use bench::shrink::probe::Unknown;
 use contract::case::CaseError;
 use contract::leafset::ReadError;
@@ -93,6 +94,15 @@ impl From<VerifyError> for Failure {
         match error {
             VerifyError::Input(why) => Self::input(why),
             VerifyError::Missing(why) => Self::missing(why),
+        }
+    }
+}
+
+impl From<GateError> for Failure {
+    fn from(error: GateError) -> Self {
+        match error {
+            GateError::Input(why) => Self::input(why),
+            GateError::Missing(why) => Self::missing(why),
         }
     }
 }

@@ -1,10 +1,9 @@
 //! The report of a gate as text, Markdown, JUnit XML and JSON.
 
+use crate::junit::{Ended, suite, test, to_text};
 use crate::markdown::escaped;
 use crate::table::Table;
-use crate::verification::junit::to_text;
 use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
-use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use std::fmt::Write as _;
 use std::time::Duration;
 
@@ -47,7 +46,7 @@ pub fn markdown(report: &GateReport) -> String {
         vec!["layer", "verdict", "case", "metric", "baseline", "candidate", "change", "note"];
     let head =
         format!("## harness gate\n\n{}: **{}**\n\n", escaped(&heading(report)), verdict(report));
-    head + &Table { columns, rows, ..Table::default() }.markdown(4..7)
+    head + &Table { columns, rows, ..Table::default() }.markdown()
 }
 
 /// The report as JUnit XML: a suite per layer, a test per metric. Inconclusive metrics are skipped tests with a reason.
@@ -55,51 +54,25 @@ pub fn junit(report: &GateReport) -> String {
     let mut xml = quick_junit::Report::new("harness gate");
     xml.set_time(Duration::from_secs_f64(report.time_s));
     for layer in &report.layers {
-        let mut suite = TestSuite::new(layer.name.to_string());
-        suite.set_time(Duration::from_secs_f64(layer.time_s));
-        if let Some(why) = &layer.left_out {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(format!("left out: {why}"));
-            suite.add_test_case(TestCase::new("layer", status));
-        }
-        suite.add_test_cases(layer.findings.iter().map(test));
-        xml.add_test_suite(suite);
+        let left_out = layer.left_out.iter();
+        let left_out =
+            left_out.map(|why| test("layer", Ended::Skipped(format!("left out: {why}")), ""));
+        let of_finding = |finding: &GateFinding| {
+            let GateFinding { case, metric, verdict, note, .. } = finding;
+            let ended = match verdict {
+                Verdict::Regression => Ended::Failed(line(finding)),
+                Verdict::Missing => Ended::Error(format!("not compared: {note}")),
+                Verdict::Inconclusive | Verdict::LeftOut => {
+                    Ended::Skipped(format!("{verdict}: {note}"))
+                }
+                _ => Ended::Passed,
+            };
+            test(format!("{case}: {metric}"), ended, &line(finding))
+        };
+        let tests = left_out.chain(layer.findings.iter().map(of_finding));
+        xml.add_test_suite(suite(&layer.name.to_string(), layer.time_s, tests));
     }
     to_text(&xml)
-}
-
-/// The report as JSON.
-pub fn json(report: &GateReport) -> String {
-    crate::json::pretty(report)
-}
-
-fn test(finding: &GateFinding) -> TestCase {
-    let status = match finding.verdict {
-        Verdict::Regression => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status.set_message(line(finding)).set_description(finding.note.as_str());
-            status
-        }
-        Verdict::Missing => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-            status.set_message(format!("not compared: {}", finding.note));
-            status
-        }
-        Verdict::Inconclusive => {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(format!("inconclusive: {}", finding.note));
-            status
-        }
-        Verdict::LeftOut => {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(format!("left out: {}", finding.note));
-            status
-        }
-        _ => TestCaseStatus::success(),
-    };
-    let mut test = TestCase::new(format!("{}: {}", finding.case, finding.metric), status);
-    test.set_system_out(line(finding));
-    test
 }
 
 fn heading(report: &GateReport) -> String {
@@ -151,7 +124,7 @@ fn summary(layer: &Layer) -> String {
 
 /// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.
 fn is_shown(layer: &Layer, finding: &GateFinding) -> bool {
-    use bench::gate::report::LayerName::{Correctness, Time};
+    use bench::gate::measures::LayerName::{Correctness, Time};
     finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
 }
 
@@ -178,18 +151,20 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::gate::measures::{Measured, Measures};
-    use bench::gate::report::LayerName;
+    use bench::gate::measures::{LayerName, Measured, Measures};
 
     fn sample() -> GateReport {
         let measured = |named: &str| Measured { named: named.into(), ..Measured::default() };
         let mut report =
             GateReport::new(Some(measured("main")), Measures::of_program(measured(".")));
         let cases = || vec!["cube".to_owned()];
+        let values = |metric: &str, verdict, values, note: &str| {
+            GateFinding::of_values("cube", metric, verdict, values, note.to_owned())
+        };
         let mut counters = Layer::new(LayerName::Counters, cases());
         counters.findings = vec![
-            GateFinding::exact("cube", "rays", [6, 7], 0.0, Verdict::Changed),
-            GateFinding::exact("cube", "messages", [6, 6], 0.0, Verdict::Changed),
+            values("rays", Verdict::Regression, [6.0, 7.0], "exceeds the tolerance of 0 %"),
+            values("messages", Verdict::Unchanged, [6.0, 6.0], ""),
             GateFinding::noted("cube", "time", Verdict::Inconclusive, "a <busy> machine | or so"),
         ];
         let left_out = Some("no valgrind".into());

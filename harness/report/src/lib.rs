@@ -12,6 +12,7 @@ pub mod benchmark;
 pub mod figure;
 pub mod gate;
 pub mod json;
+mod junit;
 pub mod leak;
 pub mod markdown;
 pub mod page;

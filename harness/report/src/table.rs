@@ -17,32 +17,40 @@ pub struct Table {
     pub notes: Vec<String>,
 }
 
+/// The heading of a column, and its field in the row of an item.
+pub type Column<'a, T> = (&'static str, &'a dyn Fn(&T) -> String);
+
 impl Table {
-    /// The table as text: columns as wide as their widest field. The words of a heading are below each other.
+    /// A table with a row for each item.
+    pub fn of<T>(title: String, items: &[T], columns: &[Column<T>]) -> Self {
+        let row = |item: &T| columns.iter().map(|(_, field)| field(item)).collect();
+        let rows = items.iter().map(row).collect();
+        let columns = columns.iter().map(|column| column.0).collect();
+        Self { title, columns, rows, notes: Vec::new() }
+    }
+
+    /// The table as text: columns as wide as their widest field. The words of a heading are below each other, but for units.
     pub fn text(&self) -> String {
-        let words = |title: &&str| title.split(' ').map(str::to_owned).collect::<Vec<String>>();
-        let titles: Vec<Vec<String>> = self.columns.iter().map(words).collect();
-        let height = titles.iter().map(Vec::len).max().unwrap_or(0);
-        let line = |i: usize| {
-            let word = |title: &Vec<String>| {
-                (i + title.len()).checked_sub(height).map(|at| title[at].clone())
+        const GLUED: &str = "\u{a0}/\u{a0}";
+        let titles: Vec<String> = self.columns.iter().map(|t| t.replace(" / ", GLUED)).collect();
+        let height = titles.iter().map(|title| title.split(' ').count()).max().unwrap_or(0);
+        // The words of a title, the last one in the last line.
+        let line = |up: usize| {
+            let word = |title: &String| {
+                let word = title.rsplit(' ').nth(up).unwrap_or_default();
+                word.replace(GLUED, " / ")
             };
-            titles.iter().map(|title| word(title).unwrap_or_default()).collect::<Vec<String>>()
+            titles.iter().map(word).collect::<Vec<String>>()
         };
-        let head: Vec<Vec<String>> = (0..height).map(line).collect();
+        let head: Vec<Vec<String>> = (0..height).rev().map(line).collect();
         let all = || head.iter().chain(&self.rows);
         let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        // Numbers are to the right.
-        let is_number = |field: &String| {
-            field.trim_start_matches(['+', '-']).starts_with(|first: char| first.is_ascii_digit())
-        };
-        let right =
-            |column: usize| column > 0 && self.rows.iter().any(|row| is_number(&row[column]));
-        let aligned = |(column, field): (usize, &String)| match (right(column), widths[column]) {
-            (false, width) => format!("{field:<width$}"),
-            (true, width) => format!("{field:>width$}"),
-        };
+        let aligned =
+            |(column, field): (usize, &String)| match (self.is_number(column), widths[column]) {
+                (false, width) => format!("{field:<width$}"),
+                (true, width) => format!("{field:>width$}"),
+            };
         let line = |row: &Vec<String>| {
             let fields: Vec<String> = row.iter().enumerate().map(aligned).collect();
             fields.join("  ").trim_end().to_owned()
@@ -52,10 +60,18 @@ impl Table {
         lines.map(|line| line + "\n").collect()
     }
 
-    /// The table as Markdown, with the columns of this range to the right.
-    pub fn markdown(&self, right: std::ops::Range<usize>) -> String {
+    /// Whether a column has numbers, which are to the right.
+    fn is_number(&self, column: usize) -> bool {
+        let is_number = |field: &String| {
+            field.trim_start_matches(['+', '-']).starts_with(|first: char| first.is_ascii_digit())
+        };
+        column > 0 && self.rows.iter().any(|row| is_number(&row[column]))
+    }
+
+    /// The table as Markdown.
+    pub fn markdown(&self) -> String {
         let line = |fields: Vec<String>| format!("| {} |\n", fields.join(" | "));
-        let rule = |i: usize| if right.contains(&i) { "---:" } else { "---" }.to_owned();
+        let rule = |i: usize| if self.is_number(i) { "---:" } else { "---" }.to_owned();
         let mut text = line(self.columns.iter().map(|title| escaped(title)).collect());
         text += &line((0..self.columns.len()).map(rule).collect());
         let rows =
@@ -82,7 +98,7 @@ mod tests {
     fn sample() -> Table {
         let rows =
             [["a", "<x>", "7"], ["long", "_y_", "-12"]].map(|row| row.map(str::to_owned).to_vec());
-        let columns = vec!["a|b", "two words", "n"];
+        let columns = vec!["a|b", "two words", "n / s"];
         Table { title: "t".into(), columns, rows: rows.to_vec(), notes: vec!["n".into()] }
     }
 
@@ -90,14 +106,14 @@ mod tests {
     fn columns_are_aligned_below_the_words_of_their_headings() {
         assert_eq!(
             sample().text(),
-            "t\n      two\na|b   words    n\na     <x>      7\nlong  _y_    -12\nn\n"
+            "t\n      two\na|b   words  n / s\na     <x>        7\nlong  _y_      -12\nn\n"
         );
     }
 
     #[test]
     fn fields_cannot_become_markup() {
-        let expected = "| a\\|b | two words | n |\n| --- | --- | ---: |\n| a | &lt;x&gt; | 7 |\n| long | \\_y\\_ | -12 |\n";
-        assert_eq!(sample().markdown(2..3), expected);
+        let expected = "| a\\|b | two words | n / s |\n| --- | --- | ---: |\n| a | &lt;x&gt; | 7 |\n| long | \\_y\\_ | -12 |\n";
+        assert_eq!(sample().markdown(), expected);
         assert!(sample().html().into_string().contains("<td>&lt;x&gt;</td>"));
     }
 }

@@ -3,26 +3,24 @@
 use crate::markdown::escaped;
 use crate::table::Table;
 use bench::experiments::entry::{Judged, Verdict};
-use bench::study::Study;
-use bench::study::row::fields;
 
-fn table(study: &Study, rows: &[Judged]) -> Table {
+fn table(rows: &[Judged]) -> Table {
     Table {
         columns: vec!["row", "target", "measured", "how", "verdict"],
-        rows: rows.iter().map(|row| fields(study, row).to_vec()).collect(),
+        rows: rows.iter().map(|row| row.fields().to_vec()).collect(),
         ..Table::default()
     }
 }
 
 /// The table as text, followed by the counts of the verdicts.
-pub fn text(study: &Study, rows: &[Judged]) -> String {
-    Table { notes: vec![count(rows)], ..table(study, rows) }.text()
+pub fn text(rows: &[Judged]) -> String {
+    Table { notes: vec![count(rows)], ..table(rows) }.text()
 }
 
 /// The table as Markdown, below a line about the machine and the counts of the verdicts.
-pub fn markdown(study: &Study, rows: &[Judged], machine: &str) -> String {
+pub fn markdown(rows: &[Judged], machine: &str) -> String {
     let head = format!("# Targets\n\n{}\n\n{}\n\n", escaped(machine), count(rows));
-    head + &table(study, rows).markdown(0..0)
+    head + &table(rows).markdown()
 }
 
 fn count(rows: &[Judged]) -> String {
@@ -58,7 +56,7 @@ mod tests {
         };
         let failed = unjudged(row, Verdict::Failed, "run a failed: <no memory>".into());
         let rows = [missed, failed];
-        let text = text(&targets, &rows);
+        let text = text(&rows);
         for part in [
             "at least 100.00 M cells/s, at most 300.00 M cells/s",
             "99.50 M cells/s  measured  MISSED",
@@ -67,7 +65,7 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
-        let markdown = markdown(&targets, &rows, "2 cores");
+        let markdown = markdown(&rows, "2 cores");
         let table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
         assert_eq!(table.len(), 4);
         assert!(table[1].starts_with("| --- | --- |"), "{markdown}");

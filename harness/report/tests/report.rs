@@ -3,7 +3,6 @@
 use bench::experiments::entry::{
     Comm, Entry, Line, Machine, Network, Phase, Run, SCHEMA, Session, Setup, Spread,
 };
-use bench::track::history::Record;
 use report::benchmark::report;
 use std::path::Path;
 
@@ -145,7 +144,7 @@ fn has_row(text: &str, x: &str, end: &str) -> bool {
 #[test]
 fn every_figure_has_its_values_and_its_axis_for_latex() {
     let place = tempfile::tempdir().unwrap();
-    let written = report(place.path(), &record(), &[]).unwrap();
+    let written = report(place.path(), &record()).unwrap();
     let drawn = files(place.path(), "svg");
     assert_eq!(drawn.len(), written.figures);
     let mut extensions = vec!["csv", "tex"];
@@ -216,7 +215,7 @@ fn two_programs_are_never_in_one_series() {
     };
     lines.extend(record().iter().map(other));
     let place = tempfile::tempdir().unwrap();
-    let written = report(place.path(), &lines, &[]).unwrap();
+    let written = report(place.path(), &lines).unwrap();
     // Figures over cells show both programs, all others one; three compare them on one core.
     assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4 + 3);
     let read = |name: &str| {
@@ -253,7 +252,7 @@ fn two_programs_are_never_in_one_series() {
 
 /// Number of figures of the record of one program.
 fn files_of_one() -> usize {
-    report(tempfile::tempdir().unwrap().path(), &record(), &[]).unwrap().figures
+    report(tempfile::tempdir().unwrap().path(), &record()).unwrap().figures
 }
 
 /// A name that is no name of a file, and one that is another's after that: every figure has files of its own.
@@ -269,7 +268,7 @@ fn figures_of_any_case_and_program_have_files_of_their_own() {
     };
     let both = named("a b", "p/4").chain(named("a-b", "p-4")).collect::<Vec<_>>();
     let place = tempfile::tempdir().unwrap();
-    let written = report(place.path(), &both, &[]).unwrap();
+    let written = report(place.path(), &both).unwrap();
     let drawn = files(place.path(), "svg");
     assert_eq!(drawn.len(), written.figures);
     for name in
@@ -299,40 +298,22 @@ fn an_efficiency_above_one_has_its_reason_in_figure_table_and_summary() {
         }
     }
     let place = tempfile::tempdir().unwrap();
-    let page = std::fs::read_to_string(report(place.path(), &lines, &[]).unwrap().page).unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
     let reason =
         "Computation scaling is above 1 where all ranks together take less CPU time per cell";
     // The figure of the efficiency, the table of the experiment, that of its phases, and the causes on 16, 32 and 64 ranks.
     assert_eq!(page.matches(reason).count(), 6, "{page}");
     assert!(
-        !std::fs::read_to_string(report(place.path(), &record(), &[]).unwrap().page)
+        !std::fs::read_to_string(report(place.path(), &record()).unwrap().page)
             .unwrap()
             .contains(reason)
     );
 }
 
 #[test]
-fn a_history_adds_its_trend() {
-    let commit = |i: u32| Record {
-        metrics: [("uav/rays".to_owned(), 100.0 + f64::from(i))].into(),
-        ..Record::new(format!("{i:040}"))
-    };
-    let place = tempfile::tempdir().unwrap();
-    let page = |history: &[Record]| {
-        std::fs::read_to_string(report(place.path(), &record(), history).unwrap().page).unwrap()
-    };
-    assert!(!page(&[]).contains("trend"));
-    let with = page(&[commit(0), commit(1), commit(2)]);
-    assert!(with.contains("<a href=\"#trend\">") && with.contains("id=\"trend-uav\""));
-    assert!(with.contains("<h2 id=\"trend\">") && with.contains("no change points"));
-    let numbers = std::fs::read_to_string(place.path().join("figures/trend-uav.csv")).unwrap();
-    assert!(numbers.contains(",2,1.02,") && has_row(&numbers, "2", "rays,measured"), "{numbers}");
-}
-
-#[test]
 fn the_page_is_self_contained() {
     let place = tempfile::tempdir().unwrap();
-    let page = std::fs::read_to_string(report(place.path(), &record(), &[]).unwrap().page).unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &record()).unwrap().page).unwrap();
     for external in ["<script", "<link", "<img", "<iframe", "src=", "@import"] {
         assert!(!page.contains(external), "{external}");
     }

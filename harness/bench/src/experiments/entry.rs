@@ -26,6 +26,16 @@ pub struct Line {
     pub entry: Entry,
 }
 
+impl Line {
+    /// Returns the session that the line begins, if it begins one.
+    pub fn session(&self) -> Option<&Session> {
+        match &self.entry {
+            Entry::Session(session) => Some(session),
+            _ => None,
+        }
+    }
+}
+
 /// The content of a line, by kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -91,10 +101,11 @@ pub struct Network {
 }
 
 /// How the ranks of a run communicate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Comm {
     /// One rank, no messages.
+    #[default]
     Solo,
     /// Ranks started by a launcher.
     Mpi,
@@ -172,7 +183,7 @@ pub struct Phase {
 }
 
 /// A run's parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
     /// The experiment: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
@@ -200,18 +211,8 @@ pub struct Setup {
 impl Setup {
     /// A serial run of the mesher outside of all experiments.
     pub fn serial(case: &str, spacing_min: f64, layer_cells_min: u32) -> Self {
-        Self {
-            experiment: String::new(),
-            engine: "mesher".to_owned(),
-            case: case.to_owned(),
-            spacing_min,
-            layer_cells_min,
-            ranks: 1,
-            comm: Comm::Solo,
-            partitioner: String::new(),
-            weights: String::new(),
-            weight_exposed: None,
-        }
+        let (engine, case) = ("mesher".to_owned(), case.to_owned());
+        Self { engine, case, spacing_min, layer_cells_min, ranks: 1, ..Self::default() }
     }
 
     /// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
@@ -228,7 +229,7 @@ impl Setup {
 }
 
 /// A run and its measurements.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// A run's parameters.
     pub setup: Setup,

@@ -14,6 +14,7 @@ use run::engine::process::{self, Watch};
 use run::engine::programs::Programs;
 use run::engine::report::{PhaseReport, RunReport};
 use run::engine::runner::{Completed, Engine};
+use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -44,20 +45,28 @@ pub struct Runner<'a> {
     pub place: &'a Path,
 }
 
-/// Why a run gave no result.
-#[derive(Debug)]
-pub enum Failed {
-    /// The user interrupted the harness.
+/// Why a run has no result, or a session ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// Invalid input, or a program that failed, in a sentence.
+    #[error("{0}")]
+    Input(String),
+    /// Ctrl-C; the record contains all results so far.
+    #[error("interrupted: the record contains all results so far")]
     Interrupted,
-    /// A failure, in a sentence.
-    Reason(String),
 }
 
-impl From<Failure> for Failed {
+impl From<String> for BenchError {
+    fn from(why: String) -> Self {
+        Self::Input(why)
+    }
+}
+
+impl From<Failure> for BenchError {
     fn from(failure: Failure) -> Self {
         match failure.is_interrupt() {
             true => Self::Interrupted,
-            false => Self::Reason(failure.to_string()),
+            false => Self::Input(failure.to_string()),
         }
     }
 }
@@ -74,7 +83,7 @@ impl Runner<'_> {
         case: &Path,
         repeat: usize,
         warm_up: bool,
-    ) -> Result<Run, Failed> {
+    ) -> Result<Run, BenchError> {
         let engine = self.engine(setup);
         let checked = warm_up && !engine.description().promises.definition;
         let mesh = self.place.join("mesh");
@@ -93,25 +102,25 @@ impl Runner<'_> {
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
-        kept.map_err(Failed::Reason)?;
+        kept?;
         if setup.comm == Comm::Sim && report.phases.is_empty() {
             let why =
                 "its run report has no phases, without which simulated ranks cannot be projected";
-            return Err(Failed::Reason(why.to_owned()));
+            return Err(BenchError::Input(why.to_owned()));
         }
         if setup.partitioner == METIS
             && report.partitioner.as_deref().is_some_and(|used| used != METIS)
         {
             let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use \
                        fewer ranks or more cells";
-            return Err(Failed::Reason(why.to_owned()));
+            return Err(BenchError::Input(why.to_owned()));
         }
         Ok(Run {
             program: machine::digest_of_file(engine.program()),
             repeat,
             warm_up,
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
-            command: shown(&command, self.place),
+            command: shown(&command),
             time_launch_s: time_process_s,
             time_cpu_s: time_process_cpu_s,
             ..measurements(setup.clone(), report)
@@ -127,8 +136,8 @@ impl Runner<'_> {
         base: &Base,
         spacing_min: f64,
         layer_cells_min: u32,
-    ) -> Result<u64, Failed> {
-        let case = base.variant(spacing_min, layer_cells_min).map_err(Failed::Reason)?;
+    ) -> Result<u64, BenchError> {
+        let case = base.variant(spacing_min, layer_cells_min)?;
         let setup = Setup::serial(&base.name, spacing_min, layer_cells_min);
         self.run(&setup, &case, 0, true).map(|run| run.cells)
     }
@@ -141,9 +150,9 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// If the mesh or the audit fails. A mesh with findings is a result.
-    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, Failed> {
+    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, BenchError> {
         let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk);
-        let place = place.map_err(|error| Failed::Reason(error.to_string()))?;
+        let place = place.map_err(|error| BenchError::Input(error.to_string()))?;
         let mesh = place.path().join("mesh");
         let options = RunOptions {
             mesh: Some(&mesh),
@@ -160,11 +169,11 @@ impl Runner<'_> {
             Ok(_) | Err(Failure { end: End::Exited { code: 1, .. }, .. }) => {}
             Err(failure) => return Err(failure.into()),
         }
-        let record = AuditRecord::read(&json).map_err(Failed::Reason)?;
+        let record = AuditRecord::read(&json)?;
         let found = record.checks.iter().filter(|c| c.findings > 0).map(|c| c.name.clone());
         Ok(Audited {
             setup: setup.clone(),
-            command: shown(&command, self.place),
+            command: shown(&command),
             cells: record.leaves,
             holds: record.holds,
             found: found.collect(),
@@ -230,17 +239,10 @@ fn layout(setup: &Setup) -> Layout {
 fn measurements(setup: Setup, report: RunReport) -> Run {
     let time_wall_s = report.time_wall_s.unwrap_or(0.0);
     Run {
-        repeat: 0,
-        warm_up: false,
-        oversubscribed: false,
-        command: String::new(),
-        program: String::new(),
         facets: report.facets,
         geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
         cells: report.cells,
         time_wall_s,
-        time_launch_s: 0.0,
-        time_cpu_s: 0.0,
         peak_rss_bytes: Spread::brief(&peak_rss_bytes(&setup, &report)),
         useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
         phases: report.phases.iter().map(phase).collect(),
@@ -248,6 +250,7 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         digest: report.digest,
         message_matrix: report.message_matrix,
         setup,
+        ..Run::default()
     }
 }
 
@@ -287,21 +290,14 @@ fn spread(counts: &[u64]) -> Spread {
     Spread::brief(&counts.iter().map(|&count| count as f64).collect::<Vec<_>>())
 }
 
-/// A command line for people, without the directories of programs and of this session's files.
-fn shown(command: &Command, place: &Path) -> String {
-    let word = |w: &std::ffi::OsStr| {
-        let path = Path::new(w);
-        let local = path
-            .strip_prefix(place)
-            .ok()
-            .or_else(|| path.is_absolute().then(|| Path::new(path.file_name().unwrap_or(w))));
-        local.unwrap_or(path).to_string_lossy().into_owned()
+/// A command line for people, without the directories of programs and files.
+fn shown(command: &Command) -> String {
+    let word = |word: &OsStr| {
+        let name = Path::new(word).file_name().filter(|_| Path::new(word).is_absolute());
+        name.unwrap_or(word).to_string_lossy().into_owned()
     };
-    std::iter::once(command.get_program())
-        .chain(command.get_args())
-        .map(word)
-        .collect::<Vec<_>>()
-        .join(" ")
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(word).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -342,6 +338,6 @@ mod tests {
     fn a_shown_command_contains_no_directory_of_the_machine() {
         let mut command = Command::new("/opt/bin/mpirun");
         command.args(["-n", "2", "/opt/bin/mesher", "/tmp/x/uav.toml"]);
-        assert_eq!(shown(&command, Path::new("/tmp/x")), "mpirun -n 2 mesher uav.toml");
+        assert_eq!(shown(&command), "mpirun -n 2 mesher uav.toml");
     }
 }

@@ -17,10 +17,7 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
     if time_s > limit.as_secs_f64() {
         return Some(from(format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())));
     }
-    let memory = lines.iter().find_map(|line| match &line.entry {
-        Entry::Session(session) => Some(session.machine.memory_bytes as f64),
-        _ => None,
-    })?;
+    let memory = lines.iter().find_map(Line::session)?.machine.memory_bytes as f64;
     let [needed, available] = [bytes, memory].map(|b| b / 1e9);
     let why = || format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB");
     (bytes > memory).then(|| from(why()))

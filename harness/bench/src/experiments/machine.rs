@@ -1,10 +1,12 @@
 //! The description of the machine that runs the measurements.
 
 use super::entry::Machine;
+use crate::git;
 use contract::digest::mix;
+use std::fmt;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// Describes this machine; `mpirun` is the launcher's program, `place` a directory of the repository.
 pub fn describe(mpirun: &Path, place: &Path) -> Machine {
@@ -25,6 +27,22 @@ impl Machine {
     pub fn label(&self) -> String {
         let Self { cpu, cores, memory_bytes, kernel, mpi, .. } = self;
         format!("{cpu}, {cores} cores, {} MiB, {kernel}, {mpi}", memory_bytes >> 20)
+    }
+}
+
+impl fmt::Display for Machine {
+    /// All that is known of it.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { cpu, cores, memory_bytes, kernel, mpi, compiler, commit } = self;
+        let gib = *memory_bytes as f64 / f64::from(1 << 30);
+        let or = |text: &str, none: &str| {
+            if text.is_empty() { none.to_owned() } else { text.to_owned() }
+        };
+        let (mpi, commit) = (or(mpi, "no MPI"), or(commit, "unknown"));
+        write!(
+            f,
+            "{cpu}, {cores} cores, {gib:.1} GiB, {kernel}, {mpi}, {compiler}, commit {commit}"
+        )
     }
 }
 
@@ -70,29 +88,19 @@ fn memory_bytes(meminfo: &str) -> u64 {
 }
 
 fn commit(place: &Path) -> String {
-    let git = |arguments: &[&str]| {
-        let mut command = Command::new("git");
-        command.arg("-C").arg(place).args(arguments);
-        output(&mut command)
+    let Some(commit) = git(place, &["rev-parse", "--short=12", "HEAD"]) else {
+        return String::new();
     };
-    match git(&["rev-parse", "--short=12", "HEAD"]) {
-        Some(commit) => {
-            let clean = git(&["status", "--porcelain", "--untracked-files=no"])
-                .is_some_and(|changes| changes.trim().is_empty());
-            format!("{}{}", commit.trim(), if clean { "" } else { "-dirty" })
-        }
-        None => String::new(),
-    }
+    let changes = git(place, &["status", "--porcelain", "--untracked-files=no"]);
+    let is_clean = changes.is_some_and(|changes| changes.is_empty());
+    format!("{commit}{}", if is_clean { "" } else { "-dirty" })
 }
 
+/// Returns the first line that a command prints; empty if it fails.
 fn first_line(command: &mut Command) -> String {
-    let text = output(command).unwrap_or_default();
-    text.lines().next().unwrap_or_default().trim().to_owned()
-}
-
-fn output(command: &mut Command) -> Option<String> {
-    let out = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
-    out.status.success().then(|| String::from_utf8_lossy(&out.stdout).into_owned())
+    let output = command.output().ok().filter(|output| output.status.success());
+    let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
+    text.unwrap_or_default().lines().next().unwrap_or_default().trim().to_owned()
 }
 
 #[cfg(test)]

@@ -2,10 +2,19 @@
 
 use super::entry::Network;
 use serde::Deserialize;
+use std::fmt;
 
 /// The default: a current cluster interconnect.
 pub const ASSUMED: Network =
     Network { latency_s: 2e-6, bandwidth_bytes_per_s: 1e10, measured: false };
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (latency, bandwidth) = (self.latency_s * 1e6, self.bandwidth_bytes_per_s / 1e9);
+        let how = if self.measured { "measured by ping-pong" } else { "given" };
+        write!(f, "{latency:.2} µs per message and {bandwidth:.2} GB/s ({how})")
+    }
+}
 
 /// The output of the program `pingpong`.
 #[derive(Debug, Deserialize)]

@@ -20,7 +20,7 @@
 //! C is the time on an ideal network, as ranks wait for each other at the end of a phase. For simulated ranks T is projected:
 //! C plus the cost of the counted messages in a latency-bandwidth model.
 
-use super::entry::{Comm, Network, Phase, Run};
+use super::entry::{Comm, Network, Phase, Run, Spread};
 
 /// The factors of efficiency; 1 is ideal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,9 @@ pub struct Efficiency {
     pub time_s: f64,
 }
 
+/// A factor of efficiency, or a product of factors.
+pub type Factor = fn(&Efficiency) -> f64;
+
 impl Efficiency {
     /// Serialisation and transfer together.
     pub fn communication(&self) -> f64 {
@@ -56,7 +59,7 @@ impl Efficiency {
     }
 
     /// Whether an efficiency needs an explanation: it is above 1, beyond what rounding to percents shows.
-    pub fn is_above_one(&self) -> bool {
+    pub(crate) fn is_above_one(&self) -> bool {
         self.global().max(self.parallel()) > ABOVE_ONE
     }
 
@@ -81,6 +84,8 @@ impl Efficiency {
 
 /// Efficiencies up to this are 1.
 const ABOVE_ONE: f64 = 1.005;
+/// Factors up to this are shown as 1.
+const SHOWN_AS_ONE: f64 = 1.0005;
 /// Relative error of times that are stored to the microsecond.
 const ROUNDING: f64 = 1e-3;
 
@@ -89,14 +94,21 @@ pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
     phase.messages.max * network.latency_s + phase.message_bytes.max / network.bandwidth_bytes_per_s
 }
 
+/// Returns the time of a phase on its slowest rank in seconds: measured, or projected with its messages for simulated ranks.
+pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
+    match run.setup.comm {
+        Comm::Sim => phase.useful_s.max + messages_s(phase, network),
+        Comm::Mpi | Comm::Solo => phase.wall_s.max,
+    }
+}
+
 /// Returns the projected time in seconds: every phase takes as long as its slowest rank, plus the modelled messages.
-pub fn projected_s(run: &Run, network: &Network) -> f64 {
+fn projected_s(run: &Run, network: &Network) -> f64 {
     run.phases.iter().map(|p| p.useful_s.max + messages_s(p, network)).sum()
 }
 
-/// Returns the critical path on an ideal network, in seconds. It must agree between simulated and MPI ranks, even on a busy
-/// machine. A program that reports no phases has a single one.
-pub fn path_s(run: &Run) -> f64 {
+/// Returns the critical path on an ideal network, in seconds. A program that reports no phases has a single one.
+fn path_s(run: &Run) -> f64 {
     if run.phases.is_empty() {
         return run.useful_s.max;
     }
@@ -113,20 +125,9 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
-    let time_s = time_s(run, network);
-    let path_s = path_s(run);
-    let per_cell = |r: &Run| r.useful_s.sum / r.cells.max(1) as f64;
-    let lambda = run.useful_s.lambda(run.setup.ranks);
-    let efficiency = Efficiency {
-        load_balance: 1.0 / lambda,
-        serialisation: ratio(run.useful_s.max, path_s),
-        transfer: ratio(path_s, time_s),
-        computation_scaling: ratio(per_cell(reference), per_cell(run)),
-        lambda,
-        time_s,
-    };
-    efficiency.check_invariants();
-    efficiency
+    let (time_s, path_s) = (time_s(run, network), path_s(run));
+    let before = per_cell(&reference.useful_s, reference);
+    factors(run, &run.useful_s, path_s, time_s, before)
 }
 
 /// Returns the efficiencies of one phase relative to the same phase of the reference run, if it exists.
@@ -136,24 +137,61 @@ pub fn phase_efficiency(
     reference: &Run,
     network: &Network,
 ) -> Efficiency {
-    let time_s = match run.setup.comm {
-        Comm::Sim => phase.useful_s.max + messages_s(phase, network),
-        Comm::Mpi | Comm::Solo => phase.wall_s.max,
-    };
-    let lambda = phase.useful_s.lambda(run.setup.ranks);
+    let time_s = phase_s(run, phase, network);
     let before = reference.phases.iter().find(|p| p.name == phase.name);
-    let per_cell = |p: &Phase, r: &Run| p.useful_s.sum / r.cells.max(1) as f64;
-    let scaling = before.map_or(0.0, |b| ratio(per_cell(b, reference), per_cell(phase, run)));
+    let before = before.map_or(0.0, |p| per_cell(&p.useful_s, reference));
+    factors(run, &phase.useful_s, phase.useful_s.max, time_s, before)
+}
+
+/// Returns the factors of a time in which the ranks work so long, along a path, with the work per cell of the reference.
+fn factors(run: &Run, useful_s: &Spread, path_s: f64, time_s: f64, before: f64) -> Efficiency {
+    let lambda = useful_s.lambda(run.setup.ranks);
     let efficiency = Efficiency {
         load_balance: 1.0 / lambda,
-        serialisation: 1.0,
-        transfer: ratio(phase.useful_s.max, time_s),
-        computation_scaling: scaling,
+        serialisation: ratio(useful_s.max, path_s),
+        transfer: ratio(path_s, time_s),
+        computation_scaling: ratio(before, per_cell(useful_s, run)),
         lambda,
         time_s,
     };
     efficiency.check_invariants();
     efficiency
+}
+
+fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
+    useful_s.sum / run.cells.max(1) as f64
+}
+
+/// Returns why factors of these efficiencies exceed 1, as sentences; `None` if none does.
+///
+/// # Panics
+/// If an efficiency exceeds 1 and no factor can be the reason: then a factor is wrong.
+pub fn above_one(all: &[Efficiency], experiment: &str) -> Option<String> {
+    let scaling = match experiment {
+        "weak" => "the cost of the facets does not grow with the mesh",
+        _ => "smaller parts of a mesh fit into caches better, or the base case was disturbed",
+    };
+    let scaling = format!(
+        "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: {scaling}."
+    );
+    let factors: [(Factor, &str); 3] = [
+        (|e| e.computation_scaling, &scaling),
+        (
+            |e| e.serialisation,
+            "Serialisation is above 1 where CPU time outside of the phases is on the slowest rank.",
+        ),
+        (
+            |e| e.transfer,
+            "Transfer is above 1 where ranks do not wait at the end of every phase, or where the clocks disagree.",
+        ),
+    ];
+    let exceeds = |factor: Factor| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
+    let reasons = factors.iter().filter(|(factor, _)| exceeds(*factor)).map(|(_, why)| *why);
+    let reasons: Vec<&str> = reasons.collect();
+    let above = all.iter().find(|e| e.is_above_one());
+    let has_reason = above.is_none() || !reasons.is_empty();
+    assert!(has_reason, "an efficiency above 1 has a reason: {above:?}");
+    (!reasons.is_empty()).then(|| reasons.join(" "))
 }
 
 /// Returns a / b, or 1 for b = 0: nothing was lost.
@@ -163,7 +201,6 @@ fn ratio(a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::entry::Spread;
     use super::*;
     use crate::testing::run;
     use proptest::prelude::*;
@@ -224,6 +261,29 @@ mod tests {
         let mut two = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0])]);
         two.useful_s.max = 1.5;
         efficiency(&two, &two.clone(), &FREE);
+    }
+
+    #[test]
+    fn an_efficiency_above_1_has_a_reason() {
+        let one = run(Comm::Sim, 100, &[("grade", &[6.0])]);
+        let less = run(Comm::Sim, 100, &[("grade", &[2.0, 2.0])]);
+        let ideal = efficiency(&one, &one, &FREE);
+        let scaled = efficiency(&less, &one, &FREE);
+        assert_eq!(above_one(&[ideal], "weak"), None);
+        assert!(above_one(&[ideal, scaled], "weak").unwrap().contains("the facets"));
+        assert!(above_one(&[scaled], "strong").unwrap().contains("caches"));
+        let mut overlapping = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0]), ("b", &[1.0, 3.0])]);
+        overlapping.time_wall_s = 3.9;
+        let early = Efficiency { serialisation: 1.1, ..efficiency(&overlapping, &one, &FREE) };
+        let both = above_one(&[early], "strong").unwrap();
+        assert!(both.contains("Transfer") && both.contains("Serialisation"), "{both}");
+    }
+
+    #[test]
+    #[should_panic(expected = "an efficiency above 1 has a reason")]
+    fn an_efficiency_above_1_without_a_reason_is_noticed() {
+        let one = run(Comm::Sim, 100, &[("grade", &[4.0])]);
+        above_one(&[Efficiency { load_balance: 2.0, ..efficiency(&one, &one, &FREE) }], "strong");
     }
 
     #[test]

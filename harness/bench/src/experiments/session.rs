@@ -1,7 +1,8 @@
 //! A measurement session: makes runs, checks that equal meshes have equal digests, and appends to the record.
 
-use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
-use super::execute::{Failed, Runner};
+use super::entry::{Entry, Failure, LeftOut, Line, Network, Run, Session, Setup};
+pub use super::execute::BenchError;
+use super::execute::Runner;
 use super::record::Record;
 use super::{machine, network};
 use check::promises::Independence;
@@ -40,17 +41,6 @@ impl SessionOptions {
     }
 }
 
-/// Why a session ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// Invalid input.
-    #[error("{0}")]
-    Input(String),
-    /// Ctrl-C; the record contains all results so far.
-    #[error("interrupted: the record contains all results so far")]
-    Interrupted,
-}
-
 /// A run to be repeated.
 pub(crate) struct Planned {
     pub setup: Setup,
@@ -71,12 +61,6 @@ impl Planned {
     }
 }
 
-/// Creates a directory for the files of runs.
-pub(crate) fn temporary_directory() -> Result<tempfile::TempDir, BenchError> {
-    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
-    place.map_err(|error| BenchError::Input(format!("no temporary directory: {error}")))
-}
-
 /// Everything that a mesh, and so its digest, depends on: engine, case, spacing, n, and the partition unless the engine
 /// promises independence of it.
 type Mesh = [String; 5];
@@ -85,10 +69,12 @@ type Mesh = [String; 5];
 pub(crate) struct Bench<'a> {
     pub(crate) options: &'a SessionOptions,
     pub(crate) runner: Runner<'a>,
-    pub(crate) record: Record,
     pub(crate) progress: &'a mut dyn FnMut(&str),
     pub(crate) lines: Vec<Line>,
+    record: Record,
     digests: HashMap<Mesh, String>,
+    /// Whether the cost of messages is known.
+    network: bool,
 }
 
 impl<'a> Bench<'a> {
@@ -101,17 +87,32 @@ impl<'a> Bench<'a> {
         place: &'a Path,
         progress: &'a mut dyn FnMut(&str),
     ) -> Result<Self, BenchError> {
-        let record = Record::new(record);
         let (launcher, limit) = (&options.launcher, Duration::from_secs(options.timeout));
-        let runner = Runner { programs, launcher, limit, place };
-        let (lines, digests) = (Vec::new(), HashMap::new());
-        let mut bench = Self { options, runner, record, progress, lines, digests };
-        bench.begin(engines)?;
+        let catalogue = programs.paths.catalogue.path();
+        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let lacks = |engine: String| {
+            let lacks = programs.labelled(&engine).description().lacks();
+            (engine, lacks)
+        };
+        let session = Session {
+            command: std::env::args().collect(),
+            machine: machine::describe(&launcher.program(), repository),
+            load_average: machine::load_average(),
+            lacks: engines.into_iter().map(lacks).collect(),
+        };
+        let mut bench = Self {
+            options,
+            runner: Runner { programs, launcher, limit, place },
+            progress,
+            lines: Vec::new(),
+            record: Record::new(record),
+            digests: HashMap::new(),
+            network: false,
+        };
+        bench.append(Entry::Session(Box::new(session)))?;
         Ok(bench)
     }
-}
 
-impl Bench<'_> {
     pub(crate) fn append(&mut self, entry: Entry) -> Result<(), BenchError> {
         let line = self.record.append(entry).map_err(|error| {
             BenchError::Input(format!("{}: {error}", self.record.path().display()))
@@ -120,38 +121,20 @@ impl Bench<'_> {
         Ok(())
     }
 
-    fn begin(&mut self, engines: Vec<String>) -> Result<(), BenchError> {
-        let catalogue = &self.runner.programs.paths.catalogue;
-        let repository = catalogue.path().parent().and_then(Path::parent).unwrap_or(Path::new("."));
-        let lacks = |engine: String| {
-            let lacks = self.runner.programs.labelled(&engine).description().lacks();
-            (engine, lacks)
-        };
-        let session = Session {
-            command: std::env::args().collect(),
-            machine: machine::describe(&self.options.launcher.program(), repository),
-            load_average: machine::load_average(),
-            lacks: engines.into_iter().map(lacks).collect(),
-        };
-        self.append(Entry::Session(Box::new(session)))
-    }
-
+    /// Records the cost of messages, once.
     pub(crate) fn measure_network(&mut self) -> Result<(), BenchError> {
-        let network = match self.options.network {
-            Some(given) => given,
-            None => match self.runner.ping_pong().and_then(|text| network::parse(&text)) {
-                Ok(measured) => measured,
-                Err(why) => {
-                    (self.progress)(&format!(
-                        "latency 2 us and bandwidth 10 GB/s are assumed: {why}"
-                    ));
-                    network::ASSUMED
-                }
-            },
-        };
+        if std::mem::replace(&mut self.network, true) {
+            return Ok(());
+        }
+        let measured = || self.runner.ping_pong().and_then(|text| network::parse(&text));
+        let network = self.options.network.map_or_else(measured, Ok).unwrap_or_else(|why| {
+            (self.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
+            network::ASSUMED
+        });
         self.append(Entry::Network(network))
     }
 
+    /// Runs a point, or writes and audits its mesh, and records the result.
     pub(crate) fn run(
         &mut self,
         point: &mut Planned,
@@ -159,41 +142,54 @@ impl Bench<'_> {
         warm_up: bool,
     ) -> Result<(), BenchError> {
         let s = &point.setup;
+        let repetition = match (point.audit, warm_up) {
+            (true, _) => "audit on disk".to_owned(),
+            (false, true) => "warm-up".to_owned(),
+            (false, false) => format!("{}, repeat {}", s.division(), repeat + 1),
+        };
         (self.progress)(&format!(
-            "{} {} by {}: {} {} ranks, spacing {:.3e}, n {}{}",
+            "{} {} by {}: {} ranks ({}), spacing {:.3e}, n {}, {repetition}",
             s.experiment,
             s.case,
             s.engine,
-            match s.comm {
-                Comm::Sim => "simulated",
-                Comm::Mpi => "MPI",
-                Comm::Solo => "serial",
-            },
             s.ranks,
+            crate::name_of(&s.comm),
             s.spacing_min,
             s.layer_cells_min,
-            if warm_up {
-                ", warm-up".to_owned()
-            } else {
-                format!(", {}, repeat {}", s.division(), repeat + 1)
-            }
         ));
-        let why = match self.runner.run(&point.setup, &point.case, repeat, warm_up) {
-            Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
-            Err(Failed::Reason(why)) => why,
-            Ok(run) => match self.right_mesh(point, &run).and_then(|()| self.same_mesh(&run)) {
-                Ok(()) => return self.append(Entry::Run(Box::new(run))),
-                Err(why) => why,
-            },
+        let entry = match point.audit {
+            true => self.audited(point),
+            false => self.timed(point, repeat, warm_up),
         };
-        self.failed(point, why)
+        match entry {
+            Ok(entry) => self.append(entry),
+            Err(BenchError::Interrupted) => Err(BenchError::Interrupted),
+            Err(BenchError::Input(why)) => {
+                (self.progress)(&format!("failed: {why}"));
+                point.failed = true;
+                let setup = point.setup.clone();
+                let command = format!("{} on {} ranks", setup.engine, setup.ranks);
+                self.append(Entry::Failure(Failure { setup, command, why }))
+            }
+        }
     }
 
-    fn failed(&mut self, point: &mut Planned, why: String) -> Result<(), BenchError> {
-        (self.progress)(&format!("failed: {why}"));
-        point.failed = true;
-        let command = format!("{} on {} ranks", point.setup.engine, point.setup.ranks);
-        self.append(Entry::Failure(Failure { setup: point.setup.clone(), command, why }))
+    fn timed(
+        &mut self,
+        point: &Planned,
+        repeat: usize,
+        warm_up: bool,
+    ) -> Result<Entry, BenchError> {
+        let run = self.runner.run(&point.setup, &point.case, repeat, warm_up)?;
+        self.check_mesh(point, &run)?;
+        Ok(Entry::Run(Box::new(run)))
+    }
+
+    /// Writes a mesh to the record's file system and audits it.
+    fn audited(&mut self, point: &Planned) -> Result<Entry, BenchError> {
+        let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
+        let disk = disk.unwrap_or(Path::new("."));
+        Ok(Entry::Audit(self.runner.audit(&point.setup, &point.case, disk)?))
     }
 
     /// Leaves a run out, with the reason.
@@ -202,61 +198,36 @@ impl Bench<'_> {
         self.append(Entry::LeftOut(LeftOut { setup, why }))
     }
 
-    /// Writes a mesh to the record's file system and audits it.
-    pub(crate) fn audit(&mut self, point: &mut Planned) -> Result<(), BenchError> {
-        let s = &point.setup;
-        (self.progress)(&format!("audit of {}, spacing {:.3e}, on disk", s.case, s.spacing_min));
-        let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
-        let disk = disk.unwrap_or(Path::new("."));
-        match self.runner.audit(s, &point.case, disk) {
-            Ok(audited) => self.append(Entry::Audit(audited)),
-            Err(Failed::Interrupted) => Err(BenchError::Interrupted),
-            Err(Failed::Reason(why)) => self.failed(point, why),
-        }
-    }
-
-    /// Requires the mesh of an engine that promises the definition to be that of the mesher, once for each mesh.
-    fn right_mesh(&self, point: &Planned, run: &Run) -> Result<(), String> {
+    /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result. The mesh of an
+    /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
+    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), String> {
         let engine = self.runner.programs.labelled(&point.setup.engine);
-        if !run.warm_up || engine.name() == "mesher" || !engine.description().promises.definition {
-            return Ok(());
-        }
-        let s = &point.setup;
-        let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
-        let expected = match self.runner.run(&setup, &point.case, 0, true) {
-            Ok(run) => run.digest,
+        let (promises, s) = (&engine.description().promises, &run.setup);
+        if run.warm_up && engine.name() != "mesher" && promises.definition {
+            let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
             // Whether the mesher can be run is not a property of this engine.
-            Err(_) => return Ok(()),
-        };
-        match expected == run.digest {
-            true => Ok(()),
-            false => Err(format!(
-                "the mesh has digest {}, but that of the definition has {expected}",
-                run.digest
-            )),
+            let expected = self.runner.run(&setup, &point.case, 0, true);
+            if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
+                return Err(format!(
+                    "the mesh has digest {}, but that of the definition has {}",
+                    run.digest, expected.digest
+                ));
+            }
         }
-    }
-
-    /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result.
-    fn same_mesh(&mut self, run: &Run) -> Result<(), String> {
-        let promises = &self.runner.programs.labelled(&run.setup.engine).description().promises;
-        if !promises.is_deterministic() {
-            return Ok(());
-        }
-        let s = &run.setup;
-        let mut partition = String::new();
-        if !promises.is_independent_of(Independence::Ranks) {
-            partition.push_str(&s.ranks.to_string());
-        }
-        if !promises.is_independent_of(Independence::Partitioner) {
-            partition.push_str(&s.partitioner);
-        }
+        let ranks = !promises.is_independent_of(Independence::Ranks);
+        let partitioner = !promises.is_independent_of(Independence::Partitioner);
+        let partition =
+            [ranks.then(|| s.ranks.to_string()), partitioner.then(|| s.partitioner.clone())];
+        let partition = partition.into_iter().flatten().collect();
         let (spacing, n) = (format!("{:e}", s.spacing_min), s.layer_cells_min.to_string());
         let mesh = [s.engine.clone(), s.case.clone(), spacing, n, partition];
         let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
-        if *first == run.digest {
-            return Ok(());
+        match *first == run.digest || !promises.is_deterministic() {
+            true => Ok(()),
+            false => Err(format!(
+                "the mesh has digest {}, but that of an earlier run has {first}",
+                run.digest
+            )),
         }
-        Err(format!("the mesh has digest {}, but that of an earlier run has {first}", run.digest))
     }
 }

@@ -1,7 +1,6 @@
 //! The measures of one program: counters, digests, memory, instructions. Recorded, they are a baseline that needs no build,
 //! and a point in the history of `harness track`.
 
-use super::report::LayerName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -43,6 +42,34 @@ impl fmt::Display for Measured {
             }
             _ => f.write_str(&self.named),
         }
+    }
+}
+
+/// The layers, in the order in which they are run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LayerName {
+    /// The checks of the candidate's meshes.
+    Correctness,
+    /// Deterministic counters.
+    Counters,
+    /// Peak memory.
+    Memory,
+    /// Instructions and allocations, counted by valgrind.
+    Instructions,
+    /// Run times of baseline and candidate in one session.
+    Time,
+}
+
+impl LayerName {
+    /// All layers.
+    pub const ALL: [Self; 5] =
+        [Self::Correctness, Self::Counters, Self::Memory, Self::Instructions, Self::Time];
+}
+
+impl fmt::Display for LayerName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(&crate::name_of(self))
     }
 }
 
@@ -97,13 +124,15 @@ impl Measures {
     /// One sentence, if it is neither.
     pub fn parse(text: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
-        struct GateReport {
-            candidate_measures: Measures,
+        #[serde(untagged)]
+        enum Either {
+            Report { candidate_measures: Measures },
+            Record(Measures),
         }
-        let measures: Self = match serde_json::from_slice::<GateReport>(text) {
-            Ok(report) => report.candidate_measures,
-            Err(_) => serde_json::from_slice(text)
-                .map_err(|error| format!("not a record of `harness gate`: {error}"))?,
+        let measures = match serde_json::from_slice(text) {
+            Ok(Either::Report { candidate_measures }) => candidate_measures,
+            Ok(Either::Record(measures)) => measures,
+            Err(error) => return Err(format!("not a record of `harness gate`: {error}")),
         };
         match measures.schema == SCHEMA {
             true => Ok(measures),

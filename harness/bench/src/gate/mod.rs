@@ -1,47 +1,41 @@
 //! `harness gate`: compares a candidate with a baseline in five layers, from deterministic to noisy: correctness, counters,
 //! memory, instructions, time.
 //!
-//! [`rules`] defines cases, ranks and tolerances; [`subject`] finds or builds the two programs; [`measures`] holds the exact
-//! measures of one; [`correctness`], [`numbers`] and [`time`] compare, the last with [`crate::statistics::comparison`];
+//! `rules` defines cases, ranks and tolerances; `subject` finds or builds the two programs; [`measures`] holds the exact
+//! measures of one; `correctness`, [`numbers`] and `time` compare, the last with [`crate::statistics::comparison`];
 //! [`report`] is the result, which cannot hold without a comparison of every case.
 //!
 //! Invariant: times of different sessions are never compared.
 
-pub mod build;
-pub mod callgrind;
-pub mod correctness;
-pub mod known;
+mod build;
+mod callgrind;
+mod correctness;
 pub mod measures;
 pub mod numbers;
 pub mod phases;
 pub mod report;
-pub mod rules;
-pub mod subject;
-pub mod time;
+mod rules;
+mod subject;
+mod time;
 
 use crate::experiments::machine;
 use build::top_level;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use measures::Measures;
+use measures::{LayerName, Measures};
 use numbers::Measurement;
-use report::{GateFinding, GateReport, Layer, LayerName, Verdict};
+use report::{GateFinding, GateReport, Layer, Verdict};
 use rules::{Rules, Selected};
 use run::engine::failure::Failure;
 use run::engine::interrupt;
-use run::engine::launcher::Launcher;
-use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use subject::{Baseline, Subject};
-
-/// Seed of the schedule of simulated ranks: counters must not depend on it.
-const SEED: u64 = 1;
 
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
@@ -116,17 +110,15 @@ pub enum GateError {
 }
 
 /// The input of every layer.
-#[derive(Debug)]
-pub struct Bench<'a> {
+struct Bench<'a> {
     options: &'a GateOptions,
     rules: &'a Rules,
     cases: Vec<Selected>,
     programs: &'a Programs,
     candidate: Engine,
+    baseline: Baseline,
     /// Directory for the files of runs.
-    place: &'a std::path::Path,
-    /// Why there are no ranks on MPI.
-    no_mpi: Option<String>,
+    place: &'a Path,
     /// Counters and memory, of which each layer takes its own, by program and case.
     counted: RefCell<HashMap<(PathBuf, String), Result<Measurement, Failure>>>,
 }
@@ -137,54 +129,29 @@ pub struct Bench<'a> {
 /// If the gate cannot start; later failures are in the report.
 pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, GateError> {
     let start = Instant::now();
-    let rules =
-        Rules::read(options.rules.as_deref().unwrap_or(&programs.paths.engines.join("gate.toml")))?;
+    let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
+    let rules = Rules::read(&rules)?;
     let cases = rules.select(&options.case, programs)?;
     let baseline = Baseline::find(options, &programs.engine)?;
     let candidate = Subject::candidate(options, &programs.engine, &baseline)?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
     let place =
         place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
-    let bench = Bench {
-        options,
-        rules: &rules,
-        cases,
-        programs,
-        no_mpi: no_mpi(&candidate.engine, programs),
-        candidate: candidate.engine.clone(),
-        place: place.path(),
-        counted: RefCell::default(),
-    };
-    let mpirun = &programs.paths.mpirun;
-    let measures = Measures {
-        machine: machine::describe(mpirun, &options.repository).label(),
-        ..Measures::of_program(candidate.measured)
-    };
+    let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
+    let measures = Measures { machine, ..Measures::of_program(candidate.measured) };
     let mut report = GateReport::new(baseline.measured(), measures);
+    let (candidate, counted) = (candidate.engine, RefCell::default());
+    let (rules, place) = (&rules, place.path());
+    let bench = Bench { options, rules, cases, programs, candidate, baseline, place, counted };
     report.require_layers = options.require_layers;
-    run_layers(&bench, &baseline, &mut report)?;
+    run_layers(&bench, &mut report)?;
     report.interrupted = interrupt::requested();
     report.time_s = start.elapsed().as_secs_f64();
     report.check_invariants();
     Ok(report)
 }
 
-/// Returns why an engine cannot be run on MPI.
-fn no_mpi(engine: &Engine, programs: &Programs) -> Option<String> {
-    let mpirun = &programs.paths.mpirun;
-    if !Launcher::mpirun(mpirun).is_found() {
-        return Some("mpirun is not on the PATH (ci/setup installs it)".to_owned());
-    }
-    let description = engine.description();
-    let why = || format!("the description of {} has no command for ranks on MPI", description.name);
-    description.run.parallel.is_none().then(why)
-}
-
-fn run_layers(
-    bench: &Bench,
-    baseline: &Baseline,
-    report: &mut GateReport,
-) -> Result<(), GateError> {
+fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), GateError> {
     // Without a choice of layers, those are requested for which the rules have a case.
     let requested = |name: &LayerName| match bench.options.layers.is_empty() {
         true => bench.asked(*name).next().is_some(),
@@ -200,11 +167,20 @@ fn run_layers(
         let mut layer = Layer::new(name, cases);
         let measures = &mut report.candidate_measures;
         match name {
-            LayerName::Correctness => correctness::layer(bench, baseline, measures, &mut layer)?,
-            LayerName::Time => time::layer(bench, baseline, &mut layer),
-            _ => numbers::layer(bench, baseline, measures, &mut layer),
+            LayerName::Correctness => correctness::layer(bench, measures, &mut layer)?,
+            LayerName::Time => time::layer(bench, &mut layer),
+            _ => numbers::layer(bench, measures, &mut layer),
         }
-        layer.findings.extend(bench.cases_left_out(name));
+        for case in bench.asked(name) {
+            let note = |metric, why: &str| {
+                GateFinding::noted(&case.rule.name, metric, Verdict::LeftOut, why)
+            };
+            layer.findings.extend(case.path.as_ref().err().map(|why| note("runs", why)));
+            let on_ranks =
+                name != LayerName::Instructions && case.path.is_ok() && layer.left_out.is_none();
+            let why = case.no_mpi.as_ref().filter(|_| on_ranks);
+            layer.findings.extend(why.map(|why| note("ranks on MPI", why)));
+        }
         layer.time_s = start.elapsed().as_secs_f64();
         report.layers.push(layer);
     }
@@ -217,45 +193,10 @@ impl Bench<'_> {
         self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
     }
 
-    /// Returns the cases of a layer that can be run.
+    /// Returns the cases of a layer that can be run, until the user interrupts it.
     fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
-        self.asked(layer).filter(|case| case.path.is_ok())
-    }
-
-    /// Returns the other cases of a layer as findings with their reasons.
-    fn cases_left_out(&self, layer: LayerName) -> impl Iterator<Item = GateFinding> {
-        self.asked(layer).filter_map(|case| {
-            let why = case.path.as_ref().err()?;
-            Some(GateFinding::noted(&case.rule.name, "runs", Verdict::LeftOut, why))
-        })
-    }
-
-    /// Returns the real ranks of a case: those of the rules, and those that the engine cannot simulate.
-    fn ranks_on_mpi(&self, case: &Selected) -> Vec<usize> {
-        if self.no_mpi.is_some() {
-            return Vec::new();
-        }
-        let simulates = self.candidate.description().run.simulated.is_some();
-        let instead =
-            case.rule.ranks.iter().filter(|ranks| !simulates && !case.rule.mpi.contains(ranks));
-        case.rule.mpi.iter().chain(instead).copied().collect()
-    }
-
-    /// Returns the reason for which a case is not run on its real ranks, as a finding.
-    fn ranks_left_out(&self, case: &Selected) -> Option<GateFinding> {
-        let simulates = self.candidate.description().run.simulated.is_some();
-        let asks = !case.rule.mpi.is_empty() || !case.rule.ranks.is_empty() && !simulates;
-        let why = self.no_mpi.as_ref().filter(|_| asks)?;
-        Some(GateFinding::noted(&case.rule.name, "ranks on MPI", Verdict::LeftOut, why))
-    }
-
-    /// Returns the ranks on which a case is counted.
-    fn layouts(&self, case: &Selected) -> Vec<Ranks> {
-        let simulates = self.candidate.description().run.simulated.is_some();
-        let simulated = case.rule.ranks.iter().filter(|_| simulates);
-        let simulated = simulated.map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
-        let real = self.ranks_on_mpi(case).into_iter().map(Ranks::Mpi);
-        std::iter::once(Ranks::Serial).chain(simulated).chain(real).collect()
+        let runs = |case: &&Selected| case.path.is_ok();
+        self.asked(layer).filter(runs).take_while(|_| !interrupt::requested())
     }
 
     /// Returns what a layer measures of a program on a case; counters and memory are of the same runs.
@@ -277,11 +218,18 @@ impl Bench<'_> {
         counted
     }
 
-    /// Creates an empty directory for one run.
-    fn enter(&self, name: &str) -> Result<PathBuf, String> {
+    /// Creates an empty directory for one run of an engine.
+    fn enter(&self, engine: &Engine, name: &str) -> Result<PathBuf, Failure> {
         let place = self.place.join(name);
         let _ = std::fs::remove_dir_all(&place);
-        std::fs::create_dir_all(&place).map_err(|error| error.to_string())?;
-        Ok(place)
+        let created = std::fs::create_dir_all(&place);
+        created.map(|()| place).map_err(|error| engine.unusable(error.to_string()))
+    }
+
+    /// Returns the file of a case in a form that an engine reads.
+    fn prepare(&self, engine: &Engine, case: &Selected, name: &str) -> Result<PathBuf, Failure> {
+        let place = self.enter(engine, name)?.join("case");
+        let prepared = case.path.clone().and_then(|path| engine.prepare(&path, &place));
+        prepared.map_err(|why| engine.unusable(why))
     }
 }

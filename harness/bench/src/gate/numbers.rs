@@ -3,13 +3,12 @@
 
 use super::Bench;
 use super::callgrind::Profile;
-use super::measures::{CaseMeasures, Measures, Numbers};
-use super::report::{GateFinding, Layer, LayerName, Verdict};
+use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
+use super::report::{GateFinding, Layer, Verdict, change_percent};
 use super::rules::Selected;
 use super::subject::Baseline;
 use check::promises::Independence;
 use run::engine::failure::Failure;
-use run::engine::interrupt;
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use run::engine::options::RunOptions;
 use run::engine::process::{self, Watch};
@@ -26,78 +25,62 @@ pub const MEMORY: &str = "peak_rss_bytes";
 const MEMORY_NOISE_BYTES: u64 = 1 << 20;
 /// Number of functions named if instructions grew.
 const FUNCTIONS_SHOWN: usize = 3;
+const VALGRIND: &str = "valgrind";
+const INSTRUCTIONS: &str = "instructions";
+/// Beginning of the names of the profiles.
+const PROFILE: &str = "callgrind.out";
 
 /// What a program does on a case.
 #[derive(Clone, Debug, Default)]
-pub struct Measurement {
+pub(super) struct Measurement {
     measures: CaseMeasures,
     profile: Profile,
 }
 
 /// Compares the numbers of a layer.
-pub fn layer(bench: &Bench, baseline: &Baseline, measures: &mut Measures, layer: &mut Layer) {
+pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
     let name = layer.name;
-    if let Some(why) = left_out(bench, baseline, name, &measures.machine) {
-        layer.left_out = Some(why);
-        return;
-    }
-    for case in bench.cases_of(name) {
-        if interrupt::requested() {
-            break;
-        }
-        let case_name = &case.rule.name;
+    layer.left_out = left_out(bench, name, &measures.machine);
+    for case in bench.cases_of(name).take_while(|_| layer.left_out.is_none()) {
+        let noted = |metric, verdict, why: String| {
+            vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
+        };
         let findings = match bench.measured(&bench.candidate, case, name) {
             Err(why) if why.is_interrupt() => break,
-            Err(why) => {
-                vec![GateFinding::noted(case_name, "runs", Verdict::Regression, why.to_string())]
-            }
+            Err(why) => noted("runs", Verdict::Regression, why.to_string()),
             Ok(mut candidate) => {
-                let entry = measures.case(case_name);
+                let entry = measures.case(&case.rule.name);
                 *entry.of_layer(name) = candidate.measures.of_layer(name).clone();
                 if name == LayerName::Counters {
                     entry.digest.clone_from(&candidate.measures.digest);
                     entry.geometry.clone_from(&candidate.measures.geometry);
                 }
-                match old(bench, baseline, case, name) {
-                    Err(why) => {
-                        vec![GateFinding::noted(case_name, "baseline", Verdict::Missing, why)]
-                    }
+                match old(bench, case, name) {
+                    Err(why) => noted("baseline", Verdict::Missing, why),
                     Ok(old) => compare(bench, case, name, old, candidate),
                 }
             }
         };
         layer.findings.extend(findings);
-        if name != LayerName::Instructions {
-            layer.findings.extend(bench.ranks_left_out(case));
-        }
     }
 }
 
 /// Why a layer cannot be run at all.
-fn left_out(bench: &Bench, baseline: &Baseline, name: LayerName, machine: &str) -> Option<String> {
+fn left_out(bench: &Bench, name: LayerName, machine: &str) -> Option<String> {
     if name == LayerName::Instructions && run::engine::paths::on_path(VALGRIND).is_none() {
         return Some("valgrind is not on the PATH".to_owned());
     }
-    match baseline {
-        Baseline::Record(_, record) if name != LayerName::Counters && record.machine != machine => {
-            let of = if record.machine.is_empty() { "unknown" } else { &record.machine };
-            Some(format!(
-                "the record is of another machine ({of}): {name} would differ without a change"
-            ))
-        }
-        _ => None,
-    }
-    .filter(|_| bench.cases_of(name).next().is_some())
+    let Baseline::Record(_, record) = &bench.baseline else { return None };
+    let is_of_machine = name != LayerName::Counters && bench.cases_of(name).next().is_some();
+    (is_of_machine && record.machine != machine).then(|| {
+        let of = if record.machine.is_empty() { "unknown" } else { &record.machine };
+        format!("the record is of another machine ({of}): {name} would differ without a change")
+    })
 }
 
 /// The measurement of the baseline; `None` if there is nothing to compare with.
-fn old(
-    bench: &Bench,
-    baseline: &Baseline,
-    case: &Selected,
-    layer: LayerName,
-) -> Result<Option<Measurement>, String> {
-    match baseline {
+fn old(bench: &Bench, case: &Selected, layer: LayerName) -> Result<Option<Measurement>, String> {
+    match &bench.baseline {
         Baseline::None => Ok(None),
         Baseline::Record(_, record) => {
             let measures = record.cases.get(&case.rule.name);
@@ -122,16 +105,13 @@ fn compare(
     let name = &case.rule.name;
     let numbers = new.measures.of_layer(layer).clone();
     let Some(mut old) = old else {
-        let note = format!("{} quantities", numbers.len());
-        let verdict = if numbers.is_empty() { Verdict::Missing } else { Verdict::Measured };
         let compared = numbers.len() as u64;
-        return vec![GateFinding {
-            compared,
-            ..GateFinding::noted(name, &layer.to_string(), verdict, note)
-        }];
+        let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
+        let note = format!("{compared} quantities");
+        let finding = GateFinding::noted(name, &layer.to_string(), verdict, note);
+        return vec![GateFinding { compared, ..finding }];
     };
-    let geometries = [&old.measures.geometry, &new.measures.geometry];
-    if let [Some(one), Some(other)] = geometries
+    if let (Some(one), Some(other)) = (&old.measures.geometry, &new.measures.geometry)
         && one != other
     {
         let why = format!("other facets were read: their digest is {other}, and was {one}");
@@ -173,63 +153,66 @@ fn compared_numbers(
     tolerance: &dyn Fn(&str) -> f64,
 ) -> Vec<GateFinding> {
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
-    let shared = |name: &&&String| old.contains_key(**name) && new.contains_key(**name);
-    let is_counter = |name: &&&String| **name != CELLS;
+    let (count, of) = ([old.len(), new.len()], |name: &String| [old, new].map(|of| of.get(name)));
+    let mut counters = names.iter().filter(|name| **name != CELLS).map(|name| of(name)).peekable();
     let mut findings = Vec::new();
-    if names.iter().any(|name| is_counter(&name))
-        && !names.iter().filter(is_counter).any(|name| shared(&name))
-    {
-        let why = format!(
-            "no quantity is in both: the baseline has {}, the candidate {}",
-            old.len(),
-            new.len()
-        );
+    if counters.peek().is_some() && !counters.any(|both| both.iter().all(Option::is_some)) {
+        let [old, new] = count;
+        let why = format!("no quantity is in both: the baseline has {old}, the candidate {new}");
         findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
     }
-    // Noise within the tolerance is not worth a line.
-    let less = if layer == LayerName::Counters { Verdict::Changed } else { Verdict::Unchanged };
     findings.extend(names.into_iter().map(|metric| {
-        let finding = match (old.get(metric), new.get(metric)) {
-            (Some(&old), Some(&new)) => {
-                GateFinding::exact(case, metric, [old, new], tolerance(metric), less)
+        let changed = |note| GateFinding::noted(case, metric, Verdict::Changed, note);
+        match of(metric) {
+            [Some(&old), Some(&new)] => {
+                let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
+                GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
             }
-            (None, new) => GateFinding::noted(
-                case,
-                metric,
-                Verdict::Changed,
-                format!("new, {}", new.unwrap_or(&0)),
-            ),
-            (Some(old), None) => {
-                GateFinding::noted(case, metric, Verdict::Changed, format!("removed, was {old}"))
-            }
-        };
-        let grown = finding.candidate.unwrap_or(0.0) - finding.baseline.unwrap_or(0.0);
-        let is_result = metric == CELLS || metric.ends_with("leaves");
-        match finding.verdict {
-            // The size of the mesh is a result, not a cost: a change is neither better nor worse.
-            Verdict::Improvement | Verdict::Regression | Verdict::Changed if is_result => {
-                GateFinding { verdict: Verdict::Changed, note: "different mesh".into(), ..finding }
-            }
-            Verdict::Regression
-                if layer == LayerName::Memory && grown <= MEMORY_NOISE_BYTES as f64 =>
-            {
-                GateFinding { verdict: Verdict::Unchanged, note: String::new(), ..finding }
-            }
-            _ => finding,
+            [Some(old), None] => changed(format!("removed, was {old}")),
+            [None, new] => changed(format!("new, {}", new.unwrap_or(&0))),
         }
     }));
     findings
 }
 
+/// The verdict on a number with a tolerance in percent, and the reason.
+fn verdict(
+    layer: LayerName,
+    metric: &str,
+    [old, new]: [u64; 2],
+    tolerance: f64,
+) -> (Verdict, String) {
+    let change = change_percent(old as f64, new as f64);
+    // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
+    let is_within = change.is_some_and(|by| by.abs() <= tolerance + 1e-9);
+    let is_noise = layer == LayerName::Memory && new.saturating_sub(old) <= MEMORY_NOISE_BYTES;
+    match () {
+        () if old == new => (Verdict::Unchanged, String::new()),
+        // The size of the mesh is a result, not a cost: a change is neither better nor worse.
+        () if metric == CELLS || metric.ends_with("leaves") => {
+            (Verdict::Changed, "different mesh".to_owned())
+        }
+        () if is_within && layer == LayerName::Counters => {
+            (Verdict::Changed, format!("within the tolerance of {tolerance} %"))
+        }
+        // Noise within the tolerance is not worth a line.
+        () if is_within => (Verdict::Unchanged, String::new()),
+        () if new < old => (Verdict::Improvement, String::new()),
+        () if is_noise => (Verdict::Unchanged, String::new()),
+        () => (Verdict::Regression, format!("exceeds the tolerance of {tolerance} %")),
+    }
+}
+
 /// Counters and memory of a program on a case. Digests of all rank counts must be the same if the engine promises that.
-pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurement, Failure> {
-    let unusable = |why: String| engine.unusable(why);
-    let path = case.path.clone().map_err(unusable)?;
-    let place = bench.enter("counters").map_err(unusable)?;
-    let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
+pub(super) fn count(
+    bench: &Bench,
+    engine: &Engine,
+    case: &Selected,
+) -> Result<Measurement, Failure> {
+    let path = bench.prepare(engine, case, "counters")?;
     let mut measures = CaseMeasures::default();
-    for ranks in bench.layouts(case) {
-        let place = bench.enter("counters/run").map_err(unusable)?;
+    for ranks in case.layouts() {
+        let place = bench.enter(engine, "counters/run")?;
         let options =
             RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit()) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
@@ -238,7 +221,7 @@ pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurem
         if *serial != report.digest && independent {
             let digest = report.digest;
             let why = format!("on {ranks} has digest {digest}, which differs from the serial one");
-            return Err(unusable(why));
+            return Err(engine.unusable(why));
         }
         let prefix = prefix(ranks);
         if ranks == Ranks::Serial {
@@ -246,9 +229,7 @@ pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurem
             measures.geometry = report.geometry.as_ref().map(|geometry| geometry.digest.clone());
         }
         let bytes = report.peak_rss_bytes_total();
-        if bytes > 0 {
-            measures.memory.insert(format!("{prefix}{MEMORY}"), bytes);
-        }
+        measures.memory.extend((bytes > 0).then(|| (format!("{prefix}{MEMORY}"), bytes)));
         let total = |(name, of): (String, Vec<u64>)| (format!("{prefix}{name}"), of.iter().sum());
         measures.exact.extend(report.counters.into_iter().map(total));
     }
@@ -256,7 +237,7 @@ pub fn count(bench: &Bench, engine: &Engine, case: &Selected) -> Result<Measurem
 }
 
 /// The beginning of the names of quantities on these ranks.
-pub fn prefix(ranks: Ranks) -> String {
+pub(super) fn prefix(ranks: Ranks) -> String {
     match ranks {
         Ranks::Serial => String::new(),
         Ranks::Simulated { ranks, .. } => format!("{ranks} ranks/"),
@@ -264,22 +245,15 @@ pub fn prefix(ranks: Ranks) -> String {
     }
 }
 
-const VALGRIND: &str = "valgrind";
-const INSTRUCTIONS: &str = "instructions";
-/// Beginning of the names of the profiles.
-const PROFILE: &str = "callgrind.out";
-
 /// Instructions and allocations of a serial run under valgrind, of all its processes. They do not depend on the load of
 /// the machine, so a difference of a percent is significant.
-pub fn instructions(
+pub(super) fn instructions(
     bench: &Bench,
     engine: &Engine,
     case: &Selected,
 ) -> Result<Measurement, Failure> {
-    let unusable = |why: String| engine.unusable(why);
-    let path = case.path.clone().map_err(unusable)?;
-    let place = bench.enter("instructions").map_err(unusable)?;
-    let path = engine.prepare(&path, &place.join("case")).map_err(unusable)?;
+    let path = bench.prepare(engine, case, "instructions")?;
+    let place = bench.place.join("instructions");
     // Without output files, the count is that of meshing alone.
     let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit()) };
     let plain = engine.command(&path, &SERIAL, &options)?;
@@ -290,7 +264,7 @@ pub fn instructions(
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place))?;
-    let profile = profile_of_all(&place).map_err(unusable)?;
+    let profile = profile_of_all(&place).map_err(|why| engine.unusable(why))?;
     let counted = [(INSTRUCTIONS, profile.instructions), ("allocations", profile.allocations())];
     let counted = counted.map(|(name, count)| (name.to_owned(), count)).into();
     Ok(Measurement { measures: CaseMeasures { counted, ..CaseMeasures::default() }, profile })
@@ -354,6 +328,17 @@ mod tests {
         assert!(of(&[("cells", 1), ("rays", 2)], &[("cells", 1), ("hops", 2)]));
         assert!(!of(&[("cells", 1)], &[("cells", 1)]), "a program that counts nothing else");
         assert!(!of(&[("rays", 1), ("words", 2)], &[("rays", 1), ("hops", 2)]));
+    }
+
+    #[test]
+    fn only_growth_beyond_the_tolerance_is_a_regression() {
+        let of = |values, tolerance| verdict(LayerName::Counters, "m", values, tolerance).0;
+        assert_eq!(of([100, 100], 0.0), Verdict::Unchanged);
+        assert_eq!(of([100, 101], 0.0), Verdict::Regression);
+        assert_eq!(of([100, 101], 1.5), Verdict::Changed);
+        assert_eq!(of([100, 99], 0.0), Verdict::Improvement);
+        assert_eq!(of([0, 0], 0.0), Verdict::Unchanged);
+        assert_eq!(of([0, 1], 50.0), Verdict::Regression);
     }
 
     #[test]

@@ -15,44 +15,56 @@ pub const CPU: &str = "CPU time";
 pub const WALL: &str = "wall time";
 
 /// CPU time of the process outside all phases that it reports: before the first, between them, after the last.
-pub const OUTSIDE: &str = "outside the phases";
+pub(super) const OUTSIDE: &str = "outside the phases";
 
-/// A time that the gate compares, over all rounds of a case.
+/// A time that the gate compares, over all rounds of a case on some ranks.
 #[derive(Debug)]
-pub(super) struct Quantity {
+pub(super) struct Quantity<'a> {
+    pub case: &'a str,
+    /// The beginning of the names of quantities on these ranks.
+    pub prefix: String,
     /// [`CPU`], [`WALL`], [`OUTSIDE`], or the name of a phase.
     pub name: String,
     /// Logarithms of its times.
     pub rounds: Vec<Round>,
     /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
-    pub found: Option<Comparison>,
+    pub found: Comparison,
 }
 
-impl Quantity {
-    /// A quantity without rounds.
-    pub fn new(name: &str) -> Self {
-        Self { name: name.to_owned(), rounds: Vec::new(), found: None }
-    }
-
+impl Quantity<'_> {
     /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
     /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
-    pub fn times(&self) -> [f64; 2] {
+    fn times(&self) -> [f64; 2] {
         let baseline: Vec<f64> = self.rounds.iter().map(|r| (r.a + r.a_again) / 2.0).collect();
         let baseline = trimmed_mean(&baseline).exp();
-        [baseline, baseline * (1.0 + self.found.map_or(0.0, |found| found.effect))]
+        [baseline, baseline * (1.0 + self.found.effect)]
     }
-}
 
-/// The certainty of an effect, as text.
-pub(super) fn certainty(found: &Comparison) -> String {
-    let percent = |ratio: f64| ratio * 100.0;
-    format!(
-        "99 % interval {:+.1} to {:+.1} %, p = {:.5} among all times; noise floor {:.1} %",
-        percent(found.low),
-        percent(found.high),
-        found.p,
-        percent(found.floor)
-    )
+    /// The finding about this time.
+    pub fn finding(&self, verdict: Verdict, note: String) -> GateFinding {
+        let metric = match self.name.as_str() {
+            CPU | WALL => self.name.clone(),
+            OUTSIDE => format!("CPU time {OUTSIDE}"),
+            phase => format!("CPU time in {phase}"),
+        };
+        let metric = format!("{}{metric}", self.prefix);
+        GateFinding::of_values(self.case, &metric, verdict, self.times(), note)
+    }
+
+    /// The certainty of the effect, as text.
+    pub fn certainty(&self) -> String {
+        let Comparison { low, high, p, floor, .. } = self.found;
+        let [low, high, floor] = [low, high, floor].map(|ratio| ratio * 100.0);
+        format!(
+            "99 % interval {low:+.1} to {high:+.1} %, p = {p:.5} among all times; noise floor {floor:.1} %"
+        )
+    }
+
+    /// Whether the effect is significant, and larger than both the noise floor and the effects of code alignment (`effect_min`).
+    pub fn is_changed(&self, rules: &TimeRules) -> bool {
+        let least = self.found.floor.max(rules.effect_min / 100.0);
+        self.found.p <= rules.alpha && size(self.found.effect) > least
+    }
 }
 
 /// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
@@ -62,20 +74,14 @@ pub(super) fn size(effect: f64) -> f64 {
 
 /// Returns a finding for every phase that changed; `whole` is the CPU time of the process.
 pub(super) fn findings(
-    case: &str,
-    prefix: &str,
     whole: &Quantity,
     phases: &[Quantity],
     rules: &TimeRules,
 ) -> Vec<GateFinding> {
-    let least_s = rules.phase_min / 100.0 * whole.times()[0];
+    let whole_s = whole.times()[0];
+    let least_s = rules.phase_min / 100.0 * whole_s;
     let change_s = |phase: &Quantity| phase.times()[1] - phase.times()[0];
-    let is_changed = |phase: &&Quantity| {
-        phase.found.is_some_and(|found| {
-            let least = found.floor.max(rules.effect_min / 100.0);
-            found.p <= rules.alpha && size(found.effect) > least && change_s(phase).abs() > least_s
-        })
-    };
+    let is_changed = |phase: &&Quantity| phase.is_changed(rules) && change_s(phase).abs() > least_s;
     let changed: Vec<&Quantity> = phases.iter().filter(is_changed).collect();
     let net_s: f64 = changed.iter().map(|phase| change_s(phase)).sum();
     let finding = |phase: &&Quantity| {
@@ -84,17 +90,10 @@ pub(super) fn findings(
             (true, false) => (Verdict::Changed, "; other phases save as much"),
             (false, _) => (Verdict::Improvement, ""),
         };
-        let part = 100.0 * change_s(phase) / whole.times()[0];
-        let note = format!("{part:+.1} % of the whole{why}; {}", certainty(&phase.found?));
-        let metric = format!("{prefix}{}", metric(&phase.name));
-        Some(GateFinding::of_values(case, &metric, verdict, phase.times(), note))
+        let part = 100.0 * change_s(phase) / whole_s;
+        phase.finding(verdict, format!("{part:+.1} % of the whole{why}; {}", phase.certainty()))
     };
-    changed.iter().filter_map(finding).collect()
-}
-
-/// The name of a phase's time in the report.
-pub fn metric(phase: &str) -> String {
-    if phase == OUTSIDE { format!("CPU time {phase}") } else { format!("CPU time in {phase}") }
+    changed.iter().map(finding).collect()
 }
 
 #[cfg(test)]
@@ -103,18 +102,22 @@ mod tests {
     use crate::statistics::comparison::compare;
     use proptest::prelude::*;
 
+    fn of(name: &str, rounds: Vec<Round>, found: Comparison) -> Quantity<'static> {
+        Quantity { case: "c", prefix: String::new(), name: name.into(), rounds, found }
+    }
+
     /// A quantity with a certain change of its time.
-    fn quantity(name: &str, before: f64, after: f64) -> Quantity {
+    fn quantity(name: &str, before: f64, after: f64) -> Quantity<'static> {
         let round = Round { a: before.ln(), a_again: before.ln(), b: after.ln() };
         let effect = after / before - 1.0;
         let found =
             Comparison { effect, p: 1e-5, floor: 0.01, visible: 0.02, low: effect, high: effect };
-        Quantity { name: name.into(), rounds: vec![round; 4], found: Some(found) }
+        of(name, vec![round; 4], found)
     }
 
     fn verdicts(phases: &[Quantity]) -> Vec<(String, Verdict)> {
         let whole = quantity("CPU time", 1.0, 1.01);
-        let found = findings("c", "", &whole, phases, &TimeRules::default());
+        let found = findings(&whole, phases, &TimeRules::default());
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 
@@ -123,7 +126,10 @@ mod tests {
         let phases = [quantity("read", 0.3, 0.3), quantity("grade", 0.1, 0.11)];
         assert_eq!(verdicts(&phases), [("CPU time in grade".into(), Verdict::Regression)]);
         let after = [quantity(OUTSIDE, 0.01, 0.1)];
-        assert_eq!(verdicts(&after), [(metric(OUTSIDE), Verdict::Regression)]);
+        assert_eq!(
+            verdicts(&after),
+            [("CPU time outside the phases".to_owned(), Verdict::Regression)]
+        );
     }
 
     #[test]
@@ -149,7 +155,7 @@ mod tests {
             let rounds: Vec<Round> = drawn.iter().map(|&[a, a_again, b]| Round { a, a_again, b }).collect();
             let found = compare(&rounds, 0.01, 1);
             let effect = found.effect;
-            let times = Quantity { found: Some(found), rounds, ..Quantity::new(CPU) }.times();
+            let times = of(CPU, rounds, found).times();
             prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);
         }
     }

@@ -8,7 +8,7 @@
 //! [`End::Holds`] carries the number of comparisons, which is not 0: a report that compared nothing of a case that it was asked for
 //! cannot hold.
 
-use super::measures::{Measured, Measures};
+use super::measures::{LayerName, Measured, Measures};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::fmt;
@@ -16,34 +16,6 @@ use std::num::NonZeroU64;
 
 /// Version of the JSON form.
 pub const SCHEMA: &str = "octree-gate/1";
-
-/// The layers, in the order in which they are run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum LayerName {
-    /// The checks of the candidate's meshes.
-    Correctness,
-    /// Deterministic counters.
-    Counters,
-    /// Peak memory.
-    Memory,
-    /// Instructions and allocations, counted by valgrind.
-    Instructions,
-    /// Run times of baseline and candidate in one session.
-    Time,
-}
-
-impl LayerName {
-    /// All layers.
-    pub const ALL: [Self; 5] =
-        [Self::Correctness, Self::Counters, Self::Memory, Self::Instructions, Self::Time];
-}
-
-impl fmt::Display for LayerName {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(&crate::name_of(self))
-    }
-}
 
 /// The assessment of a finding, best first after those without a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -126,31 +98,6 @@ impl GateFinding {
         }
     }
 
-    /// Returns the finding for a number with a tolerance in percent, below which `less` is the verdict on growth.
-    pub fn exact(
-        case: &str,
-        metric: &str,
-        values: [u64; 2],
-        tolerance: f64,
-        less: Verdict,
-    ) -> Self {
-        let [baseline, candidate] = values.map(|value| value as f64);
-        let change = change_percent(baseline, candidate);
-        let verdict = match values[1].cmp(&values[0]) {
-            Ordering::Equal => Verdict::Unchanged,
-            // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
-            _ if change.is_some_and(|by| by.abs() <= tolerance + 1e-9) => less,
-            Ordering::Less => Verdict::Improvement,
-            Ordering::Greater => Verdict::Regression,
-        };
-        let note = match verdict {
-            Verdict::Regression => format!("exceeds the tolerance of {tolerance} %"),
-            Verdict::Changed => format!("within the tolerance of {tolerance} %"),
-            _ => String::new(),
-        };
-        Self::of_values(case, metric, verdict, [baseline, candidate], note)
-    }
-
     fn check_invariants(&self) {
         if let (Some(baseline), Some(candidate)) = (self.baseline, self.candidate) {
             let expected = change_percent(baseline, candidate);
@@ -160,12 +107,9 @@ impl GateFinding {
                 Verdict::Improvement => Some(Ordering::Less),
                 _ => None,
             };
-            let is_right =
-                expected.is_none_or(|sign| candidate.partial_cmp(&baseline) == Some(sign));
-            assert!(
-                is_right || self.metric == CHECKS,
-                "the verdict has the sign of the change: {self:?}"
-            );
+            let found = candidate.partial_cmp(&baseline);
+            let is_right = self.metric == CHECKS || expected.is_none_or(|_| found == expected);
+            assert!(is_right, "the verdict has the sign of the change: {self:?}");
         }
         let is_empty = matches!(self.verdict, Verdict::LeftOut | Verdict::Missing);
         assert!(!is_empty || self.compared == 0, "nothing was compared: {self:?}");
@@ -175,7 +119,8 @@ impl GateFinding {
 /// Metric of the checks, of which one may fail that did not although fewer fail.
 pub const CHECKS: &str = "checks";
 
-fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
+/// Returns the change in percent; `None` of a baseline of 0.
+pub(super) fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
     match (baseline == candidate, baseline == 0.0) {
         (true, _) => Some(0.0),
         (_, true) => None,
@@ -208,23 +153,6 @@ impl Layer {
     pub fn verdict(&self) -> Verdict {
         let worst = self.findings.iter().map(|finding| finding.verdict).max();
         worst.unwrap_or(Verdict::LeftOut)
-    }
-
-    /// Returns the number of comparisons of a case.
-    fn compared(&self, case: &str) -> Option<NonZeroU64> {
-        let of_case = self.findings.iter().filter(|finding| finding.case == case);
-        NonZeroU64::new(of_case.map(|finding| finding.compared).sum())
-    }
-
-    /// Returns why nothing of a case was compared, and whether a missing prerequisite excuses that.
-    fn reason(&self, case: &str) -> (bool, String) {
-        let of_case = || self.findings.iter().filter(|finding| finding.case == case);
-        let excused = self.left_out.is_some()
-            || of_case().next().is_some() && of_case().all(|f| f.verdict == Verdict::LeftOut);
-        let unmet = of_case().find(|f| matches!(f.verdict, Verdict::Missing | Verdict::LeftOut));
-        let note = unmet.map(|finding| finding.note.clone());
-        let why = self.left_out.clone().or(note).unwrap_or_else(|| "it has no quantity".to_owned());
-        (excused, format!("{} of {case}: nothing was compared: {why}", self.name))
     }
 }
 
@@ -288,17 +216,23 @@ impl GateReport {
         if self.layers.iter().any(|layer| layer.verdict() == Verdict::Regression) {
             return End::Regression;
         }
-        let mut total = None;
+        let mut total = 0;
         for layer in &self.layers {
             for case in &layer.cases {
-                match layer.compared(case) {
-                    Some(some) => {
-                        total = Some(some.saturating_add(total.map_or(0, NonZeroU64::get)))
-                    }
-                    None => match layer.reason(case) {
-                        (true, _) if !self.require_layers => {}
-                        (_, why) => return End::Incomplete(why),
-                    },
+                let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
+                let compared: u64 = of_case().map(|finding| finding.compared).sum();
+                total += compared;
+                let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
+                let is_excused = layer.left_out.is_some()
+                    || of_case().next().is_some() && of_case().all(is_left_out);
+                if compared == 0 && (self.require_layers || !is_excused) {
+                    let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
+                    let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));
+                    let why = why.map_or("it has no quantity", String::as_str);
+                    let name = layer.name;
+                    return End::Incomplete(format!(
+                        "{name} of {case}: nothing was compared: {why}"
+                    ));
                 }
             }
             let mut missing = layer.findings.iter().filter(|f| f.verdict == Verdict::Missing);
@@ -309,10 +243,8 @@ impl GateReport {
                 return End::Incomplete(format!("the rules have no case for {}", layer.name));
             }
         }
-        match total {
-            Some(total) => End::Holds(total),
-            None => End::Incomplete("nothing was compared".to_owned()),
-        }
+        let none = || End::Incomplete("nothing was compared".to_owned());
+        NonZeroU64::new(total).map_or_else(none, End::Holds)
     }
 
     /// Executes the invariants at the head of this file.

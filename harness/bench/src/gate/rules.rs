@@ -1,9 +1,11 @@
 //! Cases and tolerances of a gate: `engines/gate.toml`, or a user's file of the same format.
 
 use super::GateError;
-use super::report::LayerName;
+use super::measures::LayerName;
 use crate::statistics::comparison::rounds_min;
 use contract::case::Case;
+use run::engine::launcher::Launcher;
+use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -106,7 +108,25 @@ pub struct Selected {
     pub rule: CaseRule,
     /// Its file, or the reason why it cannot be run: it is missing, or the engine does not support it.
     pub path: Result<PathBuf, String>,
+    /// The numbers of simulated ranks on which it is run.
+    pub simulated: Vec<usize>,
+    /// The numbers of ranks on MPI: those of the rules, and those that the engine cannot simulate.
+    pub mpi: Vec<usize>,
+    /// Why it is not run on ranks of MPI although the rules ask for them.
+    pub no_mpi: Option<String>,
 }
+
+impl Selected {
+    /// The ranks on which it is counted: serially, then those of the rules.
+    pub fn layouts(&self) -> impl Iterator<Item = Ranks> {
+        let simulated = self.simulated.iter().map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
+        let real = self.mpi.iter().copied().map(Ranks::Mpi);
+        std::iter::once(Ranks::Serial).chain(simulated).chain(real)
+    }
+}
+
+/// Seed of the schedule of simulated ranks: counters must not depend on it.
+const SEED: u64 = 1;
 
 impl Rules {
     /// Reads a file of rules.
@@ -192,13 +212,31 @@ impl Rules {
                 found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
             }
         };
-        let engine = programs.engine.description();
+        let (engine, mpirun) = (programs.engine.description(), &programs.paths.mpirun);
         let path = path.and_then(|path| match Case::read(&path) {
             Ok(case) => engine.declines(&case).map_or(Ok(path), Err),
             // What is wrong with the case is for the layers to report.
             Err(_) => Ok(path),
         });
-        Ok(Selected { rule: rule.clone(), path })
+        let (mut simulated, mut mpi) = (rule.ranks.clone(), rule.mpi.clone());
+        if engine.run.simulated.is_none() {
+            mpi.extend(simulated.drain(..).filter(|ranks| !rule.mpi.contains(ranks)));
+        }
+        let no_mpi = match engine.run.parallel {
+            _ if mpi.is_empty() => None,
+            _ if !Launcher::mpirun(mpirun).is_found() => {
+                Some("mpirun is not on the PATH (ci/setup installs it)".to_owned())
+            }
+            None => {
+                let name = &engine.name;
+                Some(format!("the description of {name} has no command for ranks on MPI"))
+            }
+            Some(_) => None,
+        };
+        if no_mpi.is_some() {
+            mpi.clear();
+        }
+        Ok(Selected { rule: rule.clone(), path, simulated, mpi, no_mpi })
     }
 }
 

@@ -6,32 +6,25 @@
 //! [`adjusted`] controls the rate of false discoveries.
 
 use super::Bench;
+use super::measures::LayerName;
 use super::numbers::prefix;
-use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, certainty, size};
-use super::report::{GateFinding, Layer, LayerName, Verdict};
+use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, size};
+use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
-use crate::statistics::comparison::{Comparison, Round, compare};
+use crate::statistics::comparison::{Round, compare};
 use crate::statistics::false_discovery::adjusted;
 use crate::statistics::random::Random;
 use run::engine::failure::Failure;
-use run::engine::interrupt;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
 use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::path::Path;
 
-/// The times of a case on some ranks.
-struct Timed<'a> {
-    case: &'a str,
-    ranks: Ranks,
-    quantities: Vec<Quantity>,
-}
-
 /// Compares the times of candidate and baseline.
-pub fn layer(bench: &Bench, baseline: &Baseline, layer: &mut Layer) {
-    let why = match baseline {
+pub fn layer(bench: &Bench, layer: &mut Layer) {
+    let why = match &bench.baseline {
         Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
         Baseline::Record(..) => {
             "a record cannot be run, and times of different sessions are not comparable"
@@ -42,28 +35,35 @@ pub fn layer(bench: &Bench, baseline: &Baseline, layer: &mut Layer) {
 }
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
+    let (rules, seed) = (&bench.rules.time, bench.options.seed);
     let mut measured = Vec::new();
-    for case in bench.cases_of(LayerName::Time) {
-        let name = &case.rule.name;
-        let real = bench.ranks_on_mpi(case).into_iter().map(Ranks::Mpi);
-        for ranks in std::iter::once(Ranks::Serial).chain(real) {
-            if interrupt::requested() {
-                break;
-            }
+    'all: for case in bench.cases_of(LayerName::Time) {
+        for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
+            let (case_name, prefix) = (&case.rule.name, prefix(ranks));
             match rounds(bench, baseline, case, ranks) {
-                Ok(quantities) => measured.push(Timed { case: name, ranks, quantities }),
-                Err(failure) if failure.is_interrupt() => break,
+                Ok(times) => measured.extend(times.into_iter().map(|(name, rounds)| {
+                    let found = compare(&rounds, rules.alpha, seed);
+                    Quantity { case: case_name, prefix: prefix.clone(), name, rounds, found }
+                })),
+                Err(failure) if failure.is_interrupt() => break 'all,
                 Err(why) => {
-                    let metric = format!("{}time", prefix(ranks));
-                    let finding =
-                        GateFinding::noted(name, &metric, Verdict::Missing, why.to_string());
+                    let (metric, why) = (format!("{prefix}time"), why.to_string());
+                    let finding = GateFinding::noted(case_name, &metric, Verdict::Missing, why);
                     layer.findings.push(finding);
                 }
             }
         }
-        layer.findings.extend(bench.ranks_left_out(case));
     }
-    layer.findings.extend(judged(bench, &mut measured));
+    // All quantities of all cases are tested together.
+    let p_values: Vec<f64> = measured.iter().map(|quantity| quantity.found.p).collect();
+    for (quantity, p) in measured.iter_mut().zip(adjusted(&p_values)) {
+        quantity.found.p = p;
+    }
+    for times in measured.chunk_by(|a, b| (a.case, &a.prefix) == (b.case, &b.prefix)) {
+        let (whole, phases) = times.split_at(2);
+        layer.findings.extend(whole.iter().map(|quantity| whole_finding(quantity, rules)));
+        layer.findings.extend(phases::findings(&whole[0], phases, rules));
+    }
 }
 
 /// The three runs of a round.
@@ -71,17 +71,14 @@ const BASELINE: usize = 0;
 const AGAIN: usize = 1;
 const CANDIDATE: usize = 2;
 
-/// Runs all rounds of a case: the two times of the process, then the phases that both programs report.
+/// Runs all rounds of a case: the two times of the process, then the phases that both programs report, by name.
 fn rounds(
     bench: &Bench,
     baseline: &Engine,
     case: &Selected,
     ranks: Ranks,
-) -> Result<Vec<Quantity>, Failure> {
-    let unusable = |why: String| baseline.unusable(why);
-    let path = case.path.clone().map_err(unusable)?;
-    let place = bench.enter("time").map_err(unusable)?;
-    let path = baseline.prepare(&path, &place.join("case")).map_err(unusable)?;
+) -> Result<Vec<(String, Vec<Round>)>, Failure> {
+    let path = bench.prepare(baseline, case, "time")?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run reads program and geometry from disk and is not counted.
     let first = run(bench, baseline, &path, ranks)?;
@@ -91,13 +88,15 @@ fn rounds(
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let mut random = Random(bench.options.seed);
-    let mut quantities = vec![Quantity::new(CPU), Quantity::new(WALL)];
+    let mut names = vec![CPU, WALL];
     if first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some() {
         let of_candidate = |p: &&PhaseReport| also.report.phases.iter().any(|o| o.name == p.name);
         let both = first.report.phases.iter().filter(of_candidate);
-        quantities.extend(both.map(|phase| Quantity::new(&phase.name)));
-        quantities.push(Quantity::new(OUTSIDE));
+        names.extend(both.map(|phase| phase.name.as_str()));
+        names.push(OUTSIDE);
     }
+    let mut times: Vec<(String, Vec<Round>)> =
+        names.into_iter().map(|name| (name.to_owned(), Vec::new())).collect();
     for _ in 0..count {
         let mut order = [BASELINE, AGAIN, CANDIDATE];
         random.shuffle(&mut order);
@@ -106,17 +105,17 @@ fn rounds(
             runs[index] = Some(run(bench, engines[index], &path, ranks)?);
         }
         let [Some(a), Some(a_again), Some(b)] = runs else { unreachable!("each was run") };
-        for quantity in &mut quantities {
+        for (name, rounds) in &mut times {
             // A microsecond is the resolution of the clocks.
-            let of = |run: &Completed| seconds(run, &quantity.name).max(1e-6).ln();
-            quantity.rounds.push(Round { a: of(&a), a_again: of(&a_again), b: of(&b) });
+            let of = |run: &Completed| seconds(run, name).max(1e-6).ln();
+            rounds.push(Round { a: of(&a), a_again: of(&a_again), b: of(&b) });
         }
     }
-    Ok(quantities)
+    Ok(times)
 }
 
 fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
-    let place = bench.enter("time/run").map_err(|why| engine.unusable(why))?;
+    let place = bench.enter(engine, "time/run")?;
     engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit()))
 }
 
@@ -133,60 +132,28 @@ fn seconds(run: &Completed, name: &str) -> f64 {
     }
 }
 
-/// Tests all quantities of all cases together.
-fn judged(bench: &Bench, measured: &mut [Timed]) -> Vec<GateFinding> {
-    let rules = &bench.rules.time;
-    let quantities = || measured.iter().flat_map(|timed| &timed.quantities);
-    let compared: Vec<Comparison> = quantities()
-        .map(|quantity| compare(&quantity.rounds, rules.alpha, bench.options.seed))
-        .collect();
-    let p_values: Vec<f64> = compared.iter().map(|found| found.p).collect();
-    let all = measured.iter_mut().flat_map(|timed| &mut timed.quantities);
-    for ((quantity, found), p) in all.zip(compared).zip(adjusted(&p_values)) {
-        quantity.found = Some(Comparison { p, ..found });
-    }
-    let of_case = |Timed { case, ranks, quantities }: &Timed| {
-        let (whole, phases) = quantities.split_at(2);
-        let prefix = prefix(*ranks);
-        let mut findings: Vec<GateFinding> = whole
-            .iter()
-            .filter_map(|quantity| whole_finding(case, &prefix, quantity, rules))
-            .collect();
-        findings.extend(phases::findings(case, &prefix, &whole[0], phases, rules));
-        findings
-    };
-    measured.iter().flat_map(of_case).collect()
-}
-
 /// The finding for a time of the whole process.
-fn whole_finding(
-    case: &str,
-    prefix: &str,
-    quantity: &Quantity,
-    rules: &TimeRules,
-) -> Option<GateFinding> {
-    let found = quantity.found?;
+fn whole_finding(quantity: &Quantity, rules: &TimeRules) -> GateFinding {
     let note = format!(
         "{} rounds; {}, minimum detectable effect {:.1} %",
         quantity.rounds.len(),
-        certainty(&found),
-        100.0 * found.visible.max(rules.effect_min / 100.0)
+        quantity.certainty(),
+        100.0 * quantity.found.visible.max(rules.effect_min / 100.0)
     );
-    let metric = format!("{prefix}{}", quantity.name);
-    Some(GateFinding::of_values(case, &metric, verdict(&found, rules), quantity.times(), note))
+    quantity.finding(verdict(quantity, rules), note)
 }
 
 /// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
 
-/// A change must be significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
-/// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
-/// seen.
-fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
-    let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-    if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
+/// "Unchanged" requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious
+/// effect was seen.
+fn verdict(quantity: &Quantity, rules: &TimeRules) -> Verdict {
+    let found = &quantity.found;
+    if quantity.is_changed(rules) {
         return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
     }
+    let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
     let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
     let within = size(found.low) <= wanted && size(found.high) <= wanted;
     match found.visible <= wanted && within && !suspicious {
@@ -198,6 +165,7 @@ fn verdict(found: &Comparison, rules: &TimeRules) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::comparison::Comparison;
 
     #[test]
     fn a_verdict_needs_significance_and_size() {
@@ -210,7 +178,10 @@ mod tests {
             low: 0.06,
             high: 0.1,
         };
-        let of = |found: Comparison| verdict(&found, &rules);
+        let of = |found: Comparison| {
+            let (prefix, name) = (String::new(), CPU.to_owned());
+            verdict(&Quantity { case: "c", prefix, name, rounds: Vec::new(), found }, &rules)
+        };
         assert_eq!(of(found), Verdict::Regression);
         assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);
         assert_eq!(of(Comparison { p: 0.02, ..found }), Verdict::Unchanged);

@@ -23,29 +23,17 @@ pub struct Repeat {
 impl Repeat {
     /// Returns a shell command that tests whether the case still fails the check.
     pub fn line(&self, case: &Path, check: &str, ranks: Ranks) -> String {
-        let mut words: Vec<String> =
-            vec!["harness".into(), "shrink".into(), case.display().to_string()];
-        words.extend(["--test-only".into(), "--check".into(), check.to_owned()]);
-        words.extend(["--engine".into(), self.engine.clone()]);
-        if let Some(program) = &self.program {
-            words.extend(["--mesher".into(), program.clone()]);
-        }
-        match ranks {
-            Ranks::Serial => {}
-            Ranks::Mpi(ranks) => {
-                words.extend(["--ranks".into(), ranks.to_string(), "--mpi".into()])
-            }
-            Ranks::Simulated { ranks, seed } => {
-                words.extend([
-                    "--ranks".into(),
-                    ranks.to_string(),
-                    "--seed".into(),
-                    seed.to_string(),
-                ]);
-            }
-        }
+        let case = case.display().to_string();
+        let mut words = vec!["harness", "shrink", &case, "--test-only", "--check", check];
+        words.extend(["--engine", &self.engine]);
+        words.extend(self.program.iter().flat_map(|program| ["--mesher", program]));
         // Arguments of a process contain no NUL, the one character that a shell cannot quote.
-        shlex::try_join(words.iter().map(String::as_str)).expect("no argument contains NUL")
+        let line = shlex::try_join(words).expect("no argument contains NUL");
+        match ranks {
+            Ranks::Serial => line,
+            Ranks::Mpi(ranks) => format!("{line} --ranks {ranks} --mpi"),
+            Ranks::Simulated { ranks, seed } => format!("{line} --ranks {ranks} --seed {seed}"),
+        }
     }
 }
 

@@ -16,8 +16,15 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
     let mut smallest = trial;
     loop {
         let before = smallest.clone();
-        for step in [depth, facets, plainness, layer, boxes, seeds, ranks] {
-            smallest = step(smallest, fails);
+        smallest = facets(depth(smallest, fails), fails);
+        for simpler in [plain, crossing, enclosed, thinner, fewer_ranks] {
+            let simpler = simpler(&smallest);
+            smallest = first(smallest, fails, simpler);
+        }
+        // Seeds that remain stay where they are: a case in which one has come to lie in a crossing leaf is refused by every program and
+        // does not fail.
+        for list in ["box", "seeds"] {
+            smallest = shorten(smallest, fails, list);
         }
         if smallest == before {
             return smallest;
@@ -118,32 +125,32 @@ fn facets(trial: Trial, fails: Fails) -> Trial {
 }
 
 /// Keeps all leaves, including crossing and enclosed ones: deletion is then ruled out as a cause.
-fn plainness(trial: Trial, fails: Fails) -> Trial {
-    let all = with(&trial, "keep", Some(Value::String("all".into())));
-    let trial = first(trial, fails, [all]);
-    let crossing = with(&trial, "keep_crossing", None);
-    let trial = first(trial, fails, [crossing]);
-    let default = with(&trial, "enclosed", None);
-    first(trial, fails, [default])
+fn plain(trial: &Trial) -> Vec<Trial> {
+    vec![with(trial, "keep", Some(Value::String("all".into())))]
+}
+
+fn crossing(trial: &Trial) -> Vec<Trial> {
+    vec![with(trial, "keep_crossing", None)]
+}
+
+fn enclosed(trial: &Trial) -> Vec<Trial> {
+    vec![with(trial, "enclosed", None)]
 }
 
 /// Reduces the layer to the smallest n.
-fn layer(trial: Trial, fails: Fails) -> Trial {
+fn thinner(trial: &Trial) -> Vec<Trial> {
     let now = trial.case.table.get("layer_cells_min").and_then(Value::as_integer).unwrap_or(4);
-    let thinner: Vec<Trial> =
-        (1..now).map(|n| with(&trial, "layer_cells_min", Some(Value::Integer(n)))).collect();
-    first(trial, fails, thinner)
+    (1..now).map(|n| with(trial, "layer_cells_min", Some(Value::Integer(n)))).collect()
 }
 
-/// Removes as many boxes as possible.
-fn boxes(trial: Trial, fails: Fails) -> Trial {
-    shorten(trial, fails, "box")
-}
-
-/// Removes as many seeds as possible. Those that remain stay where they are: a case in which one has come to lie in a
-/// crossing leaf is refused by every program and does not fail.
-fn seeds(trial: Trial, fails: Fails) -> Trial {
-    shorten(trial, fails, "seeds")
+/// Reduces the number of ranks.
+fn fewer_ranks(trial: &Trial) -> Vec<Trial> {
+    let fewer = |ranks| match trial.ranks {
+        Ranks::Serial => Ranks::Serial,
+        Ranks::Mpi(_) => Ranks::Mpi(ranks),
+        Ranks::Simulated { seed, .. } => Ranks::Simulated { ranks, seed },
+    };
+    (2..trial.ranks.count()).map(|ranks| Trial { ranks: fewer(ranks), ..trial.clone() }).collect()
 }
 
 /// Removes as many entries of a list as possible.
@@ -163,19 +170,6 @@ fn shorten(trial: Trial, fails: Fails, key: &str) -> Trial {
         }
     }
     smallest
-}
-
-/// Reduces the number of ranks.
-fn ranks(trial: Trial, fails: Fails) -> Trial {
-    let on = |ranks| Trial { ranks, ..trial.clone() };
-    let fewer: Vec<Trial> = match trial.ranks {
-        Ranks::Serial => Vec::new(),
-        Ranks::Mpi(now) => (2..now).map(|ranks| on(Ranks::Mpi(ranks))).collect(),
-        Ranks::Simulated { ranks: now, seed } => {
-            (2..now).map(|ranks| on(Ranks::Simulated { ranks, seed })).collect()
-        }
-    };
-    first(trial, fails, fewer)
 }
 
 #[cfg(test)]

@@ -3,11 +3,12 @@
 //! Invariants of the [`Study`] that [`Study::read`] returns: it has a series or a row; every name that is used is declared; a row
 //! has exactly the runs, the other run and the phase that its measure requires.
 
-use super::measure::{Kind, Measure};
+use super::measure::{Input, Measure};
 use crate::experiments::entry::{Comm, Setup};
+use crate::order::distinct;
 use run::engine::description::{Description, is_own};
-use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -155,7 +156,7 @@ const CHOICES: [Choice; 6] = [
 
 impl Series {
     /// Returns the numbers of cells, or that of the case.
-    pub fn sizes(&self) -> Vec<Option<f64>> {
+    pub(super) fn sizes(&self) -> Vec<Option<f64>> {
         match self.cells.is_empty() {
             true => vec![None],
             false => self.cells.iter().copied().map(Some).collect(),
@@ -172,42 +173,45 @@ impl Series {
 
     /// Returns the ranks on which an engine is run: those of the series that it offers. A serial run replaces ranks on MPI that
     /// are missing; nothing can replace the ranks of experiments about ranks.
-    pub fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<(Comm, usize)> {
+    pub(super) fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<(Comm, usize)> {
         let has_mpi = engine.run.parallel.is_some() && !no_mpi;
         let sim = self.sim.iter().filter(|_| engine.run.simulated.is_some());
         let mpi = self.mpi.iter().filter(|_| has_mpi);
         let mut all: Vec<(Comm, usize)> =
             sim.map(|r| (Comm::Sim, *r)).chain(mpi.map(|r| (Comm::Mpi, *r))).collect();
-        let is_about_ranks = matches!(self.experiment, Experiment::Weak | Experiment::Weights);
-        if self.experiment == Experiment::Weights && !is_own(&engine.name) {
-            return Vec::new();
-        }
-        if !is_about_ranks && (all.is_empty() || !self.mpi.is_empty() && !has_mpi) {
-            all.push((Comm::Solo, 1));
+        match self.experiment {
+            Experiment::Weights if !is_own(&engine.name) => all.clear(),
+            Experiment::Weights | Experiment::Weak => {}
+            _ if all.is_empty() || !self.mpi.is_empty() && !has_mpi => all.push((Comm::Solo, 1)),
+            _ => {}
         }
         all
     }
 
     fn check(&self) -> Result<(), String> {
-        let wrong = |why: &str| Err(format!("series {} of {}: {why}", self.experiment, self.case));
-        let ranks = || self.sim.iter().chain(&self.mpi);
-        match self.experiment {
-            _ if !ranks().all(|ranks| (1..=RANKS_MAX).contains(ranks)) => {
-                wrong("ranks are from 1 to 65536")
-            }
-            _ if self.repeats == 0 => wrong("repeats is at least 1"),
-            _ if self.engines.is_empty() => wrong("it has no engines"),
-            _ if !self.cells.iter().all(|cells| CELLS.contains(cells)) => {
-                wrong("cells is from 1e3 to 1e12")
-            }
-            Experiment::Weak if self.cells.is_empty() => wrong("give the cells of a rank"),
-            Experiment::Weak | Experiment::Weights if ranks().next().is_none() => {
-                wrong("give ranks")
-            }
-            Experiment::Layers if self.layers.is_empty() => wrong("give layers"),
-            _ => Ok(()),
-        }
+        use Experiment::{Layers, Weak, Weights};
+        let (what, ranks) = (self.experiment, [&self.sim[..], &self.mpi].concat());
+        let is_about_ranks = matches!(what, Weak | Weights);
+        let wrong = [
+            (!are_ranks(&ranks), "ranks are from 1 to 65536"),
+            (self.repeats == 0, "repeats is at least 1"),
+            (self.engines.is_empty(), "it has no engines"),
+            (!self.cells.iter().all(|cells| CELLS.contains(cells)), "cells is from 1e3 to 1e12"),
+            (what == Weak && self.cells.is_empty(), "give the cells of a rank"),
+            (is_about_ranks && ranks.is_empty(), "give ranks"),
+            (what == Layers && self.layers.is_empty(), "give layers"),
+        ];
+        refuse(&wrong).map_err(|why| format!("series {what} of {}: {why}", self.case))
     }
+}
+
+fn are_ranks(all: &[usize]) -> bool {
+    all.iter().all(|ranks| (1..=RANKS_MAX).contains(ranks))
+}
+
+/// Returns the first reason that applies.
+fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
+    reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
 }
 
 fn mesher() -> Vec<String> {
@@ -229,37 +233,33 @@ pub struct Row {
     /// The name, used by `--only`.
     pub name: String,
     /// One or several runs. Each of several runs has its own row, unless the measure is that of a series.
-    pub run: OneOrMany,
+    #[serde(deserialize_with = "one_or_many")]
+    pub run: Vec<String>,
     /// The run with which it is compared.
     pub against: Option<String>,
     /// The measure.
-    pub measure: Measure,
+    pub measure: &'static Measure,
     /// The phase or phases, for measures of phases.
-    pub phase: Option<OneOrMany>,
+    #[serde(default, deserialize_with = "one_or_many")]
+    pub phase: Vec<String>,
     /// Lower bound.
     pub at_least: Option<f64>,
     /// Upper bound.
     pub at_most: Option<f64>,
 }
 
-/// Names of runs or phases.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum OneOrMany {
-    /// One.
-    One(String),
-    /// Several.
-    Many(Vec<String>),
-}
-
-impl OneOrMany {
-    /// Returns all names.
-    pub fn all(&self) -> &[String] {
-        match self {
-            Self::One(name) => std::slice::from_ref(name),
-            Self::Many(names) => names,
-        }
+/// Reads a name or a list of names.
+fn one_or_many<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum OneOrMany {
+        One(String),
+        Many(Vec<String>),
     }
+    Ok(match OneOrMany::deserialize(from)? {
+        OneOrMany::One(name) => vec![name],
+        OneOrMany::Many(names) => names,
+    })
 }
 
 impl Study {
@@ -282,7 +282,13 @@ impl Study {
     /// # Errors
     /// If no row and no experiment has one of the names.
     pub fn only(&mut self, names: &[String]) -> Result<(), String> {
-        let is_row = |row: &Row, name: &String| row.name == *name || row.family() == name;
+        if names.is_empty() {
+            return Ok(());
+        }
+        let is_row = |row: &Row, name: &String| {
+            // A row of several runs has the name of the run at its end.
+            row.name == *name || row.name == format!("{name}: {}", row.run[0])
+        };
         let is_series = |series: &Series, name: &String| series.experiment.to_string() == *name;
         let is_known = |name: &&String| {
             self.row.iter().any(|row| is_row(row, name))
@@ -291,30 +297,24 @@ impl Study {
         if let Some(name) = names.iter().find(|name| !is_known(name)) {
             return Err(format!("no row and no experiment is called {name:?}"));
         }
-        self.row.retain(|row| names.is_empty() || names.iter().any(|name| is_row(row, name)));
-        self.series.retain(|one| names.is_empty() || names.iter().any(|name| is_series(one, name)));
+        self.row.retain(|row| names.iter().any(|name| is_row(row, name)));
+        self.series.retain(|series| names.iter().any(|name| is_series(series, name)));
         Ok(())
     }
 
     /// Returns the programs of all series, and the mesher if a row needs it, each once.
     pub fn engines(&self) -> Vec<String> {
-        let mut engines: Vec<String> = Vec::new();
         let of_rows = (!self.row.is_empty()).then(mesher).unwrap_or_default();
-        for engine in self.series.iter().flat_map(|series| series.engines.clone()).chain(of_rows) {
-            if !engines.contains(&engine) {
-                engines.push(engine);
-            }
-        }
-        engines
+        distinct(self.series.iter().flat_map(|series| series.engines.clone()).chain(of_rows))
     }
 
     /// Returns the runs that a row needs: its own and the one with which it is compared.
     pub fn runs_of<'a>(&self, row: &'a Row) -> Vec<&'a String> {
-        row.run.all().iter().chain(&row.against).collect()
+        row.run.iter().chain(&row.against).collect()
     }
 
     /// Whether a setup of a record is the run of this name.
-    pub fn is_run(&self, name: &str, setup: &Setup) -> bool {
+    pub(super) fn is_run(&self, name: &str, setup: &Setup) -> bool {
         let Some(run) = self.run.get(name) else { return false };
         let mesh = &self.mesh[&run.mesh];
         setup.experiment == EXPERIMENT
@@ -330,247 +330,88 @@ impl Study {
             return Err("it has no [[series]] and no [[row]]".to_owned());
         }
         self.series.iter().try_for_each(Series::check)?;
-        self.mesh.iter().try_for_each(|(name, mesh)| mesh.check(name))?;
-        self.run.iter().try_for_each(|(name, run)| self.check_run(name, run))?;
-        self.row.iter().try_for_each(|row| self.check_row(row))?;
-        let mut names = BTreeSet::new();
-        match self.row.iter().find(|row| !names.insert(&row.name)) {
-            Some(row) => Err(format!("two rows are called {:?}", row.name)),
-            None => Ok(()),
+        for (name, mesh) in &self.mesh {
+            mesh.check().map_err(|why| format!("mesh {name}: {why}"))?;
         }
-    }
-
-    fn check_run(&self, name: &str, run: &RunSpec) -> Result<(), String> {
-        let wrong = |why: String| Err(format!("run {name}: {why}"));
-        if !self.mesh.contains_key(&run.mesh) {
-            return wrong(format!("no mesh is called {:?}", run.mesh));
+        for (name, run) in &self.run {
+            self.check_run(run).map_err(|why| format!("run {name}: {why}"))?;
         }
-        if !(1..=RANKS_MAX).contains(&run.ranks) || run.comm == Comm::Solo && run.ranks != 1 {
-            return wrong(format!("it cannot have {} ranks", run.ranks));
-        }
-        if run.repeats == 0 {
-            return wrong("repeats is at least 1".to_owned());
+        for (i, row) in self.row.iter().enumerate() {
+            self.check_row(row).map_err(|why| format!("row {:?}: {why}", row.name))?;
+            if self.row[..i].iter().any(|other| other.name == row.name) {
+                return Err(format!("two rows are called {:?}", row.name));
+            }
         }
         Ok(())
+    }
+
+    fn check_run(&self, run: &RunSpec) -> Result<(), String> {
+        let wrong_ranks = !are_ranks(&[run.ranks]) || run.comm == Comm::Solo && run.ranks != 1;
+        refuse(&[
+            (!self.mesh.contains_key(&run.mesh), &format!("no mesh is called {:?}", run.mesh)),
+            (wrong_ranks, &format!("it cannot have {} ranks", run.ranks)),
+            (run.repeats == 0, "repeats is at least 1"),
+        ])
     }
 
     fn check_row(&self, row: &Row) -> Result<(), String> {
-        let wrong = |why: String| Err(format!("row {:?}: {why}", row.name));
         if let Some(name) = self.runs_of(row).into_iter().find(|n| !self.run.contains_key(*n)) {
-            return wrong(format!("no run is called {name:?}"));
+            return Err(format!("no run is called {name:?}"));
         }
-        let kind = row.measure.kind();
-        let needs_other = kind == Kind::Against;
-        if needs_other != row.against.is_some() {
-            let what = if needs_other { "requires" } else { "does not accept" };
-            return wrong(format!("{} {what} a run in `against`", row.measure));
-        }
-        let phase = row.measure == Measure::PhaseShare;
-        if phase != row.phase.is_some() {
-            let what = if phase { "requires" } else { "does not accept" };
-            return wrong(format!("{} {what} a name in `phase`", row.measure));
-        }
-        let least = if kind == Kind::Series { 2 } else { 1 };
-        if row.run.all().len() < least {
-            return wrong(format!("{} requires {least} or more runs", row.measure));
-        }
-        let audit = kind == Kind::Audit;
-        if let Some(name) = row.run.all().iter().find(|n| self.run[*n].audit != audit) {
-            let what = if audit { "a run with audit = true" } else { "no run with audit = true" };
-            return wrong(format!("{} is measured of {what}, which {name} is not", row.measure));
-        }
-        Ok(())
+        let (name, input) = (row.measure.name, row.measure.input);
+        let [against, phase] = [input == Input::Against, input == Input::Phases];
+        let audit = input == Input::Audit;
+        let other = row.run.iter().find(|n| self.run[*n].audit != audit);
+        let least = if input == Input::Series { 2 } else { 1 };
+        let needs = |needs: bool| if needs { "requires" } else { "does not accept" };
+        let of = if audit { "a run with audit = true" } else { "no run with audit = true" };
+        refuse(&[
+            (
+                against != row.against.is_some(),
+                &format!("{name} {} a run in `against`", needs(against)),
+            ),
+            (phase == row.phase.is_empty(), &format!("{name} {} a name in `phase`", needs(phase))),
+            (row.run.len() < least, &format!("{name} requires {least} or more runs")),
+            (
+                other.is_some(),
+                &format!("{name} is measured of {of}, which {} is not", other.unwrap_or(&row.name)),
+            ),
+        ])
     }
 }
 
 impl Mesh {
-    fn check(&self, name: &str) -> Result<(), String> {
-        let wrong = |why: &str| Err(format!("mesh {name}: {why}"));
-        let given = [self.case.is_some(), self.geometry.is_some(), self.generator.is_some()];
-        if given.iter().filter(|&&g| g).count() != 1 {
-            return wrong("give one of case, geometry and [generator]");
-        }
-        if self.case.is_some() && self.root_scale.is_some() {
-            return wrong("the case defines root_scale");
-        }
-        if self.case.is_none() && (self.spacing_min.is_none() || self.cells.is_some()) {
-            return wrong("without a case, spacing_min is required and cells is not allowed");
-        }
-        if self.spacing_min.is_some() && self.cells.is_some() {
-            return wrong("give spacing_min or cells, not both");
-        }
-        if self.cells.is_some_and(|cells| !CELLS.contains(&cells)) {
-            return wrong("cells is from 1e3 to 1e12");
-        }
-        Ok(())
-    }
-}
-
-impl Row {
-    /// Returns the row's name in the file, without the appended name of the run.
-    fn family(&self) -> &str {
-        match self.run.all() {
-            [run] => self.name.strip_suffix(&format!(": {run}")).unwrap_or(&self.name),
-            _ => &self.name,
-        }
+    fn check(&self) -> Result<(), String> {
+        let Self { case, geometry, generator, root_scale, spacing_min, cells, .. } = self;
+        let given = [case.is_some(), geometry.is_some(), generator.is_some()];
+        refuse(&[
+            (
+                given.iter().filter(|&&given| given).count() != 1,
+                "give one of case, geometry and [generator]",
+            ),
+            (case.is_some() && root_scale.is_some(), "the case defines root_scale"),
+            (
+                case.is_none() && (spacing_min.is_none() || cells.is_some()),
+                "without a case, spacing_min is required and cells is not allowed",
+            ),
+            (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
+            (cells.is_some_and(|cells| !CELLS.contains(&cells)), "cells is from 1e3 to 1e12"),
+        ])
     }
 }
 
 /// Splits a row of several runs into one row for each, unless its measure is that of a series.
 fn each_run(row: &Row) -> Vec<Row> {
-    let OneOrMany::Many(names) = &row.run else { return vec![row.clone()] };
-    if row.measure.kind() == Kind::Series {
+    if row.run.len() == 1 || row.measure.input == Input::Series {
         return vec![row.clone()];
     }
-    let of = |name: &String| Row {
-        name: format!("{}: {name}", row.name),
-        run: OneOrMany::One(name.clone()),
+    let of = |run: &String| Row {
+        name: format!("{}: {run}", row.name),
+        run: vec![run.clone()],
         ..row.clone()
     };
-    names.iter().map(of).collect()
+    row.run.iter().map(of).collect()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::study as read;
-
-    const FILE: &str = r#"
-        [mesh.cube]
-        case = "cube-small"
-        spacing_min = 0.1
-        [run]
-        one = { mesh = "cube", repeats = 3 }
-        two = { mesh = "cube", ranks = 2, comm = "sim", weights = "area" }
-        disk = { mesh = "cube", audit = true }
-        [[row]]
-        name = "rate"
-        run = ["one", "two"]
-        measure = "cells_per_second_per_core"
-        at_least = 1e6
-        [[row]]
-        name = "speed-up"
-        run = "two"
-        against = "one"
-        measure = "speed_up"
-        [[row]]
-        name = "growth"
-        run = ["one", "two"]
-        measure = "time_per_cell_growth"
-        at_most = 1.05
-        [[row]]
-        name = "audit"
-        run = "disk"
-        measure = "audit_holds"
-    "#;
-
-    #[test]
-    fn several_runs_are_several_rows_except_for_a_series() {
-        let mut study = read(FILE).unwrap();
-        let names = |t: &Study| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&study), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
-        assert!(study.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
-        study.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
-        assert_eq!(names(&study), ["rate: one", "rate: two", "growth"]);
-    }
-
-    fn of_repository(name: &str) -> Study {
-        let reports = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports");
-        Study::read(&reports.join(name)).unwrap()
-    }
-
-    #[test]
-    fn the_targets_of_this_repository_are_consistent() {
-        let study = of_repository("targets.toml");
-        // A run that no row needs is a mistake.
-        let used = |name| study.row.iter().any(|r| study.runs_of(r).contains(&name));
-        let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
-        assert!(unused.is_empty(), "{unused:?}");
-    }
-
-    #[test]
-    fn the_series_of_this_repository_have_every_experiment() {
-        use Experiment::{Layers, Spacing, Strong, Weak, Weights};
-        for name in ["small.toml", "full.toml"] {
-            let study = of_repository(name);
-            let has = |experiment| study.series.iter().any(|s| s.experiment == experiment);
-            assert!([Strong, Weak, Spacing, Layers, Weights].into_iter().all(has), "{name}");
-        }
-    }
-
-    #[test]
-    fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out() {
-        let paths = run::engine::paths::Paths::find();
-        let find = |name| Description::find(name, &paths).unwrap();
-        let [own, parallel, serial] = ["mesher", "p4est", "discretize"].map(find);
-        let mut study = of_repository("small.toml");
-        let of = |series: &Series, engine, no_mpi| series.layouts(engine, no_mpi);
-        let (sim, solo) = ((Comm::Sim, 64), (Comm::Solo, 1));
-        study.series.retain(|series| series.experiment == Experiment::Strong);
-        let strong = &study.series[0];
-        assert_eq!(of(strong, &own, false).len(), strong.sim.len() + strong.mpi.len());
-        assert!(of(strong, &own, true).ends_with(&[sim, solo]));
-        assert_eq!(of(strong, &parallel, false).len(), strong.mpi.len());
-        assert_eq!(of(strong, &serial, false), [solo]);
-        let weak = Series { experiment: Experiment::Weak, ..strong.clone() };
-        assert!(of(&weak, &serial, false).is_empty());
-        let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
-        assert!(of(&weights, &parallel, false).is_empty());
-        assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "", None)][..]));
-    }
-
-    #[test]
-    fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
-        let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\nsim = [1, 2]\n\
-                    [[series]]\nexperiment = 'weak'\ncase = 'cube'\ncells = [1e4]\nmpi = [1]\n";
-        let mut study = read(text).unwrap();
-        study.only(&["weak".to_owned()]).unwrap();
-        assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
-        for (from, to, why) in [
-            ("[1, 2]", "[0]", "ranks are from 1"),
-            ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
-            ("cells = [1e4]", "", "give the cells of a rank"),
-            ("mpi = [1]", "", "give ranks"),
-            ("'strong'", "'layers'", "give layers"),
-            ("'strong'", "'luck'", "unknown variant"),
-            ("sim", "repeats = 0\nsim", "repeats is at least 1"),
-        ] {
-            let found = read(&text.replacen(from, to, 1)).unwrap_err();
-            assert!(found.contains(why), "{why} is not in: {found}");
-        }
-    }
-
-    #[test]
-    fn contradictions_are_reported() {
-        for (from, to, why) in [
-            ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
-            ("repeats = 3", "repeats = 0", "run one: repeats"),
-            ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
-            ("against = \"one\"", "", "\"speed-up\": speed_up requires a run in `against`"),
-            ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
-            ("run = \"disk\"", "run = \"one\"", "which one is not"),
-            ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
-            ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
-            ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
-            (
-                "case = \"cube-small\"",
-                "case = \"cube-small\"\nroot_scale = 3.0",
-                "the case defines",
-            ),
-            (
-                "case = \"cube-small\"\n        spacing_min = 0.1",
-                "geometry = \"a.stl\"",
-                "spacing_min is required",
-            ),
-            ("case = \"cube-small\"", "", "give one of"),
-            ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
-            ("at_least", "atleast", "unknown field"),
-            ("name = \"growth\"", "name = \"rate\"", "two rows are called \"rate\""),
-        ] {
-            assert!(FILE.contains(from), "{from}");
-            let found = read(&FILE.replacen(from, to, 1)).unwrap_err();
-            assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
-        }
-        assert!(read("").unwrap_err().contains("no [[series]] and no [[row]]"));
-    }
-}
+mod tests;

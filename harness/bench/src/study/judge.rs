@@ -4,11 +4,11 @@
 //! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
 //! has none; a row without a value, and an efficiency above 1, states the reason.
 
-use super::file::{OneOrMany, Row, Study};
-use super::measure::{Kind, Measure, Sample};
-use crate::experiments::cause::above_one;
+use super::file::{EXPERIMENT, Row, Study};
+use super::measure::{Input, Measure, Sample};
 use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
+use crate::experiments::pop::{Efficiency, above_one};
 
 /// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
 pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
@@ -19,19 +19,17 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
 /// Returns the lines without the runs, audits and failures of sessions on other machines or commits than the last one, and
 /// without those of other builds of the program than the last run's.
 fn of_last_origin(lines: &[Line]) -> Vec<Line> {
-    let machine = |line: &Line| match &line.entry {
-        Entry::Session(session) => Some((session.machine.label(), session.machine.commit.clone())),
-        _ => None,
+    let machine = |line: &Line| {
+        line.session().map(|session| (session.machine.label(), session.machine.commit.clone()))
     };
-    let last = lines.iter().rev().find_map(machine);
-    let of_last = |line: &&Line| machine(line).is_some() && machine(line) == last;
-    let sessions: Vec<&str> =
-        lines.iter().filter(of_last).map(|line| line.session.as_str()).collect();
     let program = |line: &Line| match &line.entry {
         Entry::Run(run) => Some(run.program.clone()),
         _ => None,
     };
+    let last = lines.iter().rev().find_map(machine);
     let built = lines.iter().rev().find_map(program);
+    let of_last = lines.iter().filter(|line| machine(line).is_some() && machine(line) == last);
+    let sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
     let is_of = |line: &&Line| {
         let same_build = program(line).is_none() || program(line) == built;
         same_build && (last.is_none() || sessions.contains(&line.session.as_str()))
@@ -40,12 +38,12 @@ fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
-pub fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
+pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     let judged = match measured(study, row, lines) {
         Ok((value, how, why)) => Judged {
             measured: Some(value),
-            how,
-            verdict: verdict(row, value),
+            how: how.to_owned(),
+            verdict: verdict(row.at_least, row.at_most, value),
             ..unjudged(row, Verdict::ForComparison, why)
         },
         Err(why) => {
@@ -56,30 +54,23 @@ pub fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
             }
         }
     };
-    check_invariants(&judged, row.measure);
+    check_invariants(&judged);
     judged
 }
 
 /// Executes the invariants at the head of this file.
-fn check_invariants(row: &Judged, measure: Measure) {
+fn check_invariants(row: &Judged) {
     use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
-    let Judged { name, at_least, at_most, measured, how, verdict, why, .. } = row;
-    let has_value = matches!(verdict, Met | Missed | ForComparison);
-    assert!(
-        has_value == measured.is_some() && has_value != how.is_empty(),
-        "{name}: a value is measured: {row:?}"
-    );
+    let Judged { name, at_least, at_most, measured, how, verdict: found, why, .. } = row;
+    let has_value = matches!(found, Met | Missed | ForComparison);
+    let is_measured = has_value == measured.is_some() && has_value != how.is_empty();
+    assert!(is_measured, "{name}: a value is measured: {row:?}");
     assert!(has_value || !why.is_empty(), "{name}: a row without a value has a reason: {row:?}");
-    let Some(value) = *measured else { return assert!(matches!(verdict, Failed | LeftOut)) };
-    let is_within =
-        at_least.is_none_or(|least| value >= least) && at_most.is_none_or(|most| value <= most);
-    let expected = match (at_least.is_some() || at_most.is_some(), is_within) {
-        (false, _) => ForComparison,
-        (true, true) => Met,
-        (true, false) => Missed,
-    };
-    assert_eq!(*verdict, expected, "{name}: the verdict is that of value and bounds: {row:?}");
-    let explained = !measure.is_efficiency() || value <= EXPLAINED || !why.is_empty();
+    let Some(value) = *measured else { return assert!(matches!(found, Failed | LeftOut)) };
+    let expected = verdict(*at_least, *at_most, value);
+    assert_eq!(*found, expected, "{name}: the verdict is that of value and bounds: {row:?}");
+    let is_efficiency = Measure::named(&row.measure).is_some_and(Measure::is_efficiency);
+    let explained = !is_efficiency || value <= EXPLAINED || !why.is_empty();
     assert!(explained, "{name}: an efficiency above 1 has a reason: {row:?}");
 }
 
@@ -90,9 +81,9 @@ const EXPLAINED: f64 = 1.01;
 pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
     Judged {
         name: row.name.clone(),
-        runs: row.run.all().to_vec(),
+        runs: row.run.clone(),
         against: row.against.clone(),
-        measure: row.measure.to_string(),
+        measure: row.measure.name.to_owned(),
         at_least: row.at_least,
         at_most: row.at_most,
         measured: None,
@@ -102,61 +93,53 @@ pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
     }
 }
 
-fn verdict(row: &Row, value: f64) -> Verdict {
-    if row.at_least.is_none() && row.at_most.is_none() {
-        return Verdict::ForComparison;
-    }
+fn verdict(at_least: Option<f64>, at_most: Option<f64>, value: f64) -> Verdict {
     // NaN is within no bounds.
-    let above = row.at_least.is_none_or(|least| value >= least);
-    let below = row.at_most.is_none_or(|most| value <= most);
-    if above && below { Verdict::Met } else { Verdict::Missed }
+    let is_within =
+        at_least.is_none_or(|least| value >= least) && at_most.is_none_or(|most| value <= most);
+    match (at_least.is_some() || at_most.is_some(), is_within) {
+        (false, _) => Verdict::ForComparison,
+        (true, true) => Verdict::Met,
+        (true, false) => Verdict::Missed,
+    }
 }
 
 /// Returns the row's value, how it was measured, and the reason for an efficiency above 1.
-fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<(f64, String, String), String> {
-    if row.measure.kind() == Kind::Audit {
-        let name = &row.run.all()[0];
-        let audits: Vec<&Audited> =
-            lines.iter().filter_map(|line| audit_of(study, name, line)).collect();
+fn measured(
+    study: &Study,
+    row: &Row,
+    lines: &[Line],
+) -> Result<(f64, &'static str, String), String> {
+    let absent = |name: &String| format!("run {name} is not in the record");
+    if row.measure.input == Input::Audit {
+        let name = &row.run[0];
+        let audit = |line: &'_ Line| match &line.entry {
+            Entry::Audit(audited) if study.is_run(name, &audited.setup) => Some(audited.clone()),
+            _ => None,
+        };
+        let audits: Vec<Audited> = lines.iter().filter_map(audit).collect();
         if audits.is_empty() {
             return Err(absent(name));
         }
-        return Ok((row.measure.of_audits(&audits)?, "audited".to_owned(), String::new()));
+        return Ok((row.measure.of_audits(&audits)?, "audited", String::new()));
     }
     let groups = Groups::of(lines);
     let find = |name: &String| {
         let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
         found.ok_or_else(|| absent(name))
     };
-    let runs = row.run.all().iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
-    let against = row.against.as_ref().map(find).transpose()?;
-    let phases = row.phase.as_ref().map(OneOrMany::all).unwrap_or_default();
-    let sample = Sample { runs: &runs, against, phases, network: &groups.network };
-    let reference = against.unwrap_or(runs[0]);
-    let above_one = |run: &&Group| {
-        let e = run.efficiency(reference, &groups.network);
-        above_one(&e, &run.typical, &reference.typical).filter(|_| row.measure.is_efficiency())
-    };
-    let why = runs.iter().find_map(above_one).unwrap_or_default();
-    Ok((row.measure.of(&sample)?, worst_how(&runs).to_owned(), why))
-}
-
-fn absent(name: &str) -> String {
-    format!("run {name} is not in the record")
-}
-
-/// Returns how the least trustworthy run was measured.
-fn worst_how(runs: &[&Group]) -> &'static str {
+    let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
+    let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
+    let sample = Sample { runs: &runs, against, phases: &row.phase, network: &groups.network };
+    let efficiencies = runs.iter().map(|run| run.efficiency(against, &groups.network));
+    let efficiencies: Vec<Efficiency> =
+        efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
+    let why = above_one(&efficiencies, EXPERIMENT).unwrap_or_default();
+    // The least trustworthy run counts.
     let rank =
         |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
-    runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured")
-}
-
-fn audit_of<'a>(study: &Study, name: &str, line: &'a Line) -> Option<&'a Audited> {
-    match &line.entry {
-        Entry::Audit(audited) if study.is_run(name, &audited.setup) => Some(audited),
-        _ => None,
-    }
+    let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
+    Ok((row.measure.of(&sample)?, how, why))
 }
 
 /// Returns the reason for which a run failed, if it did.
@@ -169,9 +152,31 @@ fn failure(study: &Study, name: &str, lines: &[Line]) -> Option<String> {
     })
 }
 
+impl Judged {
+    /// Returns name, target, measured value, how it was measured, and verdict.
+    pub fn fields(&self) -> [String; 5] {
+        let measure = Measure::named(&self.measure);
+        let show = |value: f64| measure.map_or_else(|| value.to_string(), |m| (m.show)(value));
+        let bounds = [("at least ", self.at_least), ("at most ", self.at_most)];
+        let bounds = bounds.into_iter().filter_map(|(word, b)| Some(format!("{word}{}", show(b?))));
+        let target = bounds.collect::<Vec<_>>().join(", ");
+        let word = match self.verdict {
+            Verdict::Met => "met",
+            Verdict::Missed => "MISSED",
+            Verdict::ForComparison => "for comparison",
+            Verdict::Failed => "FAILED",
+            Verdict::LeftOut => "left out",
+        };
+        let why = if self.why.is_empty() { "" } else { ": " };
+        let verdict = format!("{word}{why}{}", self.why);
+        let dash = |text: String| if text.is_empty() { "-".to_owned() } else { text };
+        let measured = dash(self.measured.map(show).unwrap_or_default());
+        [self.name.clone(), dash(target), measured, dash(self.how.clone()), verdict]
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::file::EXPERIMENT;
     use super::*;
     use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
     use crate::testing::line;
@@ -285,17 +290,17 @@ mod tests {
         }
     }
 
-    fn planted(fault: impl Fn(&mut Judged), measure: Measure) {
+    fn planted(fault: impl Fn(&mut Judged)) {
         let targets = read(FILE).unwrap();
         let mut row = judge(&targets, &targets.row[0], &[ran(1, 9.0)]);
         fault(&mut row);
-        check_invariants(&row, measure);
+        check_invariants(&row);
     }
 
     #[test]
     #[should_panic(expected = "the verdict is that of value and bounds")]
     fn a_row_that_is_met_outside_its_bounds_is_noticed() {
-        planted(|row| row.at_most = Some(1.0), Measure::Seconds);
+        planted(|row| row.at_most = Some(1.0));
     }
 
     #[test]
@@ -304,13 +309,13 @@ mod tests {
         let left_out = |row: &mut Judged| {
             (row.measured, row.verdict, row.how) = (None, Verdict::LeftOut, String::new());
         };
-        planted(left_out, Measure::Seconds);
+        planted(left_out);
     }
 
     #[test]
     #[should_panic(expected = "an efficiency above 1 has a reason")]
     fn an_efficiency_above_1_without_a_reason_is_noticed() {
-        planted(|_| {}, Measure::Efficiency);
+        planted(|row| row.measure = "efficiency".into());
     }
 
     #[test]

@@ -8,7 +8,6 @@
 pub mod file;
 pub mod judge;
 pub mod measure;
-pub mod row;
 mod session;
 
 pub use file::Study;

@@ -2,15 +2,12 @@
 //!
 //! Repetitions are the outer loop, so that a drift of the machine affects all setups equally.
 
-use super::file::{EXPERIMENT, Experiment, Mesh, Row, RunSpec, Series, Study};
+use super::file::{EXPERIMENT, Experiment, Mesh, Row, Series, Study};
 use super::judge::{judge, unjudged};
-use super::row;
 use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
-use crate::experiments::execute::{Failed, has_message_matrix};
+use crate::experiments::execute::has_message_matrix;
 use crate::experiments::feasible;
-use crate::experiments::session::{
-    Bench, BenchError, Planned, SessionOptions, temporary_directory,
-};
+use crate::experiments::session::{Bench, BenchError, Planned, SessionOptions};
 use crate::experiments::sizing::Sizes;
 use crate::experiments::variant::Base;
 use contract::case::Case;
@@ -43,18 +40,11 @@ pub fn measure(
     programs: &Programs,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, BenchError> {
-    let place = temporary_directory()?;
+    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
+    let place = place.map_err(|error| format!("no temporary directory: {error}"))?;
     let bench = Bench::open(options, record, study.engines(), programs, place.path(), progress)?;
-    let mut session = Session {
-        bench,
-        study,
-        options,
-        bases: BTreeMap::new(),
-        meshes: BTreeMap::new(),
-        made: BTreeSet::new(),
-        warm: BTreeSet::new(),
-        network: false,
-    };
+    let (bases, made, warm) = Default::default();
+    let mut session = Session { bench, study, options, bases, made, warm };
     let series = study.series.iter().try_for_each(|series| session.series(series));
     let mut interrupted = match series {
         Err(BenchError::Interrupted) => true,
@@ -63,26 +53,29 @@ pub fn measure(
     let mut rows = Vec::new();
     for (i, row) in study.row.iter().enumerate() {
         interrupted |= interrupt::requested();
-        let judged = match interrupted {
-            true => Err(BenchError::Interrupted),
-            false => session.row(row),
-        };
-        let judged = match judged {
+        let judged = if interrupted { Err(BenchError::Interrupted) } else { session.row(row) };
+        rows.push(match judged {
             Err(BenchError::Interrupted) => {
                 interrupted = true;
+                // A row that was not measured before the interruption is not a result.
                 unjudged(row, Verdict::LeftOut, "interrupted".to_owned())
             }
-            judged => judged?,
-        };
-        // A row that was not measured before the interruption is not a result.
-        if !interrupted {
-            let of = format!("row {} of {}", i + 1, study.row.len());
-            (session.bench.progress)(&format!("{of}: {}", row::line(study, &judged)));
-            session.bench.append(Entry::Target(judged.clone()))?;
-        }
-        rows.push(judged);
+            judged => {
+                let judged = judged?;
+                let [name, target, value, how, verdict] = judged.fields();
+                let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
+                (session.bench.progress)(&format!("row {} of {}: {line}", i + 1, study.row.len()));
+                session.bench.append(Entry::Target(judged.clone()))?;
+                judged
+            }
+        });
     }
-    let missing = session.missing();
+    let needs_mpi =
+        |row: &Row| study.runs_of(row).into_iter().any(|name| study.run[name].comm == Comm::Mpi);
+    let is_missing = !options.no_mpi && !options.launcher.is_found();
+    let program = options.launcher.program();
+    let missing = (is_missing && study.row.iter().any(needs_mpi))
+        .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
 }
 
@@ -93,88 +86,72 @@ struct Session<'a> {
     options: &'a SessionOptions,
     /// Geometries read so far, by their source, with the known sizes of their meshes by n.
     bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
-    /// Meshes with a written case file, or the reason for a failure.
-    meshes: BTreeMap<String, Result<Ready, String>>,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
     warm: BTreeSet<(String, PathBuf)>,
-    /// Whether latency and bandwidth were measured.
-    network: bool,
-}
-
-/// A mesh that can be generated.
-#[derive(Clone, Debug)]
-struct Ready {
-    case: PathBuf,
-    spacing_min: f64,
-    layer_cells_min: u32,
 }
 
 impl Session<'_> {
     /// Runs a series: every size by all programs in turn.
     fn series(&mut self, series: &Series) -> Result<(), BenchError> {
-        let no_mpi = self.mpi_left_out().is_some();
-        let mesh = Mesh { case: Some(series.case.clone()), ..Mesh::default() };
-        let input = |failed| match failed {
-            Failed::Interrupted => BenchError::Interrupted,
-            Failed::Reason(why) => BenchError::Input(format!("{}: {why}", series.case)),
-        };
-        let (experiment, key) = (series.experiment, self.base(&series.case, &mesh).map_err(input)?);
-        let base = self.bases[&key].0.clone();
-        let layers = if series.layers.is_empty() {
-            vec![base.layer_cells_min]
-        } else {
-            series.layers.clone()
-        };
         for cells in series.sizes() {
             let mut points = Vec::new();
             for engine in &series.engines {
-                let description = self.bench.runner.programs.labelled(engine).description().clone();
-                let layouts = series.layouts(&description, no_mpi);
-                if layouts.is_empty() {
-                    (self.bench.progress)(&format!("{engine} cannot run the series {experiment}"));
-                }
-                for (&n, &(comm, ranks)) in
-                    layers.iter().flat_map(|n| layouts.iter().map(move |l| (n, l)))
-                {
-                    for spacing in self.spacings(&key, experiment, cells, ranks).map_err(input)? {
-                        let case = base.variant(spacing, n).map_err(BenchError::Input)?;
-                        let setup = Setup {
-                            experiment: experiment.to_string(),
-                            engine: engine.clone(),
-                            ranks,
-                            comm,
-                            ..Setup::serial(&base.name, spacing, n)
-                        };
-                        let read = Case::read(&case)
-                            .map_err(|error| BenchError::Input(error.to_string()))?;
-                        if let Some(why) = description.declines(&read) {
-                            self.bench.leave_out(setup, why)?;
-                            continue;
-                        }
-                        let choices = series.choices().iter();
-                        points.extend(choices.map(|&(weights, partitioner, weight_exposed)| {
-                            Planned {
-                                setup: Setup {
-                                    weights: weights.to_owned(),
-                                    partitioner: partitioner.to_owned(),
-                                    weight_exposed,
-                                    ..setup.clone()
-                                },
-                                case: case.clone(),
-                                repeats: self.options.repeats(series.repeats),
-                                warm_up: true,
-                                audit: false,
-                                failed: false,
-                            }
-                        }));
-                    }
-                }
+                points.extend(self.points(series, engine, cells)?);
             }
             self.make(&mut points)?;
         }
         Ok(())
+    }
+
+    /// Plans the runs of a series by one engine at one size; those of cases that it declines are left out.
+    fn points(
+        &mut self,
+        series: &Series,
+        engine: &str,
+        cells: Option<f64>,
+    ) -> Result<Vec<Planned>, BenchError> {
+        let description = self.bench.runner.programs.labelled(engine).description().clone();
+        let layouts = series.layouts(&description, self.mpi_left_out().is_some());
+        if layouts.is_empty() {
+            let experiment = series.experiment;
+            (self.bench.progress)(&format!("{engine} cannot run the series {experiment}"));
+        }
+        let mesh = Mesh { case: Some(series.case.clone()), ..Mesh::default() };
+        let key = self.base(&series.case, &mesh)?;
+        let of_case = [self.bases[&key].0.layer_cells_min];
+        let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
+        let mut points = Vec::new();
+        for &n in layers {
+            for &(comm, ranks) in &layouts {
+                for spacing in self.spacings(&key, series.experiment, cells, ranks)? {
+                    let base = &self.bases[&key].0;
+                    let path = base.variant(spacing, n)?;
+                    let setup = Setup {
+                        experiment: series.experiment.to_string(),
+                        engine: engine.to_owned(),
+                        ranks,
+                        comm,
+                        ..Setup::serial(&base.name, spacing, n)
+                    };
+                    let case = Case::read(&path).map_err(|error| error.to_string())?;
+                    if let Some(why) = description.declines(&case) {
+                        self.bench.leave_out(setup, why)?;
+                        continue;
+                    }
+                    points.extend(series.choices().iter().map(|&choice| {
+                        let (weights, partitioner, weight_exposed) = choice;
+                        let (weights, partitioner) = (weights.to_owned(), partitioner.to_owned());
+                        let setup = Setup { weights, partitioner, weight_exposed, ..setup.clone() };
+                        let repeats = self.options.repeats(series.repeats);
+                        let (case, audit, failed) = (path.clone(), false, false);
+                        Planned { setup, case, repeats, warm_up: true, audit, failed }
+                    }));
+                }
+            }
+        }
+        Ok(points)
     }
 
     /// Returns the spacings of the meshes of a series for a number of ranks.
@@ -184,7 +161,7 @@ impl Session<'_> {
         experiment: Experiment,
         cells: Option<f64>,
         ranks: usize,
-    ) -> Result<Vec<f64>, Failed> {
+    ) -> Result<Vec<f64>, BenchError> {
         let base = &self.bases[key].0;
         let (Some(cells), n) = (cells, base.layer_cells_min) else {
             return Ok(vec![base.spacing_min]);
@@ -200,7 +177,7 @@ impl Session<'_> {
     }
 
     /// Returns the spacing that gives about this number of cells.
-    fn spacing(&mut self, key: &str, n: u32, cells: f64) -> Result<f64, Failed> {
+    fn spacing(&mut self, key: &str, n: u32, cells: f64) -> Result<f64, BenchError> {
         let (base, sizes) = self.bases.get_mut(key).expect("the geometry was read");
         let runner = &self.bench.runner;
         sizes.entry(n).or_default().spacing(cells, base.coarse(), |s| runner.count(base, s, n))
@@ -211,26 +188,45 @@ impl Session<'_> {
         let study = self.study;
         let mut points = Vec::new();
         for name in study.runs_of(row) {
-            let spec = &study.run[name];
-            if let Some(why) = self.mpi_left_out().filter(|_| spec.comm == Comm::Mpi) {
+            let is_mpi = study.run[name].comm == Comm::Mpi;
+            if let Some(why) = self.mpi_left_out().filter(|_| is_mpi) {
                 return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
             }
-            if self.made.insert(name.clone()) {
-                match self.ready(&spec.mesh) {
-                    Ok(ready) => points.push(self.point(spec, ready)),
-                    Err(Failed::Interrupted) => return Err(BenchError::Interrupted),
-                    Err(Failed::Reason(why)) => {
-                        self.made.remove(name);
-                        return Ok(unjudged(row, Verdict::Failed, why));
-                    }
+            if self.made.contains(name) {
+                continue;
+            }
+            match self.point(name) {
+                Ok(point) => points.push(point),
+                Err(BenchError::Interrupted) => return Err(BenchError::Interrupted),
+                Err(BenchError::Input(why)) => {
+                    let why = format!("mesh {}: {why}", study.run[name].mesh);
+                    return Ok(unjudged(row, Verdict::Failed, why));
                 }
             }
         }
         self.make(&mut points)?;
+        self.made.extend(study.runs_of(row).into_iter().cloned());
         Ok(judge(study, row, &self.bench.lines))
     }
 
-    fn point(&self, spec: &RunSpec, ready: Ready) -> Planned {
+    /// Plans the run of this name, and writes its case.
+    fn point(&mut self, name: &str) -> Result<Planned, BenchError> {
+        let spec = &self.study.run[name];
+        let mesh = &self.study.mesh[&spec.mesh];
+        let key = self.base(&spec.mesh, mesh)?;
+        let base = self.bases[&key].0.clone();
+        let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
+        let (case, spacing) = match mesh.cells {
+            None => {
+                let spacing = mesh.spacing_min.unwrap_or(base.spacing_min);
+                (base.in_own_root(spacing, n), spacing)
+            }
+            Some(cells) => {
+                (self.bench.progress)(&format!("{}: looking for the spacing", spec.mesh));
+                let spacing = self.spacing(&key, n, cells)?;
+                (base.variant(spacing, n), spacing)
+            }
+        };
         let repeats = self.options.repeats(spec.repeats);
         let setup = Setup {
             experiment: EXPERIMENT.to_owned(),
@@ -238,10 +234,11 @@ impl Session<'_> {
             comm: spec.comm,
             partitioner: spec.partitioner.clone(),
             weights: spec.weights.clone(),
-            ..Setup::serial(&spec.mesh, ready.spacing_min, ready.layer_cells_min)
+            ..Setup::serial(&spec.mesh, spacing, n)
         };
         let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);
-        Planned { setup, case: ready.case, repeats, warm_up, audit: spec.audit, failed: false }
+        let case = case?;
+        Ok(Planned { setup, case, repeats, warm_up, audit: spec.audit, failed: false })
     }
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
@@ -255,17 +252,14 @@ impl Session<'_> {
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
     /// the time or the memory is not run on that mesh.
     fn make(&mut self, points: &mut [Planned]) -> Result<(), BenchError> {
-        if !self.network && points.iter().any(|p| p.setup.comm == Comm::Sim) {
-            self.network = true;
+        if points.iter().any(|p| p.setup.comm == Comm::Sim) {
             self.bench.measure_network()?;
         }
         for index in warmers(points) {
-            let point = &points[index];
-            let mesh = (point.setup.engine.clone(), point.case.clone());
+            let (mesh, setup) = (points[index].mesh(), points[index].setup.clone());
             if !self.warm.insert(mesh.clone()) {
                 continue;
             }
-            let setup = point.setup.clone();
             match feasible::excess(&self.bench.lines, &setup, self.bench.runner.limit) {
                 None => self.bench.run(&mut points[index], 0, true)?,
                 Some(why) => {
@@ -275,86 +269,29 @@ impl Session<'_> {
             }
         }
         for repeat in 0..points.iter().map(|p| p.repeats).max().unwrap_or(0) {
-            for point in points.iter_mut().filter(|p| repeat < p.repeats) {
-                match point.audit {
-                    _ if point.failed => {}
-                    true => self.bench.audit(point)?,
-                    false => self.bench.run(point, repeat, false)?,
-                }
+            for point in points.iter_mut().filter(|p| repeat < p.repeats && !p.failed) {
+                self.bench.run(point, repeat, false)?;
             }
         }
         Ok(())
     }
 
-    /// Returns the case file of a mesh, which is written once.
-    fn ready(&mut self, name: &str) -> Result<Ready, Failed> {
-        if let Some(known) = self.meshes.get(name) {
-            return known.clone().map_err(Failed::Reason);
-        }
-        let made = match self.prepare(name) {
-            Err(Failed::Interrupted) => return Err(Failed::Interrupted),
-            Err(Failed::Reason(why)) => Err(format!("mesh {name}: {why}")),
-            Ok(ready) => Ok(ready),
-        };
-        self.meshes.insert(name.to_owned(), made.clone());
-        made.map_err(Failed::Reason)
-    }
-
-    fn prepare(&mut self, name: &str) -> Result<Ready, Failed> {
-        let mesh = &self.study.mesh[name];
-        let key = self.base(name, mesh)?;
-        let base = self.bases[&key].0.clone();
-        let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
-        let (case, spacing_min) = match mesh.cells {
-            None => {
-                let spacing = mesh.spacing_min.unwrap_or(base.spacing_min);
-                (base.in_own_root(spacing, n), spacing)
-            }
-            Some(cells) => {
-                (self.bench.progress)(&format!("{name}: looking for the spacing"));
-                let spacing = self.spacing(&key, n, cells)?;
-                (base.variant(spacing, n), spacing)
-            }
-        };
-        Ok(Ready { case: case.map_err(Failed::Reason)?, spacing_min, layer_cells_min: n })
-    }
-
     /// Writes the geometry of a mesh as a binary STL file, once; returns its key.
-    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, Failed> {
+    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, BenchError> {
         let Mesh { case, geometry, generator, root_scale, .. } = mesh;
         let key = format!("{case:?} {geometry:?} {generator:?} {root_scale:?}");
         if self.bases.contains_key(&key) {
             return Ok(key);
         }
         (self.bench.progress)(&format!("{name}: reading the geometry"));
-        let place = self.bench.runner.place;
+        let (place, directory) = (self.bench.runner.place, &self.study.directory);
         let path = match case {
-            Some(case) => {
-                let catalogue = &self.bench.runner.programs.paths.catalogue;
-                catalogue.case_file(case, &self.study.directory).map_err(Failed::Reason)?
-            }
-            None => {
-                let path = place.join(format!("{name}-given.toml"));
-                let text = given_case(mesh, &self.study.directory).map_err(Failed::Reason)?;
-                let wrong = |error| Failed::Reason(format!("{}: {error}", path.display()));
-                std::fs::write(&path, text).map_err(wrong)?;
-                path
-            }
+            Some(case) => self.bench.runner.programs.paths.catalogue.case_file(case, directory),
+            None => given_case(mesh, directory, place.join(format!("{name}-given.toml"))),
         };
-        let base = Base::read(&path, place).map_err(Failed::Reason)?;
+        let base = path.and_then(|path| Base::read(&path, place))?;
         self.bases.insert(key.clone(), (base, BTreeMap::new()));
         Ok(key)
-    }
-
-    /// Returns the missing prerequisite of skipped rows; `None` if the user excluded them.
-    fn missing(&self) -> Option<String> {
-        let needs_mpi = |row: &Row| {
-            self.study.runs_of(row).iter().any(|n| self.study.run[*n].comm == Comm::Mpi)
-        };
-        let missing = !self.options.no_mpi && !self.options.launcher.is_found();
-        let missing = missing && self.study.row.iter().any(needs_mpi);
-        let program = self.options.launcher.program();
-        missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()))
     }
 }
 
@@ -376,20 +313,20 @@ fn warmers(points: &[Planned]) -> Vec<usize> {
     best
 }
 
-/// Returns a case file for a geometry that was given without one.
-fn given_case(mesh: &Mesh, directory: &Path) -> Result<String, String> {
+/// Writes a case file for a geometry that was given without one; returns its path.
+fn given_case(mesh: &Mesh, directory: &Path, path: PathBuf) -> Result<PathBuf, String> {
+    let wrong = |error| format!("{}: {error}", path.display());
     let mut table = toml::Table::new();
     if let Some(file) = &mesh.geometry {
-        let path = std::path::absolute(directory.join(file)).map_err(|error| error.to_string())?;
-        table.insert("geometry".into(), path.to_string_lossy().into_owned().into());
+        let file = std::path::absolute(directory.join(file)).map_err(wrong)?;
+        table.insert("geometry".into(), file.to_string_lossy().into_owned().into());
     }
-    if let Some(generator) = &mesh.generator {
-        table.insert("generator".into(), generator.clone().into());
-    }
+    table.extend(mesh.generator.clone().map(|generator| ("generator".into(), generator.into())));
     for (key, value) in [("root_scale", mesh.root_scale), ("spacing_min", mesh.spacing_min)] {
         table.extend(value.map(|v| (key.to_owned(), v.into())));
     }
-    Ok(table.to_string())
+    std::fs::write(&path, table.to_string()).map_err(wrong)?;
+    Ok(path)
 }
 
 #[cfg(test)]

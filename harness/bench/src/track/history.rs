@@ -11,17 +11,17 @@
 //! if false)}`.
 
 use super::unit;
-use crate::gate::measures::{CaseMeasures, Measures};
+use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::phases::{CPU, WALL};
-use crate::gate::report::{GateReport, LayerName};
+use crate::gate::report::GateReport;
+use crate::git;
 use crate::jsonl::{self, Line};
 use crate::origin::Origins;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::io;
 use std::path::Path;
-use std::process::Command;
 
 /// Version of a line.
 pub const SCHEMA: &str = "octree-track/1";
@@ -61,19 +61,10 @@ impl Record {
     /// # Errors
     /// One sentence, if git does not find the commit.
     pub fn of_commit(named: &str, repository: &Path) -> Result<Self, String> {
-        let mut git = Command::new("git");
-        git.arg("-C").arg(repository).args([
-            "log",
-            "-1",
-            "--format=%H%n%cI%n%s",
-            "--end-of-options",
-            named,
-        ]);
-        let output = git.output().map_err(|error| format!("git: {error}"))?;
-        if !output.status.success() {
-            return Err(format!("git knows no commit {named} in {}", repository.display()));
-        }
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let format = "--format=%H%n%cI%n%s";
+        let text = git(repository, &["log", "-1", format, "--end-of-options", named]);
+        let place = repository.display();
+        let text = text.ok_or_else(|| format!("git knows no commit {named} in {place}"))?;
         let mut lines = text.lines().map(str::to_owned);
         let mut next = || lines.next().unwrap_or_default();
         let (commit, time, subject) = (next(), next(), next());

@@ -10,8 +10,7 @@
 //! commits are those of the history; p is a probability.
 
 pub mod history;
-pub mod link;
-pub mod summary;
+mod summary;
 
 pub use summary::summary;
 
@@ -36,24 +35,26 @@ pub struct Series {
     pub unit: &'static str,
     /// Index of the record and value.
     pub points: Vec<(usize, f64)>,
-    /// The steps.
+    /// The steps, then the drifts.
     pub changes: Vec<Change>,
-    /// The slow changes.
-    pub drifts: Vec<Drift>,
 }
 
-/// A step.
+/// A step, or a drift: a slow change over many commits.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Index of the first new value in `points`.
+    /// Whether it is a drift.
+    pub is_drift: bool,
+    /// Index in `points` of the last old value; of a drift, of its first value.
+    pub from: usize,
+    /// Index of the first new value; of a drift, of its last value.
     pub at: usize,
-    /// The last commit with the old values.
+    /// The commit of the value `from`.
     pub last_old: String,
-    /// The first commit with the new ones.
+    /// The commit of the value `at`.
     pub first_new: String,
-    /// Median of the values since the previous change.
+    /// Median of the values since the previous step, or the mean at the first commit of a drift.
     pub before: f64,
-    /// Median of the values up to the next change.
+    /// Median of the values up to the next step, or the mean at the last commit of a drift.
     pub after: f64,
     /// Relative change in percent; `None` if it was 0.
     pub percent: Option<f64>,
@@ -63,71 +64,41 @@ pub struct Change {
     pub accepted: bool,
 }
 
-/// A slow change over many commits.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Drift {
-    /// Index of its first value in `points`.
-    pub from: usize,
-    /// Index after its last value.
-    pub until: usize,
-    /// Its first commit.
-    pub first: String,
-    /// Its last commit.
-    pub last: String,
-    /// Mean at the first commit.
-    pub before: f64,
-    /// Mean at the last commit.
-    pub after: f64,
-    /// Relative change in percent; `None` if it was 0.
-    pub percent: Option<f64>,
-    /// The p-value of the permutation test.
-    pub p: f64,
-}
-
 impl Series {
+    /// The steps alone.
+    fn steps(&self) -> impl Iterator<Item = &Change> {
+        self.changes.iter().filter(|change| !change.is_drift)
+    }
+
     /// Executes the invariants at the head of this file.
     fn check_invariants(&self, records: &[Record]) {
-        let Self { name, points, changes, drifts, .. } = self;
-        let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
-        let is_within = |value: f64, part: &[f64]| {
-            let least = part.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let Self { name, points, changes, .. } = self;
+        let is_within = |value: f64, part: &[(usize, f64)]| {
+            let least = part.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+            let most = part.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
             (least..=most).contains(&value)
         };
-        let commit = |at: usize| &records[points[at].0].commit;
-        for (i, change) in changes.iter().enumerate() {
-            let from = if i == 0 { 0 } else { changes[i - 1].at };
-            let until = changes.get(i + 1).map_or(values.len(), |next| next.at);
-            assert!(from < change.at && change.at < until, "{name}: steps in order: {change:?}");
-            let (old, new) = (&values[from..change.at], &values[change.at..until]);
-            let beside = is_within(change.before, old) && is_within(change.after, new);
-            assert!(beside, "{name}: values beside a step are of their segments: {change:?}");
-            let commits = [&change.last_old, &change.first_new];
-            assert_eq!(
-                commits,
-                [commit(change.at - 1), commit(change.at)],
-                "{name}: commits of a step"
-            );
+        let mut from = 0;
+        let ends = self.steps().map(|step| step.at).skip(1).chain([points.len()]);
+        for (step, until) in self.steps().zip(ends) {
+            let at = step.at;
+            assert!(from < at && at < until && step.from + 1 == at, "{name}: in order: {step:?}");
+            let (old, new) = (&points[from..at], &points[at..until]);
+            let beside = is_within(step.before, old) && is_within(step.after, new);
+            assert!(beside, "{name}: values beside a step are of their segments: {step:?}");
+            from = at;
         }
-        for drift in drifts {
-            assert!(drift.from < drift.until && drift.until <= values.len(), "{name}: {drift:?}");
-            let commits = [&drift.first, &drift.last];
+        for change in changes {
+            let Change { from, at, last_old, first_new, before, after, p, .. } = change;
+            assert!(from <= at && *at < points.len(), "{name}: within the series: {change:?}");
+            let commits = [from, at].map(|at| &records[points[*at].0].commit);
+            assert_eq!([last_old, first_new], commits, "{name}: commits of a step or a drift");
+            let by = percent(*before, *after);
             assert_eq!(
-                commits,
-                [commit(drift.from), commit(drift.until - 1)],
-                "{name}: commits of a drift"
-            );
-        }
-        let steps = changes.iter().map(|c| (c.before, c.after, c.percent, c.p));
-        for (before, after, by, p) in
-            steps.chain(drifts.iter().map(|d| (d.before, d.after, d.percent, d.p)))
-        {
-            assert_eq!(
-                by,
-                percent(before, after),
+                change.percent, by,
                 "{name}: the percentage is that of {before} and {after}"
             );
-            assert!(p > 0.0 && p <= 1.0, "{name}: {p} is a probability");
+            assert!(*p > 0.0 && *p <= 1.0, "{name}: {p} is a probability");
         }
     }
 
@@ -139,7 +110,7 @@ impl Series {
     /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
     /// `recent`.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
-        let last = self.changes.last()?;
+        let last = self.steps().last()?;
         let new = self.points.len() - last.at <= recent;
         (self.is_cost() && new && !last.accepted && last.after > last.before).then_some(last)
     }
@@ -208,35 +179,29 @@ fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
 fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Record]) -> Series {
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
     let commit = |at: usize| records[points[at].0].commit.clone();
-    let changes = (0..found.steps.len()).map(|i| {
-        let Step { at, p } = found.steps[i];
+    let change = |is_drift, [from, at]: [usize; 2], [before, after]: [f64; 2], p| Change {
+        is_drift,
+        from,
+        at,
+        last_old: commit(from),
+        first_new: commit(at),
+        before,
+        after,
+        percent: percent(before, after),
+        p,
+        accepted: !is_drift && is_accepted(at, &points, records),
+    };
+    let mut changes = Vec::new();
+    for (i, &Step { at, p }) in found.steps.iter().enumerate() {
         let from = if i == 0 { 0 } else { found.steps[i - 1].at };
         let until = found.steps.get(i + 1).map_or(values.len(), |next| next.at);
-        let (before, after) = (median_of(&values[from..at]), median_of(&values[at..until]));
-        Change {
-            at,
-            last_old: commit(at - 1),
-            first_new: commit(at),
-            before,
-            after,
-            percent: percent(before, after),
-            p,
-            accepted: is_accepted(at, &points, records),
-        }
-    });
-    let changes = changes.collect();
-    let drifts = found.drifts.iter().map(|drift| Drift {
-        from: drift.from,
-        until: drift.until,
-        first: commit(drift.from),
-        last: commit(drift.until - 1),
-        before: drift.before,
-        after: drift.after,
-        percent: percent(drift.before, drift.after),
-        p: drift.p,
-    });
-    let drifts = drifts.collect();
-    Series { name: name.to_owned(), unit: unit(name), changes, drifts, points }
+        let medians = [&values[from..at], &values[at..until]].map(median_of);
+        changes.push(change(false, [at - 1, at], medians, p));
+    }
+    changes.extend(found.drifts.iter().map(|drift| {
+        change(true, [drift.from, drift.until - 1], [drift.before, drift.after], drift.p)
+    }));
+    Series { name: name.to_owned(), unit: unit(name), changes, points }
 }
 
 /// The change relative to a value that is not 0, in percent.
@@ -297,9 +262,8 @@ mod tests {
             record.metrics.insert("uav/words".into(), 1000.0 + 5.0 * i as f64 + 8.0 * noise);
         }
         let all = analyse(&records, &Rules::default());
-        assert!(all[1].changes.is_empty(), "{:?}", all[1].changes);
-        let [drift] = &all[1].drifts[..] else { panic!("{:?}", all[1].drifts) };
-        assert_eq!((drift.from, drift.until), (0, 30));
+        let [drift] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
+        assert_eq!((drift.is_drift, drift.from, drift.at), (true, 0, 29));
         assert!((13.0..16.0).contains(&drift.percent.unwrap()), "{drift:?}");
         assert!(summary(&all).contains("drifts from"), "{}", summary(&all));
     }

@@ -5,37 +5,23 @@ use super::Series;
 /// Returns a text with one step or drift per line.
 pub fn summary(all: &[Series]) -> String {
     let short = |commit: &str| commit.chars().take(12).collect::<String>();
-    let relative =
-        |percent: Option<f64>| percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
     let mut text = String::new();
     for series in all {
-        // Counts are exact.
-        let shown = |value| if series.unit == "count" { value } else { rounded(value) };
-        let unit = if series.unit == "count" { String::new() } else { format!(" {}", series.unit) };
+        let is_count = series.unit == "count";
+        let unit = if is_count { String::new() } else { format!(" {}", series.unit) };
         for change in &series.changes {
-            text.push_str(&format!(
-                "{}: {} -> {}{unit} ({}) in {}..{}, p = {:.2e}{}\n",
-                series.name,
-                shown(change.before),
-                shown(change.after),
-                relative(change.percent),
-                short(&change.last_old),
-                short(&change.first_new),
-                change.p,
-                if change.accepted { ", accepted" } else { "" }
-            ));
-        }
-        for drift in &series.drifts {
-            text.push_str(&format!(
-                "{}: drifts from {} to {}{unit} ({}) over {}..{}, p = {:.2e}\n",
-                series.name,
-                rounded(drift.before),
-                rounded(drift.after),
-                relative(drift.percent),
-                short(&drift.first),
-                short(&drift.last),
-                drift.p
-            ));
+            // Counts are exact, but not their mean.
+            let exact = is_count && !change.is_drift;
+            let shown = |value| if exact { value } else { rounded(value) };
+            let [before, after] = [change.before, change.after].map(shown);
+            let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
+            let commits = format!("{}..{}", short(&change.last_old), short(&change.first_new));
+            let what = match change.is_drift {
+                true => format!("drifts from {before} to {after}{unit} ({by}) over {commits}"),
+                false => format!("{before} -> {after}{unit} ({by}) in {commits}"),
+            };
+            let accepted = if change.accepted { ", accepted" } else { "" };
+            text += &format!("{}: {what}, p = {:.2e}{accepted}\n", series.name, change.p);
         }
     }
     if text.is_empty() {

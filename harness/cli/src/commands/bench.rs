@@ -1,13 +1,15 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
-use super::files::{prepare, put};
+use super::files::put;
 use super::programs::ProgramArguments;
-use bench::experiments::entry::{Entry, Judged, Line, Machine, Verdict};
+use crate::failure::Failure;
+use bench::experiments::entry::{Entry, Judged, Line, Verdict};
 use bench::experiments::group::Groups;
 use bench::experiments::record::{self, Content};
 use bench::experiments::session::{BenchError, SessionOptions};
 use bench::study::{self, Study};
 use clap::Args;
+use contract::files::named;
 use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
@@ -17,7 +19,9 @@ use run::engine::runner::Engine;
 use run::verify::report::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
 };
+use rustix::fs::{Access, access};
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -51,77 +55,72 @@ pub struct Arguments {
 }
 
 /// Measures, or reads an existing record with `--show`, and prints; returns the exit code.
-pub fn run(arguments: Arguments) -> u8 {
-    let code = match arguments.show {
-        true => show(&arguments),
-        false => measure(&arguments),
-    };
-    let code = code.unwrap_or_else(|code| code);
-    let Some(directory) = &arguments.report else { return code };
-    match super::report::write(directory, &[], None) {
-        Ok(()) => code,
-        Err(why) => exit_first(code, refuse(why)),
+///
+/// # Errors
+/// If the study or the record is invalid, a program is missing, or a report cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let code = if arguments.show { show(arguments)? } else { measure(arguments)? };
+    if let Some(directory) = &arguments.report {
+        super::report::write(directory, &[])
+            .map_err(|why| Failure { code: exit_first(code, EXIT_INPUT), why })?;
     }
-}
-
-fn refuse(why: String) -> u8 {
-    eprintln!("harness: {why}");
-    EXIT_INPUT
+    Ok(code)
 }
 
 /// Reads the study, restricted to the names of `--only`.
-fn read(arguments: &Arguments) -> Result<Study, u8> {
+fn read(arguments: &Arguments) -> Result<Study, String> {
     let default = || Paths::find().root.join("reports/small.toml");
     let file = arguments.file.clone().unwrap_or_else(default);
-    let mut study = Study::read(&file).map_err(refuse)?;
-    study.only(&arguments.only).map_err(|why| refuse(format!("{}: {why}", file.display())))?;
+    let mut study = Study::read(&file)?;
+    study.only(&arguments.only).map_err(|why| format!("{}: {why}", file.display()))?;
     for series in study.series.iter_mut().filter(|_| !arguments.engine.is_empty()) {
         series.engines.clone_from(&arguments.engine);
     }
     Ok(study)
 }
 
-fn measure(arguments: &Arguments) -> Result<u8, u8> {
-    let page = arguments.report.as_ref().map(|directory| directory.join("index.html"));
-    page.iter().try_for_each(|page| prepare(page)).map_err(|error| refuse(error.to_string()))?;
+fn measure(arguments: &Arguments) -> Result<u8, Failure> {
+    if let Some(directory) = &arguments.report {
+        // A report that could not be written is refused before the runs.
+        fs::create_dir_all(directory).map_err(|error| named(directory, &error))?;
+        // A trial file would remain if a signal arrived at that moment.
+        access(directory, Access::WRITE_OK | Access::EXEC_OK)
+            .map_err(|error| named(directory, &error.into()))?;
+    }
     let mut study = read(arguments)?;
     let programs = programs(arguments, &mut study)?;
     let record = record_path(arguments);
     let start = Instant::now();
     let mut progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&arguments.session, &record, &study, &programs, &mut progress);
-    let outcome = outcome.map_err(|error| refuse(error.to_string()))?;
-    let written = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
+    let outcome = study::measure(&arguments.session, &record, &study, &programs, &mut progress)
+        .map_err(Failure::input)?;
+    let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", record.display());
     if outcome.interrupted {
         eprintln!("harness: {}", BenchError::Interrupted);
         return Ok(EXIT_INTERRUPTED);
     }
-    let code = exit_first(
-        code(&study, &outcome.rows, &outcome.lines),
-        written.err().unwrap_or(EXIT_HOLDS),
-    );
-    match &outcome.missing {
+    match outcome.missing {
         Some(missing) => {
             eprintln!("harness: {missing}");
-            Ok(exit_first(code, EXIT_MISSING))
+            Ok(exit_first(code?, EXIT_MISSING))
         }
-        None => Ok(code),
+        None => code,
     }
 }
 
 /// Finds the programs, and replaces the names in the series by those of the results.
-fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, u8> {
+fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, Failure> {
     let given = arguments.programs.given();
     let names = study.engines();
     let mut foreign = names.iter().filter(|name| !is_own(name));
     if names.len() > 1 && given.mesher.is_some() {
-        return Err(refuse("--mesher replaces the program of one engine: name one".to_owned()));
+        return Err(Failure::input("--mesher replaces the program of one engine: name one"));
     }
     let first = foreign.next().map_or("mesher", String::as_str);
-    let mut programs = Programs::find_with_engine(first, given).map_err(refuse)?;
+    let mut programs = Programs::find_with_engine(first, given)?;
     for name in foreign {
-        programs.others.push(Engine::find(name, None, &programs.paths).map_err(refuse)?);
+        programs.others.push(Engine::find(name, None, &programs.paths)?);
     }
     let mut found: BTreeMap<&str, &Engine> = BTreeMap::new();
     for name in &names {
@@ -130,28 +129,27 @@ fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, u8> {
         let engine = engine.expect("every engine was found");
         let label = engine.label();
         if found.values().any(|other| other.label() == label) {
-            return Err(refuse(format!("two programs of one name, {label}: rename a file")));
+            return Err(Failure::input(format!(
+                "two programs of one name, {label}: rename a file"
+            )));
         }
         found.insert(name, engine);
     }
-    found.values().try_for_each(|engine| require(engine.program()))?;
     // Our mesher chooses the spacings, also for other engines.
-    if names.iter().any(|name| name != "reference") {
-        require(programs.mesher.program())?;
+    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
+    for engine in found.values().copied().chain(also) {
+        let program = engine.program();
+        if !program.is_file() {
+            let program = program.display();
+            return Err(Failure::missing(format!(
+                "{program} is missing: build it or give its path"
+            )));
+        }
     }
     for engine in study.series.iter_mut().flat_map(|series| &mut series.engines) {
         *engine = found[engine.as_str()].label();
     }
     Ok(programs)
-}
-
-/// Checks that a program to be measured exists.
-fn require(program: &Path) -> Result<(), u8> {
-    if program.is_file() {
-        return Ok(());
-    }
-    eprintln!("harness: {} is missing: build it or give its path", program.display());
-    Err(EXIT_MISSING)
 }
 
 /// Returns the record to append to.
@@ -161,26 +159,25 @@ fn record_path(arguments: &Arguments) -> PathBuf {
     given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
 }
 
-fn show(arguments: &Arguments) -> Result<u8, u8> {
+fn show(arguments: &Arguments) -> Result<u8, Failure> {
     let study = read(arguments)?;
     let path = record_path(arguments);
-    let Content { lines, broken } =
-        record::read(&path).map_err(|error| refuse(format!("{}: {error}", path.display())))?;
+    let Content { lines, broken } = record::read(&path).map_err(|error| named(&path, &error))?;
     for (line, why) in &broken {
         eprintln!("harness: line {line} is skipped: {why}");
     }
     let rows = study::judged(&study, &lines);
-    let written = publish(&study, &rows, &lines, arguments.report.as_deref());
-    Ok(exit_first(code(&study, &rows, &lines), written.err().unwrap_or(EXIT_HOLDS)))
+    publish(&study, &rows, &lines, arguments.report.as_deref())
 }
 
-/// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given.
+/// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given; returns the exit
+/// code.
 fn publish(
     study: &Study,
     rows: &[Judged],
     lines: &[Line],
     report: Option<&Path>,
-) -> Result<(), u8> {
+) -> Result<u8, Failure> {
     if !study.series.is_empty() {
         print!("{}", tables::text(&Groups::of(lines)));
         for line in lines {
@@ -189,29 +186,27 @@ fn publish(
             }
         }
     }
+    let code = code(study, rows, lines);
     if study.row.is_empty() {
-        return Ok(());
+        return Ok(code);
     }
-    print!("{}", page::text(study, rows));
-    let Some(directory) = report else { return Ok(()) };
-    let path = directory.join(PAGE);
-    put(&path, &page::markdown(study, rows, &machine(lines)))
-        .map_err(|error| refuse(error.to_string()))?;
-    println!("table: {}", path.display());
-    Ok(())
+    print!("{}", page::text(rows));
+    if let Some(directory) = report {
+        let path = directory.join(PAGE);
+        put(&path, &page::markdown(rows, &machine(lines))).map_err(|error| Failure {
+            code: exit_first(code, EXIT_INPUT),
+            why: error.to_string(),
+        })?;
+        println!("table: {}", path.display());
+    }
+    Ok(code)
 }
 
 /// Describes the machine of the last session.
 fn machine(lines: &[Line]) -> String {
-    let session = lines.iter().rev().find_map(|line| match &line.entry {
-        Entry::Session(session) => Some(&session.machine),
-        _ => None,
-    });
-    let Some(Machine { cpu, cores, kernel, mpi, compiler, commit, memory_bytes }) = session else {
-        return "a machine that the record does not describe".to_owned();
-    };
-    let gib = memory_bytes >> 30;
-    format!("{cpu}, {cores} cores, {gib} GiB, {kernel}, {mpi}, {compiler}, commit {commit}")
+    let session = lines.iter().rev().find_map(Line::session);
+    let unknown = || "a machine that the record does not describe".to_owned();
+    session.map_or_else(unknown, |session| session.machine.to_string())
 }
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.

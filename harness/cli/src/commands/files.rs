@@ -1,27 +1,11 @@
 //! Writing files.
 
+use super::values::Output;
+use crate::failure::Failure;
 use contract::files::{named, write_atomically};
-use rustix::fs::{Access, access};
+use run::verify::report::{EXIT_INPUT, exit_first};
 use std::path::Path;
-use std::{fs, io};
-
-/// Creates the missing parent directories of a file, and refuses one that could not be written after a long run.
-///
-/// # Errors
-/// The file's name and the reason.
-pub fn prepare(path: &Path) -> io::Result<()> {
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let directory = directory.unwrap_or(Path::new("."));
-    let writable = || {
-        if path.is_dir() {
-            return Err(io::Error::other("it is a directory: give a file"));
-        }
-        fs::create_dir_all(directory)?;
-        // A trial file would remain if a signal arrived at that moment.
-        Ok(access(directory, Access::WRITE_OK | Access::EXEC_OK)?)
-    };
-    writable().map_err(|error| named(path, &error))
-}
+use std::{env, fs, io};
 
 /// Writes a file and creates its missing parent directories.
 ///
@@ -35,4 +19,30 @@ pub fn put(path: &Path, text: &str) -> io::Result<()> {
         write_atomically(path, |out| out.write_all(text.as_bytes()))
     };
     make().map_err(|error| named(path, &error))
+}
+
+/// A file for a form of a report, if it was asked for, and the form.
+pub type Form<'a> = (&'a Option<Output>, &'a dyn Fn() -> String);
+
+/// Writes the forms that were asked for, and appends Markdown to the summary page of a GitHub action; returns the exit code of the
+/// report.
+///
+/// # Errors
+/// If a file cannot be written, with the exit code that comes first.
+pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8, Failure> {
+    let write = || -> io::Result<()> {
+        for (file, form) in forms {
+            file.as_ref().map_or(Ok(()), |file| put(file, &form()))?;
+        }
+        let page = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty());
+        if let (Some(page), Some(text)) = (page, summary) {
+            let mut file = fs::OpenOptions::new().create(true).append(true).open(page)?;
+            io::Write::write_all(&mut file, text.as_bytes())?;
+        }
+        Ok(())
+    };
+    write().map(|()| code).map_err(|error| Failure {
+        code: exit_first(code, EXIT_INPUT),
+        why: format!("a report could not be written: {error}"),
+    })
 }

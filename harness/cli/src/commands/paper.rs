@@ -36,21 +36,17 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
     let named = |error| named(out, &error);
     let staging = Staging::inside(nearest_directory(out)).map_err(named)?;
     let layout = Layout::on(Ranks::Simulated { ranks: RANKS, seed: 1 });
-    let mut drawn: Vec<Option<Drawn>> = MEMBERS.iter().map(|_| None).collect();
-    for (i, first) in MEMBERS.iter().enumerate() {
-        if drawn[i].is_some() {
-            continue;
-        }
+    let mut pictures = Vec::new();
+    for members in MEMBERS.chunk_by(|a, b| a.1 == b.1) {
+        let (_, made, ..) = members[0];
         let place = tempfile::tempdir()?;
-        let case = variant(&plain, first.made).write(place.path(), StlForm::Any)?;
-        let meshed = source.engine.mesh(&engine, &case, &layout, first.made == Made::Base)?;
-        for (member, drawn) in MEMBERS.iter().zip(&mut drawn) {
-            if member.made == first.made {
-                *drawn = Some(draw_member(member, &meshed, staging.path(), &paths, source)?);
-            }
+        let case = variant(&plain, made).write(place.path(), StlForm::Any)?;
+        let meshed = source.engine.mesh(&engine, &case, &layout, made == Made::Base)?;
+        for member in members {
+            let drawn = draw_member(member, &meshed, staging.path(), &paths, source)?;
+            pictures.push((*member, drawn));
         }
     }
-    let pictures: Vec<_> = MEMBERS.into_iter().zip(drawn.into_iter().flatten()).collect();
     let text = page(&source.mesh, &command(), &pictures);
     put(&staging.path().join(INDEX), text.as_bytes())?;
     staging.publish(|staged| publish(staged, out)).map_err(named)?;
@@ -86,15 +82,16 @@ fn draw_member(
     paths: &Paths,
     source: &MeshArguments,
 ) -> Result<Drawn, Failure> {
+    let (name, _, part, colour, _) = *member;
     let case = meshed.case.as_ref().expect("a case was meshed");
     let mesh = Mesh::open(&meshed.dir)?;
-    let (selection, zoom, level_max) = request(member.part, case);
-    let (body, colour) = (Some(&case.facets[..]), member.colour);
+    let (selection, zoom, level_max) = request(part, case);
+    let body = Some(&case.facets[..]);
     let request = Request { selection, body, colour, zoom, level_max, command: command() };
-    let file = |extension: &str| out.join(format!("{}.{extension}", member.name));
-    if matches!(member.part, Part::View | Part::ViewOfBody) {
+    let file = |extension: &str| out.join(format!("{name}.{extension}"));
+    if matches!(part, Part::View | Part::ViewOfBody) {
         let mut scene = Scene::collect(&mesh, &request)?;
-        if member.part == Part::ViewOfBody {
+        if part == Part::ViewOfBody {
             scene = scene.of_body();
         }
         write_view(&scene, &file("html"), paths, source)?;

@@ -1,11 +1,11 @@
 //! `harness report`: draws figures and a page from records.
 
+use crate::failure::Failure;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::record;
-use bench::track::history::{self, History, Record};
 use clap::Args;
 use report::benchmark::report;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT};
+use run::verify::report::EXIT_HOLDS;
 use std::path::{Path, PathBuf};
 
 /// `harness report`.
@@ -16,31 +16,23 @@ pub struct Arguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
-    /// A history of `harness track`, to show its trend
-    #[arg(long, value_name = "FILE")]
-    pub history: Option<PathBuf>,
 }
 
 /// Writes the report; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    match write(&arguments.directory, &arguments.record, arguments.history.as_deref()) {
-        Ok(()) => EXIT_HOLDS,
-        Err(why) => {
-            eprintln!("harness: {why}");
-            EXIT_INPUT
-        }
-    }
+///
+/// # Errors
+/// As [`write`].
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    write(&arguments.directory, &arguments.record)?;
+    Ok(EXIT_HOLDS)
 }
 
 /// Reads records, writes the report into `directory` and prints a summary.
 ///
 /// # Errors
-/// One sentence, if a record or the history cannot be read, or the report cannot be written.
-pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Result<(), String> {
-    let mut records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
-    // The history is a *.jsonl file too, but no record.
-    records.retain(|path| Some(path.as_path()) != history);
-    let history = history.map_or(Ok(Vec::new()), history_of)?;
+/// One sentence, if a record cannot be read, or the report cannot be written.
+pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
+    let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let mut lines = Vec::new();
     for path in &records {
         let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -55,36 +47,21 @@ pub fn write(directory: &Path, given: &[PathBuf], history: Option<&Path>) -> Res
             "no results to report: {shown} has no record; make one with harness bench"
         ));
     }
-    let written = report(directory, &lines, &history).map_err(|error| error.to_string())?;
+    let written = report(directory, &lines).map_err(|error| error.to_string())?;
     let shows_nothing = |line: &Line| {
         matches!(line.entry, Entry::Session(_) | Entry::Failure(_) | Entry::LeftOut(_))
     };
     if lines.iter().all(shows_nothing) {
         return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
-    for finding in &written.broken {
-        println!("rule {} broken, {}: {}", finding.rule, finding.about, finding.why);
+    for (rule, why) in &written.broken {
+        println!("rule {rule} broken: {why}");
     }
     if !cfg!(feature = "figures") {
         println!("PNG and PDF are left out: the harness was built without its feature figures");
     }
     println!("{} figures; the page is {}", written.figures, written.page.display());
     Ok(())
-}
-
-/// Reads the history. `harness track` starts a missing one; here a missing one is an error.
-fn history_of(path: &Path) -> Result<Vec<Record>, String> {
-    if !path.is_file() {
-        return Err(format!(
-            "{}: the file is missing; create it with harness track",
-            path.display()
-        ));
-    }
-    let History { records, warnings } = history::read(path)?;
-    for warning in warnings {
-        eprintln!("harness: {}: {warning}", path.display());
-    }
-    Ok(records)
 }
 
 fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {

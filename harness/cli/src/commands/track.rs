@@ -1,15 +1,17 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
-use super::files::{prepare, put};
+use super::files::put_forms;
 use super::values::{Input, Output, percentage, probability};
+use crate::failure::Failure;
 use bench::jsonl;
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, History, Record};
-use bench::track::{Series, analyse, link, summary};
+use bench::track::{analyse, summary};
 use clap::Args;
+use report::json::pretty;
 use report::track::{export, page};
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT};
-use std::path::PathBuf;
+use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
+use std::path::{Path, PathBuf};
 
 /// `harness track`.
 #[derive(Args, Debug)]
@@ -34,7 +36,7 @@ pub struct Arguments {
     /// Write the trend page
     #[arg(long, value_name = "FILE")]
     page: Option<Output>,
-    /// Address of a commit for the links of the page, with {commit} [default: from the remote `origin` of the repository]
+    /// Address of a commit for the links of the page, with {commit}, such as https://host/name/repository/commit/{commit}
     #[arg(long, value_name = "URL")]
     link: Option<String>,
     /// Write the last record in Bencher Metric Format
@@ -74,22 +76,17 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
 }
 
 /// Appends, analyses, prints and writes; returns the exit code.
-pub fn run(arguments: &Arguments) -> u8 {
-    try_run(arguments).unwrap_or_else(|why| {
-        eprintln!("harness: {why}");
-        EXIT_INPUT
-    })
-}
-
-fn try_run(arguments: &Arguments) -> Result<u8, String> {
-    arguments.outputs().try_for_each(|file| prepare(file).map_err(|error| error.to_string()))?;
+///
+/// # Errors
+/// If the history cannot be read or continued, or a file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else if !arguments.history.exists() {
         let history = arguments.history.display();
-        return Err(format!(
+        return Err(Failure::input(format!(
             "{history} is missing: give a history, or the first values with --add or --value"
-        ));
+        )));
     }
     for commit in &arguments.accept {
         history::accept(&arguments.history, commit)?;
@@ -98,28 +95,33 @@ fn try_run(arguments: &Arguments) -> Result<u8, String> {
     for warning in &warnings {
         eprintln!("harness: {}: {warning}", arguments.history.display());
     }
-    let effect_min = arguments.effect_min / 100.0;
-    let rules = Rules { alpha: arguments.alpha, effect_min };
+    let rules = Rules { alpha: arguments.alpha, effect_min: arguments.effect_min / 100.0 };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
     print!("{}", summary(&all));
-    write(arguments, &records, &all).map_err(|error| error.to_string())?;
-    let worse = all.iter().any(|series| series.worse_recently(arguments.fail_recent).is_some());
-    Ok(if worse { EXIT_FAILED } else { EXIT_HOLDS })
-}
-
-impl Arguments {
-    /// The files to write.
-    fn outputs(&self) -> impl Iterator<Item = &Output> {
-        let Self { page, bencher, github_benchmark, csv, junit, json, .. } = self;
-        [page, bencher, github_benchmark, csv, junit, json].into_iter().flatten()
-    }
+    let none = Record::new(String::new());
+    let last = records.last().unwrap_or(&none);
+    let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
+    let worse = all.iter().any(|series| series.worse_recently(recent).is_some());
+    put_forms(
+        if worse { EXIT_FAILED } else { EXIT_HOLDS },
+        &[
+            (&arguments.page, &|| page::page(&records, &all, link)),
+            (&arguments.bencher, &|| export::bencher(last)),
+            (&arguments.github_benchmark, &|| export::github(last)),
+            (&arguments.csv, &|| export::csv(&records)),
+            (&arguments.junit, &|| export::junit(&all, recent)),
+            (&arguments.json, &|| pretty(&all)),
+        ],
+        None,
+    )
 }
 
 fn append(arguments: &Arguments) -> Result<(), String> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
-    let mut record = Record::of_commit(&arguments.commit, &repository(arguments))?;
+    let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
+    let mut record = Record::of_commit(&arguments.commit, repository)?;
     for file in &arguments.add {
         let wrong = |why: String| format!("{}: {why}", file.display());
         let text = contract::files::read(file).map_err(|error| wrong(error.to_string()))?;
@@ -128,28 +130,4 @@ fn append(arguments: &Arguments) -> Result<(), String> {
     record.metrics.extend(arguments.value.iter().cloned());
     jsonl::append(&arguments.history, &record)
         .map_err(|error| format!("{}: {error}", arguments.history.display()))
-}
-
-fn repository(arguments: &Arguments) -> PathBuf {
-    arguments.repository.clone().unwrap_or_else(|| PathBuf::from("."))
-}
-
-fn write(arguments: &Arguments, records: &[Record], all: &[Series]) -> std::io::Result<()> {
-    let none = Record::new(String::new());
-    let last = records.last().unwrap_or(&none);
-    let link = arguments.link.clone().or_else(|| link::of_repository(&repository(arguments)));
-    let forms: [(&Option<Output>, &dyn Fn() -> String); 6] = [
-        (&arguments.page, &|| page::page(records, all, link.as_deref())),
-        (&arguments.bencher, &|| export::bencher(last)),
-        (&arguments.github_benchmark, &|| export::github(last)),
-        (&arguments.csv, &|| export::csv(records)),
-        (&arguments.junit, &|| export::junit(all, arguments.fail_recent)),
-        (&arguments.json, &|| serde_json::to_string_pretty(all).expect("plain data") + "\n"),
-    ];
-    for (file, form) in forms {
-        if let Some(file) = file {
-            put(file, &form())?;
-        }
-    }
-    Ok(())
 }

@@ -1,21 +1,16 @@
 //! `harness verify`: verifies the selected cases and reports.
 
-use super::files::put;
+use super::files::{put, put_forms};
 use super::programs::ProgramArguments;
 use super::values::Output;
 use crate::failure::Failure;
 use clap::Args;
-use report::verification::json::json;
-use report::verification::junit::junit;
 use report::verification::markdown::markdown;
 use report::verification::table::table;
+use report::verification::{json, junit};
 use run::engine::programs::Programs;
 use run::verify::options::Options;
-use run::verify::report::{EXIT_INPUT, Report, exit_first};
 use run::verify::verify;
-use std::env;
-use std::fs::OpenOptions;
-use std::io::{self, Write};
 
 /// `harness verify`.
 #[derive(Args, Debug)]
@@ -41,47 +36,25 @@ pub struct Arguments {
 /// # Errors
 /// If the verification cannot begin, or a report cannot be written.
 pub fn run(arguments: Arguments) -> Result<u8, Failure> {
-    let Arguments { options, junit, json, engine, programs } = arguments;
+    let Arguments { options, junit: junit_file, json: json_file, engine, programs } = arguments;
     let programs = Programs::find_with_engine(&engine, programs.given())?;
     let report = verify(&options, &programs)?;
     print!("{}", table(&report));
-    write(&report, &options, junit, json).map_err(|error| Failure {
-        code: exit_first(report.exit_code(), EXIT_INPUT),
-        why: format!("a report could not be written: {error}"),
-    })?;
-    Ok(report.exit_code())
-}
-
-/// Writes the requested forms of the report, and all forms into the directory of `--out`.
-fn write(
-    report: &Report,
-    options: &Options,
-    junit_file: Option<Output>,
-    json_file: Option<Output>,
-) -> io::Result<()> {
-    let forms = [
-        ("table.txt", table(report)),
-        ("report.md", markdown(report)),
-        ("junit.xml", junit(report)),
-        ("report.json", json(report)),
-    ];
+    let text = markdown(&report);
+    // All forms go into the directory of `--out`.
     if let Some(out) = &options.out {
-        for (name, text) in &forms {
+        for (name, text) in [
+            ("table.txt", &table(&report)),
+            ("report.md", &text),
+            ("junit.xml", &junit::junit(&report)),
+            ("report.json", &json::json(&report)),
+        ] {
             put(&out.join(name), text)?;
         }
     }
-    let [_, (_, markdown), (_, junit), (_, json)] = &forms;
-    for (file, text) in [(junit_file, junit), (json_file, json)] {
-        if let Some(file) = file {
-            put(&file, text)?;
-        }
-    }
-    if let Some(summary) = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty()) {
-        OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(summary)?
-            .write_all(markdown.as_bytes())?;
-    }
-    Ok(())
+    put_forms(
+        report.exit_code(),
+        &[(&junit_file, &|| junit::junit(&report)), (&json_file, &|| json::json(&report))],
+        Some(&text),
+    )
 }

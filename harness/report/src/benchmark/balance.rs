@@ -2,7 +2,7 @@
 
 use super::groups::{Subject, by_subject};
 use super::paper;
-use crate::figure::{Axis, Bars, Body, Claims, Figure, Provenance, svg};
+use crate::figure::{Axis, Bars, Body, Figure, Provenance};
 use bench::experiments::cause::heaviest_base_leaf;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
@@ -26,8 +26,8 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     }
     for (subject, all) in by_subject(groups, "weights") {
         for (mesh, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
-            let both = [CELLS, EXPOSED];
-            out.extend(both.iter().filter_map(|what| imbalance(subject, mesh, &of, what)));
+            out.extend(imbalance(subject, mesh, &of, false));
+            out.extend(imbalance(subject, mesh, &of, true));
         }
     }
     out
@@ -42,94 +42,73 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
     let ranks = run.setup.ranks;
     let mean = run.useful_s.sum / ranks as f64;
     let lambda = run.useful_s.lambda(ranks);
-    let cells = run.counters.get("leaves").map_or(1.0, |l| l.lambda(ranks));
-    Some(Figure {
-        id: format!("per-rank-{}-{ranks}", subject.file()),
-        title: format!("Useful time per rank: {subject}, {ranks} ranks"),
-        caption: format!(
-            "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
-             the load on 16, 32 and 64 ranks at 100 million cells around its UAV. Load imbalance λ = max/mean: {lambda:.3} by time, {cells:.3} by cells. {}.",
-            grouped(run.cells),
-            group.rank_times_caption()
-        ),
-        x: Axis::linear("rank"),
-        y: Axis::linear("useful time / s"),
-        body: Body::Bars(Bars {
-            categories: (0..ranks).map(|r| r.to_string()).collect(),
-            segments: vec![(
-                format!("{}: useful time", subject.engine),
-                run.useful_s.by_rank.clone(),
-            )],
-            references: vec![(format!("mean; λ = {lambda:.2}"), mean)],
-            provenance: Provenance::Projected,
-        }),
-        height: svg::HEIGHT,
-        claims: Claims::default(),
-    })
+    let caption = format!(
+        "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
+         the load on 16, 32 and 64 ranks at 100 million cells around its UAV. Load imbalance λ = max/mean: {lambda:.3} by time, {:.3} by cells. {}.",
+        grouped(run.cells),
+        run.counters.get("leaves").map_or(1.0, |leaves| leaves.lambda(ranks)),
+        group.rank_times_caption()
+    );
+    let bars = Bars {
+        categories: (0..ranks).map(|r| r.to_string()).collect(),
+        segments: vec![(format!("{}: useful time", subject.engine), run.useful_s.by_rank.clone())],
+        references: vec![(format!("mean; λ = {lambda:.2}"), mean)],
+        provenance: Provenance::Projected,
+    };
+    Some(Figure::new(
+        format!("per-rank-{}-{ranks}", subject.file()),
+        format!("Useful time per rank: {subject}, {ranks} ranks"),
+        caption,
+        [Axis::linear("rank"), Axis::linear("useful time / s")],
+        Body::Bars(bars),
+    ))
 }
 
-/// What is balanced.
-struct Balanced {
-    /// Its counter.
-    counter: &'static str,
-    /// How the figure's name begins.
-    id: &'static str,
-    /// Its name.
-    name: &'static str,
-    /// Its name in the legend.
-    legend: &'static str,
-    /// What the caption adds.
-    note: &'static str,
-}
-
-const CELLS: Balanced =
-    Balanced { counter: "leaves", id: "balance", name: "cells", legend: "by cells", note: "" };
-const EXPOSED: Balanced = Balanced {
-    counter: "exposed_faces",
-    id: "balance-exposed",
-    name: "exposed faces",
-    legend: "by faces",
-    note: " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly.",
-};
-
-/// Load imbalance for weights and partitioners; `None` if some run did not count.
+/// Load imbalance of cells, or of exposed faces, for weights and partitioners; `None` if some run did not count them.
 fn imbalance(
     subject: Subject,
     (cells, ranks): (u64, usize),
     of: &[&Group],
-    balanced: &Balanced,
+    exposed: bool,
 ) -> Option<Figure> {
-    let Balanced { counter, id, name, legend, note } = balanced;
-    let lambda = |g: &&Group| Some(g.typical.counters.get(*counter)?.lambda(ranks));
+    let (counter, id, name, legend, note) = match exposed {
+        false => ("leaves", "balance", "cells", "by cells", ""),
+        true => (
+            "exposed_faces",
+            "balance-exposed",
+            "exposed faces",
+            "by faces",
+            " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly.",
+        ),
+    };
+    let lambda = |g: &&Group| Some(g.typical.counters.get(counter)?.lambda(ranks));
     let lambdas: Option<Vec<f64>> = of.iter().map(lambda).collect();
     let mut references = vec![("target, 1.10".to_owned(), 1.1)];
-    if *counter == CELLS.counter {
+    if !exposed {
         // A base leaf is never divided, so no partition beats a rank that has only the largest one.
         let largest = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical)).reduce(f64::min);
         let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
         references.extend(bound.map(|b| (format!("lower bound, {b:.2}"), b)));
     }
-    Some(Figure {
-        id: format!("{id}-{}-{:.0}M-{ranks}", subject.file(), cells as f64 / 1e6),
-        title: format!(
-            "Load imbalance of {name} by weights and partitioner: {subject}, {} cells, {ranks} ranks",
-            grouped(cells)
+    let (millions, cells) = (cells as f64 / 1e6, grouped(cells));
+    let caption = format!(
+        "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
+         tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), of a base tree with a typical depth of 7; here the depth is \
+         automatic. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
+    );
+    let bars = Bars {
+        categories: of.iter().map(|g| g.setup.division()).collect(),
+        segments: vec![(format!("{}: {legend}", subject.engine), lambdas?)],
+        references,
+        provenance: Provenance::Measured,
+    };
+    Some(Figure::new(
+        format!("{id}-{}-{millions:.0}M-{ranks}", subject.file()),
+        format!(
+            "Load imbalance of {name} by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
         ),
-        caption: format!(
-            "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {} cells on {ranks} simulated ranks, by the partitioner of the base \
-             tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), of a base tree with a typical depth of 7; here the depth is \
-             automatic. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly.",
-            grouped(cells)
-        ),
-        x: Axis::linear("partitioner and weights"),
-        y: Axis::linear("λ = max/mean over ranks"),
-        body: Body::Bars(Bars {
-            categories: of.iter().map(|g| g.setup.division()).collect(),
-            segments: vec![(format!("{}: {legend}", subject.engine), lambdas?)],
-            references,
-            provenance: Provenance::Measured,
-        }),
-        height: svg::HEIGHT,
-        claims: Claims { compares: true, deterministic: true, ..Claims::default() },
-    })
+        caption,
+        [Axis::linear("partitioner and weights"), Axis::linear("λ = max/mean over ranks")],
+        Body::Bars(bars),
+    ))
 }

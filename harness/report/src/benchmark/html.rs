@@ -1,17 +1,14 @@
 //! The page of a benchmark report.
 
-use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
-use super::lint::{Broken, RULES};
+use super::rules::{Broken, RULES};
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure as page_figure, page as whole_page, table, with_code};
-use bench::experiments::cause::sentence;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::number::grouped;
-use bench::order::by_key;
 use maud::{Markup, html};
 
 /// A figure with its drawing and its values.
@@ -25,16 +22,10 @@ pub struct Drawn<'a> {
     pub csv: String,
 }
 
-/// The page; `trend` lists the change points of a history.
-pub fn page(
-    groups: &Groups,
-    drawn: &[Drawn],
-    broken: &[Broken],
-    lines: &[Line],
-    trend: Option<&str>,
-) -> String {
+/// The page.
+pub fn page(groups: &Groups, drawn: &[Drawn], broken: &[Broken], lines: &[Line]) -> String {
     let content = html! {
-        (summary(groups, lines, trend.is_some()))
+        (summary(groups, lines))
         h2 id="figures" { "Figures" }
         p {
             "Filled markers were measured with at most one rank per core. Hollow markers were measured with more ranks than \
@@ -44,10 +35,6 @@ pub fn page(
         h2 id="tables" { "Tables" }
         p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions. Exposed faces are those that the mesh shows to the body; W is the number of cells that each weighs." }
         @for table in tables::tables(groups) { (table.html()) }
-        @if let Some(trend) = trend {
-            h2 id="trend" { "Changes over commits" }
-            pre { (trend) }
-        }
         h2 id="rules" { "The twelve rules of Hoefler and Belli" }
         (rules(broken))
         h2 id="machine" { "Machine and commands" }
@@ -56,21 +43,18 @@ pub fn page(
     whole_page("Oct-tree meshing: scaling and load balance", &content)
 }
 
-fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
+fn summary(groups: &Groups, lines: &[Line]) -> Markup {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
     let failed = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
-    let network = &groups.network;
     html! {
         p {
             (runs) " runs of " (groups.all.len()) " configurations"
             @if failed > 0 { ", " (failed) " more failed" }
             ". For simulated ranks, time is the critical path: the sum over phases of the CPU time of the slowest rank, plus "
-            (format!("{:.2} µs per message and {:.2} GB/s", network.latency_s * 1e6, network.bandwidth_bytes_per_s / 1e9))
-            @if network.measured { " (measured by a ping-pong)." } @else { " (given)." }
+            (groups.network) "."
         }
         nav {
             a href="#figures" { "figures" } " " a href="#tables" { "tables" } " "
-            @if trend { a href="#trend" { "changes over commits" } " " }
             a href="#rules" { "twelve rules" } " " a href="#machine" { "machine and commands" }
         }
         h2 { "Causes of lost efficiency" }
@@ -78,8 +62,7 @@ fn summary(groups: &Groups, lines: &[Line], trend: bool) -> Markup {
             @for group in groups.all.iter().filter(|g| is_summarised(g)) {
                 li {
                     b { (Subject::of(&group.setup)) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
-                    (with_code(&sentence(&group.typical, &groups.reference(group).typical, network)))
-                    @if let Some(why) = reasons(&[group.efficiency(groups.reference(group), network)], &group.setup.experiment) { ". " (why) }
+                    (with_code(&groups.cause(group)))
                 }
             }
         }
@@ -96,34 +79,21 @@ fn figure(drawn: &Drawn) -> Markup {
 fn rules(broken: &[Broken]) -> Markup {
     let mut rows = Vec::new();
     for (number, (rule, kept)) in (1..).zip(RULES) {
-        let row = |verdict: Markup, places: &str, why: &str| {
-            vec![html! { (number) ". " (rule) }, verdict, html! { (places) }, html! { (why) }]
+        let row = |verdict: Markup, why: &str| {
+            vec![html! { (number) ". " (rule) }, verdict, html! { (why) }]
         };
-        let of_rule: Vec<&Broken> = broken.iter().filter(|b| b.rule == number).collect();
-        if of_rule.is_empty() {
-            rows.push(row(html! { "kept" }, "", kept));
-        }
-        for (why, of_why) in by_key(of_rule, |b| &b.why) {
-            let places: Vec<&str> = of_why.iter().map(|b| b.about.as_str()).collect();
-            let places = match places.len() {
-                n if n > 3 => format!("{n} figures"),
-                _ => places.join(", "),
-            };
-            rows.push(row(html! { strong { "broken" } }, &places, why));
+        let of_rule = broken.iter().filter(|b| b.0 == number);
+        rows.extend(of_rule.map(|(_, why)| row(html! { strong { "broken" } }, why)));
+        if broken.iter().all(|b| b.0 != number) {
+            rows.push(row(html! { "kept" }, kept));
         }
     }
-    table(Some("words"), &["rule", "verdict", "figures", "reason"], &rows)
+    table(Some("words"), &["rule", "verdict", "reason"], &rows)
 }
 
 fn machine(lines: &[Line]) -> Markup {
     html! {
-        @for m in machines(lines) {
-            p {
-                (m.cpu) "; " (m.cores) " cores; " (format!("{:.1}", m.memory_bytes as f64 / f64::from(1u32 << 30))) " GiB; "
-                (m.kernel) "; " (if m.mpi.is_empty() { "no MPI" } else { &m.mpi }) "; " (m.compiler) "; commit "
-                (if m.commit.is_empty() { "unknown" } else { &m.commit })
-            }
-        }
+        @for machine in machines(lines) { p { (machine) } }
         pre { @for command in commands(lines) { (command) "\n" } }
     }
 }

@@ -1,56 +1,43 @@
 //! Figures of message matrices: bytes and messages between pairs of ranks.
 
 use super::groups::{Subject, cells_label};
-use crate::figure::{Axis, Body, Claims, Figure, HeatMap, Layer, svg};
-use bench::experiments::entry::Run;
-use bench::experiments::group::Groups;
+use crate::figure::{Axis, Body, Figure, HeatMap, Layer};
+use bench::experiments::entry::{Run, Setup};
 use bench::experiments::number::grouped;
 
-/// A figure per recorded message matrix.
-pub fn figures(groups: &Groups) -> Vec<Figure> {
-    groups.matrices.iter().map(figure).collect()
-}
-
-fn figure(run: &Run) -> Figure {
-    let s = &run.setup;
-    let subject = Subject::of(s);
+/// The figure of a message matrix.
+pub fn figure(run: &Run) -> Figure {
+    let Setup { ranks, layer_cells_min: n, .. } = run.setup;
+    let (subject, division) = (Subject::of(&run.setup), run.setup.division());
+    let matrix = &run.message_matrix;
     let layer = |label: &str, quantity: usize| {
         let entry = |e: &[u64; 4]| (e[0] as usize, e[1] as usize, e[quantity] as f64);
-        Layer { label: label.to_owned(), entries: run.message_matrix.iter().map(entry).collect() }
+        Layer { label: label.to_owned(), entries: matrix.iter().map(entry).collect() }
     };
-    let total = |quantity: usize| run.message_matrix.iter().map(|e| e[quantity]).sum::<u64>();
-    let pairs = s.ranks * s.ranks.saturating_sub(1);
-    Figure {
-        id: format!("messages-{}-{}-{}", subject.file(), cells_label(run.cells), s.ranks),
-        title: format!(
-            "Messages between pairs of ranks: {subject}, {} cells, {} ranks",
-            grouped(run.cells),
-            s.ranks
-        ),
-        caption: format!(
-            "Bytes and messages sent between pairs of ranks in point-to-point communication: {subject}, {} cells, n = {}, {} simulated ranks, partition: \
-             {}. The total is {} messages with {:.1} MB between {} of {} ordered pairs; white pairs exchange nothing. Collective calls are not \
-             included{}. The counts repeat exactly.",
-            grouped(run.cells),
-            s.layer_cells_min,
-            s.ranks,
-            s.division(),
-            grouped(total(2)),
-            total(3) as f64 / 1e6,
-            grouped(run.message_matrix.len() as u64),
-            grouped(pairs as u64),
-            collective_fraction(run, total(3))
-        ),
-        x: Axis::linear("to rank"),
-        y: Axis::linear("from rank"),
-        body: Body::HeatMap(HeatMap {
-            order: s.ranks,
-            layers: vec![layer("bytes", 3), layer("messages", 2)],
-            command: run.command.clone(),
-        }),
-        height: svg::HEIGHT,
-        claims: Claims { deterministic: true, ..Claims::default() },
-    }
+    let total = |quantity: usize| matrix.iter().map(|e| e[quantity]).sum::<u64>();
+    let cells = grouped(run.cells);
+    let caption = format!(
+        "Bytes and messages sent between pairs of ranks in point-to-point communication: {subject}, {cells} cells, n = {n}, {ranks} simulated ranks, \
+         partition: {division}. The total is {} messages with {:.1} MB between {} of {} ordered pairs; white pairs exchange nothing. Collective \
+         calls are not included{}. The counts repeat exactly.",
+        grouped(total(2)),
+        total(3) as f64 / 1e6,
+        grouped(matrix.len() as u64),
+        grouped((ranks * ranks.saturating_sub(1)) as u64),
+        collective_fraction(run, total(3))
+    );
+    let map = HeatMap {
+        order: ranks,
+        layers: vec![layer("bytes", 3), layer("messages", 2)],
+        command: run.command.clone(),
+    };
+    Figure::new(
+        format!("messages-{}-{}-{ranks}", subject.file(), cells_label(run.cells)),
+        format!("Messages between pairs of ranks: {subject}, {cells} cells, {ranks} ranks"),
+        caption,
+        [Axis::linear("to rank"), Axis::linear("from rank")],
+        Body::HeatMap(map),
+    )
 }
 
 /// The fraction of all bytes that collective calls send, in parentheses; empty if the program does not count all bytes.
@@ -66,6 +53,7 @@ fn collective_fraction(run: &Run, point_to_point_bytes: u64) -> String {
 mod tests {
     use super::*;
     use bench::experiments::entry::{Comm, Entry, Spread};
+    use bench::experiments::group::Groups;
     use bench::testing::{line, run};
 
     #[test]
@@ -74,8 +62,9 @@ mod tests {
         warm_up.warm_up = true;
         warm_up.message_matrix = vec![[0, 1, 2, 3_000_000], [2, 0, 1, 1_000_000]];
         warm_up.counters.insert("message_bytes".into(), Spread::brief(&[4e6, 0.0, 1e6]));
-        let figures = figures(&Groups::of(&[line(Entry::Run(Box::new(warm_up)))]));
-        let [f] = &figures[..] else { panic!("{figures:?}") };
+        let groups = Groups::of(&[line(Entry::Run(Box::new(warm_up)))]);
+        let [run] = &groups.matrices[..] else { panic!("{:?}", groups.matrices) };
+        let f = figure(run);
         assert_eq!(f.id, "messages-cube-2M-3");
         for part in [
             "n = 4, 3 simulated ranks, partition: metis area",

@@ -1,31 +1,25 @@
 //! `harness report DIR`: figures, a page, a LaTeX fragment and an artifact description from records.
 
-mod above_one;
-pub mod balance;
-pub mod figures;
-pub mod groups;
-pub mod html;
-pub mod latex;
-pub mod lint;
-pub mod matrix;
-pub mod paper;
-pub mod programs;
-pub mod scaling;
+mod balance;
+mod figures;
+mod groups;
+mod html;
+mod latex;
+mod matrix;
+mod paper;
+mod rules;
+mod scaling;
 pub mod tables;
 
 use crate::figure::check::check_invariants;
 #[cfg(feature = "figures")]
 use crate::figure::raster;
 use crate::figure::{Figure, csv, name_apart, svg, tex};
-use crate::track::figures as trend;
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
-use bench::statistics::change_points::Rules;
-use bench::track::analyse;
-use bench::track::history::Record;
 use contract::files::{named, write_atomically};
 use html::Drawn;
-use lint::Broken;
+use rules::Broken;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -41,30 +35,23 @@ pub struct Written {
     pub broken: Vec<Broken>,
 }
 
-/// Writes figures, page, LaTeX fragment and artifact description of a record into `directory`, with the trend of a
-/// history that is not empty.
+/// Writes figures, page, LaTeX fragment and artifact description of a record into `directory`.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn report(directory: &Path, lines: &[Line], history: &[Record]) -> io::Result<Written> {
+pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let groups = Groups::of(lines);
-    let tracked = analyse(history, &Rules::default());
-    let mut figures = figures::figures(&groups);
-    figures.extend(trend::by_case(history, &tracked));
+    let figures = figures::figures(&groups);
     let mut figures: Vec<Figure> = figures.into_iter().map(Figure::without_zeros).collect();
     name_apart(&mut figures);
     check_invariants(&figures);
-    let trend = (!history.is_empty()).then(|| {
-        let changes = bench::track::summary(&tracked);
-        format!("{} commits, {} metrics\n{changes}", history.len(), tracked.len())
-    });
     let place = directory.join("figures");
     fs::create_dir_all(&place)?;
     let drawn: Vec<Drawn> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
-    let broken = lint::lint(&figures, lines);
+    let broken = rules::broken(&groups, lines);
     let page = directory.join("index.html");
-    write(&page, html::page(&groups, &drawn, &broken, lines, trend.as_deref()))?;
+    write(&page, html::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     write(&directory.join("artifact.md"), latex::artifact(&figures, lines))?;
     Ok(Written { page, figures: figures.len(), broken })

@@ -1,13 +1,11 @@
 //! The tables of a record, for the page of a report and as text.
 
-use super::above_one::reasons;
 use super::groups::{Subject, is_summarised};
 use crate::table::Table;
-use bench::experiments::cause::sentence;
 use bench::experiments::entry::Phase;
-use bench::experiments::group::{Group, Groups, Projection};
+use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
-use bench::experiments::pop::{self, Efficiency};
+use bench::experiments::pop::{Efficiency, above_one, phase_efficiency, phase_s};
 use bench::experiments::programs::Comparison;
 use bench::order::{by_key, distinct};
 
@@ -18,135 +16,91 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
         experiments.into_iter().map(|name| experiment(groups, name)).collect();
     all.extend(projections(groups));
     all.extend(largest(groups).into_iter().map(|group| phases(groups, group)));
-    all.extend(groups.comparisons().iter().map(|comparison| programs(groups, comparison)));
+    all.extend(groups.comparisons().iter().map(programs));
     all
 }
 
 /// All tables as text, with the causes of lost efficiency.
 pub fn text(groups: &Groups) -> String {
-    let n = groups.network;
-    let measured = if n.measured { "measured by ping-pong" } else { "given" };
-    let (latency, bandwidth) = (n.latency_s * 1e6, n.bandwidth_bytes_per_s / 1e9);
-    let mut lines = vec![format!("network: {latency:.2} us, {bandwidth:.2} GB/s ({measured})")];
+    let mut lines = vec![format!("network: {}", groups.network)];
     lines.extend(groups.origins.iter().cloned());
     lines.extend(tables(groups).iter().map(|table| format!("\n{}", table.text().trim_end())));
     lines.push("\ncauses of lost efficiency".to_owned());
-    for group in &groups.all {
-        let (run, reference) = (&group.typical, &groups.reference(group).typical);
-        let is_above_one = pop::efficiency(run, reference, &groups.network).is_above_one();
-        if group.setup.ranks > 1 || is_above_one {
-            let of = format!(
-                "{}, {}, {}",
-                Subject::of(&group.setup),
-                group.setup.experiment,
-                group.how()
-            );
-            lines.push(format!("  {of}: {}", sentence(run, reference, &groups.network)));
-        }
+    for group in groups.all.iter().filter(|group| group.setup.ranks > 1) {
+        let (subject, cause) = (Subject::of(&group.setup), groups.cause(group));
+        lines.push(format!("  {subject}, {}, {}: {cause}", group.setup.experiment, group.how()));
     }
     lines.into_iter().map(|line| line + "\n").collect()
 }
 
+/// A group, or a phase, with its efficiencies.
+type With<'a, T> = (&'a T, Efficiency);
+
 /// Time, load imbalance λ = max/mean, POP efficiencies, rate and memory of every group.
 fn experiment(groups: &Groups, name: &str) -> Table {
-    let of: Vec<&Group> = groups.all.iter().filter(|g| g.setup.experiment == name).collect();
-    let efficiency = |g: &&Group| g.efficiency(groups.reference(g), &groups.network);
-    let efficiencies: Vec<Efficiency> = of.iter().map(efficiency).collect();
-    Table {
-        title: name.to_owned(),
-        columns: vec![
-            "engine",
-            "case",
-            "cells",
-            "n",
-            "partitioner and weights",
-            "ranks",
-            "provenance",
-            "time / s (median)",
-            "confidence interval",
-            "coverage",
-            "runs",
-            "λ (time)",
-            "λ (cells)",
-            "λ (exposed faces)",
-            "load balance",
-            "serialisation",
-            "transfer",
-            "parallel efficiency",
-            "computation scaling",
-            "global efficiency",
-            "10⁶ cells / (s rank)",
-            "bytes / cell",
+    let of = groups.all.iter().filter(|g| g.setup.experiment == name);
+    let of: Vec<With<Group>> = of.map(|g| (g, groups.efficiency(g))).collect();
+    let lambda = |group: &Group, counter: &str| {
+        let counted = group.typical.counters.get(counter);
+        counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
+    };
+    let table = Table::of(
+        name.to_owned(),
+        &of,
+        &[
+            ("engine", &|(g, _)| g.setup.engine.clone()),
+            ("case", &|(g, _)| g.setup.case.clone()),
+            ("cells", &|(g, _)| grouped(g.cells())),
+            ("n", &|(g, _)| g.setup.layer_cells_min.to_string()),
+            ("partition", &|(g, _)| g.setup.division()),
+            ("ranks", &|(g, _)| g.setup.ranks.to_string()),
+            ("how", &|(g, _)| g.how().to_owned()),
+            ("median time / s", &|(g, _)| format!("{:.3}", g.time_s.value)),
+            ("interval", &|(g, _)| format!("{:.3} – {:.3}", g.time_s.low, g.time_s.high)),
+            ("coverage", &|(g, _)| format!("{:.0} %", g.time_s.coverage * 100.0)),
+            ("runs", &|(g, _)| g.time_s.count.to_string()),
+            ("λ (time)", &|(_, e)| format!("{:.3}", e.lambda)),
+            ("λ (cells)", &|(g, _)| lambda(g, "leaves")),
+            ("λ (exposed faces)", &|(g, _)| lambda(g, "exposed_faces")),
+            ("load balance", &|(_, e)| format!("{:.3}", e.load_balance)),
+            ("serialisation", &|(_, e)| format!("{:.3}", e.serialisation)),
+            ("transfer", &|(_, e)| format!("{:.3}", e.transfer)),
+            ("parallel efficiency", &|(_, e)| format!("{:.3}", e.parallel())),
+            ("computation scaling", &|(_, e)| format!("{:.3}", e.computation_scaling)),
+            ("global efficiency", &|(_, e)| format!("{:.3}", e.global())),
+            ("10⁶ cells / s / rank", &|(g, _)| format!("{:.2}", g.rate() / 1e6)),
+            ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],
-        rows: of.iter().zip(&efficiencies).map(|(g, e)| row(g, e)).collect(),
-        notes: reasons(&efficiencies, name).into_iter().collect(),
-    }
+    );
+    explained(table, &of, name)
 }
 
-fn row(group: &Group, e: &Efficiency) -> Vec<String> {
-    let (s, t) = (&group.setup, group.time_s);
-    let lambda = |counter: &str| {
-        let counted = group.typical.counters.get(counter);
-        counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(s.ranks)))
-    };
-    vec![
-        s.engine.clone(),
-        s.case.clone(),
-        grouped(group.cells()),
-        s.layer_cells_min.to_string(),
-        s.division(),
-        s.ranks.to_string(),
-        group.how().to_owned(),
-        format!("{:.3}", t.value),
-        format!("{:.3} – {:.3}", t.low, t.high),
-        format!("{:.0} %", t.coverage * 100.0),
-        t.count.to_string(),
-        format!("{:.3}", e.lambda),
-        lambda("leaves"),
-        lambda("exposed_faces"),
-        format!("{:.3}", e.load_balance),
-        format!("{:.3}", e.serialisation),
-        format!("{:.3}", e.transfer),
-        format!("{:.3}", e.parallel()),
-        format!("{:.3}", e.computation_scaling),
-        format!("{:.3}", e.global()),
-        format!("{:.2}", group.rate() / 1e6),
-        format!("{:.2}", group.bytes_per_cell().value),
-    ]
+/// The table with the reasons for efficiencies above 1.
+fn explained<T>(table: Table, of: &[With<T>], experiment: &str) -> Table {
+    let efficiencies: Vec<Efficiency> = of.iter().map(|(_, e)| *e).collect();
+    Table { notes: above_one(&efficiencies, experiment).into_iter().collect(), ..table }
 }
 
 /// Projected and measured times of the same meshes on equally many ranks; `None` if the record has no such pairs.
 fn projections(groups: &Groups) -> Option<Table> {
-    let row = |p: &Projection| {
-        vec![
-            p.sim.setup.engine.clone(),
-            p.sim.setup.case.clone(),
-            p.sim.setup.experiment.clone(),
-            grouped(p.sim.cells()),
-            p.sim.setup.ranks.to_string(),
-            format!("{:.3}", p.sim.time_s.value),
-            format!("{:.3}", p.measured.time_s.value),
-            format!("{:+.1} %", p.error() * 100.0),
-            format!("{:+.1} %", p.path_error() * 100.0),
-        ]
-    };
-    let rows: Vec<Vec<String>> = groups.projections().iter().map(row).collect();
-    (!rows.is_empty()).then(|| Table {
-        title: "projected and measured times".to_owned(),
-        columns: vec![
-            "engine",
-            "case",
-            "experiment",
-            "cells",
-            "ranks",
-            "projected / s",
-            "measured / s",
-            "error",
-            "error of the critical path of CPU times",
+    let pairs = groups.projections();
+    let time = |group: &Group| format!("{:.3}", group.time_s.value);
+    let error = |[sim, measured]: &[&Group; 2]| sim.time_s.value / measured.time_s.value - 1.0;
+    let table = Table::of(
+        "projected and measured times".to_owned(),
+        &pairs,
+        &[
+            ("engine", &|[sim, _]| sim.setup.engine.clone()),
+            ("case", &|[sim, _]| sim.setup.case.clone()),
+            ("experiment", &|[sim, _]| sim.setup.experiment.clone()),
+            ("cells", &|[sim, _]| grouped(sim.cells())),
+            ("ranks", &|[sim, _]| sim.setup.ranks.to_string()),
+            ("projected / s", &|[sim, _]| time(sim)),
+            ("measured / s", &|[_, measured]| time(measured)),
+            ("error", &|pair| format!("{:+.1} %", error(pair) * 100.0)),
         ],
-        rows,
-        notes: Vec::new(),
-    })
+    );
+    (!pairs.is_empty()).then_some(table)
 }
 
 /// The largest simulated run of every strong or weak scaling study.
@@ -166,87 +120,55 @@ fn largest<'a>(groups: &'a Groups) -> Vec<&'a Group> {
 fn phases(groups: &Groups, group: &Group) -> Table {
     let (run, network) = (&group.typical, &groups.network);
     let reference = &groups.reference(group).typical;
-    let total: f64 = run.phases.iter().map(|p| p.useful_s.max + pop::messages_s(p, network)).sum();
-    let efficiency = |p: &Phase| pop::phase_efficiency(run, p, reference, network);
-    let efficiencies: Vec<Efficiency> = run.phases.iter().map(efficiency).collect();
-    let row = |(p, e): (&Phase, &Efficiency)| {
-        vec![
-            p.name.clone(),
-            format!("{:.4}", p.useful_s.sum / run.setup.ranks as f64),
-            format!("{:.4}", p.useful_s.max),
-            format!("{:.2}", e.lambda),
-            format!("{:.2}", e.load_balance),
-            format!("{:.2}", e.transfer),
-            format!("{:.2}", e.parallel()),
-            format!("{:.2}", e.computation_scaling),
-            format!("{:.1} %", 100.0 * e.time_s / total),
-            format!("{:.0}", p.messages.max),
-            format!("{:.3}", p.message_bytes.max / 1e6),
-        ]
-    };
+    let with = |p| (p, phase_efficiency(run, p, reference, network));
+    let of: Vec<With<Phase>> = run.phases.iter().map(with).collect();
+    let total: f64 = run.phases.iter().map(|p| phase_s(run, p, network)).sum();
     let s = &run.setup;
-    Table {
-        title: format!(
-            "phases: {}, {} scaling, {} cells, {} simulated ranks",
+    let cells = grouped(run.cells);
+    let table = Table::of(
+        format!(
+            "phases: {}, {} scaling, {cells} cells, {} simulated ranks",
             Subject::of(s),
             s.experiment,
-            grouped(run.cells),
             s.ranks
         ),
-        columns: vec![
-            "phase",
-            "mean useful time / s",
-            "max useful time / s",
-            "λ",
-            "load balance",
-            "transfer",
-            "parallel efficiency",
-            "computation scaling",
-            "fraction of run time",
-            "messages, max over ranks",
-            "MB, max over ranks",
+        &of,
+        &[
+            ("phase", &|(p, _)| p.name.clone()),
+            ("mean useful time / s", &|(p, _)| format!("{:.4}", p.useful_s.sum / s.ranks as f64)),
+            ("max useful time / s", &|(p, _)| format!("{:.4}", p.useful_s.max)),
+            ("λ", &|(_, e)| format!("{:.2}", e.lambda)),
+            ("load balance", &|(_, e)| format!("{:.2}", e.load_balance)),
+            ("transfer", &|(_, e)| format!("{:.2}", e.transfer)),
+            ("parallel efficiency", &|(_, e)| format!("{:.2}", e.parallel())),
+            ("computation scaling", &|(_, e)| format!("{:.2}", e.computation_scaling)),
+            ("of run time", &|(_, e)| format!("{:.1} %", 100.0 * e.time_s / total)),
+            ("max messages / rank", &|(p, _)| format!("{:.0}", p.messages.max)),
+            ("max MB / rank", &|(p, _)| format!("{:.3}", p.message_bytes.max / 1e6)),
         ],
-        rows: run.phases.iter().zip(&efficiencies).map(row).collect(),
-        notes: reasons(&efficiencies, &s.experiment).into_iter().collect(),
-    }
+    );
+    explained(table, &of, &s.experiment)
 }
 
 /// Several programs on one core, the meshes that are missing, and what the programs do not provide.
-fn programs(groups: &Groups, comparison: &Comparison) -> Table {
-    let row = |group: &&Group| {
-        let cpu_s = group.cpu_s().map_or(f64::NAN, |time| time.value);
-        let search = group.search_s().map(|time| format!("{:.2}", time.value));
-        vec![
-            group.setup.engine.clone(),
-            grouped(group.cells()),
-            format!("{cpu_s:.2}"),
-            search.unwrap_or_else(|| "not separate".to_owned()),
-            format!("{:.3}", group.cells() as f64 / cpu_s / 1e6),
-            format!("{:.1}", group.bytes_per_cell().value),
-        ]
-    };
-    let left_out = comparison
-        .left_out(groups)
-        .into_iter()
-        .map(|left| format!("No mesh at spacing {:.2e}: {}", left.setup.spacing_min, left.why));
-    let lacks = comparison.lacks(groups);
-    let lacks = lacks.map(|(engine, lacks)| format!("{engine} does not provide: {lacks}"));
-    Table {
-        title: format!(
-            "programs on one core: {}, n = {}",
-            comparison.case, comparison.layer_cells_min
-        ),
-        columns: vec![
-            "engine",
-            "cells",
-            "CPU time / s",
-            "of it search / s",
-            "10⁶ cells / (s core)",
-            "bytes / cell",
+fn programs(comparison: &Comparison) -> Table {
+    let groups: Vec<&Group> = comparison.programs.iter().flat_map(|p| p.1.clone()).collect();
+    let cpu_s = |g: &Group| g.cpu_s().map_or(f64::NAN, |time| time.value);
+    let table = Table::of(
+        format!("programs on one core: {}, n = {}", comparison.case, comparison.layer_cells_min),
+        &groups,
+        &[
+            ("engine", &|g| g.setup.engine.clone()),
+            ("cells", &|g| grouped(g.cells())),
+            ("CPU time / s", &|g| format!("{:.2}", cpu_s(g))),
+            ("of it search / s", &|g| {
+                g.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
+            }),
+            ("10⁶ cells / s / core", &|g| format!("{:.3}", g.cells() as f64 / cpu_s(g) / 1e6)),
+            ("bytes / cell", &|g| format!("{:.1}", g.bytes_per_cell().value)),
         ],
-        rows: comparison.programs.iter().flat_map(|(_, groups)| groups).map(row).collect(),
-        notes: left_out.chain(lacks).collect(),
-    }
+    );
+    Table { notes: comparison.notes.clone(), ..table }
 }
 
 #[cfg(test)]
@@ -304,7 +226,7 @@ mod tests {
         ];
         let groups = Groups::of(&lines);
         let [comparison] = &groups.comparisons()[..] else { panic!("one comparison") };
-        let table = programs(&groups, comparison);
+        let table = programs(comparison);
         assert_eq!(table.rows[0].join(" "), "mesher 2,000,000 2.00 not separate 1.000 0.5");
         assert_eq!(table.rows[1].join(" "), "slow 1,000,000 2.00 0.50 0.500 1.0");
         let notes = [

@@ -16,6 +16,11 @@ pub const FONT: &str = "DejaVu Sans";
 /// Height of the text.
 pub const SIZE: f64 = 42.0;
 
+/// Width of a symbol in a legend, with the space beside it.
+pub const SYMBOL: f64 = 80.0;
+/// Distance of lines of text.
+pub const LINE: f64 = SIZE + 8.0;
+
 /// Colour of axes and text: that of the page's text where the drawing is part of a page, else black.
 pub const INK: &str = "currentColor";
 /// Colour of grid lines.
@@ -151,6 +156,27 @@ impl Canvas<'_> {
         // Twice the first edge, so that the corner where the line ends is like the others.
         points.extend_from_within(..2);
         self.line(&points, ink, 4, None);
+    }
+
+    /// Draws a legend in as many rows as it needs, the first of which begins at `start` and the others at `left`: beside every name the
+    /// symbol of its index, which `symbol` draws at its left end. Returns its lower end.
+    pub fn legend(
+        &mut self,
+        [left, start]: [f64; 2],
+        names: &[&str],
+        symbol: impl Fn(&mut Self, At, usize),
+    ) -> f64 {
+        let (mut x, mut y) = (start, 36.0);
+        for (i, name) in names.iter().enumerate() {
+            let entry = SYMBOL + width(name) + 50.0;
+            if x > left && x + entry > f64::from(WIDTH) {
+                (x, y) = (left, y + LINE);
+            }
+            symbol(self, (x, y), i);
+            self.text(name, (x + SYMBOL, y), Anchor::Start);
+            x += entry;
+        }
+        y + 40.0
     }
 
     /// Draws a text.

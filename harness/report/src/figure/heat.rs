@@ -3,9 +3,9 @@
 //! Invariants: larger values are darker, so that the order survives in grey; zero has the colour of the background; the
 //! colour scale is logarithmic and ends at powers of ten.
 
+use super::axes::axes;
 use super::canvas::{Canvas, SIZE, WIDTH};
 use super::palette::{SHADES, hex, shade};
-use super::svg::axes;
 use super::{Axis, Figure, HeatMap, Layer};
 
 /// Ends of the colour scale of a layer: powers of ten that enclose its values.

@@ -4,6 +4,7 @@
 //! Invariants: every value states its provenance; points are joined only where interpolation between them is
 //! meaningful; captions state the confidence intervals.
 
+pub(crate) mod axes;
 pub mod canvas;
 pub mod check;
 pub mod csv;
@@ -202,6 +203,9 @@ impl Body {
     }
 }
 
+/// Usual height of a figure.
+const HEIGHT: u32 = 1040;
+
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
@@ -219,30 +223,12 @@ pub struct Figure {
     pub body: Body,
     /// Height in units of which the width has [`canvas::WIDTH`].
     pub height: u32,
-    /// Facts that the rules for figures are checked against.
-    pub claims: Claims,
-}
-
-/// Facts about a figure that the rules for figures are checked against.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Claims {
-    /// The base case of the ratios shown, with its absolute performance.
-    pub base_case: Option<String>,
-    /// The figure shows ratios.
-    pub shows_ratios: bool,
-    /// The figure shows scaling over ranks.
-    pub shows_scaling: bool,
-    /// The figure compares alternatives.
-    pub compares: bool,
-    /// The values repeat exactly.
-    pub deterministic: bool,
 }
 
 impl Figure {
-    /// All points with their provenance.
-    pub fn points(&self) -> Vec<(Provenance, Point)> {
-        let Body::Points { series, .. } = &self.body else { return Vec::new() };
-        series.iter().flat_map(|s| s.points.iter().map(|p| (s.provenance, *p))).collect()
+    /// A figure of the usual height.
+    pub fn new(id: String, title: String, caption: String, [x, y]: [Axis; 2], body: Body) -> Self {
+        Self { id, title, caption, x, y, body, height: HEIGHT }
     }
 }
 
@@ -295,8 +281,7 @@ pub(crate) mod samples {
             x: Axis::log("ranks").with_ticks(vec![1.0, 2.0, 4.0]),
             y: Axis::log("speedup"),
             body,
-            height: svg::HEIGHT,
-            claims: Claims::default(),
+            height: HEIGHT,
         }
     }
 
@@ -321,7 +306,6 @@ pub(crate) mod samples {
             caption: "On 3 simulated ranks, without collective calls.".into(),
             x: Axis::linear("to rank"),
             y: Axis::linear("from rank"),
-            claims: Claims { deterministic: true, ..Claims::default() },
             ..figure(Body::HeatMap(map))
         }
     }

@@ -79,7 +79,12 @@ pub fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
         return axis.ticks.iter().copied().filter(inside).collect();
     }
     if !axis.log {
-        return RangedCoordf64::from(range.clone()).key_points(7);
+        let ticks = RangedCoordf64::from(range.clone()).key_points(7);
+        // Rounding leaves a remainder of zero.
+        return ticks
+            .into_iter()
+            .map(|v| if v.abs() < 1e-9 * (high - low) { 0.0 } else { v })
+            .collect();
     }
     let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
     let multiples = |factors: &[f64]| -> Vec<f64> {
@@ -159,6 +164,7 @@ mod tests {
         assert_eq!(range(&Axis::linear(""), [3.0, 9.0]).start, 0.0);
         assert_eq!(of(&Axis::linear(""), &[3.0, 9.0]), [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert!(of(&Axis::linear(""), &[]).len() > 2);
+        assert!(ticks(&Axis::linear(""), &(-0.1..0.1)).contains(&0.0));
     }
 
     #[test]

@@ -2,17 +2,12 @@
 //!
 //! The legend is above the data in as many columns as fit, because that of `plotters` is within the frame, where it hides data.
 
+use super::axes::{BELOW, ToPage, axes, left};
 use super::canvas::*;
 use super::palette::colour;
-use super::scale::{Scale, range, tick_labels, ticks};
+use super::scale::range;
 use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat};
-use plotters::coord::combinators::BindKeyPoints;
-use plotters::coord::ranged1d::Ranged;
-use plotters::prelude::*;
-use std::ops::Range;
-
-/// Usual height of a figure.
-pub const HEIGHT: u32 = 1040;
+use plotters::style::colors::BLACK;
 
 /// The figure as an SVG document.
 pub fn svg(figure: &Figure) -> String {
@@ -35,38 +30,12 @@ enum Symbol<'a> {
     Reference(usize),
 }
 
-/// Least space at the left of the data, for ticks and label.
-const LEFT: f64 = 190.0;
-/// Space at the left of ticks.
-const BESIDE_TICKS: f64 = 100.0;
 /// Space at the right of the data.
 const RIGHT: f64 = 40.0;
-/// Space below the data, for ticks and label.
-const BELOW: f64 = 130.0;
-/// Width of a symbol in the legend.
-const SYMBOL: f64 = 80.0;
-/// Distance of lines of text.
-const LINE: f64 = SIZE + 8.0;
-
-/// Space at the left of data on this axis.
-pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
-    let labels = tick_labels(&ticks(axis, ends));
-    labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
-}
-
-/// Draws the legend in as many rows as it needs, and returns its lower end.
-fn legend(canvas: &Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
-    let (mut x, mut y) = (left, 36.0);
-    for (name, symbol) in entries {
-        let entry = SYMBOL + width(name) + 50.0;
-        if x > left && x + entry > f64::from(WIDTH) {
-            (x, y) = (left, y + LINE);
-        }
-        draw_symbol(canvas, (x, y), symbol);
-        canvas.text(name, (x + SYMBOL, y), Anchor::Start);
-        x += entry;
-    }
-    y + 40.0
+/// Draws the legend, and returns its lower end.
+fn legend(canvas: &mut Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
+    let names: Vec<&str> = entries.iter().map(|entry| entry.0).collect();
+    canvas.legend([left; 2], &names, |canvas, at, i| draw_symbol(canvas, at, &entries[i].1))
 }
 
 fn draw_symbol(canvas: &Canvas, (x, y): At, symbol: &Symbol) {
@@ -96,57 +65,6 @@ fn draw_symbol(canvas: &Canvas, (x, y): At, symbol: &Symbol) {
 /// Dashes of a reference line, which differ from those of the next.
 fn reference_dashes(index: usize) -> Dashes {
     [DOTTED, Some((40, 20)), Some((6, 6))][index % 3]
-}
-
-/// Where values are on the page.
-pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
-
-/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values and perhaps a grid;
-/// returns where values are.
-pub fn axes(
-    canvas: &Canvas,
-    axes: [&Axis; 2],
-    ends: [Range<f64>; 2],
-    (from, to): (At, At),
-    grid: bool,
-) -> ToPage {
-    let scales = || [0, 1].map(|i| Scale::new(axes[i], &ends[i]));
-    let [x, y] = scales();
-    let [at_x, at_y] = [0, 1].map(|i| ticks(axes[i], &ends[i]));
-    let label = |ticks: &[f64], value: &f64| {
-        let at = ticks.iter().position(|tick| tick == value);
-        at.map_or_else(String::new, |at| tick_labels(ticks).swap_remove(at))
-    };
-    let (x, y) = (x.with_key_points(at_x.clone()), y.with_key_points(at_y.clone()));
-    let space = |i: usize, space: f64| if axes[i].label.is_empty() { 0.0 } else { space };
-    // The label of the vertical axis keeps clear of the edge of the page.
-    let [left, below] = [space(1, left(axes[1], &ends[1]) - 14.0), space(0, BELOW)];
-    let height = f64::from(canvas.area.dim_in_pixel().1);
-    let whole =
-        canvas.area.margin(from.1, height - to.1 - below, from.0 - left, f64::from(WIDTH) - to.0);
-    let mut chart = ChartBuilder::on(&whole)
-        .set_label_area_size(LabelAreaPosition::Left, left)
-        .set_label_area_size(LabelAreaPosition::Bottom, below)
-        .build_cartesian_2d(x, y)
-        .expect("the rectangle lies on the page");
-    let (of_x, of_y) = (|value: &f64| label(&at_x, value), |value: &f64| label(&at_y, value));
-    let mut mesh = chart.configure_mesh();
-    let grid = if grid { FAINT.to_rgba() } else { TRANSPARENT };
-    mesh.light_line_style(TRANSPARENT).bold_line_style(grid).axis_style(BLACK.stroke_width(2));
-    mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(12);
-    mesh.x_label_formatter(&of_x).y_label_formatter(&of_y);
-    mesh.x_desc(axes[0].label.as_str()).y_desc(axes[1].label.as_str());
-    mesh.draw().expect("a string accepts every element");
-    canvas.frame(from, to);
-    let (scales, limits) = (scales(), [(from.0 as i32, to.0 as i32), (to.1 as i32, from.1 as i32)]);
-    Box::new(move |x, y| {
-        let at = |i: usize, value: f64| {
-            let Range { start, end } = ends[i];
-            let within = value.clamp(start.min(end), start.max(end));
-            f64::from(scales[i].map(&within, limits[i]))
-        };
-        (at(0, x), at(1, y))
-    })
 }
 
 fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark]) {
@@ -200,7 +118,7 @@ fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
     }
 }
 
-fn draw_bars(canvas: &Canvas, figure: &Figure, bars: &Bars) {
+fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
     let segments = bars.segments.iter().enumerate();
     let references = bars.references.iter().enumerate();
     let entries: Vec<(&str, Symbol)> = segments

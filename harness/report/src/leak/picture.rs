@@ -104,25 +104,17 @@ fn draw_passage(canvas: &mut Canvas, window: &Window, passage: &Passage) {
 }
 
 fn draw_legend(canvas: &mut Canvas) {
-    let entries = [
-        ("leaf crossed by facets", None),
-        ("facets", Some(BLACK)),
-        ("projected path", Some(colour(0))),
-        ("largest ball", Some(colour(1))),
-    ];
-    let (mut x, y) = (SIDES, 70.0);
-    for (name, line) in entries {
-        match line {
-            Some(ink) => canvas.line(&[(x, y), (x + 50.0, y)], ink, 6, None),
-            None => {
-                let box_ =
-                    vec![(x, y - 22.0), (x + 50.0, y - 22.0), (x + 50.0, y + 22.0), (x, y + 22.0)];
-                canvas.polygons(&[box_], CROSSING, FAINT);
-            }
+    let lines = [("facets", BLACK), ("projected path", colour(0)), ("largest ball", colour(1))];
+    let names = lines.map(|line| line.0);
+    let names = [&["leaf crossed by facets"], &names[..]].concat();
+    canvas.legend([SIDES; 2], &names, |canvas, (x, y), i| match i {
+        0 => {
+            let [left, right, top, bottom] = [x, x + 50.0, y - 22.0, y + 22.0];
+            let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+            canvas.polygons(&[corners.to_vec()], CROSSING, FAINT);
         }
-        canvas.text(name, (x + 64.0, y), Anchor::Start);
-        x += 64.0 + width(name) + 46.0;
-    }
+        _ => canvas.line(&[(x, y), (x + 50.0, y)], lines[i - 1].1, 6, None),
+    });
 }
 
 /// A bar as long as a cell of the base tree and one as long as the width, and the place and orientation of the plane.

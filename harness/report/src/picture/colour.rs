@@ -25,12 +25,7 @@ pub enum Colour {
 
 impl fmt::Display for Colour {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Level => "level",
-            Self::Rank => "rank",
-            Self::Side => "side",
-            Self::Spacing => "spacing",
-        })
+        f.write_str(["level", "rank", "side", "spacing"][*self as usize])
     }
 }
 
@@ -91,12 +86,12 @@ impl Colour {
         values.iter().enumerate().map(entry).collect()
     }
 
-    /// The legend of a key: names with colours, then a remark.
+    /// The legend of a key: names with colours, and its title.
     pub fn legend(self, key: &[Entry]) -> (Vec<(&str, [u8; 3])>, String) {
         if self == Self::Rank && key.len() > RANKS_NAMED {
             return (Vec::new(), format!("{} ranks, coloured in turn", key.len()));
         }
-        (key.iter().map(|e| (e.name.as_str(), e.fill)).collect(), String::new())
+        (key.iter().map(|e| (e.name.as_str(), e.fill)).collect(), self.to_string())
     }
 }
 

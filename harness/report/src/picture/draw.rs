@@ -1,13 +1,11 @@
-//! The layout of a picture: the squares, the section line, axes, a legend and a scale.
+//! The layout of a picture: the squares, the section line, axes and a legend.
 
 use super::Picture;
-use super::colour::short;
 use super::squares::Square;
 use crate::figure::Axis;
-use crate::figure::canvas::{Anchor, Canvas, INK, SIZE, WIDTH, document};
+use crate::figure::axes;
+use crate::figure::canvas::{Anchor, Canvas, INK, SYMBOL, WIDTH, document, width};
 use crate::figure::palette::hex;
-use crate::figure::scale::ticks;
-use crate::figure::svg as axes;
 use crate::section::Planar;
 use std::collections::BTreeSet;
 
@@ -15,18 +13,10 @@ use std::collections::BTreeSet;
 const SIDES: (f64, f64) = (200.0, 40.0);
 /// Greatest height of the window: it and its margins fit on a page.
 const HEIGHT_MAX: f64 = 1650.0;
-/// Space below the window for ticks, label and scale.
-const BELOW: f64 = 270.0;
-/// Height of a row of the legend, and width of its symbols.
-const ROW: f64 = SIZE + 16.0;
-const SYMBOL: f64 = 50.0;
+/// Space below the window for ticks, label and the name of the plane.
+const BELOW: f64 = 210.0;
 /// Width of the section line, and of the light line below it, which separates it from dark cells.
 const SECTION: (f64, f64) = (2.5, 5.0);
-
-/// Estimated width of a text that consists mainly of digits, which are wide.
-fn width(text: &str) -> f64 {
-    text.chars().count() as f64 * SIZE * 0.62
-}
 
 /// Left edge of a window on the page.
 fn left(window: &[Planar; 2]) -> f64 {
@@ -72,7 +62,7 @@ impl Page<'_> {
 
 /// Draws the picture; returns its height.
 fn draw(picture: &Picture, canvas: &mut Canvas) -> u32 {
-    let top = legend(picture, canvas) + 14.0;
+    let top = legend(picture, canvas) - 4.0;
     let page = Page { picture, left: left(&picture.window), top, scale: scale(&picture.window) };
     // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
     let [low, high] = picture.window;
@@ -95,33 +85,21 @@ fn draw(picture: &Picture, canvas: &mut Canvas) -> u32 {
     (bottom + BELOW) as u32
 }
 
-/// Draws the legend in as many rows as it needs; returns its lower end.
+/// Draws the legend beside its title; returns its lower end.
 fn legend(picture: &Picture, canvas: &mut Canvas) -> f64 {
-    let (entries, remark) = picture.colour.legend(&picture.key);
-    let right = f64::from(WIDTH) - SIDES.1;
+    let (entries, title) = picture.colour.legend(&picture.key);
     let left = left(&picture.window);
-    let (mut x, mut y) = (left, ROW / 2.0);
-    let title = if remark.is_empty() { picture.colour.to_string() } else { remark };
-    canvas.text(&title, (x, y), Anchor::Start);
-    x += width(&title) + 40.0;
+    canvas.text(&title, (left, 36.0), Anchor::Start);
     let line = picture.section.as_ref().map(|_| "geometry");
-    let names = entries.iter().map(|(name, fill)| (*name, Some(*fill)));
-    for (name, fill) in names.chain(line.map(|name| (name, None))) {
-        let entry = SYMBOL + 14.0 + width(name) + 30.0;
-        if x + entry > right {
-            (x, y) = (left, y + ROW);
+    let names: Vec<&str> = entries.iter().map(|entry| entry.0).chain(line).collect();
+    let start = left + width(&title) + 50.0;
+    canvas.legend([left, start], &names, |canvas, (x, y), i| match entries.get(i) {
+        Some((_, fill)) => {
+            let symbol = [x, y - 18.0, SYMBOL - 20.0, 36.0];
+            canvas.outlined(&[symbol], &hex(*fill), &hex(outline(*fill)));
         }
-        match fill {
-            Some(fill) => {
-                let symbol = [x, y - 18.0, SYMBOL, 36.0];
-                canvas.outlined(&[symbol], &hex(fill), &hex(outline(fill)));
-            }
-            None => canvas.segments(&[[(x, y), (x + SYMBOL, y)]], INK, SECTION.0),
-        }
-        canvas.text(name, (x + SYMBOL + 14.0, y), Anchor::Start);
-        x += entry;
-    }
-    y + ROW / 2.0
+        None => canvas.segments(&[[(x, y), (x + SYMBOL - 20.0, y)]], INK, SECTION.0),
+    })
 }
 
 /// The colour of outlines around a fill: the same hue, so that small cells look like those of the legend.
@@ -174,29 +152,10 @@ fn section(page: &Page, canvas: &mut Canvas) {
     }
 }
 
-/// A length that is a round part of another.
-fn round_length(length: f64) -> f64 {
-    let ticks = ticks(&Axis::linear(""), &(0.0..length));
-    ticks.into_iter().find(|tick| *tick > 0.0).unwrap_or(length)
-}
-
-/// The scale, and the plane and number of cells.
+/// The plane and the number of cells.
 fn below(page: &Page, canvas: &mut Canvas) {
     let picture = page.picture;
-    let [low, high] = picture.window;
-    let y = page.at(low).1 + 170.0;
-    let length = round_length(high[0] - low[0]);
-    let (left, right) = (page.left, page.left + length * page.scale);
-    let bar = [
-        [(left, y), (right, y)],
-        [(left, y - 12.0), (left, y + 12.0)],
-        [(right, y - 12.0), (right, y + 12.0)],
-    ];
-    canvas.segments(&bar, INK, 4.0);
-    let label = short(length);
-    canvas.text(&label, (right + 16.0, y), Anchor::Start);
     let plane = super::plane_name(&picture.root, picture.slice);
-    canvas.text(&plane, (right + 16.0 + width(&label) + 60.0, y), Anchor::Start);
-    let cells = picture.count();
-    canvas.text(&cells, (page.left, y + ROW), Anchor::Start);
+    let at = (page.left, page.at(picture.window[0]).1 + 170.0);
+    canvas.text(&format!("{plane}; {}", picture.count()), at, Anchor::Start);
 }

@@ -2,13 +2,14 @@
 
 use super::squares::Detail;
 use super::{Picture, TEX, VECTOR, csv, svg, tikz};
+use clap::ValueEnum;
 use contract::files::{Content, named, write_atomically, write_together};
 use run::engine::interrupt;
 use std::io::{self, Write};
 use std::path::Path;
 
 /// A format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// A slice as SVG.
     Svg,
@@ -17,6 +18,7 @@ pub enum Format {
     /// A slice as PDF.
     Pdf,
     /// A slice as PGF/TikZ.
+    #[value(name = "tex", alias = "tikz")]
     Tikz,
     /// A view as HTML.
     Html,
@@ -29,17 +31,10 @@ impl Format {
     /// One sentence, if it states none.
     pub fn of(path: &Path) -> Result<Self, String> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        match extension.to_ascii_lowercase().as_str() {
-            "svg" => Ok(Self::Svg),
-            "png" => Ok(Self::Png),
-            "pdf" => Ok(Self::Pdf),
-            "tex" | "tikz" => Ok(Self::Tikz),
-            "html" => Ok(Self::Html),
-            _ => Err(format!(
-                "{}: the file name of a picture must end in .svg, .png, .pdf, .tex, .tikz or .html",
-                path.display()
-            )),
-        }
+        let endings = ".svg, .png, .pdf, .tex, .tikz or .html";
+        let file = path.display();
+        Self::from_str(extension, true)
+            .map_err(|_| format!("{file}: the file name of a picture must end in {endings}"))
     }
 
     /// How many squares the format can show.

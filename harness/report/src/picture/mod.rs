@@ -60,6 +60,23 @@ impl Request<'_> {
             false => Ok(()),
         }
     }
+
+    /// The squares in which a plane cuts the leaves in a window, at this many units of the page per unit of the user. The window may end
+    /// within the root, but the plane need not be in the box.
+    fn squares(
+        &self,
+        mesh: &Mesh,
+        slice: Slice,
+        mut window: [[i64; 3]; 2],
+        scale: f64,
+        detail: &Detail,
+    ) -> Result<Squares, ExportError> {
+        (window[0][slice.axis], window[1][slice.axis]) = (0, UNITS_PER_EDGE);
+        let (slice, clip) = (Some(slice), Some(window));
+        let selection = Selection { slice, clip, ..self.selection.clone() };
+        let (edge, detail) = (mesh.manifest.root.edge * scale, detail.to_level(self.level_max));
+        Squares::collect(mesh, &selection, self.colour, edge, &detail)
+    }
 }
 
 /// The data of a picture of a slice.
@@ -173,14 +190,7 @@ impl Picture {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
             return Err(ExportError::Request(why.to_owned()));
         }
-        // The window may end within the root, but the slice need not be in the box.
-        let mut reach = clip;
-        (reach[0][slice.axis], reach[1][slice.axis]) = (0, UNITS_PER_EDGE);
-        let selection =
-            Selection { slice: Some(slice), clip: Some(reach), ..request.selection.clone() };
-        let root_edge = root.edge * draw::scale(&window);
-        let detail = detail.to_level(request.level_max);
-        let squares = Squares::collect(mesh, &selection, request.colour, root_edge, &detail)?;
+        let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
         if squares.squares.is_empty() {
             let why =
                 "no leaf of the selection is in the slice: give another --slice or a larger --clip";

@@ -7,11 +7,10 @@ use super::surface::{Surface, ranks_at};
 use super::{Colour, Request, halfway, middle, plane_name, zoomed};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::lattice::Root;
 use contract::octant::LEVEL_MAX;
 use export::error::ExportError;
 use export::mesh::Mesh;
-use export::selection::Selection;
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -94,14 +93,7 @@ impl Scene {
         let planes = [first].into_iter().chain(others.map(|a| halfway(&root, request.body, a)));
         let mut slices = Vec::new();
         for slice in planes {
-            let mut reach = clip;
-            (reach[0][slice.axis], reach[1][slice.axis]) = (0, UNITS_PER_EDGE);
-            let (slice, clip) = (Some(slice), Some(reach));
-            let selection = Selection { slice, clip, ..request.selection.clone() };
-            let detail = DETAIL.to_level(request.level_max);
-            let page = root.edge / edge * PAGE;
-            slices
-                .push((slice, Squares::collect(mesh, &selection, request.colour, page, &detail)?));
+            slices.push((slice, request.squares(mesh, slice, clip, PAGE / edge, &DETAIL)?));
         }
         if slices.iter().all(|(_, squares)| squares.squares.is_empty()) {
             let why =
@@ -117,17 +109,15 @@ impl Scene {
         let values: BTreeSet<u32> = squares.chain(ranks.iter().flatten().copied()).collect();
         let key = request.colour.key(&values, &root);
         let palette = Palette::of(&key);
-        let cuts = slices.iter().filter_map(|(slice, squares)| {
-            let slice = (*slice)?;
-            let at = root.to_user([slice.at; 3])[slice.axis];
-            let name = plane_name(&root, slice);
-            let level_outlined = squares.level_outlined;
-            let squares = palette.squares(&key, squares);
-            Some(Cut { name, axis: slice.axis, at, level_outlined, squares })
+        let cuts = slices.iter().map(|(slice, squares)| Cut {
+            name: plane_name(&root, *slice),
+            axis: slice.axis,
+            at: root.to_user([slice.at; 3])[slice.axis],
+            level_outlined: squares.level_outlined,
+            squares: palette.squares(&key, squares),
         });
-        let (legend, remark) = request.colour.legend(&key);
+        let (legend, quantity) = request.colour.legend(&key);
         let legend = legend.into_iter().map(|(name, fill)| (name.to_owned(), fill)).collect();
-        let quantity = if remark.is_empty() { request.colour.to_string() } else { remark };
         let body = surface.map(|s| palette.body(&key, &s, &ranks, (centre, edge)));
         Ok(Self {
             title: format!("{} cells by {}", mesh.manifest.leaves, request.colour),

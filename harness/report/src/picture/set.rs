@@ -4,7 +4,11 @@
 //! [`crate::benchmark`] makes. The pictures are numbered in the order of the algorithm. Which of them has which number in
 //! the paper is not known here, so the names state what is shown.
 
-use super::colour::Colour;
+use self::Made::{Base, Final, Layers, WithoutCrossing};
+use self::Part::{BaseMesh, Body, CloseUp, Root, View, ViewOfBody};
+use super::colour::Colour::{self, Level, Rank, Side, Spacing};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
@@ -52,139 +56,33 @@ pub enum Part {
     ViewOfBody,
 }
 
-/// A picture of the set.
-#[derive(Clone, Copy, Debug)]
-pub struct Member {
-    /// Name of its files.
-    pub name: &'static str,
-    /// The mesh.
-    pub made: Made,
-    /// The part of it.
-    pub part: Part,
-    /// The colours.
-    pub colour: Colour,
-    /// One sentence on what it shows.
-    pub caption: &'static str,
-}
-
-const fn member(
-    name: &'static str,
-    made: Made,
-    part: Part,
-    colour: Colour,
-    caption: &'static str,
-) -> Member {
-    Member { name, made, part, colour, caption }
-}
+/// A picture of the set: the name of its files, the mesh, the part of it, the colours, and one sentence on what it shows.
+pub type Member = (&'static str, Made, Part, Colour, &'static str);
 
 /// The pictures, in the order of the algorithm.
 pub const MEMBERS: [Member; 16] = [
-    member("01-geometry", Made::Base, Part::ViewOfBody, Colour::Level, "The geometry."),
-    member(
-        "02-base-mesh",
-        Made::Base,
-        Part::BaseMesh,
-        Colour::Level,
-        "The base mesh: the base tree, cut five levels above the surface level. Its leaves are what the partition assigns to ranks.",
-    ),
-    member(
-        "03-base-partition",
-        Made::Base,
-        Part::BaseMesh,
-        Colour::Rank,
-        "The partition of the base mesh: every rank has an interval of the Morton curve.",
-    ),
-    member(
-        "04-surface-partition",
-        Made::Base,
-        Part::View,
-        Colour::Rank,
-        "The partition on the surface of the geometry and in a slice of the base tree.",
-    ),
-    member(
-        "05-refinement",
-        Made::Base,
-        Part::Body,
-        Colour::Level,
-        "The base tree after refinement: every leaf that the geometry crosses has the surface level. Nothing is balanced yet.",
-    ),
-    member(
-        "06-sides",
-        Made::Base,
-        Part::Body,
-        Colour::Side,
-        "Crossing leaves, and the components outside and inside, before the inside is deleted.",
-    ),
-    member(
-        "07-sides-close-up",
-        Made::Base,
-        Part::CloseUp,
-        Colour::Side,
-        "Close-up of the same leaves at the foremost vertex of the geometry.",
-    ),
-    member(
-        "08-balance",
-        Made::Layers(1),
-        Part::Body,
-        Colour::Level,
-        "n = 1: the 2:1 balance alone (the paper's 4:1 rule). The inside is deleted.",
-    ),
-    member(
-        "09-layers-2",
-        Made::Layers(2),
-        Part::Body,
-        Colour::Level,
-        "Layers of at least n = 2 cells.",
-    ),
-    member(
-        "10-layers-4",
-        Made::Layers(4),
-        Part::Body,
-        Colour::Level,
-        "Layers of at least n = 4 cells.",
-    ),
-    member(
-        "11-layers-10",
-        Made::Layers(10),
-        Part::Body,
-        Colour::Level,
-        "Layers of at least n = 10 cells.",
-    ),
-    member(
-        "12-mesh",
-        Made::Final,
-        Part::Root,
-        Colour::Level,
-        "The final mesh of the case, up to the far field.",
-    ),
-    member(
-        "13-mesh-close-up",
-        Made::Final,
-        Part::CloseUp,
-        Colour::Spacing,
-        "Close-up of the final mesh at the foremost vertex of the geometry.",
-    ),
-    member(
+    ("01-geometry", Base, ViewOfBody, Level, "The geometry."),
+    ("02-base-mesh", Base, BaseMesh, Level, "The base mesh, whose leaves are assigned to ranks."),
+    ("03-base-partition", Base, BaseMesh, Rank, "Its partition: intervals of the Morton curve."),
+    ("04-surface-partition", Base, View, Rank, "The partition on the surface and in a slice."),
+    ("05-refinement", Base, Body, Level, "The base tree after refinement, not yet balanced."),
+    ("06-sides", Base, Body, Side, "Crossing leaves, and components outside and inside."),
+    ("07-sides-close-up", Base, CloseUp, Side, "The same at the foremost vertex."),
+    ("08-balance", Layers(1), Body, Level, "n = 1: 2:1 balance alone (the paper's 4:1 rule)."),
+    ("09-layers-2", Layers(2), Body, Level, "Layers of at least n = 2 cells."),
+    ("10-layers-4", Layers(4), Body, Level, "Layers of at least n = 4 cells."),
+    ("11-layers-10", Layers(10), Body, Level, "Layers of at least n = 10 cells."),
+    ("12-mesh", Final, Root, Level, "The final mesh, up to the far field."),
+    ("13-mesh-close-up", Final, CloseUp, Spacing, "The final mesh at the foremost vertex."),
+    (
         "14-without-crossing",
-        Made::WithoutCrossing,
-        Part::CloseUp,
-        Colour::Spacing,
-        "The same place of the mesh without crossing leaves: the gap that a near-body mesh fills.",
+        WithoutCrossing,
+        CloseUp,
+        Spacing,
+        "The gap that a near-body mesh fills.",
     ),
-    member(
-        "15-partition",
-        Made::Final,
-        Part::Body,
-        Colour::Rank,
-        "The partition of the final mesh.",
-    ),
-    member(
-        "16-mesh-view",
-        Made::Final,
-        Part::View,
-        Colour::Level,
-        "The final mesh in a slice through the geometry.",
-    ),
+    ("15-partition", Final, Body, Rank, "The partition of the final mesh."),
+    ("16-mesh-view", Final, View, Level, "The final mesh in a slice through the geometry."),
 ];
 
 /// Leaves, window and deepest level of a slice: selection, zoom and level, as a request has them.
@@ -194,11 +92,11 @@ pub fn request(part: Part, case: &Case) -> (Selection, f64, u8) {
     let window = |extents: f64| (case.root.edge / (extents * longest)).max(1.0);
     let level_base = case.level_surface.saturating_sub(LEVELS_ABOVE_SURFACE).max(2);
     match part {
-        Part::Root | Part::View => (Selection::default(), 1.0, LEVEL_MAX),
-        Part::BaseMesh => (Selection::default(), window(AROUND_BASE_MESH), level_base),
-        Part::Body => (Selection::default(), window(AROUND), LEVEL_MAX),
-        Part::ViewOfBody => (Selection::default(), window(1.1), LEVEL_MAX),
-        Part::CloseUp => (close_up(case), 1.0, LEVEL_MAX),
+        Root | View => (Selection::default(), 1.0, LEVEL_MAX),
+        BaseMesh => (Selection::default(), window(AROUND_BASE_MESH), level_base),
+        Body => (Selection::default(), window(AROUND), LEVEL_MAX),
+        ViewOfBody => (Selection::default(), window(1.1), LEVEL_MAX),
+        CloseUp => (close_up(case), 1.0, LEVEL_MAX),
     }
 }
 
@@ -236,39 +134,28 @@ pub fn page(case: &str, command: &str, pictures: &[(Member, Drawn)]) -> String {
             "pictures as SVG and PGF/TikZ, their data as CSV, and the views as HTML, which a mouse turns."
         }
         p { "Made by " code { (command) } "." }
-        @for (member, drawn) in pictures {
-            @let caption = caption(member, drawn);
-            (figure(member, drawn, &caption))
-        }
+        @for ((name, .., caption), drawn) in pictures { (figure(name, caption, drawn)) }
     };
     crate::page::page(&format!("Pictures of {case}"), &content)
 }
 
-fn caption(member: &Member, drawn: &Drawn) -> Markup {
-    let name = member.name;
-    html! {
-        (member.caption) " "
-        @match drawn {
-            Drawn::Slice(_) => { a href=(format!("{name}.svg")) { "SVG" } ", " a href=(format!("{name}.tex")) { "TikZ" } ", " a href=(format!("{name}.csv")) { "data" } }
-            Drawn::View(_) => { a href=(format!("{name}.html")) { "Turn it in a browser" } }
-        }
-        "."
-    }
-}
-
-fn figure(member: &Member, drawn: &Drawn, caption: &Markup) -> Markup {
-    use base64::Engine;
-    let drawing = match drawn {
-        Drawn::Slice(svg) => svg.clone(),
-        Drawn::View(None) => {
-            let text = html! { p { "pyvista, which draws views, is missing; the HTML file needs no other program." } };
-            text.into_string()
-        }
-        Drawn::View(Some(png)) => {
-            let data = base64::prelude::BASE64_STANDARD.encode(png);
-            let image = html! { img src=(format!("data:image/png;base64,{data}")) alt=(member.caption) style="width: 100%"; };
-            image.into_string()
+fn figure(name: &str, caption: &str, drawn: &Drawn) -> Markup {
+    let link = |extension: &str, text: &str| html! { a href={ (name) "." (extension) } { (text) } };
+    let (drawing, links) = match drawn {
+        Drawn::Slice(svg) => (
+            PreEscaped(svg.clone()),
+            html! { (link("svg", "SVG")) ", " (link("tex", "TikZ")) ", " (link("csv", "data")) },
+        ),
+        Drawn::View(png) => {
+            let drawing = html! {
+                @if let Some(png) = png {
+                    img src={ "data:image/png;base64," (BASE64_STANDARD.encode(png)) } alt=(caption) style="width: 100%";
+                } @else {
+                    p { "pyvista, which draws views, is missing; the HTML file needs no other program." }
+                }
+            };
+            (drawing, link("html", "Turn it in a browser"))
         }
     };
-    crate::page::figure(member.name, member.name, &PreEscaped(drawing).0, caption)
+    crate::page::figure(name, name, &drawing.0, &html! { (caption) " " (links) "." })
 }

@@ -53,8 +53,7 @@ pub fn tikz(picture: &Picture) -> String {
 fn axis(out: &mut String, picture: &Picture, edges: [f64; 2]) {
     let ([low, high], [x, y]) = (picture.window, picture.axes());
     let below = format!("{}; {}", plane_name(&picture.root, picture.slice), picture.count());
-    let (entries, remark) = picture.colour.legend(&picture.key);
-    let title = if remark.is_empty() { picture.colour.to_string() } else { remark };
+    let (entries, title) = picture.colour.legend(&picture.key);
     let _ = writeln!(
         out,
         "\\begin{{axis}}[\n  at={{(0,0)}}, anchor=south west, scale only axis, width={}\\linewidth, height={}\\linewidth, enlargelimits=false,\n  \

@@ -2,10 +2,9 @@
 
 use crate::figure::csv::table;
 use crate::json::pretty;
-use crate::verification::junit::to_text;
+use crate::junit::{Ended, suite, test, to_text};
 use bench::track::history::Record;
 use bench::track::{Series, summary, unit};
-use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 use serde_json::{Map, Value, json};
 
 /// The last record in Bencher Metric Format: `{case: {metric: {"value": x}}}`.
@@ -40,23 +39,15 @@ pub fn csv(records: &[Record]) -> String {
 /// A test per metric. It fails if the last change point is an increase of a cost among the last `recent` values.
 pub fn junit(all: &[Series], recent: usize) -> String {
     let mut xml = quick_junit::Report::new("harness track");
-    let mut suite = TestSuite::new("track");
-    for series in all {
-        let status = match series.worse_recently(recent) {
-            Some(_) => {
-                let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-                status.set_message(summary(std::slice::from_ref(series)).trim_end().to_owned());
-                status
-            }
-            None => TestCaseStatus::success(),
+    let of_series = |series: &Series| {
+        let text = summary(std::slice::from_ref(series));
+        let ended = match series.worse_recently(recent) {
+            Some(_) => Ended::Failed(text.trim_end().to_owned()),
+            None => Ended::Passed,
         };
-        let mut test = TestCase::new(series.name.as_str(), status);
-        if !series.changes.is_empty() || !series.drifts.is_empty() {
-            test.set_system_out(summary(std::slice::from_ref(series)));
-        }
-        suite.add_test_case(test);
-    }
-    xml.add_test_suite(suite);
+        test(&series.name, ended, if series.changes.is_empty() { "" } else { &text })
+    };
+    xml.add_test_suite(suite("track", 0.0, all.iter().map(of_series)));
     to_text(&xml)
 }
 

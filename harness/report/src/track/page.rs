@@ -1,50 +1,44 @@
-//! The trend page: the change points as a table, then a figure per metric.
+//! The trend page: the steps and drifts as a table, then a figure per metric.
 
 use super::figures::{of_metric, short_commit};
 use crate::figure::svg::svg;
 use crate::figure::tick_label;
 use crate::page::{figure, page as whole_page, table};
 use bench::track::history::Record;
-use bench::track::link::COMMIT;
-use bench::track::{Change, Drift, Series};
+use bench::track::{Change, Series};
 use maud::{Markup, html};
 use std::cmp::Reverse;
+
+/// Placeholder for the hash of a commit in its address.
+pub const COMMIT: &str = "{commit}";
 
 /// The page. Metrics with changes come first. `link` is the address of a commit, with [`COMMIT`] for its hash.
 pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
     let (changed, constant): (Vec<&Series>, Vec<&Series>) =
-        all.iter().partition(|series| !series.changes.is_empty() || !series.drifts.is_empty());
+        all.iter().partition(|series| !series.changes.is_empty());
     let sections = [("Metrics with changes", changed), ("Metrics without changes", constant)];
+    let dated = |record: &Record| {
+        let date = record.time.get(..10).unwrap_or("no date");
+        html! { (linked(&record.commit, link)) " (" (date) ")" }
+    };
     let content = html! {
-        p { (span(records, link)) }
+        p {
+            @match records {
+                [] => "No records.",
+                [one] => { "One commit, " (dated(one)) "." }
+                [first, .., last] => { (records.len()) " commits, " (dated(first)) " to " (dated(last)) "." }
+            }
+        }
         (changes(records, all, link))
-        (drifts(records, all, link))
         @for (title, series) in sections.iter().filter(|(_, series)| !series.is_empty()) {
             h2 { (title) }
-            @for one in series { (drawn(records, one)) }
+            @for one in series {
+                @let f = of_metric(records, one);
+                (figure(&f.id, &f.title, &svg(&f), &html! {}))
+            }
         }
     };
     whole_page("Trend", &content)
-}
-
-fn drawn(records: &[Record], series: &Series) -> Markup {
-    let f = of_metric(records, series);
-    figure(&f.id, &f.title, &svg(&f), &html! {})
-}
-
-fn span(records: &[Record], link: Option<&str>) -> Markup {
-    html! {
-        @match records {
-            [] => "No records.",
-            [one] => { "One commit, " (dated(one, link)) "." }
-            [first, .., last] => { (records.len()) " commits, " (dated(first, link)) " to " (dated(last, link)) "." }
-        }
-    }
-}
-
-fn dated(record: &Record, link: Option<&str>) -> Markup {
-    let date = record.time.get(..10).unwrap_or("no date");
-    html! { (linked(&record.commit, link)) " (" (date) ")" }
 }
 
 /// The beginning of a commit's hash, with a link if there is an address.
@@ -56,37 +50,7 @@ fn linked(commit: &str, link: Option<&str>) -> Markup {
     }
 }
 
-/// A relative change, with the class of its cell in the style sheet.
-fn change_of(series: &Series, before: f64, after: f64, percent: Option<f64>) -> Markup {
-    let text = percent.map_or("new".to_owned(), |by| format!("{by:+.2} %"));
-    let class = series.is_cost().then_some(if after > before { "worse" } else { "better" });
-    html! { span class=[class] { (text) } }
-}
-
-/// A value with its unit.
-fn value(series: &Series, value: f64) -> Markup {
-    html! { (tick_label(value)) @if series.unit != "count" { " " (series.unit) } }
-}
-
-/// All drifts.
-fn drifts(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
-    let row = |(series, drift): (&Series, &Drift)| {
-        vec![
-            html! { (series.name) },
-            value(series, drift.before),
-            value(series, drift.after),
-            change_of(series, drift.before, drift.after, drift.percent),
-            html! { (linked(&drift.first, link)) ".." (linked(&drift.last, link)) },
-            html! { (drift.until - drift.from) " of " (records.len()) },
-        ]
-    };
-    let all = all.iter().flat_map(|series| series.drifts.iter().map(move |drift| (series, drift)));
-    let rows: Vec<Vec<Markup>> = all.map(row).collect();
-    let columns = ["metric", "mean before", "mean after", "change", "commits", "number of commits"];
-    html! { @if !rows.is_empty() { h2 { "Drifts" } (table(None, &columns, &rows)) } }
-}
-
-/// All change points, the latest first.
+/// All steps and drifts, the latest first. The class of a change is that of its cell in the style sheet.
 fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     let of_series = |series| -> Vec<(&Series, &Change)> {
         let series: &Series = series;
@@ -100,18 +64,29 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     found.sort_by_key(|change| Reverse(first_new(change)));
     let row = |both: &(&Series, &Change)| {
         let (series, change) = *both;
+        let value = |value: f64| {
+            html! { (tick_label(value)) @if series.unit != "count" { " " (series.unit) } }
+        };
+        let by = change.percent.map_or("new".to_owned(), |by| format!("{by:+.2} %"));
+        let sign = if change.after > change.before { "worse" } else { "better" };
+        let remark = match (change.is_drift, change.accepted) {
+            (true, _) => {
+                format!("drift over {} of {} commits", change.at - change.from + 1, records.len())
+            }
+            (false, true) => "accepted".to_owned(),
+            (false, false) => String::new(),
+        };
         vec![
             html! { (series.name) },
-            value(series, change.before),
-            value(series, change.after),
-            change_of(series, change.before, change.after, change.percent),
+            value(change.before),
+            value(change.after),
+            html! { span class=[series.is_cost().then_some(sign)] { (by) } },
             html! { (linked(&change.last_old, link)) ".." (linked(&change.first_new, link)) },
-            html! { @if change.accepted { "accepted" } },
-            html! { (records[first_new(both)].subject) },
+            html! { (remark) },
+            html! { @if !change.is_drift { (records[first_new(both)].subject) } },
         ]
     };
-    let columns =
-        ["metric", "median before", "median after", "change", "commits", "", "first commit after"];
+    let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];
     let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
     html! { h2 { "Change points" } (table(None, &columns, &rows)) }
 }

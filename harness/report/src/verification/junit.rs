@@ -1,7 +1,8 @@
 //! A verification as JUnit XML: a suite per case, a test per check. Checks that were left out are skipped tests with a
 //! reason.
 
-use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
+use crate::junit::{Ended, suite, test, to_text};
+use quick_junit::TestCase;
 use run::verify::report::{CaseReport, Check, Outcome, Report, Tally};
 use std::time::Duration;
 
@@ -9,9 +10,15 @@ use std::time::Duration;
 pub fn junit(report: &Report) -> String {
     let mut xml = quick_junit::Report::new("harness verify");
     xml.set_time(Duration::from_secs_f64(report.time_s));
-    xml.add_test_suites(report.cases.iter().map(suite));
-    if report.missing.iter().any(|missing| missing.required) {
-        xml.add_test_suite(requirements(report));
+    xml.add_test_suites(
+        report.cases.iter().map(|case| suite(&case.name, case.time_s, tests(case))),
+    );
+    // A missing program that `--require` names fails the build, so it is an error here too.
+    let required = report.missing.iter().filter(|missing| missing.required);
+    let required: Vec<TestCase> =
+        required.map(|one| test(&one.what, Ended::Error(one.why.clone()), "")).collect();
+    if !required.is_empty() {
+        xml.add_test_suite(suite("required", 0.0, required));
     }
     check_invariants(&xml, report);
     to_text(&xml)
@@ -26,71 +33,28 @@ fn check_invariants(xml: &quick_junit::Report, report: &Report) {
     assert_eq!((xml.tests, xml.failures, xml.errors), expected, "tests, failures, errors of JUnit");
 }
 
-/// JUnit XML as text, valid by the schema of Jenkins' xUnit plugin (junit-10.xsd), which does not allow `skipped` on the
-/// outermost element.
-pub fn to_text(report: &quick_junit::Report) -> String {
-    let text = report.to_string().expect("a report is representable in XML");
-    let Some((start, end)) = text.find("<testsuites").and_then(|from| {
-        let until = from + text[from..].find('>')?;
-        let skipped = from + text[from..until].find(" skipped=\"")?;
-        let value = skipped + " skipped=\"".len();
-        Some((skipped, value + text[value..until].find('"')? + 1))
-    }) else {
-        return text;
+fn tests(case: &CaseReport) -> impl Iterator<Item = TestCase> {
+    let refused = case.input_error.iter();
+    let refused =
+        refused.map(|error| test("the programs take the case", Ended::Error(error.clone()), ""));
+    let of_check = |check: &Check| {
+        let ended = match &check.outcome {
+            Outcome::Pass { .. } => Ended::Passed,
+            Outcome::Fail { why } => Ended::Failed(why.clone()),
+            Outcome::LeftOut { why } => Ended::Skipped(format!("left out: {why}")),
+        };
+        let name = format!("{}: {}", check.subject, check.name);
+        let mut test = test(name, ended, &check.notes.join("\n"));
+        test.set_time(Duration::from_secs_f64(check.time_s));
+        test
     };
-    format!("{}{}", &text[..start], &text[end..])
-}
-
-fn suite(case: &CaseReport) -> TestSuite {
-    let mut suite = TestSuite::new(case.name.as_str());
-    suite.set_time(Duration::from_secs_f64(case.time_s));
-    suite.add_test_cases(case.checks.iter().map(test));
-    if let Some(error) = &case.input_error {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-        status.set_message(error.as_str());
-        suite.add_test_case(TestCase::new("the programs take the case", status));
-    }
-    suite
-}
-
-fn test(check: &Check) -> TestCase {
-    let status = match &check.outcome {
-        Outcome::Pass { .. } => TestCaseStatus::success(),
-        Outcome::Fail { why } => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status
-                .set_message(why.lines().next().unwrap_or_default())
-                .set_description(why.as_str());
-            status
-        }
-        Outcome::LeftOut { why } => {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(format!("left out: {why}"));
-            status
-        }
-    };
-    let mut test = TestCase::new(format!("{}: {}", check.subject, check.name), status);
-    test.set_time(Duration::from_secs_f64(check.time_s));
-    if !check.notes.is_empty() {
-        test.set_system_out(check.notes.join("\n"));
-    }
-    test
-}
-
-/// A missing program that `--require` names fails the build, so it is an error here too.
-fn requirements(report: &Report) -> TestSuite {
-    let mut suite = TestSuite::new("required");
-    for missing in report.missing.iter().filter(|missing| missing.required) {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-        status.set_message(missing.why.as_str());
-        suite.add_test_case(TestCase::new(missing.what.as_str(), status));
-    }
-    suite
+    case.checks.iter().map(of_check).chain(refused)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use quick_junit::TestCaseStatus;
     use run::testing::report as sample;
 
     #[test]

@@ -8,7 +8,7 @@ use run::verify::report::Report;
 /// The report as Markdown: verdict, table, remarks.
 pub fn markdown(report: &Report) -> String {
     let mut text = format!("## harness verify\n\n{}\n\n", report.verdict());
-    text += &table_of(report).markdown(0..0);
+    text += &table_of(report).markdown();
     let remarks = remarks(report);
     if !remarks.is_empty() {
         text.push('\n');

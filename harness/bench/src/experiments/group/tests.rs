@@ -1,0 +1,176 @@
+use super::*;
+use crate::experiments::entry::{Machine, Session};
+use crate::testing::line;
+use crate::testing::run;
+use proptest::prelude::*;
+
+fn line_of(run: Run) -> Line {
+    line(Entry::Run(Box::new(run)))
+}
+
+fn free() -> Line {
+    line(Entry::Network(Network { latency_s: 0.0, bandwidth_bytes_per_s: 1e30, measured: true }))
+}
+
+fn of_machine(session: &str, cpu: &str) -> Line {
+    let machine = Machine { cpu: cpu.into(), ..Machine::default() };
+    let (command, lacks) = (Vec::new(), BTreeMap::new());
+    let entry = Session { command, machine, load_average: 0.0, lacks };
+    Line { session: session.into(), ..line(Entry::Session(Box::new(entry))) }
+}
+
+#[test]
+fn runs_of_another_machine_program_or_geometry_are_not_pooled() {
+    let of = |session: &str, time_s: f64, program: &str, geometry: &str| {
+        let mut run = run(Comm::Mpi, 9, &[("a", &[time_s])]);
+        (run.program, run.geometry) = (program.into(), Some(geometry.into()));
+        Line { session: session.into(), ..line_of(run) }
+    };
+    let lines = [
+        of_machine("s", "fast"),
+        of_machine("t", "slow"),
+        of("s", 0.130, "p", "g"),
+        of("t", 0.605, "p", "g"),
+        of("s", 0.132, "p", "g"),
+        of("s", 0.5, "q", "g"),
+        of("s", 0.7, "p", "h"),
+    ];
+    let groups = Groups::of(&lines);
+    let found: Vec<_> = groups
+        .all
+        .iter()
+        .map(|g| (g.setup.engine.as_str(), g.setup.case.as_str(), g.time_s.value, g.time_s.count))
+        .collect();
+    let expected = [
+        ("mesher", "cube", 0.131, 2),
+        ("mesher [2]", "cube", 0.605, 1),
+        ("mesher [3]", "cube", 0.5, 1),
+        ("mesher", "cube [2]", 0.7, 1),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(groups.origins.len(), 2);
+    assert!(groups.origins[0].contains("[2]: slow"), "{:?}", groups.origins);
+}
+
+proptest! {
+    #[test]
+    fn drawn_records_satisfy_the_invariants(
+        drawn in prop::collection::vec((0..3u8, prop::collection::vec(0.0..9.0f64, 1..4)), 1..12),
+    ) {
+        let comms = [Comm::Solo, Comm::Mpi, Comm::Sim];
+        let of = |(comm, times): &(u8, Vec<f64>)| {
+            line_of(run(comms[usize::from(*comm)], 9, &[("a", times), ("b", times)]))
+        };
+        let lines: Vec<Line> = drawn.iter().map(of).collect();
+        let groups = Groups::of(&lines);
+        let total: usize = groups.all.iter().map(|group| group.runs.len()).sum();
+        prop_assert_eq!(total, lines.len());
+    }
+}
+
+fn planted(fault: impl Fn(&mut Group)) {
+    let lines = [line_of(run(Comm::Mpi, 9, &[("a", &[1.0, 2.0])]))];
+    let mut groups = Groups::of(&lines);
+    fault(&mut groups.all[0]);
+    groups.check_invariants();
+}
+
+#[test]
+#[should_panic(expected = "is in its interval")]
+fn a_median_outside_its_interval_is_noticed() {
+    planted(|group| group.time_s.value *= 2.0);
+}
+
+#[test]
+#[should_panic(expected = "pools other setups")]
+fn a_run_of_another_setup_is_noticed() {
+    planted(|group| group.runs[0].setup.case = "ball".into());
+}
+
+#[test]
+#[should_panic(expected = "sum and maximum are those of the ranks")]
+fn a_sum_that_is_not_that_of_the_ranks_is_noticed() {
+    planted(|group| group.typical.phases[0].useful_s.sum += 1.0);
+}
+
+#[test]
+fn repetitions_form_a_group_without_warm_ups() {
+    let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
+    cold.warm_up = true;
+    let lines = [
+        free(),
+        line_of(cold),
+        line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0])])),
+        line_of(run(Comm::Sim, 9, &[("a", &[9.0])])),
+        line_of(run(Comm::Sim, 9, &[("a", &[2.0, 2.0])])),
+        line_of(run(Comm::Sim, 9, &[("a", &[7.0, 2.0])])),
+    ];
+    let groups = Groups::of(&lines);
+    assert_eq!(groups.all.len(), 2);
+    let two = &groups.all[0];
+    assert_eq!((two.time_s.value, two.time_s.count, two.how()), (2.0, 3, "projected"));
+    assert_eq!(two.typical.useful_s.sum, 4.0);
+    let reference = groups.reference(two);
+    assert_eq!(reference.setup.ranks, 1);
+    let e = two.efficiency(reference, &groups.network);
+    assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
+}
+
+#[test]
+fn noise_in_a_single_repetition_has_no_effect() {
+    let quiet: &[(&str, &[f64])] = &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])];
+    let of = |disturbed: [&[(&str, &[f64])]; 3]| {
+        let mut lines = vec![free()];
+        lines.extend(disturbed.map(|useful| line_of(run(Comm::Sim, 9, useful))));
+        Groups::of(&lines).all.remove(0)
+    };
+    let clean = of([quiet; 3]);
+    // Every repetition is disturbed, each on another rank or in another phase.
+    let noisy = of([
+        &[("a", &[9.0, 2.0, 3.0]), ("b", &[2.0, 2.0, 2.5])],
+        &[("a", &[1.0, 7.0, 3.0]), ("b", &[8.0, 2.0, 2.5])],
+        &[("a", &[1.0, 2.0, 3.0]), ("b", &[2.0, 6.0, 2.5])],
+    ]);
+    assert!(noisy.by_rank);
+    assert_eq!(noisy.typical.useful_s, clean.typical.useful_s);
+    assert_eq!(noisy.typical.useful_s.lambda(3), 5.5 * 3.0 / 12.5);
+    assert_eq!(noisy.time_s.value, 5.5);
+    // The repetitions' own critical paths are all longer; the interval shows that and includes the value.
+    assert_eq!((noisy.time_s.low, noisy.time_s.high), (5.5, 15.0));
+}
+
+#[test]
+fn without_times_by_rank_the_typical_run_is_a_measured_one() {
+    let mut brief = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+    brief.phases[0].useful_s.by_rank.clear();
+    let lines = [free(), line_of(brief.clone()), line_of(run(Comm::Sim, 9, &[("a", &[3.0, 2.0])]))];
+    let group = Groups::of(&lines).all.remove(0);
+    assert!(!group.by_rank && group.runs.contains(&group.typical));
+    assert!(group.rank_times_caption().starts_with("Run of median time"));
+}
+
+#[test]
+fn message_matrices_come_from_warm_ups() {
+    let mut warm = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
+    (warm.warm_up, warm.message_matrix) = (true, vec![[0, 1, 1, 8]]);
+    let groups = Groups::of(&[line_of(warm.clone()), line_of(warm)]);
+    assert_eq!((groups.all.len(), groups.matrices.len()), (0, 1));
+}
+
+#[test]
+fn projections_are_compared_with_the_same_mesh_on_equally_many_ranks() {
+    let mut crowd = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])]);
+    crowd.oversubscribed = true;
+    let lines = [
+        free(),
+        line_of(run(Comm::Sim, 9, &[("a", &[1.1, 1.0])])),
+        line_of(run(Comm::Mpi, 9, &[("a", &[1.0, 1.0])])),
+        line_of(run(Comm::Sim, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])])),
+        line_of(crowd),
+    ];
+    let groups = Groups::of(&lines);
+    let pairs = groups.projections();
+    assert_eq!(pairs.len(), 1);
+    let [sim, measured] = pairs[0].map(|group| group.time_s.value);
+    assert!((sim / measured - 1.1).abs() < 1e-9);
+}

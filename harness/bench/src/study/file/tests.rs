@@ -1,0 +1,137 @@
+use super::*;
+use crate::testing::study as read;
+
+const FILE: &str = r#"
+    [mesh.cube]
+    case = "cube-small"
+    spacing_min = 0.1
+    [run]
+    one = { mesh = "cube", repeats = 3 }
+    two = { mesh = "cube", ranks = 2, comm = "sim", weights = "area" }
+    disk = { mesh = "cube", audit = true }
+    [[row]]
+    name = "rate"
+    run = ["one", "two"]
+    measure = "cells_per_second_per_core"
+    at_least = 1e6
+    [[row]]
+    name = "speed-up"
+    run = "two"
+    against = "one"
+    measure = "speed_up"
+    [[row]]
+    name = "growth"
+    run = ["one", "two"]
+    measure = "time_per_cell_growth"
+    at_most = 1.05
+    [[row]]
+    name = "audit"
+    run = "disk"
+    measure = "audit_holds"
+"#;
+
+#[test]
+fn several_runs_are_several_rows_except_for_a_series() {
+    let mut study = read(FILE).unwrap();
+    let names = |t: &Study| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&study), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
+    assert!(study.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
+    study.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
+    assert_eq!(names(&study), ["rate: one", "rate: two", "growth"]);
+}
+
+fn of_repository(name: &str) -> Study {
+    let reports = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports");
+    Study::read(&reports.join(name)).unwrap()
+}
+
+#[test]
+fn the_targets_of_this_repository_are_consistent() {
+    let study = of_repository("targets.toml");
+    // A run that no row needs is a mistake.
+    let used = |name| study.row.iter().any(|r| study.runs_of(r).contains(&name));
+    let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
+    assert!(unused.is_empty(), "{unused:?}");
+}
+
+#[test]
+fn the_series_of_this_repository_have_every_experiment() {
+    use Experiment::{Layers, Spacing, Strong, Weak, Weights};
+    for name in ["small.toml", "full.toml"] {
+        let study = of_repository(name);
+        let has = |experiment| study.series.iter().any(|s| s.experiment == experiment);
+        assert!([Strong, Weak, Spacing, Layers, Weights].into_iter().all(has), "{name}");
+    }
+}
+
+#[test]
+fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out() {
+    let paths = run::engine::paths::Paths::find();
+    let find = |name| Description::find(name, &paths).unwrap();
+    let [own, parallel, serial] = ["mesher", "p4est", "discretize"].map(find);
+    let mut study = of_repository("small.toml");
+    let of = |series: &Series, engine, no_mpi| series.layouts(engine, no_mpi);
+    let (sim, solo) = ((Comm::Sim, 64), (Comm::Solo, 1));
+    study.series.retain(|series| series.experiment == Experiment::Strong);
+    let strong = &study.series[0];
+    assert_eq!(of(strong, &own, false).len(), strong.sim.len() + strong.mpi.len());
+    assert!(of(strong, &own, true).ends_with(&[sim, solo]));
+    assert_eq!(of(strong, &parallel, false).len(), strong.mpi.len());
+    assert_eq!(of(strong, &serial, false), [solo]);
+    let weak = Series { experiment: Experiment::Weak, ..strong.clone() };
+    assert!(of(&weak, &serial, false).is_empty());
+    let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
+    assert!(of(&weights, &parallel, false).is_empty());
+    assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "", None)][..]));
+}
+
+#[test]
+fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
+    let text = "[[series]]\nexperiment = 'strong'\ncase = 'cube'\nsim = [1, 2]\n\
+                [[series]]\nexperiment = 'weak'\ncase = 'cube'\ncells = [1e4]\nmpi = [1]\n";
+    let mut study = read(text).unwrap();
+    study.only(&["weak".to_owned()]).unwrap();
+    assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
+    for (from, to, why) in [
+        ("[1, 2]", "[0]", "ranks are from 1"),
+        ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
+        ("cells = [1e4]", "", "give the cells of a rank"),
+        ("mpi = [1]", "", "give ranks"),
+        ("'strong'", "'layers'", "give layers"),
+        ("'strong'", "'luck'", "unknown variant"),
+        ("sim", "repeats = 0\nsim", "repeats is at least 1"),
+    ] {
+        let found = read(&text.replacen(from, to, 1)).unwrap_err();
+        assert!(found.contains(why), "{why} is not in: {found}");
+    }
+}
+
+#[test]
+fn contradictions_are_reported() {
+    for (from, to, why) in [
+        ("mesh = \"cube\", repeats", "mesh = \"ball\", repeats", "run one: no mesh"),
+        ("repeats = 3", "repeats = 0", "run one: repeats"),
+        ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
+        ("against = \"one\"", "", "\"speed-up\": speed_up requires a run in `against`"),
+        ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
+        ("run = \"disk\"", "run = \"one\"", "which one is not"),
+        ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
+        ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
+        ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
+        ("case = \"cube-small\"", "case = \"cube-small\"\nroot_scale = 3.0", "the case defines"),
+        (
+            "case = \"cube-small\"\n    spacing_min = 0.1",
+            "geometry = \"a.stl\"",
+            "spacing_min is required",
+        ),
+        ("case = \"cube-small\"", "", "give one of"),
+        ("measure = \"speed_up\"", "measure = \"speed\"", "unknown variant"),
+        ("at_least", "atleast", "unknown field"),
+        ("name = \"growth\"", "name = \"rate\"", "two rows are called \"rate\""),
+    ] {
+        assert!(FILE.contains(from), "{from}");
+        let found = read(&FILE.replacen(from, to, 1)).unwrap_err();
+        assert!(found.starts_with("FILE: ") && found.contains(why), "{why} is not in: {found}");
+    }
+    assert!(read("").unwrap_err().contains("no [[series]] and no [[row]]"));
+}
