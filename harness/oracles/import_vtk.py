@@ -1,29 +1,16 @@
-"""Reads a mesh of cubes in one of VTK's formats, for `harness import`.
+"""Reads a mesh of cubes in one of VTK's formats, for `harness import`. `imports` describes how it is called.
 
-    python import_vtk.py FILE CELLS.npy [NAME]
-
-FILE is a legacy .vtk file, .vtu, .pvtu, .htg, or VTKHDF with an unstructured grid or a hyper-tree grid; its first bytes
-decide. CELLS.npy becomes a structured array with one row per cell, x, y, z and edge: the minimum corner and the edge, in
-float64. With NAME, the field `side` holds the cell array of that name. Standard output is one line of JSON:
-
-    {"root": {"origin": [x, y, z], "edge": e} | null, "has_sides": bool, "digest": "..." | null}
-
-A hyper-tree grid of 2^k trees along each axis states its root; masked leaves are left out. Files of `harness export` state their
-root and the digest of their leaves. Without NAME, their sides are those of the array `side`.
-
-Exit codes: 0 success; 2 the file cannot be read or has cells that are not axis-aligned cubes, which the last line on standard
-error explains; 3 VTK cannot be imported.
+The file is a legacy .vtk file, .vtu, .pvtu, .htg, or VTKHDF with an unstructured grid or a hyper-tree grid; its first bytes decide.
+A hyper-tree grid of 2^k trees along each axis states its root; masked leaves are left out. Files of `harness export` state their root and
+the digest of their leaves. Unless another array is requested, their sides are those of the array `side`.
 """
 
 import itertools
-import json
-import os
-import resource
-import sys
 from xml.etree import ElementTree
 
 import numpy as np
 import protocol
+from imports import TOLERANCE, Refused, run
 
 try:
     from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -39,8 +26,6 @@ try:
 except (ImportError, OSError) as error:
     protocol.missing(error)
 
-# Greatest difference between the corners of a cell and those of a cube, in edges of the cell, as in the harness.
-TOLERANCE = 0.01
 # The orders in which the corners of a cube, 4 z + 2 y + x each, may follow each other: VTK's hexahedron in its 24 rotations, whose
 # volume is positive, and its voxel. Three bits per corner.
 HEXAHEDRON, VOXEL = (0, 1, 3, 2, 4, 5, 7, 6), range(8)
@@ -69,10 +54,6 @@ READERS = {
     "PUnstructuredGrid": vtkXMLPUnstructuredGridReader,
     "HyperTreeGrid": vtkXMLHyperTreeGridReader,
 }
-
-
-class Refused(Exception):
-    """Why the file is not imported, in one sentence."""
 
 
 def reader_for(path):
@@ -269,45 +250,23 @@ def leaves_of_tree(tree):
     return tuple(np.concatenate(columns) for columns in zip(*parts))
 
 
-def main():
-    if len(sys.argv) not in (3, 4):
-        print(f"usage: {sys.argv[0]} FILE CELLS.npy [NAME]", file=sys.stderr)
-        raise SystemExit(2)
-    path, out, name = sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) == 4 else None
-    # A damaged file may state any size: an allocation beyond the memory of the machine fails and is reported.
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    most = resource.getrlimit(resource.RLIMIT_AS)[1]
-    memory = memory if most == resource.RLIM_INFINITY else min(memory, most)
-    resource.setrlimit(resource.RLIMIT_AS, (memory, most))
-    try:
-        data = read(path)
-        if data is not None and data.IsA("vtkHyperTreeGrid"):
-            corners, edges, nodes, root = of_hyper_trees(data)
-            digest = None
-        elif data is not None and data.IsA("vtkUnstructuredGrid"):
-            (corners, edges), nodes = of_unstructured(data), slice(None)
-            root, digest = of_export(path, data, edges)
-            if digest is not None and data.GetCellData().HasArray("side"):
-                name = name or "side"
-                digest = digest if name == "side" else None
-        else:
-            raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
-        sides = cell_array(data, name)[nodes] if name else None
-    except Refused as why:
-        print(why, file=sys.stderr)
-        raise SystemExit(2) from None
-    except MemoryError:
-        print("needs more memory than the machine has: it is damaged or too large", file=sys.stderr)
-        raise SystemExit(2) from None
-    fields = [(field, "<f8") for field in ("x", "y", "z", "edge")] + ([("side", "<f8")] if name else [])
-    cells = np.empty(len(edges), fields)
-    cells["x"], cells["y"], cells["z"] = corners.T
-    cells["edge"] = edges
-    if name:
-        cells["side"] = sides
-    np.save(out, cells)
-    print(json.dumps({"root": root, "has_sides": bool(name), "digest": digest}))
+def cells(path, request):
+    """Corners and edges of the cells in a file, and what else it states."""
+    data, name = read(path), request["sides"]
+    if data is not None and data.IsA("vtkHyperTreeGrid"):
+        corners, edges, nodes, root = of_hyper_trees(data)
+        digest = None
+    elif data is not None and data.IsA("vtkUnstructuredGrid"):
+        (corners, edges), nodes = of_unstructured(data), slice(None)
+        root, digest = of_export(path, data, edges)
+        if digest is not None and data.GetCellData().HasArray("side"):
+            name = name or "side"
+            digest = digest if name == "side" else None
+    else:
+        raise Refused(f"holds {data.GetClassName() if data else 'nothing'}: unstructured and hyper-tree grids are supported")
+    sides = cell_array(data, name)[nodes] if name else None
+    return corners, edges, {"root": root, "digest": digest, "sides": sides}
 
 
 if __name__ == "__main__":
-    main()
+    run(cells)

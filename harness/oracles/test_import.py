@@ -5,6 +5,7 @@ Needs target/debug/{harness,reference}, which `cargo test --workspace` builds.""
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -217,6 +218,36 @@ class ImportTest(unittest.TestCase):
             words, manifest = self.imported(file)
             np.testing.assert_array_equal(words, whole[(whole & 3 == 0) & ((whole >> 2 & 31) <= 4)])
             self.assertEqual(manifest["root"], json.loads((mesh / "mesh.json").read_text())["root"])
+
+    def test_meshes_of_other_programs(self):
+        samples = ROOT / "harness/contract/tests/samples"
+        for name, table in (("cube.json", "cube.csv"), ("flat.msh", "flat.csv"), ("foam-ascii", "foam.csv"), ("foam-binary", "foam.csv")):
+            words, manifest = self.imported(samples / name)
+            root = manifest["root"]
+            expected, _ = self.imported(samples / table, "--root", ",".join(map(repr, [*root["origin"], root["edge"]])))
+            np.testing.assert_array_equal(words, expected, name)
+        code, output, error = run("harness", "import", samples / "foam-binary", "--out", self.at / "foam")
+        self.assertEqual((code, error.count("\n")), (0, 1))
+        self.assertIn("the root -1,-1,-1,4 is the least that holds the cells", error)
+        self.assertIn("256 cells", output)
+        self.assertIn("cube.csv: cell 0 (corner", self.refused(samples / "cube.csv", "--root", "0,0,0,1"))
+        level = self.at / "level"
+        shutil.copytree(samples / "foam-ascii", level)
+        text = (level / "cellLevel").read_text()
+        (level / "cellLevel").write_text(text.replace("(\n0\n0\n0\n", "(\n0\n0\n1\n", 1))
+        self.assertIn("cell 2 has level 1 and edge 1, but cell 0 has level 0 and edge 1", self.refused(level))
+
+    def test_an_exported_polymesh_has_the_leaves_of_the_mesh(self):
+        mesh = self.at / "mesh"
+        self.assertEqual(run("reference", ROOT / "geometries/cube-small.toml", "--out", mesh)[0], 0)
+        expected = json.loads((mesh / "mesh.json").read_text())
+        root = ",".join(map(repr, [*expected["root"]["origin"], expected["root"]["edge"]]))
+        for number, options in enumerate([(), ("--label", "64")]):
+            target = self.at / f"case{number}/constant/polyMesh"
+            code, _, error = run("harness", "export", mesh, target, *options)
+            self.assertEqual(code, 0, error)
+            _, manifest = self.imported(target, "--sides", "side", "--root", root)
+            self.assertEqual(manifest["digest"], expected["digest"], options)
 
     def test_an_audit_of_a_file_needs_no_manifest(self):
         path = self.at / "mesh.vtu"

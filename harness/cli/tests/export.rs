@@ -92,7 +92,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         ("part.pvtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
         ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
-        ("part.vtu", &["--ascii"], "--ascii has no effect on .vtu"),
+        ("part.vtu", &["--label", "64"], "--label has no effect on .vtu"),
         ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
         ("polyMesh", &[], "one that ends in .vtu, .pvtu, .p8est, /polyMesh"),
         ("case/polyMesh", &["--processors", "2"], "choose a path CASE/constant/polyMesh"),

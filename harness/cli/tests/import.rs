@@ -30,23 +30,17 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
     let place = tempfile::tempdir().unwrap();
     let [first, second] = ["a", "b"].map(|name| place.path().join(name));
     let (code, output, error) =
-        result(&["import", &sample("cube.json"), "--out", first.to_str().unwrap()]);
+        result(&["import", &sample("unitcube.p8est"), "--out", first.to_str().unwrap()]);
     assert_eq!((code, error.as_str()), (0, ""));
     assert!(
         output.contains(
-            "162 cells of levels 2 to 4, sides unknown; they fill 100.000000 % of the root"
+            "106 cells of levels 1 to 4, sides unknown; they fill 100.000000 % of the root"
         ),
         "{output}"
     );
     let words = first.join("leaves-00000.npy");
-    let arguments = [
-        "import",
-        words.to_str().unwrap(),
-        "--root",
-        "-1,2,0.5,2",
-        "--out",
-        second.to_str().unwrap(),
-    ];
+    let arguments =
+        ["import", words.to_str().unwrap(), "--root", "0,0,0,1", "--out", second.to_str().unwrap()];
     assert_eq!(result(&arguments).0, 0);
     assert_eq!(digest(&first), digest(&second));
     // An existing mesh is not overwritten.
@@ -55,29 +49,16 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
 }
 
 #[test]
-fn a_derived_root_is_printed() {
-    let place = tempfile::tempdir().unwrap();
-    let out = place.path().join("mesh");
-    let (code, output, error) =
-        result(&["import", &sample("foam-binary"), "--out", out.to_str().unwrap()]);
-    assert_eq!((code, error.matches('\n').count()), (0, 1));
-    assert!(error.contains("the root -1,-1,-1,4 is the least that holds the cells"), "{error}");
-    assert!(output.contains("256 cells"), "{output}");
-}
-
-#[test]
 fn foreign_meshes_are_audited_without_a_manifest() {
-    for (name, leaves) in [("cube.json", 162), ("unitcube.p8est", 106)] {
-        let (code, output, error) = result(&["audit", &sample(name)]);
-        assert_eq!((code, error.as_str()), (0, ""), "{output}");
-        assert!(
-            output.contains(&format!("{leaves} leaves"))
-                && output.contains("nothing to check: the sides of the leaves are unknown"),
-            "{output}"
-        );
-    }
-    // This mesh fills half of its root, of which nothing states that a part is deleted.
-    let (code, output, _) = result(&["audit", &sample("flat.msh")]);
+    let (code, output, error) = result(&["audit", &sample("unitcube.p8est")]);
+    assert_eq!((code, error.as_str()), (0, ""), "{output}");
+    assert!(
+        output.contains("106 leaves")
+            && output.contains("nothing to check: the sides of the leaves are unknown"),
+        "{output}"
+    );
+    // This mesh fills a part of its root, of which nothing states that the rest is deleted.
+    let (code, output, _) = result(&["audit", &sample("brick.p8est")]);
     assert!(code == 1 && output.contains("has a hole across a face"), "{output}");
 }
 
@@ -121,27 +102,29 @@ fn unusable_input_is_one_sentence_with_the_file() {
     assert!(refused(&["/nowhere/mesh"]).contains("/nowhere/mesh: cannot be read"));
     assert!(refused(&[empty.to_str().unwrap()]).contains("--format"));
     assert!(refused(&[bare.to_str().unwrap()]).contains("--format leaf-words"));
-    assert!(
-        refused(&[&sample("cube.csv"), "--root", "0,0,0,1"]).contains("cube.csv: cell 0 (corner")
-    );
-    assert!(refused(&[&sample("cube.csv"), "--root", "0,0,0,-1"]).contains("is not a cube"));
+    assert!(refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,-1"]).contains("is not a cube"));
     assert!(refused(&[&sample("cube.json"), "--format", "p4est"]).contains("p8est"));
 }
 
 #[test]
-fn vtk_files_need_python() {
+fn formats_that_are_read_in_python_need_it() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("mesh.vtu");
     fs::write(&file, "<VTKFile type=\"UnstructuredGrid\">").unwrap();
-    let (code, _, error) = result(&["audit", file.to_str().unwrap()]);
-    assert!(code == 3 && error.contains("/nowhere/python"), "{error}");
+    for mesh in [file.to_str().unwrap(), &sample("cube.json"), &sample("foam-binary")] {
+        let (code, _, error) = result(&["audit", mesh]);
+        assert!(code == 3 && error.contains("/nowhere/python"), "{error}");
+    }
 }
 
 #[test]
 fn options_that_contradict_a_manifest_are_refused() {
     let place = tempfile::tempdir().unwrap();
     let mesh = place.path().join("mesh");
-    assert_eq!(result(&["import", &sample("cube.json"), "--out", mesh.to_str().unwrap()]).0, 0);
+    assert_eq!(
+        result(&["import", &sample("unitcube.p8est"), "--out", mesh.to_str().unwrap()]).0,
+        0
+    );
     assert_eq!(result(&["audit", mesh.to_str().unwrap()]).0, 0);
     let (code, _, error) = result(&["audit", mesh.to_str().unwrap(), "--root", "0,0,0,1"]);
     assert!(code == 2 && error.contains("has a manifest"), "{error}");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::files;
-use crate::htg::{SIDE, TreeError, TreeFile};
+use crate::htg::{TreeError, TreeFile};
 use crate::manifest::{self, Manifest, Sides};
 use crate::npy::{NpyError, PartFile};
 
@@ -88,7 +88,7 @@ impl ReadError {
 pub fn open_tree(dir: &Path, manifest: &Manifest) -> Result<Option<TreeFile>, ReadError> {
     let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
     let path = dir.join(name);
-    let sides = (manifest.sides == Sides::Known).then_some(SIDE);
+    let sides = manifest.sides == Sides::Known;
     let tree = TreeFile::open(&path, sides).and_then(|tree| match tree.root == manifest.root {
         true => Ok(tree),
         false => Err(TreeError::Layout(format!(

@@ -16,14 +16,13 @@ mod level;
 mod tests;
 
 use crate::lattice::Root;
-use crate::octant::LEVEL_MAX;
 use crate::word;
 use level::LevelReader;
 
 use std::path::{Path, PathBuf};
-use vtkhdf::format::{Chunked, Group, Kind, Member, ReadError, Value};
-use vtkhdf::read::File;
-use vtkhdf::tree::{CELL_DATA, COORDINATES, EDGE, GROUP, RANK, TYPE};
+use vtkhdf::format::{Chunked, ReadError};
+use vtkhdf::read::TreeReader;
+use vtkhdf::tree::Shape;
 
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
@@ -37,25 +36,20 @@ pub use vtkhdf::tree::SIDE;
 #[derive(Debug)]
 pub struct TreeFile {
     path: PathBuf,
-    file: File,
+    file: TreeReader,
     /// The root cube.
     pub root: Root,
-    /// Number of nodes by level.
-    nodes: Vec<u64>,
-    split: Chunked,
-    masked: Option<Chunked>,
-    sides: Option<Chunked>,
-    ranks: Option<Chunked>,
+    with_sides: bool,
 }
 
 /// Why a file is not a usable hyper-tree grid: the predicate of a sentence whose subject is the file.
 #[derive(Debug, thiserror::Error)]
 pub enum TreeError {
-    /// The HDF5 file is damaged, or has what only the HDF5 library reads.
+    /// The file is damaged, or has what only VTK reads.
     #[error(transparent)]
     File(#[from] ReadError),
-    /// It is not a hyper-tree grid of one oct-tree.
-    #[error("is not a hyper-tree grid of one oct-tree: {0}")]
+    /// It is not a hyper-tree grid of this mesh.
+    #[error("is not a hyper-tree grid of this mesh: {0}")]
     Layout(String),
     /// Its nodes are no tree.
     #[error("is damaged: {0}")]
@@ -80,50 +74,18 @@ fn nodes<T>(why: impl Into<String>) -> Result<T> {
 }
 
 impl TreeFile {
-    /// Opens a file. With `sides`, the name of cell data, its leaves have sides; otherwise all are outside.
+    /// Opens a file. With `sides`, its leaves have sides; otherwise all are outside.
     ///
     /// # Errors
-    /// If the file is not a hyper-tree grid of one oct-tree, or is damaged.
-    pub fn open(path: &Path, sides: Option<&str>) -> Result<Self> {
-        let file = File::open(path)?;
-        let root = file.root()?;
-        let Some(Member::Group(grid)) = root.member(GROUP) else {
-            return layout(format!("it has no group {GROUP}"));
-        };
-        expect(grid.attribute("Type"), &Value::Text(TYPE.to_owned()), "Type")?;
-        expect(grid.attribute("BranchFactor"), &Value::Number(2), "BranchFactor")?;
-        expect(grid.attribute("Dimensions"), &Value::Ints32(vec![2; 3]), "Dimensions")?;
-        let nodes = level_counts(grid)?;
-        let total: u64 = nodes.iter().sum();
-        let described = (total - nodes.last().copied().unwrap_or(0)).max(1);
-        for (name, number) in
-            [("NumberOfTrees", 1), ("NumberOfCells", total), ("DescriptorsSize", described)]
-        {
-            expect(small(grid, name), &Value::Ints(vec![number as i64]), name)?;
+    /// If the file is not a hyper-tree grid as this repository writes it.
+    pub fn open(path: &Path, with_sides: bool) -> Result<Self> {
+        let file = TreeReader::open(path)?;
+        let Shape { origin, edge, .. } = file.shape;
+        let is_cube = edge > 0.0 && edge.is_finite() && origin.iter().all(|c| c.is_finite());
+        if !is_cube {
+            return layout(format!("its root is no cube: corner {origin:?}, edge {edge}"));
         }
-        let split = bytes(grid, "Descriptors", described.div_ceil(8))?;
-        let Some(split) = split else { return layout("it has no Descriptors") };
-        let masked = bytes(grid, "Mask", total.div_ceil(8))?;
-        let data = match grid.member(CELL_DATA) {
-            Some(Member::Group(data)) => data,
-            _ => &Group::default(),
-        };
-        let sides = match sides {
-            None => None,
-            Some(name) => match bytes(data, name, total)? {
-                Some(sides) => Some(sides),
-                None => return layout(format!("it has no cell data {name} of unsigned bytes")),
-            },
-        };
-        // Cell data of another type are not those of this repository, and no fault of the tree.
-        let ranks = match data.member(RANK) {
-            Some(Member::Chunked(array)) if array.kind == Kind::Int32 && array.len == total => {
-                Some(array.clone())
-            }
-            _ => None,
-        };
-        let (path, root) = (path.to_owned(), root_of(grid)?);
-        Ok(Self { path, root, file, nodes, split, masked, sides, ranks })
+        Ok(Self { path: path.to_owned(), file, root: Root { origin, edge }, with_sides })
     }
 
     /// Its path.
@@ -131,14 +93,9 @@ impl TreeFile {
         &self.path
     }
 
-    /// Whether its leaves have sides.
-    pub fn has_sides(&self) -> bool {
-        self.sides.is_some()
-    }
-
     /// Whether its leaves have ranks.
     pub fn has_ranks(&self) -> bool {
-        self.ranks.is_some()
+        self.file.ranks.is_some()
     }
 
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
@@ -146,11 +103,11 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        let levels = (0..self.nodes.len()).map(|level| self.level(level, None)).collect();
+        let levels =
+            (0..self.file.shape.nodes.len()).map(|level| self.level(level, None)).collect();
         let run = &mut |words: &[u64], _: &[u32]| run(words);
-        let (words, ranks) = (Vec::with_capacity(RUN + 8), Vec::new());
-        let mut walk = Walk { levels, words, ranks, run };
-        if !(walk.siblings(0, 0, 1)? && walk.flush()) {
+        let mut walk = Walk::new(levels);
+        if !(walk.siblings(0, 0, 1, run)? && walk.flush(run)) {
             return Ok(());
         }
         match walk.levels.iter().position(|level| !level.is_at_end()) {
@@ -164,34 +121,37 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn index(&self) -> Result<Index> {
-        let total: u64 = self.nodes.iter().sum();
-        let described = total - self.nodes.last().copied().unwrap_or(0);
-        Index::new(&self.file, [described, total], &self.split, self.masked.as_ref())
+        Index::new(&self.file)
     }
 
     /// A reader of a level, with ranks if they are given.
     fn level<'a>(&'a self, level: usize, ranks: Option<&'a Chunked>) -> LevelReader<'a> {
-        let begin = self.nodes[..level].iter().sum();
-        let is_last = level + 1 == self.nodes.len();
-        let split = (!is_last).then_some(&self.split);
-        let end = begin + self.nodes[level];
-        let arrays = [split, self.masked.as_ref(), self.sides.as_ref(), ranks];
-        LevelReader::new(&self.file, begin..end, arrays)
+        let nodes = &self.file.shape.nodes;
+        let begin = nodes[..level].iter().sum();
+        let split = (level + 1 < nodes.len()).then_some(&self.file.split);
+        let sides = self.with_sides.then_some(&self.file.sides);
+        let arrays = [split, self.file.masked.as_ref(), sides, ranks];
+        LevelReader::new(&self.file, begin..begin + nodes[level], arrays)
     }
 }
 
+/// What is given the words of leaves, and their ranks if the readers have ranks. A walk ends when it returns false.
+type Run<'r> = dyn FnMut(&[u64], &[u32]) -> bool + 'r;
+
 /// A walk in Morton order.
-struct Walk<'a, 'r> {
+struct Walk<'a> {
     levels: Vec<LevelReader<'a>>,
     words: Vec<u64>,
-    /// The rank of each word; none if the readers have no ranks.
     ranks: Vec<u32>,
-    run: &'r mut dyn FnMut(&[u64], &[u32]) -> bool,
 }
 
-impl Walk<'_, '_> {
+impl<'a> Walk<'a> {
+    fn new(levels: Vec<LevelReader<'a>>) -> Self {
+        Self { levels, words: Vec::with_capacity(RUN + 8), ranks: Vec::new() }
+    }
+
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.
-    fn siblings(&mut self, level: usize, key: u64, count: u32) -> Result<bool> {
+    fn siblings(&mut self, level: usize, key: u64, count: u32, run: &mut Run) -> Result<bool> {
         let siblings = self.levels[level].next(count)?;
         let (edge, code) = (word::span(level as u8), (level as u64) << 2);
         for i in 0..count {
@@ -200,7 +160,7 @@ impl Walk<'_, '_> {
                 if level + 1 == self.levels.len() {
                     return nodes(format!("a node of level {level} is split"));
                 }
-                if !self.siblings(level + 1, key, 8)? {
+                if !self.siblings(level + 1, key, 8, run)? {
                     return Ok(false);
                 }
             } else if siblings.masked >> i & 1 == 0 {
@@ -208,78 +168,13 @@ impl Walk<'_, '_> {
                 self.ranks.extend(siblings.ranks.map(|ranks| ranks[i as usize]));
             }
         }
-        Ok(self.words.len() < RUN || self.flush())
+        Ok(self.words.len() < RUN || self.flush(run))
     }
 
-    fn flush(&mut self) -> bool {
-        let goes_on = (self.run)(&self.words, &self.ranks);
+    fn flush(&mut self, run: &mut Run) -> bool {
+        let goes_on = run(&self.words, &self.ranks);
         self.words.clear();
         self.ranks.clear();
         goes_on
     }
-}
-
-fn expect(found: Option<&Value>, expected: &Value, name: &str) -> Result<()> {
-    match found {
-        Some(value) if value == expected => Ok(()),
-        Some(value) => layout(format!("its {name} is {value:?}, not {expected:?}")),
-        None => layout(format!("it has no {name}")),
-    }
-}
-
-fn small<'a>(grid: &'a Group, name: &str) -> Option<&'a Value> {
-    match grid.member(name) {
-        Some(Member::Small(value)) => Some(value),
-        _ => None,
-    }
-}
-
-/// The array of bytes with this name; none if there is none.
-fn bytes(group: &Group, name: &str, len: u64) -> Result<Option<Chunked>> {
-    match group.member(name) {
-        None => Ok(None),
-        Some(Member::Chunked(array)) if array.kind == Kind::Byte && array.len == len => {
-            Ok(Some(array.clone()))
-        }
-        Some(_) => layout(format!("its {name} is not an array of {len} bytes")),
-    }
-}
-
-/// Numbers of nodes by level: one, and then at most eight for each node of the level above.
-fn level_counts(grid: &Group) -> Result<Vec<u64>> {
-    let Some(Value::Ints(counts)) = small(grid, "NumberOfCellsPerTreeDepth") else {
-        return layout("it has no NumberOfCellsPerTreeDepth");
-    };
-    let counts: Vec<u64> = counts.iter().map(|&n| u64::try_from(n).unwrap_or(0)).collect();
-    let is_tree = counts.first() == Some(&1)
-        && counts.windows(2).all(|w| w[1] > 0 && w[1].is_multiple_of(8) && w[1] / 8 <= w[0]);
-    let levels = usize::from(LEVEL_MAX) + 1;
-    if is_tree && counts.len() <= levels {
-        return Ok(counts);
-    }
-    layout(format!(
-        "its NumberOfCellsPerTreeDepth {counts:?} is not that of an oct-tree of at most {levels} levels"
-    ))
-}
-
-/// The root cube.
-fn root_of(grid: &Group) -> Result<Root> {
-    let ends = |name: &str| match small(grid, name) {
-        Some(Value::Doubles(ends)) if ends.len() == 2 => Ok([ends[0], ends[1]]),
-        _ => layout(format!("its {name} are not two coordinates")),
-    };
-    let mut axes = [[0.0; 2]; 3];
-    for (axis, name) in axes.iter_mut().zip(COORDINATES) {
-        *axis = ends(name)?;
-    }
-    // The difference of two coordinates has lost digits of the edge.
-    let edge = match grid.attribute(EDGE) {
-        Some(Value::Doubles(edge)) if edge.len() == 1 => edge[0],
-        _ => axes[0][1] - axes[0][0],
-    };
-    let is_cube = axes.iter().all(|[low, high]| (high - low - edge).abs() <= 1e-6 * edge);
-    if !(is_cube && edge > 0.0 && edge.is_finite() && axes.iter().all(|a| a[0].is_finite())) {
-        return layout(format!("its coordinates {axes:?} are not those of a cube of edge {edge}"));
-    }
-    Ok(Root { origin: axes.map(|axis| axis[0]), edge })
 }

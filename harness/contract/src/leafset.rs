@@ -5,6 +5,7 @@
 //! are correct.
 
 use std::fs;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::digest::Digest;
@@ -69,6 +70,28 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, ReadError> {
     names.into_iter().map(read).collect()
 }
 
+/// Writes a mesh as [`LeafSet::create`] does; `fill` writes the file of the part with an index.
+pub(crate) fn create(
+    dir: &Path,
+    manifest: &Manifest,
+    fill: impl Fn(usize, &mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
+    let write = || {
+        let names = manifest.parts.iter().map(|part| part.file.clone());
+        let claim = Claim::create(dir, manifest::FILE, names).map_err(io::Error::from)?;
+        for (i, part) in manifest.parts.iter().enumerate() {
+            let mut out = BufWriter::new(claim.draft(&part.file)?);
+            fill(i, &mut out)?;
+            out.into_inner()?.publish()?;
+        }
+        claim.commit(|out| out.write_all(manifest.text().as_bytes()))?;
+        claim.keep();
+        Ok(())
+    };
+    parents.and_then(|()| write()).map_err(|error| named(dir, &error))
+}
+
 impl LeafSet {
     /// A mesh of these parts.
     pub fn new(manifest: Manifest, parts: Vec<Vec<u64>>) -> Self {
@@ -95,29 +118,15 @@ impl LeafSet {
     ///
     /// # Errors
     /// If the directory is not empty or a file cannot be written; the message names it.
-    pub fn create(&self, dir: &Path) -> std::io::Result<()> {
-        let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
-        let write = || {
-            let parts = self.manifest.parts.iter().zip(&self.parts);
-            let names = parts.clone().map(|(part, _)| part.file.clone());
-            let claim = Claim::create(dir, manifest::FILE, names).map_err(std::io::Error::from)?;
-            for (part, words) in parts {
-                let mut out = std::io::BufWriter::new(claim.draft(&part.file)?);
-                npy::write_to(&mut out, words)?;
-                out.into_inner()?.publish()?;
-            }
-            claim.commit(|out| out.write_all(self.manifest.text().as_bytes()))?;
-            claim.keep();
-            Ok(())
-        };
-        parents.and_then(|()| write()).map_err(|error| named(dir, &error))
+    pub fn create(&self, dir: &Path) -> io::Result<()> {
+        create(dir, &self.manifest, |part, out| npy::write_to(out, &self.parts[part]))
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn write(&self, dir: &Path) -> std::io::Result<()> {
+    pub fn write(&self, dir: &Path) -> io::Result<()> {
         for (part, words) in self.manifest.parts.iter().zip(&self.parts) {
             npy::write(&dir.join(&part.file), words)?;
         }

@@ -1,17 +1,15 @@
 //! Meshes on disk, read leaf by leaf in Morton order.
 //!
 //! The parts of a leaf-set directory are sorted, so the leaves of an octant are one interval of each. A search by octants
-//! therefore reads only the blocks that meet the selection, and merges parts without comparing them: an octant whose leaves
-//! are in more than one part is split until each octant has only one.
+//! therefore reads only the blocks that meet the selection, with the leaves of all parts in a block, which are sorted.
 
-use std::ops::Range;
+use std::ops::{Deref, Range};
 use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use contract::case::Case;
 use contract::lattice::Root;
-use contract::manifest::Manifest;
-use contract::mesh::{self, Part, Readers};
+use contract::mesh::{self, Interval, Order, Part, Readers};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
@@ -34,14 +32,9 @@ pub struct Block {
 /// A mesh on disk, opened for reading.
 #[derive(Debug)]
 pub struct Mesh {
-    /// Its manifest.
-    pub manifest: Manifest,
-    parts: Vec<Part>,
+    files: mesh::Mesh,
     leaves_by_rank: OnceLock<Vec<u64>>,
 }
-
-/// Leaves of an octant in one part: an interval of indices.
-type Interval = (usize, Range<u64>);
 
 /// A mesh with readers that keep what they have read last. It can be shared by threads.
 pub struct Visitor<'a> {
@@ -62,30 +55,12 @@ impl<'a> Visitor<'a> {
         visit: &mut impl FnMut(Leaf) -> Result<(), E>,
     ) -> Result<(), E> {
         self.with_readers(|readers| {
-            let (mut intervals, mut before) = (Vec::new(), 0);
-            for (part, file) in self.mesh.parts.iter().enumerate() {
-                let mut bound = |key| {
-                    readers.lower_bound(part, 0..file.leaves(), key).map_err(ExportError::from)
-                };
-                let interval = bound(keys.start)?..bound(keys.end)?;
-                before += interval.start;
-                intervals.extend((!interval.is_empty()).then_some((part, interval)));
-            }
-            self.mesh.visit_octant(readers, Octant::ROOT, &intervals, before, selection, visit)
-        })
-    }
-
-    /// Number of leaves whose Morton codes are in `keys`.
-    ///
-    /// # Errors
-    /// If a part cannot be read.
-    pub fn count(&self, keys: Range<u64>) -> Result<u64, ExportError> {
-        self.with_readers(|readers| {
-            (0..self.mesh.parts.len()).try_fold(0, |sum, part| {
-                let all = 0..self.mesh.parts[part].leaves();
-                let start = readers.lower_bound(part, all.clone(), keys.start)?;
-                Ok(sum + readers.lower_bound(part, start..all.end, keys.end)? - start)
-            })
+            let intervals = readers.intervals(keys).map_err(ExportError::from)?;
+            let before = intervals.iter().map(|(_, interval)| interval.start).sum();
+            let visit = &mut |leaf| visit(leaf);
+            let mut visiting =
+                Visiting { mesh: self.mesh, readers, selection, order: Order::default(), visit };
+            visiting.octant(Octant::ROOT, &intervals, before)
         })
     }
 
@@ -99,14 +74,21 @@ impl<'a> Visitor<'a> {
     }
 }
 
+impl Deref for Mesh {
+    type Target = mesh::Mesh;
+
+    fn deref(&self) -> &mesh::Mesh {
+        &self.files
+    }
+}
+
 impl Mesh {
     /// Opens a leaf-set directory. If it has the tree alone, that is its only part.
     ///
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, ExportError> {
-        let mesh::Mesh { manifest, parts, .. } = mesh::Mesh::open(path)?;
-        Ok(Self { manifest, parts, leaves_by_rank: OnceLock::new() })
+        Ok(Self { files: mesh::Mesh::open(path)?, leaves_by_rank: OnceLock::new() })
     }
 
     /// Refuses a case that was not meshed here, by its root and its surface level.
@@ -127,16 +109,6 @@ impl Mesh {
             "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
             case.name
         )))
-    }
-
-    /// Number of leaves in all parts.
-    pub fn len(&self) -> u64 {
-        self.parts.iter().map(Part::leaves).sum()
-    }
-
-    /// Whether the mesh has no leaves.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Whether the rank of each leaf is known: a tree may have been written without ranks.
@@ -238,88 +210,47 @@ impl Mesh {
 
     /// The range of all Morton codes.
     pub const ALL: Range<u64> = 0..KEY_END;
+}
 
+/// A visit of leaves.
+struct Visiting<'r, 'a, V> {
+    mesh: &'a Mesh,
+    readers: &'r mut Readers<'a>,
+    selection: &'r Selection,
+    order: Order,
+    visit: V,
+}
+
+impl<E: From<ExportError>, V: FnMut(Leaf) -> Result<(), E>> Visiting<'_, '_, V> {
     /// Visits the selected leaves of an octant; `before` leaves of the mesh precede its own.
-    fn visit_octant<E: From<ExportError>>(
-        &self,
-        readers: &mut Readers,
-        octant: Octant,
-        intervals: &[Interval],
-        mut before: u64,
-        selection: &Selection,
-        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
-    ) -> Result<(), E> {
-        if intervals.is_empty() || !selection.meets(&octant) {
+    fn octant(&mut self, octant: Octant, intervals: &[Interval], mut before: u64) -> Result<(), E> {
+        if count(intervals) == 0 || !self.selection.meets(&octant) {
             return Ok(());
         }
-        match intervals {
-            [(part, interval)]
-                if interval.end - interval.start <= BLOCK || octant.level == LEVEL_MAX =>
-            {
-                self.visit_block(
-                    readers,
-                    octant,
-                    (*part, interval.clone()),
-                    before,
-                    selection,
-                    visit,
-                )
-            }
-            _ if octant.level == LEVEL_MAX => {
-                // Two parts have the same leaf.
-                let (part, interval) = &intervals[1];
-                Err(self.order(*part, interval.start).into())
-            }
-            _ => {
-                for (child, intervals) in children(readers, octant, intervals)? {
-                    self.visit_octant(readers, child, &intervals, before, selection, visit)?;
-                    before += count(&intervals);
-                }
-                Ok(())
-            }
+        if count(intervals) <= BLOCK || octant.level == LEVEL_MAX {
+            return self.block(&octant, intervals, before);
         }
-    }
-
-    /// Visits the selected leaves of one interval, which is read as a whole; `before` leaves of the mesh precede it.
-    fn visit_block<E: From<ExportError>>(
-        &self,
-        readers: &mut Readers,
-        octant: Octant,
-        (part, interval): Interval,
-        before: u64,
-        selection: &Selection,
-        visit: &mut impl FnMut(Leaf) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let file = &self.parts[part];
-        let (words, ranks) =
-            readers.words(part, &octant, interval.clone()).map_err(ExportError::from)?;
-        let mut ranks = ranks.into_iter();
-        // Leaves that ascend and do not overlap begin where the one before ends, or later.
-        let mut key_min = word::key_of(octant.corner);
-        let key_end = key_min + word::span(octant.level);
-        for (&w, index) in words.iter().zip(interval.start..) {
-            let leaf = word::decode(w).map_err(|error| ExportError::Word {
-                part: file.path().to_owned(),
-                index,
-                error,
-            })?;
-            let end = word::key(w) + word::span(leaf.octant.level);
-            if word::key(w) < key_min || end > key_end {
-                return Err(self.order(part, index).into());
-            }
-            key_min = end;
-            let rank = ranks.next().unwrap_or(part as u32);
-            let index_in_mesh = before + (index - interval.start);
-            let leaf = Leaf { octant: leaf.octant, side: leaf.side, rank, index: index_in_mesh };
-            if selection.has(&leaf) {
-                visit(leaf)?;
-            }
+        for (child, intervals) in children(self.readers, octant, intervals)? {
+            self.octant(child, &intervals, before)?;
+            before += count(&intervals);
         }
         Ok(())
     }
 
-    fn order(&self, part: usize, index: u64) -> ExportError {
-        ExportError::Order { part: self.parts[part].path().to_owned(), index }
+    /// The same for an octant whose leaves are read at once.
+    fn block(&mut self, octant: &Octant, intervals: &[Interval], before: u64) -> Result<(), E> {
+        let leaves = self.readers.leaves(octant, intervals).map_err(ExportError::from)?;
+        for ((word, rank), index) in leaves.into_iter().zip(before..) {
+            if let Some(why) = self.order.fault(word) {
+                return Err(ExportError::from(self.mesh.not_linear(why)).into());
+            }
+            let (octant, side) = (word::octant(word), word::side(word));
+            let leaf = Leaf { octant, side, rank, index };
+            if self.selection.has(&leaf) {
+                (self.visit)(leaf)?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -20,23 +20,14 @@ pub struct Options<'a> {
 /// Options of meshes for OpenFOAM.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Foam<'a> {
-    /// How numbers are written.
-    pub style: Style,
+    /// Width of labels.
+    pub label: Label,
     /// The regions that are exported.
     pub regions: Regions,
     /// Processor directories in place of one mesh.
     pub processors: Option<Processors>,
     /// The case of the mesh, whose solids become patches.
     pub case: Option<&'a Case>,
-}
-
-/// How numbers are written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Style {
-    /// Text in place of binary numbers.
-    pub is_ascii: bool,
-    /// Width of labels.
-    pub label: Label,
 }
 
 /// Width of the numbers of cells, faces and points.

@@ -1,114 +1,59 @@
 //! Results that are computed on several threads and used in order.
 
 use std::num::NonZero;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc;
 use std::thread;
 
-/// Calls `take(i, make(i))` for every `i` below `count`, in order, with `make` on `jobs` threads. At most `jobs` results exist
-/// at a time.
+/// Calls `take(i, make(i))` for every `i` below `count`, in order, with `make` on `jobs` threads, each of which holds one result until it
+/// is taken.
 ///
 /// # Errors
-/// The first error of either function, after which neither is called again.
-pub fn in_order<T, E: Send>(
+/// The first error of either function, after which `take` is not called again.
+pub fn in_order<T: Send, E: Send>(
     count: usize,
     jobs: NonZero<usize>,
     make: impl Fn(usize) -> Result<T, E> + Sync,
-    take: impl FnMut(usize, T) -> Result<(), E> + Send,
+    mut take: impl FnMut(usize, T) -> Result<(), E>,
 ) -> Result<(), E> {
-    let next = AtomicUsize::new(0);
-    let turn = Turn { state: Mutex::new(State::default()), changed: Condvar::new() };
-    let take = Mutex::new(take);
-    let work = || {
-        let _guard = StopOnPanic(&turn);
-        while let Some(index) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < count) {
-            let made = make(index);
-            if !turn.wait_for(index) {
-                return;
-            }
-            let taken = made.and_then(|made| {
-                // Only the thread whose turn it is locks, so this does not wait.
-                let mut take = take.lock().unwrap_or_else(PoisonError::into_inner);
-                take(index, made)
-            });
-            turn.end(taken.err());
-        }
-    };
+    let (jobs, make) = (jobs.get().min(count), &make);
     thread::scope(|scope| {
-        (1..jobs.get().min(count)).for_each(|_| drop(scope.spawn(work)));
-        work();
-    });
-    turn.state.into_inner().unwrap_or_else(PoisonError::into_inner).error.map_or(Ok(()), Err)
-}
-
-/// Whose turn it is.
-struct Turn<E> {
-    state: Mutex<State<E>>,
-    changed: Condvar,
-}
-
-struct State<E> {
-    index: usize,
-    is_stopped: bool,
-    error: Option<E>,
-}
-
-impl<E> Default for State<E> {
-    fn default() -> Self {
-        Self { index: 0, is_stopped: false, error: None }
-    }
-}
-
-impl<E> Turn<E> {
-    fn lock(&self) -> MutexGuard<'_, State<E>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Waits for the turn of a result; whether it comes.
-    fn wait_for(&self, index: usize) -> bool {
-        let waits = |state: &mut State<E>| state.index != index && !state.is_stopped;
-        let waited = self.changed.wait_while(self.lock(), waits);
-        !waited.unwrap_or_else(PoisonError::into_inner).is_stopped
-    }
-
-    /// Ends the turn of a result; an error is the end of all turns.
-    fn end(&self, error: Option<E>) {
-        let mut state = self.lock();
-        state.index += 1;
-        state.is_stopped |= error.is_some();
-        state.error = error;
-        self.changed.notify_all();
-    }
-}
-
-/// Ends all turns if its thread panics, because the others would wait for it forever.
-struct StopOnPanic<'a, E>(&'a Turn<E>);
-
-impl<E> Drop for StopOnPanic<'_, E> {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            self.0.lock().is_stopped = true;
-            self.0.changed.notify_all();
+        let worker = |first: usize| {
+            let (to, from) = mpsc::sync_channel(0);
+            // Nobody receives after an error.
+            let work = move || {
+                (first..count).step_by(jobs).try_for_each(|i| to.send(make(i)).map_err(drop))
+            };
+            scope.spawn(work);
+            from
+        };
+        let workers: Vec<_> = (0..jobs).map(worker).collect();
+        for index in 0..count {
+            // A thread that panicked sends nothing; its panic is passed on where the scope ends.
+            let Ok(made) = workers[index % jobs].recv() else { break };
+            take(index, made?)?;
         }
-    }
+        Ok(())
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     const JOBS: [NonZero<usize>; 3] =
         [NonZero::new(1).unwrap(), NonZero::new(3).unwrap(), NonZero::new(20).unwrap()];
 
     #[test]
-    fn results_are_used_in_order_and_at_most_one_per_thread_exists() {
+    fn results_are_used_in_order_and_each_thread_holds_one() {
         for jobs in JOBS {
             let (made, alive) = (AtomicUsize::new(0), AtomicUsize::new(0));
             let mut taken = Vec::new();
             let make = |i: usize| {
                 made.fetch_add(1, Ordering::Relaxed);
-                assert!(alive.fetch_add(1, Ordering::Relaxed) < jobs.get());
+                // One that is being taken, too.
+                assert!(alive.fetch_add(1, Ordering::Relaxed) <= jobs.get());
                 // Later results are ready first.
                 thread::sleep(std::time::Duration::from_micros(500 * (i as u64 % 3)));
                 Ok::<_, ()>(i * i)

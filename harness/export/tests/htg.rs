@@ -2,7 +2,7 @@
 //! any content is read or refused, without a panic.
 #![allow(missing_docs)]
 
-use contract::htg::{Cursor, SIDE, TreeError, TreeFile};
+use contract::htg::{Cursor, TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
@@ -108,7 +108,7 @@ proptest! {
             };
             // A file of part of a mesh counts only that part.
             let expected: Vec<u64> = expected.into_iter().map(|(word, ..)| word).collect();
-            let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), Some(SIDE)).unwrap();
+            let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), true).unwrap();
             prop_assert_eq!(file.root, ROOT);
             prop_assert_eq!(&words(&file).unwrap(), &expected);
             prop_assert_eq!(tree.len(), expected.len() as u64);
@@ -143,7 +143,7 @@ proptest! {
         let path = dir.path().join("mesh.vtkhdf");
         let nodes = [1].into_iter().chain(levels.iter().map(|n| 8 * n)).collect();
         write(&path, Shape { origin: ROOT.origin, edge: ROOT.edge, nodes }, &groups, sparse);
-        let Ok(tree) = TreeFile::open(&path, Some(SIDE)) else { return Ok(()) };
+        let Ok(tree) = TreeFile::open(&path, true) else { return Ok(()) };
         let streamed = words(&tree);
         if let Ok(index) = tree.index() {
             let mut cursor = Cursor::new(&tree, &index);

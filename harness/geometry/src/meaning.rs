@@ -14,17 +14,7 @@ pub fn changes_region(kind: Kind, keep: Keep) -> bool {
         Kind::NonManifoldOdd | Kind::Duplicates | Kind::OutsideRoot => true,
         Kind::ThinWalls => keep != Keep::Outside,
         Kind::ThinGaps => keep != Keep::Inside,
-        Kind::Openings
-        | Kind::Junctions
-        | Kind::NonManifoldEven
-        | Kind::Winding
-        | Kind::InsideOut
-        | Kind::Cavities
-        | Kind::Degenerate
-        | Kind::Slivers
-        | Kind::Intersections
-        | Kind::Contacts
-        | Kind::TouchingRoot => false,
+        _ => false,
     }
 }
 

@@ -1,5 +1,5 @@
-//! Meshes in the formats of other programs. VTK reads its own formats, in Python; `harness/oracles/import_vtk.py` describes
-//! how. The crate `contract` reads all others.
+//! Meshes in the formats of other programs. Those that the crate `contract` does not read are read in Python;
+//! `harness/oracles/imports.py` describes how.
 
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
@@ -8,17 +8,13 @@ use contract::digest::Digest;
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportError, Request};
 use contract::lattice::Root;
-use serde::Deserialize;
-use std::ffi::OsStr;
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
 /// Exit code of the script for a file that is not such a mesh.
 const CODE_INPUT: i32 = 2;
-/// The field of sides in the table that the script writes.
-const SIDES: &str = "side";
-
 /// Why a mesh was not imported.
 #[derive(Debug)]
 pub enum Refusal {
@@ -59,44 +55,84 @@ pub fn read(
     limit: Duration,
 ) -> Result<Cells, Refusal> {
     match format {
-        Format::Vtk => read_vtk(path, request, paths, limit),
-        _ => Ok(import::read(path, format, request)?),
+        Format::LeafWords | Format::P4est => Ok(import::read(path, format, request)?),
+        Format::Vtk => {
+            read_in_python(("vtk", "import_vtk.py"), path, format, request, paths, limit)
+        }
+        Format::Openfoam => {
+            let why = "has no polyMesh: give a case, its directory constant, or polyMesh, and reconstruct a decomposed mesh";
+            let mesh = import::poly_mesh(path).ok_or_else(|| ImportError::content(why))?;
+            read_in_python(CELLS, &mesh, format, request, paths, limit)
+        }
+        Format::Npy | Format::Csv | Format::Discretize => {
+            read_in_python(CELLS, path, format, request, paths, limit)
+        }
     }
 }
 
-fn read_vtk(
+/// The reader of all formats but VTK's: its name in messages, and the script.
+const CELLS: (&str, &str) = ("numpy", "import_cells.py");
+
+/// What a script is asked for.
+#[derive(Serialize)]
+struct Asked<'a> {
+    format: Format,
+    #[serde(flatten)]
+    request: &'a Request,
+}
+
+/// What a file states besides corners and edges of its cells.
+#[derive(Deserialize)]
+struct Stated {
+    root: Option<Root>,
+    has_levels: bool,
+    has_sides: bool,
+    digest: Option<Digest>,
+}
+
+fn read_in_python(
+    (name, script): (&str, &str),
     path: &Path,
+    format: Format,
     request: &Request,
     paths: &Paths,
     limit: Duration,
 ) -> Result<Cells, Refusal> {
     let place = tempfile::tempdir().map_err(ImportError::from)?;
-    let table = place.path().join("cells.npy");
-    let files = [path.as_os_str(), table.as_os_str()];
-    let arguments = files.into_iter().chain(request.sides.iter().map(OsStr::new));
-    let finished = python::run("vtk", "import_vtk.py", arguments, paths, limit, place.path())
-        .map_err(|failure| refusal(&failure))?;
-    let Stated { root, has_sides, digest } = fs::read(&finished.stdout)
-        .ok()
+    let table = place.path().join("cells");
+    let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
+    let arguments = [path.as_os_str(), table.as_os_str(), asked.as_ref()];
+    let finished = python::run(name, script, arguments, paths, limit, place.path())
+        .map_err(|failure| refusal(name, &failure))?;
+    let stated = fs::read(&finished.stdout).ok();
+    let stated: Stated = stated
         .and_then(|text| serde_json::from_slice(&text).ok())
         .ok_or_else(|| ImportError::content("was read, but the script reported no root"))?;
-    let sides = has_sides.then(|| SIDES.to_owned());
-    let cells = import::npy::read(&table, &Request { sides, ..Request::default() })?;
-    Ok(Cells { root, digest, ..cells })
+    let bytes = fs::read(&table).map_err(ImportError::from)?;
+    Ok(cells(&bytes, stated)?)
 }
 
-/// What a file states besides its cells.
-#[derive(Deserialize)]
-struct Stated {
-    root: Option<Root>,
-    has_sides: bool,
-    digest: Option<Digest>,
+/// The cells of rows of numbers: corner, edge, and level and side if they are known.
+fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, ImportError> {
+    let Stated { root, has_levels, has_sides, digest } = stated;
+    let (numbers, _) = bytes.as_chunks::<8>();
+    let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    let columns = 4 + usize::from(has_levels) + usize::from(has_sides);
+    let mut cells = Cells { root, digest, ..Cells::default() };
+    numbers.chunks_exact(columns).for_each(|row| cells.push([row[0], row[1], row[2]], row[3]));
+    let rows = || numbers.chunks_exact(columns).enumerate();
+    cells.levels = has_levels.then(|| rows().map(|(_, row)| row[4] as i64).collect());
+    let sides = || rows().map(|(cell, row)| import::side(row[columns - 1], cell)).collect();
+    cells.sides = has_sides.then(sides).transpose()?;
+    Ok(cells)
 }
 
-fn refusal(failure: &Failure) -> Refusal {
+fn refusal(name: &str, failure: &Failure) -> Refusal {
     match &failure.end {
         End::Interrupted => Refusal::Interrupted,
-        End::Missing(why) => Refusal::Missing(format!("VTK's formats need VTK, and it {why}")),
+        End::Missing(why) => {
+            Refusal::Missing(format!("this format is read with {name} in Python, which {why}"))
+        }
         End::Exited { code: CODE_INPUT, error } => Refusal::Input(ImportError::content(error)),
         _ => Refusal::Input(ImportError::content(format!("cannot be read: {failure}"))),
     }
@@ -107,7 +143,7 @@ mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
-    /// Reads a file with a shell script instead of Python, which gets the table's path as $4 and the array's name as $5.
+    /// Reads a file with a shell script instead of Python, which gets the table's path as $4 and the request as $5.
     fn read_with(script: &str, sides: Option<&str>) -> Result<Cells, Refusal> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
@@ -120,32 +156,27 @@ mod tests {
 
     /// A script that writes one cell, and this line.
     fn writing(line: &str) -> String {
-        let text = "{'descr': [('x', '<f8'), ('y', '<f8'), ('z', '<f8'), ('edge', '<f8'), ('side', '|u1')], \
-                    'fortran_order': False, 'shape': (1,), }\n";
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((text.len() as u16).to_le_bytes());
-        bytes.extend(text.bytes());
-        [1.0f64, 2.0, 3.0, 0.5].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-        bytes.push(2);
+        let row = [1.0f64, 2.0, 3.0, 0.5, 2.0];
+        let bytes: Vec<u8> = row.iter().flat_map(|v| v.to_le_bytes()).collect();
         let octal: String = bytes.iter().map(|byte| format!("\\{byte:03o}")).collect();
         format!("printf '{octal}' > \"$4\"; echo '{line}'")
     }
 
     #[test]
     fn cells_sides_and_root_come_from_the_script() {
-        let stated = r#"{"root": {"origin": [1, 2, 3], "edge": 4.0}, "has_sides": true, "digest": "000000000000000000000000000000ff"}"#;
+        let stated = r#"{"root": {"origin": [1, 2, 3], "edge": 4.0}, "has_levels": false, "has_sides": true, "digest": "000000000000000000000000000000ff"}"#;
         let script = writing(stated);
         let cells = read_with(
-            &format!("[ \"$3 $5\" = 'mesh.vtu body' ] || exit 9\n{script}"),
+            &format!("case \"$3 $5\" in 'mesh.vtu {{'*'\"sides\":\"body\"'*) ;; *) exit 9 ;; esac\n{script}"),
             Some("body"),
         )
         .unwrap();
         assert_eq!((cells.corners[0], cells.edges[0]), ([1.0, 2.0, 3.0], 0.5));
         assert_eq!((cells.root.unwrap().edge, cells.digest), (4.0, Some(Digest(255))));
         assert_eq!(cells.sides, Some(vec![contract::word::Side::Crossing]));
-        let nothing = r#"{"root": null, "has_sides": false, "digest": null}"#;
+        let nothing = r#"{"root": null, "has_levels": true, "has_sides": false, "digest": null}"#;
         let cells = read_with(&writing(nothing), None).unwrap();
-        assert_eq!((cells.root, cells.sides), (None, None));
+        assert_eq!((cells.root, cells.sides, cells.levels), (None, None, Some(vec![2])));
     }
 
     #[test]
@@ -160,7 +191,8 @@ mod tests {
             sentence("sleep 60"),
             "cannot be read: vtk did not end within 2 s and was killed"
         );
-        let no_table = r#"echo '{"root": null, "has_sides": false, "digest": null}'"#;
+        let no_table =
+            r#"echo '{"root": null, "has_levels": true, "has_sides": false, "digest": null}'"#;
         assert!(sentence(no_table).starts_with("cannot be read"));
         assert!(sentence(&writing("")).contains("no root"));
         let missing = read_with("echo no module >&2; exit 3", None).unwrap_err();

@@ -69,8 +69,8 @@ fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
     let array = || {
         let (header, offset) = npy::read_header(&bytes).map_err(|error| error.to_string())?;
         let sides = &bytes[offset as usize..];
-        match (header.dtype().descr().as_str(), header.shape()) {
-            ("'|u1'", &[length]) if length == sides.len() as u64 => Ok(sides),
+        match (header.descr.as_str(), &header.shape[..]) {
+            ("|u1", &[length]) if length == sides.len() as u64 => Ok(sides),
             (dtype, shape) => {
                 Err(format!("{} bytes of type {dtype} and shape {shape:?}", sides.len()))
             }
@@ -150,7 +150,7 @@ mod tests {
             &octal(&npy::header("|u1", "(1,)")),
             &octal(&npy::header("|u1", "(999999999999,)")),
         );
-        assert!(sentence(&promising).contains("1 bytes of type '|u1' and shape [999999999999]"));
+        assert!(sentence(&promising).contains("1 bytes of type |u1 and shape [999999999999]"));
     }
 
     #[test]

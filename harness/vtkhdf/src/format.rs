@@ -1,4 +1,4 @@
-//! What the writer and the reader know of HDF5: signatures, codes of messages, and types of elements.
+//! What the writer and the reader know of HDF5: signatures, codes of messages, types of elements, and arrays in chunks.
 
 use std::fmt;
 
@@ -6,6 +6,8 @@ use std::fmt;
 pub const SIGNATURE: [u8; 8] = *b"\x89HDF\r\n\x1a\n";
 /// Bytes of the superblock, version 3.
 pub(crate) const SUPERBLOCK_BYTES: usize = 48;
+/// Bytes of the header of a table of chunks; the table follows it.
+pub(crate) const TABLE_HEAD_BYTES: u64 = 28;
 /// The address of what is not stored.
 pub(crate) const UNDEFINED: u64 = u64::MAX;
 
@@ -51,9 +53,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All types.
-    pub(crate) const ALL: [Self; 4] = [Self::Byte, Self::Int32, Self::Int64, Self::Double];
-
     /// Bytes of an element.
     pub fn bytes(self) -> usize {
         match self {
@@ -79,53 +78,6 @@ impl Kind {
         }
         code
     }
-}
-
-/// Elements of a small array, or of an attribute.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// One text, in ASCII.
-    Text(String),
-    /// One number.
-    Number(i64),
-    /// An array.
-    Ints32(Vec<i32>),
-    /// An array.
-    Ints(Vec<i64>),
-    /// An array.
-    Doubles(Vec<f64>),
-}
-
-/// A group: attributes, and members by name.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Group {
-    /// Attributes by name.
-    pub attributes: Vec<(String, Value)>,
-    /// Members by name.
-    pub members: Vec<(String, Member)>,
-}
-
-impl Group {
-    /// The attribute with a name.
-    pub fn attribute(&self, name: &str) -> Option<&Value> {
-        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
-    }
-
-    /// The member with a name.
-    pub fn member(&self, name: &str) -> Option<&Member> {
-        self.members.iter().find(|(n, _)| n == name).map(|(_, member)| member)
-    }
-}
-
-/// A member of a group.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Member {
-    /// A group.
-    Group(Group),
-    /// A small array, stored in the object header.
-    Small(Value),
-    /// A long array.
-    Chunked(Chunked),
 }
 
 /// Where some bytes of a file are.
@@ -183,7 +135,7 @@ impl Chunked {
 pub enum ReadError {
     /// It cannot be read.
     Io(std::io::Error),
-    /// It is valid, as far as it was read, and has something that this reader does not know.
+    /// It is not what the writer makes: another HDF5 file, or none, or one whose metadata are damaged.
     Unknown(String),
     /// It is damaged.
     Damaged(String),
@@ -193,7 +145,7 @@ impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Io(e) => write!(f, "cannot be read: {e}"),
-            Self::Unknown(what) => write!(f, "has {what}, which only the HDF5 library reads"),
+            Self::Unknown(what) => write!(f, "is not a tree as this program writes it: {what}"),
             Self::Damaged(what) => write!(f, "is damaged: {what}"),
         }
     }

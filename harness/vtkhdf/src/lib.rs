@@ -1,12 +1,10 @@
-//! HDF5 files that are written and read chunk by chunk, so that a data set need not fit in memory, and the hyper-tree grid of
-//! VTK in such a file.
+//! The hyper-tree grid of VTK in an HDF5 file, written and read chunk by chunk, so that a tree need not fit in memory.
 //!
-//! - [`write`](mod@write) and [`read`](mod@read): the part of HDF5 1.10 that these files need: groups, attributes, small arrays, and long arrays of
-//!   chunks that are compressed with zlib. [`format`](mod@format) has what both know of it;
+//! - [`write`](mod@write): the metadata of HDF5 1.10 that these files need: groups, attributes, small arrays, and long arrays of
+//!   chunks that are compressed with zlib. [`format`](mod@format) has what the reader knows of it, too;
 //! - [`checksum`]: that of every block of metadata;
-//! - [`tree`]: the layout of a hyper-tree grid of one oct-tree, and its arrays, window by window.
-//!
-//! A file that VTK or h5py wrote is refused if it has anything else.
+//! - [`tree`]: the layout of a hyper-tree grid of one oct-tree, and its arrays, window by window;
+//! - [`read`]: the reader of such files. Those of other programs are refused.
 
 #![deny(missing_docs)]
 

@@ -1,79 +1,85 @@
-//! Reader of the HDF5 files that [`write`](mod@crate::write) makes. It refuses everything else, and allocates no memory for a count
-//! before the file has been seen to be long enough for it.
+//! Reader of the files that [`TreeWriter`](crate::tree::TreeWriter) makes, and of no others.
+//!
+//! The shape of the tree and the places of its chunks are looked up where the writer puts them, without further checks. Then the metadata
+//! that the writer would make of them must be those of the file, byte by byte, their checksums included. No memory is allocated for a
+//! count before the file has been seen to be long enough for it.
 
-mod messages;
-
-use crate::checksum::lookup3;
 use crate::format::{
-    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, Group, Kind, Member, PAGE_BITS,
-    SIGNATURE, SUPERBLOCK_BYTES, UNDEFINED, message,
+    Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED, message,
 };
+use crate::tree::{
+    CELL_DATA, COORDINATES, EDGE, GROUP, MASK, NODES, RANK, SIDE, SPLIT, Shape, arrays, group,
+    has_chunks,
+};
+use crate::write::metadata;
 use flate2::{Decompress, FlushDecompress, Status};
+use std::collections::HashMap;
 use std::fs;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use messages::{
-    ArrayHeader, Datatype, Input, Layout, Result, attribute, damaged, dataspace, datatype,
-    is_deflate, layout, link, unknown, value,
-};
+type Result<T> = std::result::Result<T, ReadError>;
 
-/// Greatest depth of groups in groups.
-const DEPTH_MAX: usize = 8;
-/// Greatest number of objects.
-const OBJECTS_MAX: usize = 1000;
-/// Greatest size of an object header.
-const HEADER_BYTES_MAX: u32 = 1 << 20;
-/// Greatest size of a chunk, before compression.
-const CHUNK_BYTES_MAX: u64 = 1 << 24;
+/// Bytes of an object header before its messages.
+const HEADER_BYTES: u64 = 10;
+/// Bytes of a table of chunks before its entries.
+const TABLE_BYTES: u64 = 14;
 
-/// An open file.
-#[derive(Debug)]
-pub struct File {
-    file: fs::File,
-    bytes: u64,
-    root: u64,
+fn unknown(what: &str) -> ReadError {
+    ReadError::Unknown(what.to_owned())
 }
 
-impl File {
-    /// Opens a file and reads its superblock.
+/// A file whose metadata were read.
+#[derive(Debug)]
+pub struct TreeReader {
+    file: fs::File,
+    bytes: u64,
+    /// The root and the nodes.
+    pub shape: Shape,
+    /// The bits of split nodes.
+    pub split: Chunked,
+    /// The bits of leaves that are not in the mesh, if there are any.
+    pub masked: Option<Chunked>,
+    /// The sides of all nodes.
+    pub sides: Chunked,
+    /// The ranks of all nodes, if they are known.
+    pub ranks: Option<Chunked>,
+}
+
+impl TreeReader {
+    /// Opens a file and reads its metadata.
     ///
     /// # Errors
-    /// If the file cannot be read, is damaged, or has another version of the format.
+    /// If the file cannot be read, or is another one than the writer makes.
     pub fn open(path: &Path) -> Result<Self> {
         let file = files::open(path)?;
-        let bytes = file.metadata()?.len();
-        let this = Self { file, bytes, root: 0 };
-        let head = this.bytes_at(Extent { address: 0, bytes: bytes.min(8) })?;
-        if head != SIGNATURE {
-            return unknown("another signature than HDF5 files");
+        let source = Source { bytes: file.metadata()?.len(), file: &file };
+        let head = source.bytes_at(0, source.bytes.min(SUPERBLOCK_BYTES as u64))?;
+        if !head.starts_with(&SIGNATURE) || head.get(8).is_some_and(|&version| version != 3) {
+            return Err(unknown("it does not begin with a superblock of HDF5 1.10"));
         }
-        let block = this.bytes_at(Extent { address: 0, bytes: SUPERBLOCK_BYTES as u64 })?;
-        let mut input = Input(&block[head.len()..]);
-        if input.take(4)? != [3, 8, 8, 0] {
-            return unknown("a superblock that is not of version 3");
+        if head.len() < SUPERBLOCK_BYTES {
+            return Err(ReadError::Damaged("its superblock is incomplete".to_owned()));
         }
-        verify(&block, "superblock")?;
-        let (base, extension, end, root) = (input.u64()?, input.u64()?, input.u64()?, input.u64()?);
-        if base != 0 || extension != UNDEFINED {
-            return unknown("a user block or an extension of the superblock");
+        let (end, root) = (number(&head[28..36]), number(&head[36..44]));
+        if end != source.bytes {
+            let found = source.bytes;
+            return Err(ReadError::Damaged(format!("it has {found} bytes instead of {end}")));
         }
-        if end != bytes {
-            return damaged(format!("it has {bytes} bytes instead of {end}"));
+        let (shape, arrays, start) = source.tree(root)?;
+        let expected = metadata(&group(&shape, &arrays), start);
+        let found = (source.bytes_at(start, end.saturating_sub(start))?, head);
+        if expected != found {
+            let what = "its metadata are not those of its tree".to_owned();
+            let is_ours = found.0.windows(EDGE.len()).any(|bytes| bytes == EDGE.as_bytes());
+            let error = if is_ours { ReadError::Damaged } else { ReadError::Unknown };
+            return Err(error(what));
         }
-        Ok(Self { root, ..this })
-    }
-
-    /// The root group with all that is in it.
-    ///
-    /// # Errors
-    /// If the file is damaged or has anything that this reader does not know.
-    pub fn root(&self) -> Result<Group> {
-        let mut objects = 0;
-        match self.object(self.root, 0, &mut objects)? {
-            Member::Group(group) => Ok(group),
-            _ => damaged("its root is not a group"),
-        }
+        let bytes = source.bytes;
+        let mut arrays = arrays.into_iter();
+        let mut next = || arrays.next().expect("three arrays or more");
+        let (split, masked, sides) = (next(), Some(next()).filter(has_chunks), next());
+        Ok(Self { file, bytes, shape, split, masked, sides, ranks: arrays.next() })
     }
 
     /// The elements of a chunk, little-endian; `into` gets as many bytes as a chunk has.
@@ -83,154 +89,130 @@ impl File {
     pub fn read_chunk(&self, array: &Chunked, index: usize, into: &mut Vec<u8>) -> Result<()> {
         into.clear();
         into.resize(array.chunk_bytes(), 0);
-        let Some(extent) = array.chunks[index] else { return Ok(()) };
-        let stored = self.bytes_at(extent)?;
+        let Some(Extent { address, bytes }) = array.chunks[index] else { return Ok(()) };
+        let stored = Source { file: &self.file, bytes: self.bytes }.bytes_at(address, bytes)?;
         let mut inflater = Decompress::new(true);
         let status = inflater.decompress(&stored, into, FlushDecompress::Finish);
         let is_whole = matches!(status, Ok(Status::StreamEnd))
-            && inflater.total_in() == extent.bytes
+            && inflater.total_in() == bytes
             && inflater.total_out() == into.len() as u64;
-        if is_whole { Ok(()) } else { damaged(format!("the chunk at byte {}", extent.address)) }
+        if is_whole {
+            Ok(())
+        } else {
+            Err(ReadError::Damaged(format!("the chunk at byte {address}")))
+        }
     }
+}
 
-    fn bytes_at(&self, Extent { address, bytes }: Extent) -> Result<Vec<u8>> {
+/// The bytes of a file.
+struct Source<'a> {
+    file: &'a fs::File,
+    bytes: u64,
+}
+
+impl Source<'_> {
+    fn bytes_at(&self, address: u64, bytes: u64) -> Result<Vec<u8>> {
         if address.checked_add(bytes).is_none_or(|end| end > self.bytes) {
-            return damaged(format!("it ends before byte {}", address.saturating_add(bytes)));
+            let end = address.saturating_add(bytes);
+            return Err(ReadError::Damaged(format!("it ends before byte {end}")));
         }
         let mut block = vec![0; bytes as usize];
         self.file.read_exact_at(&mut block, address)?;
         Ok(block)
     }
 
-    fn object(&self, address: u64, depth: usize, objects: &mut usize) -> Result<Member> {
-        *objects += 1;
-        if depth > DEPTH_MAX || *objects > OBJECTS_MAX {
-            return unknown("more groups and arrays than expected");
+    /// The tree below the root group: its shape, its arrays, and where the metadata begin.
+    fn tree(&self, root: u64) -> Result<(Shape, Vec<Chunked>, u64)> {
+        let missing = || unknown("it has no tree");
+        let grid = *self.links(root)?.get(GROUP).ok_or_else(missing)?;
+        let links = self.links(grid)?;
+        let link = |name: &str| links.get(name).copied().ok_or_else(missing);
+        let data = self.links(link(CELL_DATA)?)?;
+        let nodes = self.numbers(link(NODES)?)?;
+        let mut origin = [0.0; 3];
+        for (low, name) in origin.iter_mut().zip(COORDINATES) {
+            *low = f64::from_bits(*self.numbers(link(name)?)?.first().ok_or_else(missing)?);
         }
-        let block = self.header(address)?;
-        let mut input = Input(&block);
-        let (mut group, mut links) = (Group::default(), Vec::new());
-        let mut array = ArrayHeader::default();
-        while !input.0.is_empty() {
-            let (code, size, flags) = (input.u8()?, input.u16()?, input.u8()?);
-            let mut body = Input(input.take(usize::from(size))?);
-            if flags != 0 {
-                return unknown("a shared message");
-            }
-            match code {
-                message::LINK_INFO
-                    if body.take(2)? == [0, 0] && body.0.iter().all(|&b| b == 0xff) => {}
-                message::GROUP_INFO if body.0 == [0, 0] => {}
-                message::LINK => links.push(link(&mut body)?),
-                message::ATTRIBUTE => group.attributes.push(attribute(&mut body)?),
-                message::DATASPACE => array.dataspace = Some(dataspace(&mut body)?),
-                message::DATATYPE => array.datatype = Some(datatype(&mut body)?),
-                message::LAYOUT => array.layout = Some(layout(&mut body)?),
-                message::FILTERS if is_deflate(body.0) => array.is_compressed = true,
-                message::FILL_VALUE
-                    if [ALLOCATED_EARLY, ALLOCATED_BY_CHUNK]
-                        .contains(&body.0.try_into().unwrap_or_default()) => {}
-                _ => return unknown(format!("a message of type {code}")),
-            }
+        // The edge is the last attribute.
+        let attribute = self.last(grid, message::ATTRIBUTE)?;
+        let edge = f64::from_bits(tail(&attribute).ok_or_else(missing)?);
+        let shape = Shape { origin, edge, nodes };
+        if !shape.is_tree() {
+            return Err(unknown("its nodes are not those of an oct-tree"));
         }
-        if array.layout.is_some() {
-            return self.array(array);
+        // Each window has an entry in a table.
+        if shape.windows().saturating_mul(12) > self.bytes {
+            return Err(missing());
         }
-        for (name, address) in links {
-            group.members.push((name, self.object(address, depth + 1, objects)?));
+        let mut arrays = arrays(&shape, data.contains_key(RANK));
+        let sources = [links.get(SPLIT), links.get(MASK), data.get(SIDE), data.get(RANK)];
+        for (array, address) in arrays.iter_mut().zip(sources) {
+            address.map_or(Ok(()), |address| self.fill(array, *address))?;
         }
-        Ok(Member::Group(group))
+        Ok((shape, arrays, *links.values().min().ok_or_else(missing)?))
     }
 
-    /// The messages of an object header.
-    fn header(&self, address: u64) -> Result<Vec<u8>> {
-        let head = self.bytes_at(Extent { address, bytes: 10 })?;
-        let mut input = Input(&head);
-        if input.take(4)? != b"OHDR" {
-            return damaged(format!("there is no object header at byte {address}"));
+    /// The messages of the object header at an address: code and content.
+    fn messages(&self, address: u64) -> Result<Vec<(u8, Vec<u8>)>> {
+        let head = self.bytes_at(address, HEADER_BYTES)?;
+        let block = self.bytes_at(address + HEADER_BYTES, number(&head[6..]))?;
+        let (mut messages, mut rest) = (Vec::new(), &block[..]);
+        while let [code, low, high, _, after @ ..] = rest {
+            let size = usize::from(u16::from_le_bytes([*low, *high]));
+            let split = after.split_at_checked(size);
+            let (body, next) =
+                split.ok_or_else(|| unknown("a message is longer than its header"))?;
+            messages.push((*code, body.to_vec()));
+            rest = next;
         }
-        if input.take(2)? != [2, 2] {
-            return unknown("an object header of another version");
-        }
-        let size = input.u32()?;
-        if size > HEADER_BYTES_MAX {
-            return unknown(format!("an object header of {size} bytes"));
-        }
-        let mut block = self.bytes_at(Extent { address, bytes: 10 + u64::from(size) + 4 })?;
-        verify(&block, "object header")?;
-        block.truncate(10 + size as usize);
-        Ok(block.split_off(10))
+        Ok(messages)
     }
 
-    fn array(&self, header: ArrayHeader) -> Result<Member> {
-        let ArrayHeader { dataspace, datatype, layout, is_compressed } = header;
-        let (Some(len), Some(datatype), Some(layout)) = (dataspace, datatype, layout) else {
-            return damaged("an array has no type or no size");
+    /// The members of a group: addresses by name.
+    fn links(&self, address: u64) -> Result<HashMap<String, u64>> {
+        let link = |(code, body): (u8, Vec<u8>)| {
+            let (name, address) = body.get(3..)?.split_last_chunk::<8>()?;
+            let name = String::from_utf8(name.to_vec()).ok()?;
+            (code == message::LINK).then_some((name, u64::from_le_bytes(*address)))
         };
-        match (layout, datatype, len) {
-            (Layout::Compact(data), _, _) => Ok(Member::Small(value(datatype, len, &data)?)),
-            (
-                Layout::Chunked { dims: [chunk_len, bytes], table },
-                Datatype::Kind(kind),
-                Some(len),
-            ) if is_compressed && bytes as usize == kind.bytes() => {
-                let chunk_bytes = u64::from(chunk_len) * u64::from(bytes);
-                if chunk_len == 0 || chunk_bytes > CHUNK_BYTES_MAX || u64::from(chunk_len) > len {
-                    return unknown(format!("chunks of {chunk_bytes} bytes"));
-                }
-                Ok(Member::Chunked(self.table(kind, len, chunk_len, table)?))
-            }
-            _ => unknown("an array of chunks that are not compressed with zlib alone"),
-        }
+        Ok(self.messages(address)?.into_iter().filter_map(link).collect())
     }
 
-    fn table(&self, kind: Kind, len: u64, chunk_len: u32, address: u64) -> Result<Chunked> {
-        let count = len.div_ceil(u64::from(chunk_len));
-        let head = self.bytes_at(Extent { address, bytes: 28 })?;
-        verify(&head, "table of chunks")?;
-        let mut array = Chunked { kind, len, chunk_len, chunks: Vec::new() };
-        let (size_bytes, entry) = (array.size_bytes(), 12 + array.size_bytes());
-        let mut input = Input(&head);
-        if input.take(6)? != b"FAHD\x00\x01"
-            || input.take(2)? != [entry as u8, PAGE_BITS]
-            || count >= 1 << PAGE_BITS
-        {
-            return unknown("a table of chunks of another kind");
+    /// The last message with a code.
+    fn last(&self, address: u64, code: u8) -> Result<Vec<u8>> {
+        let found = self.messages(address)?.into_iter().rfind(|(other, _)| *other == code);
+        found.map(|(_, body)| body).ok_or_else(|| unknown("a message is missing"))
+    }
+
+    /// The numbers of a small array, as bits.
+    fn numbers(&self, address: u64) -> Result<Vec<u64>> {
+        let layout = self.last(address, message::LAYOUT)?;
+        Ok(layout.get(4..).unwrap_or_default().chunks_exact(8).map(number).collect())
+    }
+
+    /// Sets the places of an array's chunks.
+    fn fill(&self, array: &mut Chunked, address: u64) -> Result<()> {
+        // The layout ends with the address of the table's header.
+        let layout = self.last(address, message::LAYOUT)?;
+        let header = tail(&layout).filter(|&header| header < self.bytes);
+        let header = header.ok_or_else(|| unknown("an array has no table of chunks"))?;
+        let size = 8 + array.size_bytes();
+        let bytes = array.chunks.len() as u64 * (size as u64 + 4);
+        let entries = self.bytes_at(header + TABLE_HEAD_BYTES + TABLE_BYTES, bytes)?;
+        for (slot, entry) in array.chunks.iter_mut().zip(entries.chunks_exact(size + 4)) {
+            let extent = Extent { address: number(&entry[..8]), bytes: number(&entry[8..size]) };
+            *slot = (extent.address != UNDEFINED).then_some(extent);
         }
-        if input.u64()? != count {
-            return damaged("its table of chunks has another length than the array");
-        }
-        let bytes = 14 + count * entry as u64 + 4;
-        let block = self.bytes_at(Extent { address: input.u64()?, bytes })?;
-        verify(&block, "table of chunks")?;
-        let mut input = Input(&block);
-        if input.take(6)? != b"FADB\x00\x01" || input.u64()? != address {
-            return damaged("its table of chunks is not in its place");
-        }
-        for _ in 0..count {
-            let address = input.u64()?;
-            let mut size = [0; 8];
-            size[..size_bytes].copy_from_slice(input.take(size_bytes)?);
-            let extent = Extent { address, bytes: u64::from_le_bytes(size) };
-            if input.u32()? != 0 {
-                return unknown("chunks without compression");
-            }
-            let is_stored = address != UNDEFINED;
-            if is_stored && extent.bytes > 2 * array.chunk_bytes() as u64 + 64 {
-                return damaged(format!("its chunk at byte {address} has {} bytes", extent.bytes));
-            }
-            array.chunks.push(is_stored.then_some(extent));
-        }
-        Ok(array)
+        Ok(())
     }
 }
 
-/// Verifies the checksum at the end of a block.
-fn verify(block: &[u8], what: &str) -> Result<()> {
-    let (content, sum) = block.split_at(block.len() - 4);
-    if sum == lookup3(content).to_le_bytes() {
-        Ok(())
-    } else {
-        damaged(format!("the checksum of a {what} is wrong"))
-    }
+/// The number in some bytes, little-endian.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
+}
+
+/// The number in the last eight bytes.
+fn tail(bytes: &[u8]) -> Option<u64> {
+    bytes.last_chunk().map(|bytes| u64::from_le_bytes(*bytes))
 }

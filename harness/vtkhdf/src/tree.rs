@@ -6,27 +6,33 @@
 //! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
 //! are packed from the most significant one. Cell data have an element for every node.
 
-use crate::format::{Chunked, Group, Kind, Member, Value};
-use crate::write::{Deflater, Writer};
-use std::io::{self, Seek, Write};
+use crate::format::{Chunked, Extent, Kind, SUPERBLOCK_BYTES};
+use crate::write::{Deflater, Group, Member, Value, metadata};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
 
 /// Nodes of a window.
 pub const WINDOW: u64 = 1 << 18;
-/// The group of the file.
-pub const GROUP: &str = "VTKHDF";
-/// Its attribute `Type`.
-pub const TYPE: &str = "HyperTreeGrid";
-/// Its group of cell data.
-pub const CELL_DATA: &str = "CellData";
 /// The cell data of sides: 0 outside, 1 inside, 2 crossing; 0 for nodes that are no leaves of the mesh.
 pub const SIDE: &str = "side";
 /// The cell data of ranks.
-pub const RANK: &str = "rank";
-/// The attribute with the edge of the root, which VTK does not read: the difference of two coordinates may have lost digits.
-pub const EDGE: &str = "RootEdge";
+pub(crate) const RANK: &str = "rank";
+/// The group of the file.
+pub(crate) const GROUP: &str = "VTKHDF";
+/// Its group of cell data.
+pub(crate) const CELL_DATA: &str = "CellData";
+/// Numbers of nodes by level.
+pub(crate) const NODES: &str = "NumberOfCellsPerTreeDepth";
+/// The array of bits of split nodes.
+pub(crate) const SPLIT: &str = "Descriptors";
+/// The array of bits of leaves that are not in the mesh.
+pub(crate) const MASK: &str = "Mask";
 /// The coordinates of the root along x, y and z.
-pub const COORDINATES: [&str; 3] = ["XCoordinates", "YCoordinates", "ZCoordinates"];
+pub(crate) const COORDINATES: [&str; 3] = ["XCoordinates", "YCoordinates", "ZCoordinates"];
+/// The attribute with the edge of the root, which VTK does not read: the difference of two coordinates may have lost digits.
+pub(crate) const EDGE: &str = "RootEdge";
+/// Greatest number of levels.
+const LEVELS_MAX: usize = 20;
 
 /// The root and the nodes of a tree.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +49,13 @@ impl Shape {
     /// Number of nodes of all levels.
     pub fn nodes_total(&self) -> u64 {
         self.nodes.iter().sum()
+    }
+
+    /// Whether the numbers of nodes can be those of an oct-tree: one, then eight for some of the nodes of the level above.
+    pub(crate) fn is_tree(&self) -> bool {
+        let fits = |w: &[u64]| w[1] > 0 && w[1].is_multiple_of(8) && w[1] / 8 <= w[0];
+        let counts = &self.nodes;
+        counts.first() == Some(&1) && counts.len() <= LEVELS_MAX && counts.windows(2).all(fits)
     }
 
     /// Number of nodes with a bit in `Descriptors`.
@@ -165,7 +178,7 @@ impl Window {
 }
 
 /// The arrays that have a chunk per window: split, deleted, side, and rank if there are ranks.
-fn arrays(shape: &Shape, with_ranks: bool) -> Vec<Chunked> {
+pub(crate) fn arrays(shape: &Shape, with_ranks: bool) -> Vec<Chunked> {
     let (nodes, described) = (shape.nodes_total(), shape.nodes_described());
     let bits = |nodes: u64| Chunked::new(Kind::Byte, nodes.div_ceil(8), WINDOW as u32 / 8);
     let data = |kind| Chunked::new(kind, nodes, WINDOW as u32);
@@ -174,10 +187,51 @@ fn arrays(shape: &Shape, with_ranks: bool) -> Vec<Chunked> {
     arrays
 }
 
-/// A file that is being written.
+/// The tree as a group of HDF5, with the arrays that have a chunk per window.
+pub(crate) fn group(shape: &Shape, arrays: &[Chunked]) -> Group {
+    let mut chunked = arrays.iter().map(|array| Member::Chunked(array.clone()));
+    let mut next = || chunked.next().expect("three arrays or more");
+    let one = |number: u64| Member::Small(Value::ints(&[number]));
+    let levels = shape.nodes.len() as u64;
+    let mut members = vec![
+        ("TreeIds", one(0)),
+        ("NumberOfTrees", one(1)),
+        ("NumberOfDepths", one(levels)),
+        ("DepthPerTree", one(levels)),
+        (NODES, Member::Small(Value::ints(&shape.nodes))),
+        ("NumberOfCells", one(shape.nodes_total())),
+        ("DescriptorsSize", one(shape.nodes_described())),
+        (SPLIT, next()),
+    ];
+    let mask = next();
+    // Without a mask, no leaf is missing.
+    members.extend(has_chunks(&arrays[1]).then_some((MASK, mask)));
+    for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
+        members.push((name, Member::Small(Value::doubles(&[low, low + shape.edge]))));
+    }
+    let data = [SIDE, RANK].into_iter().zip(arrays[2..].iter().map(|_| next())).collect();
+    members.push((CELL_DATA, Member::Group(Group { members: data, ..Group::default() })));
+    let attributes = vec![
+        ("Version", Value::array(Kind::Int64, &[2i64, 8].map(i64::to_le_bytes))),
+        ("Type", Value::text("HyperTreeGrid")),
+        ("BranchFactor", Value::number(2)),
+        ("Dimensions", Value::array(Kind::Int32, &[2i32; 3].map(i32::to_le_bytes))),
+        (EDGE, Value::doubles(&[shape.edge])),
+    ];
+    let grid = Member::Group(Group { attributes, members });
+    Group { members: vec![(GROUP, grid)], ..Group::default() }
+}
+
+/// Whether an array has more than zeros.
+pub(crate) fn has_chunks(array: &Chunked) -> bool {
+    array.chunks.iter().any(Option::is_some)
+}
+
+/// A file that is being written: chunks in any order first, then the metadata.
 #[derive(Debug)]
 pub struct TreeWriter<W> {
-    out: Writer<W>,
+    out: W,
+    end: u64,
     shape: Shape,
     arrays: Vec<Chunked>,
 }
@@ -187,9 +241,11 @@ impl<W: Write + Seek> TreeWriter<W> {
     ///
     /// # Errors
     /// As `out` has.
-    pub fn new(out: W, shape: Shape, with_ranks: bool) -> io::Result<Self> {
+    pub fn new(mut out: W, shape: Shape, with_ranks: bool) -> io::Result<Self> {
+        // Without a superblock the file is invalid until it is finished.
+        out.write_all(&[0; SUPERBLOCK_BYTES])?;
         let arrays = arrays(&shape, with_ranks);
-        Ok(Self { out: Writer::new(out)?, shape, arrays })
+        Ok(Self { out, end: SUPERBLOCK_BYTES as u64, shape, arrays })
     }
 
     /// Writes the chunks of a window, which [`Window::compress`] has made.
@@ -204,7 +260,9 @@ impl<W: Write + Seek> TreeWriter<W> {
         for (array, chunk) in self.arrays.iter_mut().zip(chunks) {
             // Descriptors end before the last windows.
             if let (Some(slot), Some(chunk)) = (array.chunks.get_mut(window as usize), chunk) {
-                *slot = Some(self.out.append(chunk)?);
+                *slot = Some(Extent { address: self.end, bytes: chunk.len() as u64 });
+                self.out.write_all(chunk)?;
+                self.end += chunk.len() as u64;
             }
         }
         Ok(())
@@ -214,46 +272,12 @@ impl<W: Write + Seek> TreeWriter<W> {
     ///
     /// # Errors
     /// As `out` has.
-    pub fn finish(self) -> io::Result<W> {
-        let Self { out, shape, arrays } = self;
-        let mut arrays = arrays.into_iter();
-        let mut next = || Member::Chunked(arrays.next().expect("three arrays or more"));
-        let one = |number: u64| Member::Small(Value::Ints(vec![number as i64]));
-        let levels = shape.nodes.len() as u64;
-        let by_level = shape.nodes.iter().map(|&n| n as i64).collect();
-        let mut members = vec![
-            ("TreeIds", one(0)),
-            ("NumberOfTrees", one(1)),
-            ("NumberOfDepths", one(levels)),
-            ("DepthPerTree", one(levels)),
-            ("NumberOfCellsPerTreeDepth", Member::Small(Value::Ints(by_level))),
-            ("NumberOfCells", one(shape.nodes_total())),
-            ("DescriptorsSize", one(shape.nodes_described())),
-            ("Descriptors", next()),
-            ("Mask", next()),
-        ];
-        for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
-            members.push((name, Member::Small(Value::Doubles(vec![low, low + shape.edge]))));
-        }
-        // Without a mask, no leaf is missing.
-        let is_zero = |member: &Member| matches!(member, Member::Chunked(array) if array.chunks.iter().all(Option::is_none));
-        members.retain(|(name, member)| *name != "Mask" || !is_zero(member));
-        let mut data = vec![(SIDE.to_owned(), next())];
-        data.extend(arrays.next().map(|ranks| (RANK.to_owned(), Member::Chunked(ranks))));
-        members.push((CELL_DATA, Member::Group(Group { members: data, ..Group::default() })));
-        let attributes = [
-            ("Version", Value::Ints(vec![2, 8])),
-            ("Type", Value::Text(TYPE.to_owned())),
-            ("BranchFactor", Value::Number(2)),
-            ("Dimensions", Value::Ints32(vec![2; 3])),
-            (EDGE, Value::Doubles(vec![shape.edge])),
-        ];
-        let group = Group {
-            attributes: attributes.map(|(name, value)| (name.to_owned(), value)).into(),
-            members: members.into_iter().map(|(name, m)| (name.to_owned(), m)).collect(),
-        };
-        let root =
-            Group { members: vec![(GROUP.to_owned(), Member::Group(group))], ..Group::default() };
-        out.finish(&root)
+    pub fn finish(mut self) -> io::Result<W> {
+        let (metadata, superblock) = metadata(&group(&self.shape, &self.arrays), self.end);
+        self.out.write_all(&metadata)?;
+        self.out.seek(SeekFrom::Start(0))?;
+        self.out.write_all(&superblock)?;
+        self.out.flush()?;
+        Ok(self.out)
     }
 }

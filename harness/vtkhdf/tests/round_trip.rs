@@ -1,104 +1,121 @@
-//! Files are read back as they were written, and damaged ones are refused.
+//! Files are read back as they were written, and all others are refused.
 #![allow(missing_docs)]
 
 use proptest::prelude::*;
 use std::fs;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
-use vtkhdf::format::{Chunked, Group, Kind, Member, ReadError, Value};
-use vtkhdf::read::File;
-use vtkhdf::write::{Deflater, Writer};
+use vtkhdf::format::ReadError;
+use vtkhdf::read::TreeReader;
+use vtkhdf::tree::{Shape, Siblings, TreeWriter, WINDOW, Window, groups};
+use vtkhdf::write::Deflater;
 
-/// A file with the bytes as a chunked array and everything else that a file can have.
-fn file_of(bytes: &[u8], chunk_len: u32) -> (Vec<u8>, Group) {
-    let mut writer = Writer::new(Cursor::new(Vec::new())).unwrap();
-    let mut array = Chunked::new(Kind::Byte, bytes.len() as u64, chunk_len);
+/// A file in which the siblings of group g have the numbers `of(g)`, and its shape.
+fn file_of(
+    nodes: Vec<u64>,
+    with_ranks: bool,
+    of: impl Fn(u64) -> (Siblings, [i32; 8]),
+) -> (Vec<u8>, Shape) {
+    let shape = Shape { origin: [0.1, -2.0, 1e6], edge: 0.3, nodes };
+    let mut out = TreeWriter::new(Cursor::new(Vec::new()), shape.clone(), with_ranks).unwrap();
     let mut deflater = Deflater::default();
-    for (i, part) in bytes.chunks(array.chunk_len as usize).enumerate() {
-        let mut part = part.to_vec();
-        part.resize(array.chunk_bytes(), 0);
-        array.chunks[i] = deflater.compress(&part).map(|chunk| writer.append(&chunk).unwrap());
+    for index in 0..shape.windows() {
+        let mut window = Window::new(index, with_ranks);
+        for group in groups(index).take_while(|group| 8 * group + 1 < shape.nodes_total()) {
+            let (siblings, ranks) = of(group);
+            window.put(group, siblings, ranks);
+        }
+        let chunks = window.compress(&shape, &mut deflater);
+        out.add(index, chunks.iter().map(Option::as_deref)).unwrap();
     }
-    let inner = Group {
-        attributes: vec![
-            ("text".to_owned(), Value::Text("a text".to_owned())),
-            ("number".to_owned(), Value::Number(-7)),
-            ("ints".to_owned(), Value::Ints32(vec![1, -2])),
-        ],
-        members: vec![("array".to_owned(), Member::Chunked(array))],
-    };
-    let small = |value| Member::Small(value);
-    let root = Group {
-        attributes: Vec::new(),
-        members: vec![
-            ("inner".to_owned(), Member::Group(inner)),
-            ("ints".to_owned(), small(Value::Ints(vec![i64::MIN, 5]))),
-            ("doubles".to_owned(), small(Value::Doubles(vec![0.1, -1e300]))),
-        ],
-    };
-    (writer.finish(&root).unwrap().into_inner(), root)
+    (out.finish().unwrap().into_inner(), shape)
 }
 
-/// The groups and the bytes of the array.
-fn read(path: &Path) -> Result<(Group, Vec<u8>), ReadError> {
-    let file = File::open(path)?;
-    let root = file.root()?;
-    let mut bytes = Vec::new();
-    if let Some(Member::Group(inner)) = root.member("inner")
-        && let Some(Member::Chunked(array)) = inner.member("array")
-    {
-        let mut chunk = Vec::new();
-        for index in 0..array.chunks.len() {
-            file.read_chunk(array, index, &mut chunk)?;
+/// A small file with all arrays.
+fn small() -> Vec<u8> {
+    let siblings = Siblings { split: 1, deleted: 6, crossing: 0x30, inside: 8 };
+    file_of(vec![1, 8, 8], true, |_| (siblings, [7; 8])).0
+}
+
+/// The shape, and the bytes of all arrays.
+fn read(path: &Path) -> Result<(Shape, Vec<Vec<u8>>), ReadError> {
+    let file = TreeReader::open(path)?;
+    let mut all = Vec::new();
+    for array in [Some(&file.split), file.masked.as_ref(), Some(&file.sides), file.ranks.as_ref()] {
+        let (mut bytes, mut chunk) = (Vec::new(), Vec::new());
+        for index in 0..array.map_or(0, |array| array.chunks.len()) {
+            file.read_chunk(array.unwrap(), index, &mut chunk)?;
             bytes.extend_from_slice(&chunk);
         }
-        bytes.truncate(array.len as usize);
+        all.push(bytes);
     }
-    Ok((root, bytes))
+    Ok((file.shape.clone(), all))
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
     #[test]
-    fn groups_and_arrays_are_read_back(
-        bytes in prop::collection::vec(prop_oneof![5 => Just(0u8), 1 => any::<u8>()], 1..2000),
-        chunk_len in 1u32..300,
-    ) {
-        let (content, root) = file_of(&bytes, chunk_len);
+    fn trees_of_several_windows_are_read_back(seed in any::<u64>(), with_ranks in any::<bool>(), is_masked in any::<bool>()) {
+        let nodes: Vec<u64> = (0..8).map(|level| if level < 7 { 1 << (3 * level) } else { 1 << 20 }).collect();
+        let of = |group: u64| {
+            let mixed = (group ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
+            let deleted = if is_masked { mixed as u8 } else { 0 };
+            let siblings = Siblings { split: (mixed >> 8) as u8, deleted, crossing: 1, inside: 4 };
+            (siblings, [group as i32; 8])
+        };
+        let (content, shape) = file_of(nodes, with_ranks, of);
         let place = tempfile::NamedTempFile::new().unwrap();
         fs::write(place.path(), content).unwrap();
-        prop_assert_eq!(read(place.path()).unwrap(), (root, bytes));
+        let (found, [split, masked, sides, ranks]) = read(place.path()).map(|(shape, all)| (shape, <[_; 4]>::try_from(all).unwrap())).unwrap();
+        prop_assert!(shape.windows() > 4 && found == shape);
+        prop_assert_eq!((masked.is_empty(), ranks.is_empty()), (!is_masked, !with_ranks));
+        for group in [0, 1, 77, WINDOW / 8 - 1, WINDOW / 8, (shape.nodes_total() - 9) / 8] {
+            let (siblings, _) = of(group);
+            for i in 0..8 {
+                let node = (1 + 8 * group + i) as usize;
+                let bit = |bits: &[u8]| bits.get(node / 8).map_or(0, |byte| byte >> (7 - node % 8) & 1);
+                if (node as u64) < shape.nodes_described() {
+                    prop_assert_eq!(bit(&split), siblings.split >> i & 1);
+                }
+                prop_assert_eq!(bit(&masked), siblings.deleted >> i & 1);
+                prop_assert_eq!(sides[node], [2, 0, 1, 0, 0, 0, 0, 0][i as usize]);
+                if with_ranks {
+                    prop_assert_eq!(&ranks[4 * node..][..4], &(group as i32).to_le_bytes());
+                }
+            }
+        }
     }
 }
 
-fn put(file: &mut tempfile::NamedTempFile, at: usize, byte: u8) {
-    file.seek(SeekFrom::Start(at as u64)).unwrap();
-    file.write_all(&[byte]).unwrap();
-}
-
-/// Every bit is covered by a checksum, except the padding within compressed chunks.
+/// Every bit of the metadata is compared, and chunks have checksums, except for their padding.
 #[test]
 fn a_flipped_bit_is_an_error_or_changes_nothing() {
-    let bytes: Vec<u8> = (0..400u32).map(|i| (i * i / 7 % 5) as u8).collect();
-    let (content, root) = file_of(&bytes, 150);
+    let content = small();
     let mut place = tempfile::NamedTempFile::new().unwrap();
     place.write_all(&content).unwrap();
+    let original = read(place.path()).unwrap();
+    let mut put = |at: usize, byte: u8| {
+        place.seek(SeekFrom::Start(at as u64)).unwrap();
+        place.write_all(&[byte]).unwrap();
+        read(place.path())
+    };
     let mut harmless = 0;
     for at in 0..content.len() {
         for bit in 0..8 {
-            put(&mut place, at, content[at] ^ 1 << bit);
-            if let Ok(found) = read(place.path()) {
-                assert_eq!(found, (root.clone(), bytes.clone()), "bit {bit} of byte {at}");
+            if let Ok(found) = put(at, content[at] ^ 1 << bit) {
+                assert_eq!(found, original, "bit {bit} of byte {at}");
                 harmless += 1;
             }
-            put(&mut place, at, content[at]);
         }
+        put(at, content[at]).unwrap();
     }
-    assert!(harmless < 3 * 8, "{harmless} flipped bits were not found");
+    assert!(harmless < 4 * 8, "{harmless} flipped bits were not found");
 }
 
 #[test]
 fn a_file_of_any_other_length_is_an_error() {
-    let (content, _) = file_of(&[1, 2, 3, 4, 5, 6, 7], 3);
+    let content = small();
     let place = tempfile::NamedTempFile::new().unwrap();
     for length in 0..content.len() {
         fs::write(place.path(), &content[..length]).unwrap();
@@ -109,8 +126,25 @@ fn a_file_of_any_other_length_is_an_error() {
 }
 
 #[test]
+fn nodes_that_are_not_those_of_an_oct_tree_are_another_layout() {
+    let place = tempfile::NamedTempFile::new().unwrap();
+    for nodes in [
+        vec![2],
+        vec![1, 7],
+        vec![1, 16],
+        vec![1, 8, 0],
+        vec![1, 8, 72],
+        [vec![1], vec![8; 20]].concat(),
+    ] {
+        fs::write(place.path(), file_of(nodes.clone(), false, |_| Default::default()).0).unwrap();
+        let error = read(place.path()).unwrap_err();
+        assert!(matches!(error, ReadError::Unknown(_)), "{nodes:?}: {error}");
+    }
+}
+
+#[test]
 fn other_versions_are_named_and_not_called_damaged() {
-    let (mut content, _) = file_of(&[1], 1);
+    let mut content = small();
     let place = tempfile::NamedTempFile::new().unwrap();
     content[8] = 0;
     fs::write(place.path(), &content).unwrap();

@@ -4,15 +4,12 @@ use super::values::read_case;
 use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
-use export::options::{Foam, Label, Processors, Regions, Style};
+use export::options::{Foam, Label, Processors, Regions};
 
 /// Options of meshes for OpenFOAM.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "OpenFOAM (CASE/constant/polyMesh)")]
 pub struct FoamArguments {
-    /// Write text; default: binary
-    #[arg(long)]
-    ascii: bool,
     /// Bits of a label [default: 32]
     #[arg(long, value_name = "BITS")]
     label: Option<Label>,
@@ -33,9 +30,8 @@ impl FoamArguments {
     /// # Errors
     /// If the case cannot be read, or if an option has no effect on the format with this ending.
     pub fn case(&self, ending: &str) -> Result<Option<Case>, Failure> {
-        let Self { ascii, label, regions, processors, case } = self;
+        let Self { label, regions, processors, case } = self;
         let given = [
-            ("--ascii", *ascii),
             ("--label", label.is_some()),
             ("--regions", regions.is_some()),
             ("--processors", processors.is_some()),
@@ -54,7 +50,7 @@ impl FoamArguments {
     /// The options, with the case that they name.
     pub fn options<'a>(&self, case: Option<&'a Case>) -> Foam<'a> {
         Foam {
-            style: Style { is_ascii: self.ascii, label: self.label.unwrap_or_default() },
+            label: self.label.unwrap_or_default(),
             regions: self.regions.unwrap_or_default(),
             processors: self.processors,
             case,

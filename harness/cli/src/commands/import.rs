@@ -26,8 +26,8 @@ Examples:
   harness import foam/constant/polyMesh --out mesh             the root is derived from the cells
 
 Every cell must be a cube of the oct-tree, within 0.01 of its edge, and no two may overlap. Exit codes: 0 success; 2 the
-file is not such a mesh, which is explained in one sentence, or cannot be written; 3 Python or VTK is missing (VTK's \
-formats only).")]
+file is not such a mesh, which is explained in one sentence, or cannot be written; 3 Python, or VTK for VTK's formats, is missing (leaf \
+words, p4est and the mesher's trees need neither).")]
 pub struct Arguments {
     /// The mesh: a file, or an OpenFOAM case or polyMesh
     mesh: Input,
@@ -57,7 +57,7 @@ pub struct Source {
     /// What x, y and z are in a table
     #[arg(long, value_enum, default_value_t)]
     position: Position,
-    /// Time limit of VTK's reader
+    /// Time limit of a reader in Python
     #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = super::values::whole_seconds)]
     timeout: u64,
 }

@@ -2,7 +2,7 @@
 
 use super::Result;
 use vtkhdf::format::Chunked;
-use vtkhdf::read::File;
+use vtkhdf::read::TreeReader;
 
 /// Bytes between two counts: a divisor of the length of chunks.
 pub(super) const STEP: u64 = 512;
@@ -17,7 +17,7 @@ pub(super) fn ones(bytes: &[u8]) -> u64 {
 
 /// The bytes of an array. Fast if most positions are near the last one.
 pub(super) struct Bytes<'a> {
-    file: &'a File,
+    file: &'a TreeReader,
     array: &'a Chunked,
     /// The chunk in memory, and the position of its first byte.
     chunk: Vec<u8>,
@@ -25,7 +25,7 @@ pub(super) struct Bytes<'a> {
 }
 
 impl<'a> Bytes<'a> {
-    pub(super) fn new(file: &'a File, array: &'a Chunked) -> Self {
+    pub(super) fn new(file: &'a TreeReader, array: &'a Chunked) -> Self {
         Self { file, array, chunk: Vec::new(), start: 0 }
     }
 

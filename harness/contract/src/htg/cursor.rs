@@ -3,7 +3,6 @@
 //! The children of a node begin at eight times the number of split nodes before it on its level, which the [`Index`] gives.
 
 use super::index::Index;
-use super::level::LevelReader;
 use super::{Result, TreeFile, Walk, nodes};
 use crate::octant::LEVEL_MAX;
 use crate::word::{self, KEY_END};
@@ -11,9 +10,7 @@ use crate::word::{self, KEY_END};
 /// Reads the leaves of octants. Each one has buffers of its own, so every thread should have its own cursor.
 pub struct Cursor<'a> {
     index: &'a Index,
-    levels: Vec<LevelReader<'a>>,
-    words: Vec<u64>,
-    ranks: Vec<u32>,
+    walk: Walk<'a>,
 }
 
 /// A descent from the root.
@@ -29,9 +26,15 @@ struct Descent {
 impl<'a> Cursor<'a> {
     /// A cursor for a tree and its index.
     pub fn new(tree: &'a TreeFile, index: &'a Index) -> Self {
-        let ranks = tree.ranks.as_ref();
-        let levels = (0..tree.nodes.len()).map(|level| tree.level(level, ranks)).collect();
-        Self { index, levels, words: Vec::new(), ranks: Vec::new() }
+        let ranks = tree.file.ranks.as_ref();
+        let levels =
+            (0..tree.file.shape.nodes.len()).map(|level| tree.level(level, ranks)).collect();
+        Self { index, walk: Walk::new(levels) }
+    }
+
+    /// Number of leaves of the tree.
+    pub fn leaves(&self) -> u64 {
+        self.index.leaves
     }
 
     /// Number of leaves whose Morton codes are less than `key`.
@@ -64,30 +67,26 @@ impl<'a> Cursor<'a> {
     ) -> Result<()> {
         let Descent { next, leaf, .. } = self.descend(key)?;
         let from = leaf.min(usize::from(level));
-        for (reader, next) in self.levels.iter_mut().zip(next).skip(from) {
+        for (reader, next) in self.walk.levels.iter_mut().zip(next).skip(from) {
             reader.seek(next);
         }
         if !key.is_multiple_of(word::span(from as u8)) {
             return Ok(());
         }
-        let (levels, words) = (std::mem::take(&mut self.levels), std::mem::take(&mut self.words));
         let mut run = |words: &[u64], ranks: &[u32]| {
             into.extend_from_slice(words);
             ranks_into.extend_from_slice(ranks);
             true
         };
-        let ranks = std::mem::take(&mut self.ranks);
-        let mut walk = Walk { levels, words, ranks, run: &mut run };
-        let result = walk.siblings(from, key, 1);
-        walk.flush();
-        (self.levels, self.words, self.ranks) = (walk.levels, walk.words, walk.ranks);
+        let result = self.walk.siblings(from, key, 1, &mut run);
+        self.walk.flush(&mut run);
         result.map(drop)
     }
 
     fn descend(&mut self, key: u64) -> Result<Descent> {
-        let mut descent = Descent { next: Vec::new(), before: 0, leaf: self.levels.len() };
+        let mut descent = Descent { next: Vec::new(), before: 0, leaf: self.walk.levels.len() };
         let mut number = 0;
-        for (level, reader) in self.levels.iter_mut().enumerate() {
+        for (level, reader) in self.walk.levels.iter_mut().enumerate() {
             let is_on_path = level <= descent.leaf;
             let mut node = reader.begin() + number;
             if is_on_path && !reader.is_split(node)? {

@@ -4,9 +4,9 @@
 //! bytes.
 
 use super::bytes::{Bytes, STEP, ones};
-use super::{Result, layout, nodes};
+use super::{Result, TreeError};
 use vtkhdf::format::Chunked;
-use vtkhdf::read::File;
+use vtkhdf::read::TreeReader;
 
 /// Numbers of bits that are set.
 #[derive(Debug)]
@@ -18,34 +18,29 @@ pub struct Index {
 }
 
 impl Index {
-    /// The index of `total` nodes, of which the first `described` may be split. Bits beyond them have no meaning.
-    pub(super) fn new(
-        file: &File,
-        [described, total]: [u64; 2],
-        split: &Chunked,
-        masked: Option<&Chunked>,
-    ) -> Result<Self> {
-        let all = |array: &Chunked, counts: &[u64], bits: u64| {
-            Bytes::new(file, array).ones_before(bits, counts)
+    /// The index of the nodes of a file. Bits beyond them have no meaning.
+    pub(super) fn new(file: &TreeReader) -> Result<Self> {
+        let nodes = &file.shape.nodes;
+        let total = file.shape.nodes_total();
+        let described = total - nodes[nodes.len() - 1];
+        let counted = |array: Option<&Chunked>, bits: u64| {
+            let Some(array) = array else { return Ok((Vec::new(), 0)) };
+            let counts = counts(file, array)?;
+            let all = Bytes::new(file, array).ones_before(bits, &counts)?;
+            Ok::<_, TreeError>((counts, all))
         };
-        let split_counts = counts(file, Some(split))?;
-        let masked_counts = counts(file, masked)?;
-        let split = all(split, &split_counts, described)?;
-        let masked = masked.map_or(Ok(0), |array| all(array, &masked_counts, total))?;
-        let Some(leaves) = total.checked_sub(split + masked) else {
-            return nodes("more nodes are split or masked than there are");
-        };
-        Ok(Self { split: split_counts, masked: masked_counts, leaves })
+        let (split, all_split) = counted(Some(&file.split), described)?;
+        let (masked, all_masked) = counted(file.masked.as_ref(), total)?;
+        match total.checked_sub(all_split + all_masked) {
+            Some(leaves) => Ok(Self { split, masked, leaves }),
+            None => super::nodes("more nodes are split or masked than there are"),
+        }
     }
 }
 
 /// Numbers of set bits before each step, and at the end.
-fn counts(file: &File, array: Option<&Chunked>) -> Result<Vec<u64>> {
-    let Some(array) = array else { return Ok(Vec::new()) };
+fn counts(file: &TreeReader, array: &Chunked) -> Result<Vec<u64>> {
     let (mut counts, mut sum, mut chunk) = (vec![0], 0, Vec::new());
-    if array.chunks.len() > 1 && !u64::from(array.chunk_len).is_multiple_of(STEP) {
-        return layout(format!("its chunks have {} bytes", array.chunk_len));
-    }
     for index in 0..array.chunks.len() {
         file.read_chunk(array, index, &mut chunk)?;
         for step in chunk.chunks(STEP as usize) {

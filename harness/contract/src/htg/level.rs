@@ -5,7 +5,7 @@ use super::index::Index;
 use super::{Result, nodes};
 use std::ops::Range;
 use vtkhdf::format::Chunked;
-use vtkhdf::read::File;
+use vtkhdf::read::TreeReader;
 
 /// Up to eight siblings, a bit for each from the lowest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl<'a> LevelReader<'a> {
     /// A reader of these nodes. The arrays are the split nodes, the masked ones, sides and ranks; without one of the first three,
     /// its bits and bytes are zero.
     pub(super) fn new(
-        file: &'a File,
+        file: &'a TreeReader,
         Range { start: begin, end }: Range<u64>,
         arrays: [Option<&'a Chunked>; 4],
     ) -> Self {

@@ -6,12 +6,12 @@ use crate::case::Case;
 use crate::digest::Digest;
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
+use crate::leafset;
 use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
 use crate::npy;
 use crate::word;
-use ::files::Claim;
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
@@ -40,11 +40,11 @@ impl ImportedTree {
         program: String,
     ) -> Result<Option<Self>, ImportError> {
         let content = |error: TreeError| ImportError::content(error.to_string());
-        let tree = match sides {
-            Some(_) => TreeFile::open(path, sides),
-            None => TreeFile::open(path, Some(SIDE)).or_else(|_| TreeFile::open(path, None)),
-        };
-        let tree = match tree {
+        // Another array is VTK's to find.
+        if sides.is_some_and(|sides| sides != SIDE) {
+            return Ok(None);
+        }
+        let tree = match TreeFile::open(path, true) {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
             Err(error) if !error.is_of_another_layout() => return Err(content(error)),
             _ => return Ok(None),
@@ -64,7 +64,7 @@ impl ImportedTree {
         };
         manifest.set_tally(tally);
         manifest.root = tree.root;
-        manifest.sides = if tree.has_sides() { Sides::Known } else { Sides::Unknown };
+        manifest.sides = Sides::Known;
         let imported = Self { tree, manifest };
         imported.check_invariants();
         Ok(Some(imported))
@@ -90,11 +90,9 @@ impl ImportedTree {
     /// # Errors
     /// If the directory is not empty or a file cannot be written; the message names it.
     pub fn create(&self, dir: &Path) -> io::Result<()> {
-        let named =
-            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", dir.display()));
         let Manifest { leaves, digest, .. } = self.manifest;
-        let name = manifest::part_name(0);
-        let fill = |out: &mut dyn Write| -> io::Result<()> {
+        let parts = vec![Part { file: manifest::part_name(0), leaves, digest }];
+        leafset::create(dir, &Manifest { parts, ..self.manifest.clone() }, |_, out| {
             out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
             let (mut found, mut written) = (Digest::default(), Ok(()));
             let read = self.tree.words(&mut |run| {
@@ -109,21 +107,7 @@ impl ImportedTree {
                 Ok(()) => Err(io::Error::other("the file changed while it was read")),
                 Err(error) => Err(io::Error::other(error)),
             }
-        };
-        let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
-        let write = || {
-            let names = [name.clone()];
-            let claim = Claim::create(dir, manifest::FILE, names).map_err(io::Error::from)?;
-            let mut out = BufWriter::new(claim.draft(&name)?);
-            fill(&mut out)?;
-            out.into_inner()?.publish()?;
-            let parts = vec![Part { file: name.clone(), leaves, digest }];
-            let text = Manifest { parts, ..self.manifest.clone() }.text();
-            claim.commit(|out| out.write_all(text.as_bytes()))?;
-            claim.keep();
-            Ok(())
-        };
-        parents.and_then(|()| write()).map_err(named)
+        })
     }
 
     /// Makes an empty directory a leaf set that has the tree alone, by a link to its file.

@@ -1,7 +1,7 @@
 //! Meshes in the formats of other programs, as leaf sets.
 //!
-//! - one module per format, which returns the cells of a file as cubes: [`words`](mod@words), [`npy`], [`text`], [`p4est`],
-//!   [`discretize`], [`foam`]. VTK's formats are read by VTK itself, which the crate `run` starts;
+//! - [`words`](mod@words), [`p4est`]: the formats that are read here, as cubes. VTK, tables, discretize and OpenFOAM are read in Python,
+//!   which the crate `run` starts;
 //! - [`htg`]: the trees that this repository writes in VTKHDF, of any size;
 //! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
 //! - [`leaf_set()`]: the mesh with its manifest.
@@ -9,26 +9,22 @@
 //! No reader allocates memory for a count before the file has been seen to be long enough for it.
 
 pub mod cells;
-pub mod discretize;
-pub mod foam;
 pub mod htg;
 mod leaf_set;
-pub mod npy;
 pub mod p4est;
 pub mod root;
-mod table;
 #[cfg(test)]
 mod testing;
-pub mod text;
 pub mod words;
 
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
 use cells::Cells;
+use serde::Serialize;
 use std::fs;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use leaf_set::leaf_set;
 
@@ -37,7 +33,8 @@ pub use leaf_set::leaf_set;
 pub const TOLERANCE: f64 = 0.01;
 
 /// A format of mesh files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// Leaf words in one .npy file, or in the parts of a directory without a manifest
     LeafWords,
@@ -56,7 +53,8 @@ pub enum Format {
 }
 
 /// The place of a cell that x, y and z give in a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Position {
     /// The minimum corner, in the units of the geometry
     #[default]
@@ -68,7 +66,7 @@ pub enum Position {
 }
 
 /// What a reader needs besides the file.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Request {
     /// Name of the cell array that holds the sides.
     pub sides: Option<String>,
@@ -123,7 +121,7 @@ pub fn guess(path: &Path) -> Result<Format, ImportError> {
         )));
     }
     let format = match is_directory {
-        true => foam::poly_mesh(path).map(|_| Format::Openfoam),
+        true => poly_mesh(path).map(|_| Format::Openfoam),
         false => of_content(&head(path)?),
     };
     format.ok_or_else(|| {
@@ -161,12 +159,32 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if text.trim_start().starts_with('{') {
         return Some(Format::Discretize);
     }
-    let first = text.lines().find(|line| !text::is_comment(line) && !line.starts_with('!'))?;
-    match text::fields(first).count() {
+    let first = text.lines().find(|line| !is_comment(line) && !line.starts_with('!'))?;
+    match fields(first).count() {
         3 => Some(Format::Discretize),
         n if n > 3 => Some(Format::Csv),
         _ => None,
     }
+}
+
+/// The fields of a line of a table.
+fn fields(line: &str) -> impl Iterator<Item = &str> {
+    let separator = |c: char| c == ',' || c == ';' || c.is_whitespace();
+    line.split(separator).filter(|field| !field.trim_matches('"').is_empty())
+}
+
+/// Whether a line of a table holds no cell.
+fn is_comment(line: &str) -> bool {
+    let line = line.trim();
+    line.is_empty() || line.starts_with('#')
+}
+
+/// The directory with an OpenFOAM mesh: the given one, or the one below it in a case or in `constant`.
+pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
+    let below = ["", "polyMesh", "constant/polyMesh"].map(|place| path.join(place));
+    let has_points =
+        |place: &PathBuf| ["points", "points.gz"].iter().any(|name| place.join(name).is_file());
+    below.into_iter().find(has_points)
 }
 
 /// Number of bytes of an incomplete UTF-8 character at the end.
@@ -177,40 +195,29 @@ fn incomplete(head: &[u8]) -> usize {
     }
 }
 
-/// Reads the cells of a file in any format but VTK's.
+/// Reads the cells of a file in a format that is read here.
 ///
 /// # Errors
 /// If the file cannot be read, or is not of this format.
 pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, ImportError> {
     match format {
         Format::LeafWords => words::read(path, request),
-        Format::Npy => npy::read(path, request),
-        Format::Csv => text::read(path, request),
         Format::P4est => p4est::read(path, request),
-        Format::Discretize => discretize::read(path, request),
-        Format::Openfoam => foam::read(path, request),
-        Format::Vtk => Err(ImportError::content("VTK's formats are read by VTK itself")),
+        _ => Err(ImportError::content("is read in Python")),
     }
 }
 
 /// The side with this code in a cell array.
-fn side(code: f64, cell: usize) -> Result<Side, ImportError> {
+///
+/// # Errors
+/// If there is none.
+pub fn side(code: f64, cell: usize) -> Result<Side, ImportError> {
     let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
     known.ok_or_else(|| {
         ImportError::content(format!(
             "cell {cell} has the side {code}, and the sides are 0 (outside), 1 (inside) and 2 (crossing)"
         ))
     })
-}
-
-/// The error for a format without named cell arrays, if sides are requested.
-fn refuse_sides(request: &Request, format: &str) -> Result<(), ImportError> {
-    match &request.sides {
-        None => Ok(()),
-        Some(_) => {
-            Err(ImportError::content(format!("{format} has no named cell arrays: omit --sides")))
-        }
-    }
 }
 
 #[cfg(test)]

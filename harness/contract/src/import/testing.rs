@@ -1,9 +1,8 @@
-//! Foreign files for tests.
+//! Cells for tests.
 
 use super::cells::Cells;
 use crate::lattice::Root;
 use crate::word;
-use std::io::Write;
 
 /// The cells of leaf words.
 pub(crate) fn cells_of(words: &[u64], root: &Root) -> Cells {
@@ -13,11 +12,4 @@ pub(crate) fn cells_of(words: &[u64], root: &Root) -> Cells {
     }
     cells.sides = Some(words.iter().map(|&w| word::side(w)).collect());
     cells
-}
-
-/// A temporary file with this content.
-pub(crate) fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
-    let mut file = tempfile::NamedTempFile::new().unwrap();
-    file.write_all(bytes).unwrap();
-    file
 }

@@ -8,7 +8,7 @@ mod part;
 
 use std::path::{Path, PathBuf};
 
-pub use part::{Part, Readers};
+pub use part::{Interval, Part, Readers};
 
 pub use crate::directory::NODES_MAX;
 use crate::directory::{self, ReadError};
@@ -93,7 +93,7 @@ impl Mesh {
             }
             fault.is_none()
         })?;
-        fault.map_or(Ok(()), |why| Err(ReadError::NotLinear { path: self.dir.clone(), why }))
+        fault.map_or(Ok(()), |why| Err(self.not_linear(why)))
     }
 
     /// All leaves as a tree.
@@ -119,29 +119,28 @@ impl Mesh {
     /// As [`Mesh::visit`], as far as the words of the octant show it.
     pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, ReadError> {
         let (start, mut readers) = (word::key_of(octant.corner), Readers::new(&self.parts));
-        let mut all = Vec::new();
-        for (part, file) in self.parts.iter().enumerate() {
-            let first = readers.lower_bound(part, 0..file.leaves(), start)?;
-            let end = start + word::span(octant.level);
-            let end = readers.lower_bound(part, first..file.leaves(), end)?;
-            all.extend(readers.words(part, octant, first..end)?.0);
+        let intervals = readers.intervals(start..start + word::span(octant.level))?;
+        let (leaves, mut order) = (readers.leaves(octant, &intervals)?, Order::default());
+        let words: Vec<u64> = leaves.into_iter().map(|(word, _)| word).collect();
+        match words.iter().find_map(|&word| order.fault(word)) {
+            None => Ok(words),
+            Some(why) => Err(self.not_linear(why)),
         }
-        all.sort_unstable();
-        let mut order = Order::default();
-        match all.iter().find_map(|&word| order.fault(word)) {
-            None => Ok(all),
-            Some(why) => Err(ReadError::NotLinear { path: self.dir.clone(), why }),
-        }
+    }
+
+    /// The error of words that are not a linear oct-tree.
+    pub fn not_linear(&self, why: String) -> ReadError {
+        ReadError::NotLinear { path: self.dir.clone(), why }
     }
 }
 
 /// The end of the leaves so far, as a Morton code.
-#[derive(Default)]
-struct Order(u64);
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Order(u64);
 
 impl Order {
     /// Why a word does not follow the words before it in a linear oct-tree.
-    fn fault(&mut self, word: u64) -> Option<String> {
+    pub fn fault(&mut self, word: u64) -> Option<String> {
         if let Some(why) = word::fault(word) {
             return Some(format!("the word {word:#018x} is not a leaf: {why}"));
         }

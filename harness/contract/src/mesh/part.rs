@@ -50,6 +50,9 @@ impl Part {
     }
 }
 
+/// Leaves of a part: its number, and an interval of indices.
+pub type Interval = (usize, Range<u64>);
+
 /// One reader for each part. Each thread has readers of its own, because those of trees have buffers.
 pub struct Readers<'a>(Vec<Reader<'a>>);
 
@@ -66,6 +69,44 @@ impl<'a> Readers<'a> {
             Part::Tree(tree) => Reader::Tree(&tree.0, Cursor::new(&tree.0, &tree.1)),
         };
         Self(parts.iter().map(reader).collect())
+    }
+
+    /// The leaves whose Morton codes are in `keys`.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
+    pub fn intervals(&mut self, keys: Range<u64>) -> Result<Vec<Interval>, ReadError> {
+        let mut intervals = Vec::new();
+        for part in 0..self.0.len() {
+            let all = match &self.0[part] {
+                Reader::Words(file) => 0..file.len(),
+                Reader::Tree(_, cursor) => 0..cursor.leaves(),
+            };
+            let first = self.lower_bound(part, all.clone(), keys.start)?;
+            intervals.push((part, first..self.lower_bound(part, first..all.end, keys.end)?));
+        }
+        Ok(intervals)
+    }
+
+    /// The leaves in these intervals, which are those of an octant: words in ascending order, if those of each part are, with their ranks.
+    ///
+    /// # Errors
+    /// If a part cannot be read.
+    pub fn leaves(
+        &mut self,
+        octant: &Octant,
+        intervals: &[Interval],
+    ) -> Result<Vec<(u64, u32)>, ReadError> {
+        let mut leaves = Vec::new();
+        for (part, interval) in intervals {
+            let (words, ranks) = self.words(*part, octant, interval.clone())?;
+            let rank = |i: usize| ranks.get(i).copied().unwrap_or(*part as u32);
+            leaves.extend(words.into_iter().enumerate().map(|(i, word)| (word, rank(i))));
+        }
+        if intervals.len() > 1 {
+            leaves.sort_unstable();
+        }
+        Ok(leaves)
     }
 
     /// Index of the first leaf in a range of a part whose Morton code is at least `key`.
@@ -91,7 +132,7 @@ impl<'a> Readers<'a> {
     }
 
     /// The words at these indices, which are leaves of the octant, and their ranks if the part is a tree with ranks.
-    pub fn words(
+    fn words(
         &mut self,
         part: usize,
         octant: &Octant,

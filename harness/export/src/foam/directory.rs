@@ -8,10 +8,9 @@ use std::path::Path;
 use contract::octant::UNITS_PER_CELL;
 use contract::word;
 
-use super::lists::{self, List, label_max};
+use super::lists::{ListFile, header, label_max};
 use super::{Mesh, narrow};
 use crate::error::ExportError;
-use crate::options::Style;
 
 /// The cells and faces of a directory.
 #[derive(Clone, Debug, Default)]
@@ -28,10 +27,10 @@ pub struct Directory {
     pub between: BTreeMap<u32, Vec<usize>>,
 }
 
-/// The directories of the cells, of each of which the processor is given; otherwise there is one.
-pub fn directories(mesh: &Mesh, processors: Option<&[u32]>) -> Vec<Directory> {
-    let of = |cell: u32| processors.map_or(0, |of_cells| of_cells[cell as usize]);
-    let count = processors.map_or(1, |of_cells| of_cells.iter().max().map_or(0, |last| last + 1));
+/// The directories of the cells, of each of which the processor is given.
+pub fn directories(mesh: &Mesh, processors: &[u32]) -> Vec<Directory> {
+    let of = |cell: u32| processors[cell as usize];
+    let count = processors.iter().max().map_or(0, |last| last + 1);
     let faces = &mesh.faces;
     let empty = |processor| Directory {
         processor,
@@ -58,6 +57,9 @@ pub fn directories(mesh: &Mesh, processors: Option<&[u32]>) -> Vec<Directory> {
     all
 }
 
+/// In place of a number: the directory does not have the point.
+const NONE: u32 = u32::MAX;
+
 impl Directory {
     /// The faces in the order of the files.
     fn faces(&self) -> impl Iterator<Item = usize> + Clone {
@@ -65,102 +67,109 @@ impl Directory {
         self.internal.iter().chain(boundary).copied()
     }
 
-    /// Writes the files into a directory. With several processors, `numbers` has the number of each cell on its own.
+    /// Writes the files into a directory. `numbers` has the number of each cell on its own processor; `is_part` if there are several.
     ///
     /// # Errors
     /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
     pub fn write(
         &self,
         mesh: &Mesh,
-        numbers: Option<&[u32]>,
+        numbers: &[u32],
+        is_part: bool,
         dir: &Path,
     ) -> Result<(), ExportError> {
-        let all = &mesh.faces;
-        let style = mesh.options.foam.style;
-        let number = |cell: u32| numbers.map_or(cell, |numbers| numbers[cell as usize]);
-        let is_here = |cell: u32| self.cells.get(number(cell) as usize) == Some(&cell);
+        let (all, options) = (&mesh.faces, mesh.options);
+        let number = |cell: u32| numbers[cell as usize];
         // A face that belongs to a cell of another processor is turned.
-        let turned = |face: usize| !is_here(all.owner[face]);
-        let points = Own::new(mesh, numbers.is_some().then(|| self.faces()));
-        let (faces, vertices) = self.faces().fold((0u64, 0u64), |(faces, vertices), face| {
-            (faces + 1, vertices + all.vertices(face).len() as u64)
-        });
-        if vertices.max(points.count()) > label_max(style.label) {
+        let turned = |face: usize| {
+            self.cells.get(number(all.owner[face]) as usize) != Some(&all.owner[face])
+        };
+        let (points, point_numbers) = self.points(mesh);
+        let faces = self.faces().count() as u64;
+        let vertices: u64 = self.faces().map(|face| all.vertices(face).len() as u64).sum();
+        if vertices.max(points.len() as u64) > label_max(options.foam.label) {
             return Err(narrow());
         }
+        let (cells, internal) = (self.cells.len(), self.internal.len());
         let note = format!(
-            "nPoints:{} nCells:{} nFaces:{faces} nInternalFaces:{}",
-            points.count(),
-            self.cells.len(),
-            self.internal.len()
+            "nPoints:{} nCells:{cells} nFaces:{faces} nInternalFaces:{internal}",
+            points.len(),
         );
-        let labels =
-            |object: &str, note: &str, count: usize, numbers: &mut dyn Iterator<Item = i64>| {
-                let count = count as u64;
-                let mut list = List::create(dir, style, "labelList", object, note, count)?;
-                for (i, number) in numbers.enumerate() {
-                    mesh.options.check_at(i as u64)?;
-                    list.label(number)?;
-                }
-                Ok::<_, ExportError>(list.finish(count)?)
-            };
-        let owner = |face: usize| {
-            let of = if turned(face) { all.neighbour[face] } else { all.owner[face] };
-            i64::from(number(of))
+        let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
+            let mut file = ListFile::create(dir, options, "labelList", object, note)?;
+            file.labels(labels.len() as u64, labels)?;
+            file.finish()
         };
-        labels("owner", &note, faces as usize, &mut self.faces().map(owner))?;
+        let order: Vec<usize> = self.faces().collect();
+        let owner = |&face: &usize| {
+            i64::from(number(if turned(face) { all.neighbour[face] } else { all.owner[face] }))
+        };
         let neighbour = |&face: &usize| i64::from(number(all.neighbour[face]));
-        labels("neighbour", &note, self.internal.len(), &mut self.internal.iter().map(neighbour))?;
+        labels("owner", &note, &mut order.iter().map(owner))?;
+        labels("neighbour", &note, &mut self.internal.iter().map(neighbour))?;
         let words: Vec<u64> = mesh.leaves.cells().collect();
-        let cells = || self.cells.iter().map(|&cell| cell as usize);
-        labels(
-            "cellLevel",
-            "",
-            self.cells.len(),
-            &mut cells().map(|c| i64::from(word::level(words[c]))),
-        )?;
+        let of_cells = |object: &str, value: &dyn Fn(usize) -> i64| {
+            labels(object, "", &mut self.cells.iter().map(|&cell| value(cell as usize)))
+        };
+        of_cells("cellLevel", &|cell| i64::from(word::level(words[cell])))?;
         if mesh.has_sides {
-            labels("side", "", self.cells.len(), &mut cells().map(|c| (words[c] & 3) as i64))?;
+            of_cells("side", &|cell| (words[cell] & 3) as i64)?;
         }
         if let Some(ranks) = &mesh.ranks {
-            labels("rank", "", self.cells.len(), &mut cells().map(|c| i64::from(ranks[c])))?;
+            of_cells("rank", &|cell| i64::from(ranks[cell]))?;
         }
-        let turned_face = self.faces().map(|face| (face, turned(face)));
-        write_faces(mesh, &points, turned_face.clone(), (faces, vertices), dir)?;
-        let mut list = List::create(dir, style, "vectorField", "points", "", points.count())?;
-        for (i, point) in points.iter().enumerate() {
-            mesh.options.check_at(i as u64)?;
-            list.point(
-                mesh.root.to_user(mesh.points.at(point).map(|c| i64::from(c) * UNITS_PER_CELL)),
-            )?;
-        }
-        list.finish(points.count())?;
-        if numbers.is_some() && mesh.has_addressing() {
+        let mut position = 0;
+        let ends = order.iter().map(|&face| {
+            position += all.vertices(face).len() as i64;
+            position
+        });
+        let mut file = ListFile::create(dir, options, "faceCompactList", "faces", "")?;
+        file.labels(faces + 1, std::iter::once(0).chain(ends))?;
+        let polygon = |&face: &usize| {
+            let (of_face, is_turned) = (all.vertices(face), turned(face));
+            let index = move |i: usize| if is_turned && i > 0 { of_face.len() - i } else { i };
+            let point = |i: usize| i64::from(point_numbers[of_face[i] as usize]);
+            (0..of_face.len()).map(index).map(point)
+        };
+        file.labels(vertices, order.iter().flat_map(|face| polygon(face).collect::<Vec<_>>()))?;
+        file.finish()?;
+        let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
+        let place = |&point: &u32| {
+            mesh.root.to_user(mesh.points.at(point).map(|c| i64::from(c) * UNITS_PER_CELL))
+        };
+        file.points(points.len() as u64, points.iter().map(place))?;
+        file.finish()?;
+        if is_part && mesh.has_addressing() {
             // What reconstructPar needs: the numbers in the whole mesh, those of faces counted from 1 so that each has a sign.
-            let signed = |(face, turned): (usize, bool)| {
-                if turned { -(face as i64 + 1) } else { face as i64 + 1 }
-            };
-            labels("faceProcAddressing", "", faces as usize, &mut turned_face.map(signed))?;
-            labels(
-                "pointProcAddressing",
-                "",
-                points.count() as usize,
-                &mut points.iter().map(i64::from),
-            )?;
-            labels("cellProcAddressing", "", self.cells.len(), &mut cells().map(|c| c as i64))?;
-            let (of_mesh, between) = (self.patches.len(), self.between.len());
-            let mut patches = (0..of_mesh as i64).chain(std::iter::repeat_n(-1, between));
-            labels("boundaryProcAddressing", "", of_mesh + between, &mut patches)?;
+            let signed = |&face: &usize| (face as i64 + 1) * if turned(face) { -1 } else { 1 };
+            labels("faceProcAddressing", "", &mut order.iter().map(signed))?;
+            labels("pointProcAddressing", "", &mut points.iter().map(|&point| i64::from(point)))?;
+            of_cells("cellProcAddressing", &|cell| cell as i64)?;
+            let patches = 0..self.patches.len() as i64;
+            let patches: Vec<i64> = patches.chain(self.between.keys().map(|_| -1)).collect();
+            labels("boundaryProcAddressing", "", &mut patches.into_iter())?;
         }
         self.write_boundary(mesh, dir)
     }
 
+    /// The points of the faces, and the number here of each point of the mesh.
+    fn points(&self, mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
+        let (mut points, mut numbers) = (Vec::new(), vec![NONE; mesh.points.count() as usize]);
+        for face in self.faces() {
+            mesh.faces.vertices(face).iter().for_each(|&point| numbers[point as usize] = 0);
+        }
+        for (number, point) in numbers.iter_mut().zip(0..).filter(|(number, _)| **number != NONE) {
+            *number = points.len() as u32;
+            points.push(point);
+        }
+        (points, numbers)
+    }
+
     fn write_boundary(&self, mesh: &Mesh, dir: &Path) -> Result<(), ExportError> {
-        let style = Style { is_ascii: true, ..mesh.options.foam.style };
-        let mut text = lists::header(style, "polyBoundaryMesh", "boundary", "");
+        let mut text = header("ascii", mesh.options.foam.label, "polyBoundaryMesh", "boundary", "");
         let _ = writeln!(text, "{}\n(", self.patches.len() + self.between.len());
         let mut start = self.internal.len();
-        let mut entry = |name: String, kind: &str, faces: usize, more: &str| {
+        let mut entry = |name: &str, kind: &str, faces: usize, more: &str| {
             let _ = writeln!(
                 text,
                 "    {name}\n    {{\n        type {kind};\n        nFaces {faces};\n        startFace {start};\n{more}    }}"
@@ -168,8 +177,7 @@ impl Directory {
             start += faces;
         };
         for (patch, faces) in self.patches.iter().enumerate() {
-            let (name, kind) = (mesh.patches.names[patch].clone(), mesh.patches.type_of(patch));
-            entry(name, kind, faces.len(), "");
+            entry(&mesh.patches.names[patch], mesh.patches.type_of(patch), faces.len(), "");
         }
         let here = self.processor;
         for (there, faces) in &self.between {
@@ -177,89 +185,11 @@ impl Directory {
                 "        inGroups 1(processor);\n        matchTolerance 0.0001;\n        transform unknown;\n        \
                  myProcNo {here};\n        neighbProcNo {there};\n"
             );
-            entry(format!("procBoundary{here}to{there}"), "processor", faces.len(), &more);
+            entry(&format!("procBoundary{here}to{there}"), "processor", faces.len(), &more);
         }
         text.push_str(")\n");
         let mut file = std::fs::File::create(dir.join("boundary"))?;
         file.write_all(text.as_bytes())?;
         Ok(file.sync_all()?)
-    }
-}
-
-/// Writes faces with their directions, whose number and that of their vertices are given.
-fn write_faces(
-    mesh: &Mesh,
-    points: &Own,
-    faces: impl Iterator<Item = (usize, bool)> + Clone,
-    (count, vertices): (u64, u64),
-    dir: &Path,
-) -> Result<(), ExportError> {
-    let style = mesh.options.foam.style;
-    let mut polygon = Vec::new();
-    let mut of = |face: usize, is_turned: bool| {
-        polygon.clear();
-        polygon.extend(mesh.faces.vertices(face).iter().map(|&point| points.number(point)));
-        if is_turned {
-            polygon[1..].reverse();
-        }
-        polygon.clone()
-    };
-    if style.is_ascii {
-        let mut list = List::create(dir, style, "faceList", "faces", "", count)?;
-        for (face, is_turned) in faces {
-            mesh.options.check_at(face as u64)?;
-            list.face(&of(face, is_turned))?;
-        }
-        return Ok(list.finish(count)?);
-    }
-    let mut list = List::create(dir, style, "faceCompactList", "faces", "", count + 1)?;
-    let mut position = 0;
-    list.label(position)?;
-    for (face, _) in faces.clone() {
-        position += mesh.faces.vertices(face).len() as i64;
-        list.label(position)?;
-    }
-    list.next(vertices)?;
-    for (face, is_turned) in faces {
-        mesh.options.check_at(face as u64)?;
-        of(face, is_turned).iter().try_for_each(|&v| list.label(i64::from(v)))?;
-    }
-    Ok(list.finish(vertices)?)
-}
-
-/// The points of a directory: all, or those of its faces, with their numbers there.
-struct Own {
-    all: u32,
-    numbers: Option<Vec<u32>>,
-}
-
-/// In place of a number: the directory does not have the point.
-const NONE: u32 = u32::MAX;
-
-impl Own {
-    fn new(mesh: &Mesh, faces: Option<impl Iterator<Item = usize>>) -> Self {
-        let all = mesh.points.count();
-        let numbers = faces.map(|faces| {
-            let mut numbers = vec![NONE; all as usize];
-            faces.for_each(|face| {
-                mesh.faces.vertices(face).iter().for_each(|&v| numbers[v as usize] = 0)
-            });
-            let own = numbers.iter_mut().filter(|number| **number != NONE);
-            own.zip(0..).for_each(|(number, next)| *number = next);
-            numbers
-        });
-        Self { all, numbers }
-    }
-
-    fn number(&self, point: u32) -> u32 {
-        self.numbers.as_ref().map_or(point, |numbers| numbers[point as usize])
-    }
-
-    fn iter(&self) -> impl Iterator<Item = u32> {
-        (0..self.all).filter(|&point| self.number(point) != NONE)
-    }
-
-    fn count(&self) -> u64 {
-        self.iter().count() as u64
     }
 }

@@ -168,14 +168,14 @@ fn volume_below(polygon: impl Iterator<Item = Point>) -> i128 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{ASCII, mesh_of, options};
+    use super::super::tests::{mesh_of, options};
     use super::*;
     use contract::testing::words_of;
 
     /// Asserts that a change of the faces of a small mesh is noticed, and for the stated reason.
     fn assert_noticed(why: &str, change: impl Fn(&mut Faces)) {
         let words = words_of(|o| o.level == 0 || o.level == 1 && o.corner == [0; 3]);
-        let options = options(ASCII);
+        let options = options();
         let mesh = mesh_of(&words, |_| false, &options);
         mesh.faces.check_invariants(&mesh.leaves, &mesh.points);
         let mut faces = mesh.faces.clone();

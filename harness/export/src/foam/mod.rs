@@ -4,7 +4,7 @@
 //! and every cell is closed. `checkMesh -allTopology` verifies that. Cells are numbered in Morton order, which yields
 //! OpenFOAM's upper-triangular order of faces: a cell on the high side of another has the higher number.
 //!
-//! All is held in arrays, with 190 bytes per cell at most: less than a third of what OpenFOAM needs to read the mesh.
+//! All is held in arrays, with 200 bytes per cell at most: less than a third of what OpenFOAM needs to read the mesh.
 //!
 //! - [`leaves`]: the cells, and a walk over them; [`squares`]: their faces; [`points`]: the points; [`faces`](mod@faces): all faces, and the invariants;
 //! - [`regions`], [`patches`]; [`directory`]: the part of each processor; [`lists`]: OpenFOAM's syntax; [`notes`]: what the user should know.
@@ -79,17 +79,19 @@ pub fn write(
     let processors = distribute(&of_mesh, options.foam.processors, || {
         has_ranks.then_some(()).ok_or_else(|| mesh.ranks_unknown())
     })?;
-    let parts = directories(&of_mesh, processors.as_deref());
+    let is_distributed = processors.is_some();
+    let processors = processors.unwrap_or_else(|| vec![0; of_mesh.leaves.count() as usize]);
+    let parts = directories(&of_mesh, &processors);
     check_parts(&of_mesh, &parts);
-    let numbers = processors.map(|of_cells| numbers(&of_cells));
-    let targets = targets(path, numbers.is_some().then_some(parts.len()))?;
+    let numbers = numbers(&processors);
+    let targets = targets(path, is_distributed.then_some(parts.len()))?;
 
     let named = |error| ExportError::write(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let make = |part: usize| {
         let dir = staging.path().join(part.to_string());
         fs::create_dir(&dir).map_err(named)?;
-        parts[part].write(&of_mesh, numbers.as_deref(), &dir).map_err(|error| match error {
+        parts[part].write(&of_mesh, &numbers, is_distributed, &dir).map_err(|error| match error {
             ExportError::Write(error) => named(error),
             error => error,
         })
@@ -202,7 +204,7 @@ impl<'a> Mesh<'a> {
     /// Whether labels can hold the numbers of the whole mesh, so that each processor can state which part of it it has.
     fn has_addressing(&self) -> bool {
         let most = self.faces.count().max(self.points.count() as usize);
-        (most as u64) < lists::label_max(self.options.foam.style.label)
+        (most as u64) < lists::label_max(self.options.foam.label)
     }
 }
 

@@ -71,7 +71,11 @@ fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
     let mut overlapping = leaves.clone();
     overlapping.insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
     let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
-    for (leaves, expected) in [(swapped, "leaf 3"), (overlapping, "leaf 1"), (invalid, "leaf 0")] {
+    for (leaves, expected) in [
+        (swapped, "precedes the leaf before"),
+        (overlapping, "overlaps or precedes"),
+        (invalid, "is not a leaf"),
+    ] {
         let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
         let error = words(&mesh, Mesh::ALL, &Selection::default()).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");

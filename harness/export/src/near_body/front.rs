@@ -5,22 +5,20 @@
 //! a face is exposed. A face that is exposed in part is divided into quarters, and these again, until each is exposed or
 //! not; so no two squares of the front overlap, and a whole face is one square whatever the crossing leaves are like.
 //!
-//! The octree is traversed once, over octants for the faces within them and over pairs of octants for the faces between.
-//! Octants of many leaves are not held: of each child, only the leaves at its six faces remain when it is done. So memory
-//! grows with the surfaces of octants and with the front.
+//! The mesh is held as a tree that stores equal subtrees once. Subtrees without holes or crossing leaves, among which are their neighbours,
+//! are passed over.
 
-use std::ops::Range;
-
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::Octant;
+use contract::tree::{HOLES, Handle, Kinds, Neighbourhood, Tree};
 use contract::word::{self, Side};
 
 use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::mesh::{Mesh, Visitor};
+use crate::mesh::Mesh;
 use crate::selection::Selection;
 
-/// Octants of at most this many leaves are held as a whole.
-const LEAVES_HELD: u64 = 1 << 16;
+/// What a face is exposed to: crossing leaves, and none.
+const OPEN: Kinds = HOLES | 1 << Side::Crossing as u8;
 
 /// A square of the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,226 +61,83 @@ impl Face {
     }
 }
 
-/// The faces of the selected leaves that belong to the front.
+/// The faces of the selected leaves that belong to the front. `check` is called from time to time.
 ///
 /// # Errors
-/// If the mesh cannot be read, or with the first error of `check`, which is called from time to time.
+/// If the mesh is not a linear oct-tree or cannot be read, and those of `check`.
 pub fn front(
     mesh: &Mesh,
     selection: &Selection,
     check: &dyn Fn() -> Result<(), ExportError>,
 ) -> Result<Vec<Face>, ExportError> {
-    front_holding(LEAVES_HELD, mesh, selection, check)
+    let tree = mesh.tree()?;
+    let mut found = Vec::new();
+    search(&tree, &Neighbourhood::root(&tree), &mut found, check)?;
+    // The tree has neither ranks nor what else may be selected.
+    let (mut found, mut faces) = (found.into_iter().peekable(), Vec::new());
+    mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+        let key = word::key_of(leaf.octant.corner);
+        while let Some((owner, face)) = found.next_if(|(owner, _)| *owner <= key) {
+            faces.extend((owner == key).then_some(Face { rank: leaf.rank, ..face }));
+        }
+        Ok::<(), ExportError>(())
+    })?;
+    Ok(faces)
 }
 
-fn front_holding(
-    leaves_held: u64,
-    mesh: &Mesh,
-    selection: &Selection,
+/// Appends the front of the leaves in an octant, with their Morton codes, which ascend.
+fn search(
+    tree: &Tree,
+    around: &Neighbourhood,
+    found: &mut Vec<(u64, Face)>,
     check: &dyn Fn() -> Result<(), ExportError>,
-) -> Result<Vec<Face>, ExportError> {
-    let found = Found { selection, faces: Vec::new() };
-    let mut search = Search { mesh: mesh.visitor(), leaves_held, check, found };
-    search.octant(Octant::ROOT)?;
-    Ok(search.found.faces)
-}
-
-/// A leaf, with its Morton code.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Entry {
-    key: u64,
-    leaf: Leaf,
-}
-
-impl Entry {
-    fn is_open(&self) -> bool {
-        self.leaf.side == Side::Crossing
+) -> Result<(), ExportError> {
+    if around.handles.iter().all(|&handle| tree.kinds(handle) & OPEN == 0) {
+        return Ok(());
     }
+    let (Octant { corner, level }, centre) = (around.octant, around.centre());
+    if centre.is_node() {
+        check()?;
+        return (0..8).try_for_each(|digit| search(tree, &around.child(tree, digit), found, check));
+    }
+    let side = centre.as_leaf().map(|kind| Side::ALL[usize::from(kind)]);
+    let Some(side) = side.filter(|&side| side != Side::Crossing) else { return Ok(()) };
+    for (axis, is_leaf_above) in (0..6).map(|face| (face / 2, face % 2 == 0)) {
+        let (mut offset, mut at) = ([0; 3], corner);
+        offset[axis] = if is_leaf_above { -1 } else { 1 };
+        at[axis] += if is_leaf_above { 0 } else { around.octant.edge() };
+        let axis = axis as u8;
+        let face =
+            Face { corner: at, level, axis, is_leaf_above, leaf_level: level, side, rank: 0 };
+        let mut exposed = Vec::new();
+        if expose(tree, around.at_offset(offset), face, &mut exposed) {
+            exposed.push(face);
+        }
+        found.extend(exposed.into_iter().map(|face| (word::key_of(corner), face)));
+    }
+    Ok(())
 }
 
-/// The leaves at the six faces of an octant: at the lower and upper face along each axis, in Morton order.
-type Layers = [[Vec<Entry>; 2]; 3];
-
-/// The traversal of octants that may have too many leaves to be held.
-struct Search<'a> {
-    mesh: Visitor<'a>,
-    leaves_held: u64,
-    check: &'a dyn Fn() -> Result<(), ExportError>,
-    found: Found<'a>,
-}
-
-impl Search<'_> {
-    /// Finds the front within an octant.
-    fn octant(&mut self, octant: Octant) -> Result<Layers, ExportError> {
-        let start = word::key_of(octant.corner);
-        let keys = start..start + word::span(octant.level);
-        let leaves = self.mesh.count(keys.clone())?;
-        if leaves <= self.leaves_held || octant.level == LEVEL_MAX {
-            return self.held(octant, keys);
-        }
-        let mut below = Vec::new();
-        for child in (0..8).map(|digit| octant.child(digit)) {
-            below.push(self.octant(child)?);
-        }
-        for (low, high, axis) in neighbours() {
-            let node = |digit: usize, end: usize| Node {
-                octant: octant.child(digit as u8),
-                leaves: &below[digit][axis][end],
-            };
-            self.found.between(node(low, 1), node(high, 0), axis);
-        }
-        let mut layers = Layers::default();
-        for (digit, child) in below.into_iter().enumerate() {
-            for (axis, [low, high]) in child.into_iter().enumerate() {
-                let end = digit >> axis & 1;
-                layers[axis][end].extend(if end == 0 { low } else { high });
-            }
-        }
-        Ok(layers)
+/// Whether all of a square is exposed to the octant across it. If only parts are, the largest of them are appended.
+fn expose(tree: &Tree, across: Handle, square: Face, exposed: &mut Vec<Face>) -> bool {
+    if !across.is_node() {
+        return tree.kinds(across) & OPEN != 0;
     }
-
-    /// The same for an octant whose leaves are read at once.
-    fn held(&mut self, octant: Octant, keys: Range<u64>) -> Result<Layers, ExportError> {
-        (self.check)()?;
-        let mut leaves = Vec::new();
-        let mut closed = 0;
-        self.mesh.visit(keys, &Selection::default(), &mut |leaf: Leaf| {
-            let entry = Entry { key: word::key_of(leaf.octant.corner), leaf };
-            closed += if entry.is_open() { 0 } else { word::span(leaf.octant.level) };
-            leaves.push(entry);
-            Ok::<(), ExportError>(())
-        })?;
-        // An octant full of leaves on a side has no front within.
-        if closed != word::span(octant.level) {
-            self.found.within(Node { octant, leaves: &leaves });
-        }
-        let mut layers = Layers::default();
-        for entry in leaves {
-            let Octant { corner, .. } = entry.leaf.octant;
-            let edge = entry.leaf.octant.edge();
-            for axis in 0..3 {
-                let at = corner[axis] - octant.corner[axis];
-                let [low, high] = &mut layers[axis];
-                low.extend((at == 0).then_some(entry));
-                high.extend((at + edge == octant.edge()).then_some(entry));
-            }
-        }
-        Ok(layers)
+    let axis = usize::from(square.axis);
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let quarters = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
+        let mut quarter = Face { level: square.level + 1, ..square };
+        quarter.corner[u] += i * quarter.edge();
+        quarter.corner[v] += j * quarter.edge();
+        let digit = (i as u8) << u | (j as u8) << v | u8::from(square.is_leaf_above) << axis;
+        let child = tree.child(across, digit, square.level);
+        expose(tree, child, quarter, exposed).then_some(quarter)
+    });
+    let is_whole = quarters.iter().all(Option::is_some);
+    if !is_whole {
+        exposed.extend(quarters.into_iter().flatten());
     }
-}
-
-/// The pairs of children that share a face, each with the axis normal to it.
-fn neighbours() -> impl Iterator<Item = (usize, usize, usize)> {
-    let of_axis = |axis: usize| (0..8).map(move |low: usize| (low, low | 1 << axis, axis));
-    (0..3).flat_map(of_axis).filter(|(low, high, _)| low != high)
-}
-
-/// An octant and leaves in it: all that matter, or the one leaf that contains it.
-#[derive(Clone, Copy)]
-struct Node<'a> {
-    octant: Octant,
-    leaves: &'a [Entry],
-}
-
-/// An octant as seen across a face.
-enum Kind {
-    /// A leaf on a side.
-    Cell(Leaf),
-    /// No leaf, or a crossing one.
-    Open,
-    Split,
-}
-
-impl<'a> Node<'a> {
-    fn kind(&self) -> Kind {
-        match self.leaves {
-            [] => Kind::Open,
-            [entry] if entry.leaf.octant.level <= self.octant.level => match entry.is_open() {
-                true => Kind::Open,
-                false => Kind::Cell(entry.leaf),
-            },
-            _ => Kind::Split,
-        }
-    }
-
-    fn child(&self, digit: usize) -> Self {
-        let octant = self.octant.child(digit as u8);
-        let leaves = match self.kind() {
-            Kind::Split => {
-                let start = word::key_of(octant.corner);
-                let end = start + word::span(octant.level);
-                let first = self.leaves.partition_point(|entry| entry.key < start);
-                let count = self.leaves[first..].partition_point(|entry| entry.key < end);
-                &self.leaves[first..first + count]
-            }
-            _ => self.leaves,
-        };
-        Self { octant, leaves }
-    }
-}
-
-/// The leaf of which the whole of a face is exposed, and whether it is the upper of the two octants.
-type Exposed = Option<(Leaf, bool)>;
-
-/// The faces found so far.
-struct Found<'a> {
-    selection: &'a Selection,
-    faces: Vec<Face>,
-}
-
-impl Found<'_> {
-    /// Finds the front within an octant.
-    fn within(&mut self, node: Node) {
-        if !matches!(node.kind(), Kind::Split) {
-            return;
-        }
-        let children: [Node; 8] = std::array::from_fn(|digit| node.child(digit));
-        children.iter().for_each(|&child| self.within(child));
-        for (low, high, axis) in neighbours() {
-            self.between(children[low], children[high], axis);
-        }
-    }
-
-    /// Finds the front between two octants of the same size.
-    fn between(&mut self, low: Node, high: Node, axis: usize) {
-        let exposed = self.across(low, high, axis);
-        self.add(exposed, &high.octant, axis);
-    }
-
-    /// Finds the front between two octants of the same size, except for the whole of a leaf's face, which is returned.
-    fn across(&mut self, low: Node, high: Node, axis: usize) -> Exposed {
-        let owner = match (low.kind(), high.kind()) {
-            (Kind::Cell(_), Kind::Cell(_)) | (Kind::Open, Kind::Open) => return None,
-            (Kind::Cell(leaf), Kind::Open) => return Some((leaf, false)),
-            (Kind::Open, Kind::Cell(leaf)) => return Some((leaf, true)),
-            (Kind::Cell(leaf), Kind::Split) => Some((leaf, false)),
-            (Kind::Split, Kind::Cell(leaf)) => Some((leaf, true)),
-            (Kind::Open, Kind::Split) | (Kind::Split, Kind::Open) | (Kind::Split, Kind::Split) => {
-                None
-            }
-        };
-        let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
-        let quarters = [0, u, v, u | v].map(|digit| {
-            let (below, above) = (low.child(digit | 1 << axis), high.child(digit));
-            (above.octant, self.across(below, above, axis))
-        });
-        if owner.is_some() && quarters.iter().all(|(_, exposed)| exposed.is_some()) {
-            return owner;
-        }
-        quarters.iter().for_each(|(above, exposed)| self.add(*exposed, above, axis));
-        None
-    }
-
-    /// Adds the lower face of an octant along an axis, if it is exposed.
-    fn add(&mut self, exposed: Exposed, above: &Octant, axis: usize) {
-        let Some((leaf, is_leaf_above)) = exposed.filter(|(leaf, _)| self.selection.has(leaf))
-        else {
-            return;
-        };
-        let Leaf { octant: Octant { level: leaf_level, .. }, side, rank, .. } = leaf;
-        let (Octant { corner, level }, axis) = (*above, axis as u8);
-        self.faces.push(Face { corner, level, axis, is_leaf_above, leaf_level, side, rank });
-    }
+    is_whole
 }
 
 #[cfg(test)]
@@ -296,9 +151,9 @@ mod tests {
     /// Level of the finest cells of the random meshes.
     const LEVEL: u8 = 4;
 
-    fn faces(words: &[u64], parts: usize, leaves_held: u64) -> Vec<Face> {
+    fn faces(words: &[u64], parts: usize) -> Vec<Face> {
         let (_dir, mesh) = on_disk(words, parts, |i| i / 5);
-        front_holding(leaves_held, &mesh, &Selection::default(), &|| Ok(())).unwrap()
+        front(&mesh, &Selection::default(), &|| Ok(())).unwrap()
     }
 
     /// A square of the finest level: its minimum corner in finest cells, and its axis.
@@ -339,7 +194,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_front_is_what_brute_force_finds_and_its_squares_are_the_largest(
-            words in random_words(LEVEL), parts in 1usize..4, leaves_held in prop::sample::select(vec![1u64, 10, 1000])
+            words in random_words(LEVEL), parts in 1usize..4
         ) {
             let scale = Octant::ROOT.child(0).edge() >> (LEVEL - 1);
             let expected = expected(&words);
@@ -348,7 +203,7 @@ mod tests {
                 expected.get(&(corner, face.axis as usize)).copied()
             };
             let mut covered = 0;
-            let faces = faces(&words, parts, leaves_held);
+            let faces = faces(&words, parts);
             for face in &faces {
                 let (u, v) = ((face.axis as usize + 1) % 3, (face.axis as usize + 2) % 3);
                 let leaf = leaf_of(face).unwrap();

@@ -91,9 +91,9 @@ mod tests {
         let ranks = report.ranks.as_ref().unwrap();
         let gap = report.gap.as_ref().unwrap();
         for (found, expected) in [
-            (gap.least.min, 0.3),
-            (gap.least_cells.max, 0.7),
-            (gap.centre.p95, 0.7),
+            (gap["least"].min, 0.3),
+            (gap["least_cells"].max, 0.7),
+            (gap["centre"].p95, 0.7),
             (report.area, 128.0),
             (ranks.lambda_faces, 80.0 / 64.0),
             (ranks.lambda_cells, 1.0 + 64.0 / 448.0),

@@ -1,5 +1,6 @@
 //! What a front is like: its size, its gap to the wall, and how both cells and faces are distributed to ranks.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use contract::lattice::Root;
@@ -28,23 +29,11 @@ pub struct Report {
     pub edges_open: u64,
     /// Faces by the level of their leaf.
     pub faces_by_level: [u64; LEVEL_MAX as usize + 1],
-    /// The gap to the wall; `None` without a case.
-    pub gap: Option<GapStatistics>,
+    /// The gap to the wall: `least`, the least distance of each face, and `centre`, that of its centre, in the user's units, and both in edges of
+    /// the face's leaf, as `least_cells` and `centre_cells`. `None` without a case.
+    pub gap: Option<BTreeMap<&'static str, Spread>>,
     /// The distribution of the mesh to ranks; `None` if they are unknown.
     pub ranks: Option<Ranks>,
-}
-
-/// Statistics of the gap to the wall, over the faces.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct GapStatistics {
-    /// Least distance of each face, in the user's units.
-    pub least: Spread,
-    /// The same, in edges of the face's leaf.
-    pub least_cells: Spread,
-    /// Distance of each face's centre, in the user's units.
-    pub centre: Spread,
-    /// The same, in edges of the face's leaf.
-    pub centre_cells: Spread,
 }
 
 /// Minimum, median, 95th percentile and maximum: of n sorted numbers, those at 0, (n - 1) / 2, 0.95 (n - 1), rounded, and n - 1.
@@ -101,7 +90,7 @@ impl Report {
             area: faces.iter().map(area).sum(),
             edges_open: edges_open(polygons),
             faces_by_level,
-            gap: gaps.and_then(|gaps| GapStatistics::of(root, faces, gaps)),
+            gap: gaps.and_then(|gaps| spreads(root, faces, gaps)),
             ranks: mesh.has_ranks().then(|| Ranks::of(cells.to_vec(), faces)),
         };
         report.check_invariants(mesh.len(), root);
@@ -129,20 +118,17 @@ impl Report {
                 ranks.cells.len()
             );
         }
-        if let Some(GapStatistics { least, centre, least_cells, centre_cells }) = self.gap {
-            for Spread { min, median, p95, max } in [least, centre, least_cells, centre_cells] {
-                assert!(
-                    0.0 <= min && min <= median && median <= p95 && p95 <= max,
-                    "gaps {min} {median} {p95} {max}"
-                );
-            }
-            let is_less =
-                least.min <= centre.min && least.median <= centre.median && least.max <= centre.max;
+        let Some(gap) = &self.gap else { return };
+        for Spread { min, median, p95, max } in gap.values() {
             assert!(
-                is_less,
-                "the least distances {least:?} exceed those of the centres {centre:?}"
+                0.0 <= *min && min <= median && median <= p95 && p95 <= max,
+                "gaps {min} {median} {p95} {max}"
             );
         }
+        let (least, centre) = (gap["least"], gap["centre"]);
+        let is_less =
+            least.min <= centre.min && least.median <= centre.median && least.max <= centre.max;
+        assert!(is_less, "the least distances {least:?} exceed those of the centres {centre:?}");
     }
 }
 
@@ -190,20 +176,19 @@ pub fn edge_of_level(root: &Root, level: u8) -> f64 {
     root.edge * f64::from(Octant { corner: [0; 3], level }.edge()) / f64::from(Octant::ROOT.edge())
 }
 
-impl GapStatistics {
-    /// `None` without faces.
-    fn of(root: &Root, faces: &[Face], gaps: &[Gap]) -> Option<Self> {
-        let in_cells = |distance: fn(&Gap) -> f64| {
-            let cell = |face: &Face| edge_of_level(root, face.leaf_level);
-            gaps.iter().zip(faces).map(|(gap, face)| distance(gap) / cell(face)).collect()
-        };
-        Some(Self {
-            least: Spread::of(gaps.iter().map(|gap| gap.least).collect())?,
-            least_cells: Spread::of(in_cells(|gap| gap.least))?,
-            centre: Spread::of(gaps.iter().map(|gap| gap.centre).collect())?,
-            centre_cells: Spread::of(in_cells(|gap| gap.centre))?,
-        })
-    }
+/// The spreads of the gaps by name; `None` without faces.
+fn spreads(root: &Root, faces: &[Face], gaps: &[Gap]) -> Option<BTreeMap<&'static str, Spread>> {
+    let spread = |distance: fn(&Gap) -> f64, in_cells: bool| {
+        let unit = |face: &Face| if in_cells { edge_of_level(root, face.leaf_level) } else { 1.0 };
+        Spread::of(gaps.iter().zip(faces).map(|(gap, face)| distance(gap) / unit(face)).collect())
+    };
+    let (least, centre): (fn(&Gap) -> f64, fn(&Gap) -> f64) = (|gap| gap.least, |gap| gap.centre);
+    Some(BTreeMap::from([
+        ("least", spread(least, false)?),
+        ("least_cells", spread(least, true)?),
+        ("centre", spread(centre, false)?),
+        ("centre_cells", spread(centre, true)?),
+    ]))
 }
 
 impl Spread {
@@ -250,12 +235,13 @@ impl fmt::Display for Report {
                 "gap to the wall      {:>12} {:>12} {:>12} {:>12}",
                 "min", "median", "95 %", "max"
             )?;
-            for (name, Spread { min, median, p95, max }) in [
-                ("face", gap.least),
-                ("face, in cells", gap.least_cells),
-                ("centre", gap.centre),
-                ("centre, in cells", gap.centre_cells),
+            for (name, key) in [
+                ("face", "least"),
+                ("face, in cells", "least_cells"),
+                ("centre", "centre"),
+                ("centre, in cells", "centre_cells"),
             ] {
+                let Spread { min, median, p95, max } = gap[key];
                 writeln!(f, "  {name:<18} {min:>12.6} {median:>12.6} {p95:>12.6} {max:>12.6}")?;
             }
         }
@@ -314,8 +300,10 @@ mod tests {
         noticed("faces of all ranks", &|r| r.ranks.as_mut().unwrap().faces[1] += 1);
         noticed("cells of all ranks", &|r| r.ranks.as_mut().unwrap().cells[0] -= 1);
         noticed("lambda", &|r| r.ranks.as_mut().unwrap().lambda_faces = 0.9);
-        noticed("gaps", &|r| r.gap.as_mut().unwrap().least.p95 = 1e9);
-        noticed("exceed those of the centres", &|r| r.gap.as_mut().unwrap().centre.min = 0.1);
+        noticed("gaps", &|r| r.gap.as_mut().unwrap().get_mut("least").unwrap().p95 = 1e9);
+        noticed("exceed those of the centres", &|r| {
+            r.gap.as_mut().unwrap().get_mut("centre").unwrap().min = 0.1
+        });
     }
 
     #[test]

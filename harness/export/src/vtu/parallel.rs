@@ -6,12 +6,12 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use contract::files::{self, Staging};
 
 use super::file::VtuFile;
-use super::header::{Content, MARK};
+use super::header::MARK;
 use super::{PIECE, content, encode, leaves};
 use crate::error::ExportError;
 use crate::mesh::Mesh;
@@ -33,20 +33,25 @@ pub fn write_files(
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
-    let names = Names::of(path)?;
-    names.refuse_other_files()?;
+    let stem = path.file_stem().and_then(|stem| stem.to_str()).ok_or_else(|| {
+        let path = path.display();
+        ExportError::Request(format!("{path}: the name is not UTF-8: choose another"))
+    })?;
+    let folder = format!("{stem}_pieces");
+    let directory = path.with_file_name(&folder);
+    refuse_other_files(&directory)?;
     let pieces = pieces(mesh, selection, PIECE, options)?;
-    let named = |error| ExportError::write(&names.directory, error);
-    let place = Staging::beside(&names.directory).map_err(named)?;
-    let (mut whole, mut bytes, mut written) = (content(mesh), 0, Vec::new());
+    let named = |error| ExportError::write(&directory, error);
+    let place = Staging::beside(&directory).map_err(named)?;
+    let (mut whole, mut bytes, mut files) = (content(mesh), 0, Vec::new());
     let mut begun: Option<VtuFile> = None;
     let cells = encode(mesh, selection, &pieces, options, |index, piece| {
         let mut file = match begun.take() {
             Some(file) => file,
             None => {
-                let name = names.file(written.len());
+                let name = format!("{stem}_{:04}.vtu", files.len());
                 let file = File::create_new(place.path().join(&name)).map_err(named)?;
-                written.push(name);
+                files.push(format!("{folder}/{name}"));
                 let count = PIECES.min(pieces.len() - index);
                 VtuFile::begin(file, content(mesh), count).map_err(named)?
             }
@@ -61,90 +66,50 @@ pub fn write_files(
     })?;
     cells.check_invariants(mesh, selection, leaves(&pieces));
     options.check()?;
-    bytes += place.publish(|staged| names.publish(staged, &whole, &written))?;
-    Ok(Summary {
-        leaves: leaves(&pieces),
-        files: written.len() as u64 + 1,
-        bytes,
-        notes: Vec::new(),
-    })
+    let xml = whole.pvtu(&files);
+    place.publish(|staged| publish(path, &directory, staged, &xml))?;
+    bytes += xml.len() as u64;
+    Ok(Summary { leaves: leaves(&pieces), files: files.len() as u64 + 1, bytes, notes: Vec::new() })
 }
 
-/// The names of all files.
-#[derive(Debug)]
-struct Names {
-    /// The `.pvtu` file.
-    path: PathBuf,
-    /// Its name without the extension.
-    stem: String,
-    /// The directory of the others.
-    directory: PathBuf,
-}
-
-impl Names {
-    fn of(path: &Path) -> Result<Self, ExportError> {
-        let stem = path.file_stem().and_then(|stem| stem.to_str()).ok_or_else(|| {
-            ExportError::Request(format!(
-                "{}: the name is not UTF-8: choose another",
+/// An error if the directory exists and has a file that an earlier export did not write.
+fn refuse_other_files(directory: &Path) -> Result<(), ExportError> {
+    let entries = match fs::read_dir(directory) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(to_write(directory))?,
+    };
+    for entry in entries {
+        let path = entry.map_err(to_write(directory))?.path();
+        if !is_ours(&path).unwrap_or(false) {
+            return Err(ExportError::Request(format!(
+                "{}: was not written by harness export, and its directory would be replaced: move it, or choose \
+                 another name for the export",
                 path.display()
-            ))
-        })?;
-        let directory = path.with_file_name(format!("{stem}_pieces"));
-        Ok(Self { path: path.to_owned(), stem: stem.to_owned(), directory })
-    }
-
-    /// The name of a file in the directory.
-    fn file(&self, index: usize) -> String {
-        format!("{}_{index:04}.vtu", self.stem)
-    }
-
-    /// An error if the directory exists and has a file that an earlier export did not write.
-    fn refuse_other_files(&self) -> Result<(), ExportError> {
-        let entries = match fs::read_dir(&self.directory) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            entries => entries.map_err(|error| ExportError::write(&self.directory, error))?,
-        };
-        for entry in entries {
-            let path = entry.map_err(|error| ExportError::write(&self.directory, error))?.path();
-            if !is_ours(&path).unwrap_or(false) {
-                return Err(ExportError::Request(format!(
-                    "{}: was not written by harness export, and its directory would be replaced: move it, or choose \
-                     another name for the export",
-                    path.display()
-                )));
-            }
+            )));
         }
+    }
+    Ok(())
+}
+
+/// Gives all files their final names.
+fn publish(path: &Path, directory: &Path, staged: &Path, xml: &str) -> Result<(), ExportError> {
+    let synchronised = File::open(staged).and_then(|directory| directory.sync_all());
+    synchronised.map_err(to_write(directory))?;
+    refuse_other_files(directory)?;
+    let mut is_replaced = false;
+    // Whatever may fail for want of space comes before anything is deleted.
+    let published = files::fill_atomically(path, to_write(path), |file| {
+        file.write_all(xml.as_bytes()).map_err(to_write(path))?;
+        delete(|| fs::remove_file(path)).map_err(to_write(path))?;
+        delete(|| fs::remove_dir_all(directory)).map_err(to_write(directory))?;
+        fs::rename(staged, directory).map_err(to_write(directory))?;
+        is_replaced = true;
         Ok(())
+    });
+    if is_replaced && published.is_err() {
+        let _ = fs::remove_dir_all(directory);
     }
-
-    /// Gives all files their final names; returns the size of the `.pvtu` file.
-    fn publish(
-        &self,
-        staged: &Path,
-        content: &Content,
-        written: &[String],
-    ) -> Result<u64, ExportError> {
-        let named = |error| ExportError::write(&self.directory, error);
-        File::open(staged).and_then(|directory| directory.sync_all()).map_err(named)?;
-        self.refuse_other_files()?;
-        let directory = format!("{}_pieces", self.stem);
-        let files: Vec<_> = written.iter().map(|name| format!("{directory}/{name}")).collect();
-        let xml = content.pvtu(&files);
-        let mut is_replaced = false;
-        // Whatever may fail for want of space comes before anything is deleted.
-        let published = files::fill_atomically(&self.path, to_write(&self.path), |file| {
-            file.write_all(xml.as_bytes()).map_err(to_write(&self.path))?;
-            delete(|| fs::remove_file(&self.path)).map_err(to_write(&self.path))?;
-            delete(|| fs::remove_dir_all(&self.directory)).map_err(named)?;
-            fs::rename(staged, &self.directory).map_err(named)?;
-            is_replaced = true;
-            Ok(())
-        });
-        if is_replaced && published.is_err() {
-            let _ = fs::remove_dir_all(&self.directory);
-        }
-        published.map(|()| xml.len() as u64)
-    }
+    published
 }
 
 /// Makes an error of a file that names it.

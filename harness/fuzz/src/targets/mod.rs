@@ -1,7 +1,7 @@
 //! The targets.
 
 mod case_file;
-mod imports;
+mod forest;
 mod leaf_set;
 mod stl;
 mod texts;
@@ -11,17 +11,13 @@ pub(crate) mod whole_case;
 use crate::Target;
 
 /// All targets.
-pub const TARGETS: [Target; 19] = [
+pub const TARGETS: [Target; 15] = [
     Target { name: "stl", run: stl::bytes },
     Target { name: "stl-grammar", run: stl::grammar },
     Target { name: "case", run: case_file::run },
     Target { name: "manifest", run: leaf_set::manifest },
     Target { name: "npy-words", run: leaf_set::words },
-    Target { name: "npy-table", run: imports::npy },
-    Target { name: "csv", run: imports::csv },
-    Target { name: "p4est", run: imports::p4est },
-    Target { name: "discretize", run: imports::discretize },
-    Target { name: "openfoam", run: imports::openfoam },
+    Target { name: "p4est", run: forest::run },
     Target { name: "tree-file", run: tree_file::run },
     Target { name: "engine", run: texts::engine },
     Target { name: "rules", run: texts::rules },

@@ -2,7 +2,7 @@
 //! files of nodes that need not be those of a tree.
 
 use crate::{Scratch, repair};
-use contract::htg::{Cursor, SIDE, TreeFile};
+use contract::htg::{Cursor, TreeFile};
 use contract::import::htg::ImportedTree;
 use contract::word;
 use std::cell::RefCell;
@@ -23,7 +23,7 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     repair::checksums(&mut bytes);
     let path = scratch.file("mesh.vtkhdf", &bytes);
     let imported = ImportedTree::open(path, None, None, None, "fuzz".to_owned());
-    let tree = TreeFile::open(path, Some(SIDE)).or_else(|_| TreeFile::open(path, None));
+    let tree = TreeFile::open(path, true);
     let Ok(tree) = tree else {
         assert!(!matches!(imported, Ok(Some(_))));
         return false;

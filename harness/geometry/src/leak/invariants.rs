@@ -12,66 +12,47 @@ use super::ends::{is_free, leaf_at};
 use super::report::{Destination, Passage, Report};
 use crate::tree::{Point, from_edges, from_point, triangle};
 use contract::case::Case;
-use contract::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
+use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::query::{Ray, RayCast};
 use parry3d_f64::shape::Segment;
 
 /// Exceeds the rounding of printed points, in lattice units.
 const ROUNDING: f64 = 2.0;
+/// Legs that are compared with a facet at once, most of which are far from it.
+const GROUP: usize = 32;
 
 impl Report {
     /// Asserts the invariants, with the sorted words of the base tree that the path leads through.
-    ///
-    /// # Panics
-    /// If one is violated, which is a bug.
     pub fn check_invariants(&self, case: &Case, words: &[u64]) {
-        let level = self.spacing.level;
-        let joins = |l: u8| self.levels.iter().find(|m| m.spacing.level == l).map(|m| m.is_joined);
-        assert_eq!(
-            joins(level),
-            Some(self.is_leak),
-            "the case's level was searched with another result"
-        );
-        for (other, is_coarser) in [(self.closes, true), (self.opens, false)] {
-            let Some(other) = other else { continue };
-            assert_eq!(
-                (other.level < level, self.is_leak),
-                (is_coarser, is_coarser),
-                "{other:?} for level {level}"
-            );
-            assert_eq!(
-                joins(other.level),
-                Some(!is_coarser),
-                "{other:?} was searched with another result"
-            );
-            let between = self.levels.iter().filter(|m| {
-                let l = m.spacing.level;
-                (level.min(other.level) < l && l < level.max(other.level))
-                    && m.is_joined != is_coarser
-            });
-            assert_eq!(between.count(), 0, "{other:?} is not the level nearest to {level}");
+        let (own, is_leak) = (self.spacing.level, self.is_leak);
+        let [answer, other] = match is_leak {
+            true => [self.closes, self.opens],
+            false => [self.opens, self.closes],
+        };
+        let last = self.levels.len() - 1;
+        for (i, meshed) in self.levels.iter().enumerate() {
+            let level = if is_leak { own.checked_sub(i as u8) } else { own.checked_add(i as u8) };
+            let is_joined = is_leak != (i == last && answer.is_some());
+            let found = (Some(meshed.spacing.level), meshed.is_joined);
+            assert_eq!(found, (level, is_joined), "level {i} of {:?}", self.levels);
         }
+        let is_last = |level| last > 0 && self.levels[last].spacing.level == level;
+        assert!(
+            other.is_none() && answer.is_none_or(|answer| is_last(answer.level)),
+            "{answer:?} and {other:?} of {:?}",
+            self.levels
+        );
         let known = [self.opens.is_some(), self.is_separated, self.limit.is_some()];
         let reasons = known.iter().filter(|&&is| is).count();
-        assert_eq!(
-            reasons,
-            usize::from(!self.is_leak),
-            "one reason ends a search for an opening: {known:?}"
-        );
-        assert_eq!(
-            self.passage.is_some(),
-            self.is_leak || self.opens.is_some(),
-            "a path exists iff a level joins the ends"
-        );
+        assert_eq!(reasons, usize::from(!is_leak), "reasons to end a search: {known:?}");
+        let is_joined = is_leak || self.opens.is_some();
+        assert_eq!(self.passage.is_some(), is_joined, "a path exists iff a level joins the ends");
         if let Some(passage) = &self.passage {
-            assert_eq!(
-                joins(passage.spacing.level),
-                Some(true),
-                "the path leads through a level that joins the ends"
-            );
-            passage.check_ends(&case.root, self.from, self.to);
-            passage.check_legs(case, words);
-            passage.check_narrowest(case);
+            let level = passage.spacing.level;
+            let is_joined = self.levels.iter().any(|m| m.is_joined && m.spacing.level == level);
+            assert!(is_joined, "no path leads through level {level}");
+            passage.check_invariants(case, words, self.from, self.to);
         }
     }
 }
@@ -81,100 +62,68 @@ fn is_near(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING + 1e-9 * b.abs()
 }
 
-fn units(root: &Root) -> f64 {
-    UNITS_PER_EDGE as f64 / root.edge
-}
-
 impl Passage {
-    fn on_lattice(&self, root: &Root) -> Vec<Point> {
-        let origin = Point::from(root.origin);
-        self.points.iter().map(|p| (Point::from(p.at) - origin) * units(root)).collect()
-    }
-
-    fn check_ends(&self, root: &Root, from: [f64; 3], to: Destination) {
-        let edge = UNITS_PER_EDGE as f64;
-        let points = self.on_lattice(root);
-        let origin = Point::from(root.origin);
-        for (point, printed) in points.iter().zip(&self.points) {
-            let is_inside =
-                point.min_element() >= -ROUNDING && point.max_element() <= edge + ROUNDING;
-            assert!(is_inside, "{:?} of the path is outside the root", printed.at);
-        }
-        let ends_at = |index: usize, at: [f64; 3]| {
-            points[index].distance((Point::from(at) - origin) * units(root)) <= ROUNDING
+    fn check_invariants(&self, case: &Case, words: &[u64], from: [f64; 3], to: Destination) {
+        let (edge, scale) = (UNITS_PER_EDGE as f64, UNITS_PER_EDGE as f64 / case.root.edge);
+        let lattice = |at: [f64; 3]| (Point::from(at) - Point::from(case.root.origin)) * scale;
+        let points: Vec<Point> = self.points.iter().map(|point| lattice(point.at)).collect();
+        let margin = |at: &Point| at.min_element().min(edge - at.max_element());
+        let outside = points.iter().find(|at| margin(at) < -ROUNDING);
+        assert_eq!(outside, None, "a point of the path is outside the root");
+        let end = points[points.len() - 1];
+        let is_end = match to {
+            Destination::Point(to) => end.distance(lattice(to)) <= ROUNDING,
+            Destination::Far(_) => margin(&end) <= ROUNDING,
         };
-        let last = points.len() - 1;
-        assert!(ends_at(0, from), "the path starts at {:?}, not at {from:?}", self.points[0].at);
-        let at = self.points[last].at;
-        match to {
-            Destination::Point(to) => {
-                assert!(ends_at(last, to), "the path ends at {at:?}, not at {to:?}")
-            }
-            Destination::Far(_) => {
-                let end = points[last];
-                let margin = end.min_element().min(edge - end.max_element());
-                assert!(margin <= ROUNDING, "the path ends at {at:?}, not on the root's boundary");
-            }
-        }
-        let sum: f64 = points.windows(2).map(|leg| leg[0].distance(leg[1])).sum();
-        let length = self.length * units(root);
+        let is_start = points[0].distance(lattice(from)) <= ROUNDING;
+        assert!(is_start && is_end, "the path leads from {} to {end}", points[0]);
+        let length: f64 = points.windows(2).map(|leg| leg[0].distance(leg[1])).sum();
+        let stated = self.length * scale;
         assert!(
-            (sum - length).abs() <= 1e-6 * sum + ROUNDING,
-            "length {length} of legs of {sum} units"
+            (length - stated).abs() <= 1e-6 * length + ROUNDING,
+            "legs of {length} units, not {stated}"
         );
+        let (first, last) = self.inner;
+        assert!(first <= last && last < points.len(), "{:?} of {}", self.inner, points.len());
+        self.check_legs(case, words, &points, self.narrowest.width_min / 2.0 * scale);
+        self.check_narrowest(case, lattice(self.narrowest.at), scale);
     }
 
-    fn check_legs(&self, case: &Case, words: &[u64]) {
-        let points = self.on_lattice(&case.root);
-        let (first, last) = self.inner;
-        assert!(
-            first <= last && last < points.len(),
-            "{:?} of {} points",
-            self.inner,
-            points.len()
-        );
-        let least = self.narrowest.width_min / 2.0 * units(&case.root);
-        let legs: Vec<(Segment, f64)> = points
-            .windows(2)
-            .enumerate()
-            .map(|(i, leg)| {
-                let is_inner = (first..last).contains(&i);
-                let is_free = is_free(leaf_at(words, leg[0].midpoint(leg[1])));
-                assert!(
-                    is_inner || is_free,
-                    "leg {i} of the path runs through a leaf that facets cross"
-                );
-                (Segment::new(leg[0], leg[1]), if is_inner { least } else { 0.0 })
-            })
-            .collect();
-        // Legs in groups, most of which are far from a facet.
-        const GROUP: usize = 32;
+    /// Compares the legs with all facets; `least` is the clearance of those that count.
+    fn check_legs(&self, case: &Case, words: &[u64], points: &[Point], least: f64) {
+        let leg = |(i, ends): (usize, &[Point])| {
+            let is_inner = (self.inner.0..self.inner.1).contains(&i);
+            let is_free = is_free(leaf_at(words, ends[0].midpoint(ends[1])));
+            assert!(is_inner || is_free, "leg {i} leads through a leaf that facets cross");
+            (Segment::new(ends[0], ends[1]), if is_inner { least } else { 0.0 })
+        };
+        let legs: Vec<(Segment, f64)> = points.windows(2).enumerate().map(leg).collect();
         let bounds = |legs: &[(Segment, f64)]| {
-            let ends = || legs.iter().flat_map(|(leg, _)| [leg.a, leg.b]);
-            let fold = |f: fn(Point, Point) -> Point| ends().reduce(f).expect("a group has legs");
-            (fold(Point::min) - least, fold(Point::max) + least)
+            let boxes = legs.iter().map(|(leg, _)| leg.local_aabb());
+            let whole: Option<Aabb> = boxes.reduce(|a, b| a.merged(&b));
+            whole.expect("a group has legs").loosened(least)
         };
         let groups: Vec<_> = legs.chunks(GROUP).map(|legs| (bounds(legs), legs)).collect();
-        for (number, facet) in case.facets_lattice.iter().enumerate() {
-            let [a, b, c] = facet.map(|v| Point::from_array(v.map(|c| c as f64)));
-            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-            for ((from, to), legs) in &groups {
-                if low.cmple(*to).all() && high.cmpge(*from).all() {
-                    legs.iter().for_each(|leg| check_leg(leg, facet, number));
-                }
+        for (number, facet) in case.facets_lattice.iter().map(triangle).enumerate() {
+            let around = facet.local_aabb();
+            let near = groups.iter().filter(|(bounds, _)| bounds.intersects(&around));
+            for (leg, clearance) in near.flat_map(|(_, legs)| legs.iter()) {
+                let is_met = facet.intersects_local_ray(&Ray::new(leg.a, leg.b - leg.a), 1.0);
+                let of_ends = from_point(leg.a, &facet).min(from_point(leg.b, &facet));
+                let distance = if is_met { -1.0 } else { of_ends.min(from_edges(leg, &facet)) };
+                assert!(
+                    distance >= clearance - ROUNDING,
+                    "facet {number} is {distance} units from a leg of clearance {clearance}"
+                );
             }
         }
     }
 
-    fn check_narrowest(&self, case: &Case) {
-        let narrowest = &self.narrowest;
-        let (at, scale) = (narrowest.at, units(&case.root));
-        let (first, last) = self.inner;
-        assert_eq!(
-            Some(at),
-            self.points.get(narrowest.index).map(|p| p.at),
-            "the narrowest place is a point of the path"
-        );
+    fn check_narrowest(&self, case: &Case, centre: Point, scale: f64) {
+        let (narrowest, (first, last)) = (&self.narrowest, self.inner);
+        let is_point = self.points.get(narrowest.index).is_some_and(|p| p.at == narrowest.at);
+        let is_counted = (first..=last).contains(&narrowest.index);
+        assert!(is_point && is_counted, "point {} of {:?}", narrowest.index, self.inner);
         let [min, width, max] =
             [narrowest.width_min, narrowest.width, narrowest.width_max].map(|w| w * scale);
         assert!(
@@ -183,51 +132,22 @@ impl Passage {
         );
         let counted = self.points[first..=last].iter().map(|p| p.width * scale);
         let least = counted.fold(f64::INFINITY, f64::min);
+        let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
+        let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
+        let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
         assert!(
-            is_near(least, width),
-            "a point has the width {least}, the narrowest place {width} units"
-        );
-        assert!(
-            (first..=last).contains(&narrowest.index),
-            "point {} does not count",
-            narrowest.index
+            is_near(least, width)
+                && is_near(nearest, width)
+                && rim.is_some_and(|r| is_near(r, width)),
+            "width {width}; {least} of all points, {nearest} to all facets, {rim:?} at the rim"
         );
         // A path to the far field counts to its end.
         let ends = if last + 1 == self.points.len() { vec![first] } else { vec![first, last] };
         let is_end = ends.iter().any(|&end| self.points[end].width <= 1.05 * narrowest.width);
-        assert_eq!(
-            narrowest.is_end, is_end,
-            "ends {ends:?} of {:?} with {narrowest:?}",
-            self.points
-        );
-        let centre = (Point::from(at) - Point::from(case.root.origin)) * scale;
-        let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
-        let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
-        assert!(
-            is_near(nearest, width),
-            "the nearest facet leaves a width of {nearest}, not {width} units"
-        );
-        let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
-        assert!(
-            rim.is_some_and(|rim| is_near(rim, nearest)),
-            "the nearest facet is not at the rim"
-        );
+        assert_eq!(narrowest.is_end, is_end, "ends {ends:?} of {:?}", self.points);
         let direction = Point::from(narrowest.direction).length();
         assert!((direction - 1.0).abs() < 1e-9, "the direction has the length {direction}");
     }
-}
-
-/// Asserts that a facet is no nearer to a leg than the leg's clearance, and does not meet it.
-fn check_leg((leg, clearance): &(Segment, f64), facet: &FacetLattice, number: usize) {
-    let facet = triangle(facet);
-    let along = leg.b - leg.a;
-    let is_met = facet.intersects_local_ray(&Ray::new(leg.a, along), 1.0);
-    let of_ends = from_point(leg.a, &facet).min(from_point(leg.b, &facet));
-    let distance = if is_met { -1.0 } else { of_ends.min(from_edges(leg, &facet)) };
-    assert!(
-        distance >= clearance - ROUNDING,
-        "facet {number} is {distance} units from a leg of the path, which has a clearance of {clearance}"
-    );
 }
 
 #[cfg(test)]

@@ -123,23 +123,20 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
             return Err(LeakError::Input(self.crossed_end(level, ends)));
         }
         let spacing = |level| Spacing::of(level, root);
-        let (closes, opens, passage) = (None, None, None);
-        let (is_leak, is_separated) = (levels[0].is_joined, false);
-        let spacing_own = spacing(level);
         let mut report = Report {
             from,
             to,
-            spacing: spacing_own,
-            is_leak,
-            closes,
-            opens,
-            is_separated,
+            spacing: spacing(level),
+            is_leak: levels[0].is_joined,
+            closes: None,
+            opens: None,
+            is_separated: false,
             limit: None,
-            passage,
+            passage: None,
             levels: Vec::new(),
         };
         let mut measured = None;
-        if is_leak {
+        if report.is_leak {
             // A leaf of the level that joins the ends is free, so the opening is at least as wide, or 4 times the leaves two levels
             // below. There the widest ball's centre lies in free leaves: no finer tree has a wider path.
             const DEEPER: u8 = 2;

@@ -2,7 +2,7 @@
 
 use crate::process::{INPUT, Workspace, refused, run};
 use crate::support::{Run, Small, closed, config, first_difference, small, soup, thin};
-use contract::htg::{SIDE, TreeFile};
+use contract::htg::TreeFile;
 use mesher::output::write::{Output, TREE};
 use mesher::partition::Partitioner;
 use mesher::record::Recorder;
@@ -33,7 +33,7 @@ fn tree_of(case: &Small, run: &Run, ungraded: bool, place: &Path) -> Vec<u8> {
 
 /// The leaf words of the last file, as the harness reads them.
 fn words_of(place: &Path) -> Vec<u64> {
-    let tree = TreeFile::open(&place.join("last.vtkhdf"), Some(SIDE)).expect("a tree");
+    let tree = TreeFile::open(&place.join("last.vtkhdf"), true).expect("a tree");
     let mut words = Vec::new();
     tree.words(&mut |run| {
         words.extend_from_slice(run);
@@ -109,8 +109,8 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
     assert_eq!(names("tree"), ["mesh.json", "mesh.vtkhdf"]);
     mesher(&["--out", "both", "--write", "htg,words", "--cell-ranks", "--comm", "sim:3"]);
     assert_eq!(names("both").len(), 5);
-    let read = |folder: &str, sides: &str| {
-        let tree = TreeFile::open(&workspace.path().join(folder).join(TREE), Some(sides));
+    let read = |folder: &str| {
+        let tree = TreeFile::open(&workspace.path().join(folder).join(TREE), true);
         let mut words = Vec::new();
         tree.and_then(|tree| {
             tree.words(&mut |run| {
@@ -120,10 +120,8 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
         })
         .map(|()| words)
     };
-    let [tree, both] = ["tree", "both"].map(|folder| read(folder, SIDE).expect("a tree"));
+    let [tree, both] = ["tree", "both"].map(|folder| read(folder).expect("a tree"));
     assert_eq!(tree, both);
-    let error = read("both", "rank").expect_err("ranks are no bytes").to_string();
-    assert!(error.contains("rank is not an array"), "{error}");
     for args in [&["--write", "htg"][..], &["--cell-ranks"]] {
         let all = [&["body.stl", "--spacing-min=0.1"], args].concat();
         run(workspace.mesher(&all)).refuses(INPUT, &["--out"]);

@@ -26,7 +26,7 @@ fn patches_follow_the_internal_faces_and_lie_where_their_names_say() {
     let half = [[0; 3], [1 << 27, 1 << 27, 1 << 26]];
     let selection = Selection { clip: Some(half), ..Selection::default() };
     let target = dir.path().join("case/constant/polyMesh");
-    write(&mesh, &selection, &target, &options(ASCII)).unwrap();
+    write(&mesh, &selection, &target, &options()).unwrap();
     let complex = complex_in(&target);
     let boundary = boundary_in(&target);
     let faces: Vec<_> = boundary.iter().map(|(name, faces, _)| (name.as_str(), *faces)).collect();
@@ -76,7 +76,7 @@ proptest! {
         let (dir, mesh) = on_disk(&leaf_set(by_part));
         let case = dir.path().join("case");
         let processors = if by_rank { Processors::Ranks } else { Processors::Equal(parts as u32) };
-        let mut options = options(ASCII);
+        let mut options = options();
         options.foam.processors = Some(processors);
         write(&mesh, &Selection::default(), &case.join("constant/polyMesh"), &options).unwrap();
         let dirs: Vec<_> = (0..parts).map(|p| case.join(format!("processor{p}/constant/polyMesh"))).collect();
@@ -117,7 +117,7 @@ fn regions_that_no_face_connects_can_be_left_out() {
     );
     let words: Vec<u64> = words.into_iter().filter(|&w| word::octant(w).corner != [0; 3]).collect();
     let (dir, mesh) = on_disk(&leaf_set(vec![words]));
-    let mut options = options(ASCII);
+    let mut options = options();
     for (regions, cells) in [(options::Regions::All, 64), (options::Regions::Largest, 1)] {
         options.foam.regions = regions;
         let target = dir.path().join(format!("{cells}/constant/polyMesh"));
@@ -142,15 +142,15 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
         write(&mesh, selection, &target, options).unwrap_err().to_string()
     };
     let everything = Selection::default();
-    let mut parallel = options(ASCII);
+    let mut parallel = options();
     parallel.foam.processors = Some(Processors::Equal(65));
     assert!(refused(&parallel, &everything).contains("64 cells are too few for 65 processors"));
     let none = Selection { level_max: Some(1), ..Selection::default() };
-    assert!(refused(&options(ASCII), &none).contains("no leaf satisfies all conditions"));
+    assert!(refused(&options(), &none).contains("no leaf satisfies all conditions"));
     assert!(!case.exists());
 
-    write(&mesh, &everything, &case.join("constant/polyMesh"), &options(ASCII)).unwrap();
-    assert!(refused(&options(ASCII), &everything).contains("constant/polyMesh exists"));
+    write(&mesh, &everything, &case.join("constant/polyMesh"), &options()).unwrap();
+    assert!(refused(&options(), &everything).contains("constant/polyMesh exists"));
     fs::create_dir(case.join("processor7")).unwrap();
     parallel.foam.processors = Some(Processors::Equal(2));
     assert!(refused(&parallel, &everything).contains("processor7 exists"));
@@ -161,7 +161,7 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
 
     let empty = dir.path().join("other/constant/polyMesh");
     fs::create_dir_all(&empty).unwrap();
-    write(&mesh, &everything, &empty, &options(ASCII)).unwrap();
+    write(&mesh, &everything, &empty, &options()).unwrap();
     assert_eq!(names(&empty).len(), 7);
 }
 
@@ -211,7 +211,7 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
         Case::read(&dir.path().join("case.toml")).unwrap()
     };
     let (case, other) = (case(8.0), case(16.0));
-    let mut options = options(ASCII);
+    let mut options = options();
     options.foam.case = Some(&case);
     let target = dir.path().join("case/constant/polyMesh");
     write(&mesh, &Selection::default(), &target, &options).unwrap();
@@ -241,7 +241,7 @@ fn crossing_cells_and_solids_without_faces_produce_warnings() {
     let notes = |side: Side, selection: Selection| {
         let (dir, mesh) =
             on_disk(&leaf_set(vec![words_with_sides(|o| o.level < 1, |_| Some(side))]));
-        write(&mesh, &selection, &dir.path().join("polyMesh"), &options(ASCII)).unwrap().notes
+        write(&mesh, &selection, &dir.path().join("polyMesh"), &options()).unwrap().notes
     };
     let all = notes(Side::Crossing, Selection::default());
     let expected = [

@@ -2,7 +2,6 @@
 
 mod cells;
 mod directories;
-mod round_trip;
 mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,7 +9,6 @@ use std::num::NonZero;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::import::{self, Format, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
@@ -22,7 +20,7 @@ use super::leaves::{Around, Point};
 use super::squares::{Square, squares};
 use super::*;
 use crate::mesh::Mesh as OnDisk;
-use crate::options::{Foam, Label, Style};
+use crate::options::{Foam, Label};
 use crate::testing::Unwatched;
 
 /// Faces with their points, and the cells on both sides of each.
@@ -34,12 +32,10 @@ struct Complex {
     neighbour: Vec<usize>,
 }
 
-pub fn options<'a>(style: Style) -> Options<'a> {
-    let foam = Foam { style, ..Foam::default() };
+pub fn options<'a>() -> Options<'a> {
+    let foam = Foam::default();
     Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam }
 }
-
-pub const ASCII: Style = Style { is_ascii: true, label: Label::Bits32 };
 
 fn on_disk(set: &LeafSet) -> (tempfile::TempDir, OnDisk) {
     let dir = tempfile::tempdir().unwrap();
@@ -48,29 +44,37 @@ fn on_disk(set: &LeafSet) -> (tempfile::TempDir, OnDisk) {
     (dir, mesh)
 }
 
-/// The numbers in an ASCII file after its dictionary, those in parentheses in one list.
-fn numbers(path: &Path) -> Vec<Vec<f64>> {
-    let text = fs::read_to_string(path).unwrap();
-    let (_, body) = text.split_once("}\n").unwrap();
-    let lines = body.lines().map(|line| line.replace(['(', ')'], " "));
-    let parse = |line: String| line.split_whitespace().map(|n| n.parse().unwrap()).collect();
-    lines.map(parse).filter(|list: &Vec<f64>| !list.is_empty()).collect()
+/// The lists in a file, of items of these sizes.
+fn lists<const N: usize>(path: &Path, sizes: [usize; N]) -> [Vec<u8>; N] {
+    let bytes = fs::read(path).unwrap();
+    let dictionary = bytes.windows(3).position(|w| w == b"}\n\n").unwrap() + 3;
+    let mut rest = &bytes[dictionary..];
+    let found = sizes.map(|size| {
+        let end = rest.iter().position(|&b| b == b'\n').unwrap();
+        let count: usize = std::str::from_utf8(&rest[..end]).unwrap().parse().unwrap();
+        let parentheses = usize::from(count > 0);
+        let begin = end + 1 + parentheses;
+        let items = rest[begin..][..count * size].to_vec();
+        rest = &rest[begin + count * size + parentheses + 1..];
+        items
+    });
+    assert!(rest.is_empty(), "{}", path.display());
+    found
+}
+
+fn labels_of(bytes: &[u8]) -> Vec<usize> {
+    bytes.chunks_exact(4).map(|b| i32::from_le_bytes(b.try_into().unwrap()) as usize).collect()
 }
 
 fn complex_in(dir: &Path) -> Complex {
-    let list = |name: &str| {
-        let numbers = numbers(&dir.join(name));
-        assert_eq!(numbers.len() - 1, numbers[0][0] as usize, "{name}");
-        numbers.into_iter().skip(1)
-    };
-    let labels = |name: &str| list(name).map(|n| n[0] as usize).collect();
-    let face = |n: Vec<f64>| {
-        assert_eq!(n.len() - 1, n[0] as usize);
-        n[1..].iter().map(|&v| v as usize).collect()
-    };
+    let labels = |name: &str| labels_of(&lists(&dir.join(name), [4])[0]);
+    let [ends, vertices] = lists(&dir.join("faces"), [4, 4]).map(|bytes| labels_of(&bytes));
+    let [points] = lists(&dir.join("points"), [24]);
+    let number = |b: &[u8]| f64::from_le_bytes(b.try_into().unwrap());
+    let point = |b: &[u8]| [0, 8, 16].map(|at| number(&b[at..at + 8]));
     Complex {
-        points: list("points").map(|n| n.try_into().unwrap()).collect(),
-        faces: list("faces").map(face).collect(),
+        points: points.chunks_exact(24).map(point).collect(),
+        faces: ends.windows(2).map(|ends| vertices[ends[0]..ends[1]].to_vec()).collect(),
         owner: labels("owner"),
         neighbour: labels("neighbour"),
     }
@@ -112,7 +116,7 @@ impl Leaves {
 
 /// The complex of sorted words, without files.
 fn complex_of(words: &[u64]) -> Complex {
-    let options = options(ASCII);
+    let options = options();
     let mesh = mesh_of(words, |_| false, &options);
     let vertices = |face| mesh.faces.vertices(face).iter().map(|&v| v as usize).collect();
     let indices = |cells: &[u32]| cells.iter().map(|&cell| cell as usize).collect();
@@ -211,5 +215,25 @@ impl Complex {
         let pairs: Vec<_> = self.owner.iter().zip(&self.neighbour).collect();
         assert!(pairs.iter().all(|(owner, neighbour)| owner < neighbour));
         assert!(pairs.windows(2).all(|w| w[0] < w[1]));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20))]
+
+    /// Their content is tested by `harness import`, in `oracles/test_import.py`.
+    #[test]
+    fn files_are_as_long_as_the_summary_states(
+        words in random_words(3), is_wide in any::<bool>()
+    ) {
+        prop_assume!(!words.is_empty());
+        let (dir, mesh) = on_disk(&leaf_set(vec![words]));
+        let target = dir.path().join("case/constant/polyMesh");
+        let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
+        let mut options = options();
+        options.foam.label = label;
+        let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
+        let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
+        prop_assert_eq!(summary.bytes, size);
     }
 }

@@ -20,7 +20,7 @@ proptest! {
 
     #[test]
     fn points_are_the_corners_of_cells_and_of_the_squares_at_missing_cells(words in random_words(5), has_cut in any::<bool>()) {
-        let options = options(ASCII);
+        let options = options();
         let mesh = mesh_of(&words, |word| has_cut && is_cut(word), &options);
         let mut expected: BTreeSet<Point> = BTreeSet::new();
         mesh.leaves.visit_all(&options, |_, around, squares| {
@@ -36,7 +36,7 @@ proptest! {
 
     #[test]
     fn regions_are_the_cells_that_faces_connect(words in random_words(4), one_in in 1u64..5) {
-        let mut options = options(ASCII);
+        let mut options = options();
         let holes = words.iter().copied().filter(|&w| contract::digest::mix(w) % 5 < u128::from(one_in));
         let words: Vec<u64> = holes.collect();
         let leaves = leaves_of(&words, is_cut);
@@ -77,10 +77,10 @@ proptest! {
 /// Asserts that a change of the directories of a mesh is noticed, and for the stated reason.
 fn assert_noticed(why: &str, change: impl Fn(&mut Vec<Directory>)) {
     let words = words_with_sides(|o| o.level < 2, |_| Some(Side::Outside));
-    let options = options(ASCII);
+    let options = options();
     let mesh = mesh_of(&words, |_| false, &options);
     let of_cells: Vec<u32> = (0..64).map(|cell| cell / 22).collect();
-    let mut parts = directories(&mesh, Some(&of_cells));
+    let mut parts = directories(&mesh, &of_cells);
     check_parts(&mesh, &parts);
     change(&mut parts);
     let check = std::panic::AssertUnwindSafe(|| check_parts(&mesh, &parts));

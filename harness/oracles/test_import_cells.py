@@ -1,0 +1,244 @@
+"""Tables and meshes of discretize and OpenFOAM are read as their programs state them, and damaged ones are refused in a sentence. Run with:
+python -m unittest discover harness/oracles"""
+
+import pathlib
+import random
+import shutil
+import tempfile
+import unittest
+
+import numpy as np
+
+import import_cells
+from imports import Refused
+
+SAMPLES = pathlib.Path(__file__).parent.parent / "contract/tests/samples"
+FOAM = ("points", "faces", "owner", "neighbour", "cellLevel")
+# Every sample, the table of its cells, and the root that it states.
+KNOWN = {
+    "cube.json": ("cube.csv", [-1.0, 2.0, 0.5, 2.0]),
+    "cube.msh": ("cube.csv", [-1.0, 2.0, 0.5, 2.0]),
+    "flat.json": ("flat.csv", [0.0, 0.0, -1.0, 8.0]),
+    "flat.msh": ("flat.csv", [0.0, 0.0, -1.0, 8.0]),
+    "rounded.json": ("rounded.csv", [0.0, 0.0, 0.0, 0.25]),
+    "foam-ascii": ("foam.csv", None),
+    "foam-binary": ("foam.csv", None),
+    "unitcube.csv": ("unitcube.csv", None),
+}
+
+
+def read(path, sides=None, root=None, position="corner"):
+    """Corners, edges and what else is known of the cells in a file."""
+    kind = {".csv": "csv", ".npy": "npy", ".json": "discretize", ".msh": "discretize"}.get(path.suffix, "openfoam")
+    corners, edges, more = import_cells.READERS[kind](str(path), {"sides": sides, "root": root, "position": position})
+    for values in (corners, edges, more.get("levels"), more.get("sides")):
+        assert values is None or len(values) == len(edges)
+    return np.asarray(corners, float), np.asarray(edges, float), more
+
+
+def root_of(numbers):
+    return {"origin": numbers[:3], "edge": numbers[3]}
+
+
+class CellsTest(unittest.TestCase):
+    def setUp(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        self.at = pathlib.Path(directory.name)
+
+    def edited(self, name, file, change):
+        """A copy of a sample in which the content of one file was changed."""
+        copy = self.at / name
+        shutil.rmtree(copy, ignore_errors=True)
+        if (SAMPLES / name).is_dir():
+            shutil.copytree(SAMPLES / name, copy)
+        else:
+            shutil.copy(SAMPLES / name, copy)
+        path = copy / file if file else copy
+        path.write_bytes(change(path.read_bytes()))
+        return copy
+
+    def refused(self, path, **options):
+        with self.assertRaises((Refused, OSError)) as caught:
+            read(path, **options)
+        return str(caught.exception)
+
+    def replaced(self, name, file, before, after):
+        """The sentence with which a sample is refused after a text in it was replaced."""
+
+        def change(content):
+            self.assertIn(before, content)
+            return content.replace(before, after, 1)
+
+        return self.refused(self.edited(name, file, change))
+
+    def table(self, text):
+        path = self.at / "table.csv"
+        path.write_text(text)
+        return path
+
+    def test_every_sample_has_the_cells_that_its_program_states(self):
+        for name, (table, root) in KNOWN.items():
+            with self.subTest(name):
+                corners, edges, more = read(SAMPLES / name)
+                expected, sizes, _ = read(SAMPLES / table)
+                order, same = np.lexsort(corners.round(9).T), np.lexsort(expected.round(9).T)
+                np.testing.assert_allclose(corners[order], expected[same], atol=1e-9)
+                np.testing.assert_allclose(edges[order], sizes[same], atol=1e-9)
+                self.assertEqual("levels" in more and more["levels"] is not None, name.startswith("foam") or ".json" in name)
+                if root:
+                    np.testing.assert_allclose([*more["root"]["origin"], more["root"]["edge"]], root, atol=1e-9)
+
+    def test_a_given_root_replaces_one_that_the_file_rounded(self):
+        exact = root_of([0.0, 0.0, 0.0, 0.25])
+        corners, edges, more = read(SAMPLES / "rounded.msh", root=exact)
+        self.assertIs(more["root"], exact)
+        expected, sizes, _ = read(SAMPLES / "rounded.csv")
+        order, same = np.lexsort(corners.round(9).T), np.lexsort(expected.round(9).T)
+        np.testing.assert_allclose(corners[order], expected[same], atol=1e-9)
+        np.testing.assert_allclose(edges[order], sizes[same], atol=1e-9)
+        # This root is not the file's: cells stay where they are.
+        _, _, more = read(SAMPLES / "rounded.msh", root=root_of([0.0, 0.0, 0.0, 0.3]))
+        self.assertNotEqual(more["root"]["edge"], 0.3)
+
+    def test_columns_are_found_by_name_or_by_place(self):
+        root = root_of([1.0, 2.0, 3.0, 8.0])
+        for text in ("1 2 3 1\n5 2 3 3\n", "# comment\n\n1;2;3;1\n5;2;3;3", '"X","y","z","LEVEL","side"\n1,2,3,1,0\n5,2,3,3,2'):
+            corners, edges, more = read(self.table(text), root=root)
+            self.assertEqual((corners.tolist(), edges.tolist(), more["root"]), ([[1, 2, 3], [5, 2, 3]], [4, 1], root))
+        _, _, more = read(self.table(text), root=root, sides="side")
+        self.assertEqual(more["sides"].tolist(), [0, 2])
+        corners, edges, _ = read(self.table("0 0 0 1\n7 0 0 3\n"), root=root, position="index")
+        self.assertEqual(corners.tolist(), [[1, 2, 3], [8, 2, 3]])
+        corners, _, more = read(self.table("0 0 1 1"), position="index")
+        self.assertEqual((corners.tolist(), more["root"]["edge"]), ([[0, 0, 0.5]], 1))
+        corners, edges, more = read(self.table("edge,z,y,x\n2,3,2,1"), position="centre")
+        self.assertEqual((corners.tolist(), edges.tolist(), more["root"]), ([[0, 1, 2]], [2], None))
+
+    def test_arrays_of_numpy_are_tables(self):
+        root, path = root_of([0.0, 0.0, 0.0, 1.0]), self.at / "table.npy"
+        rows = [(0.0, 0.5, 0.0, 1), (0.5, 0.5, 0.0, 2)]
+        plain = np.array(rows)
+        structured = np.array(rows, [("x", ">f4"), ("y", "<f8"), ("z", "<f2"), ("level", "u1")])
+        for array in (plain, np.asfortranarray(plain), plain.astype(">f8"), structured):
+            np.save(path, array)
+            corners, edges, _ = read(path, root=root)
+            self.assertEqual((corners.tolist(), edges.tolist()), ([[0, 0.5, 0], [0.5, 0.5, 0]], [0.5, 0.25]))
+        for array in (plain[:, :3], plain[None], plain.astype(complex), np.array(5.0), plain.astype("U9"), np.zeros(2, [("x", "f8", 2)])):
+            np.save(path, array)
+            self.refused(path, root=root)
+        content = (np.save(path, plain), path.read_bytes())[1]
+        for length in range(0, len(content), 7):
+            path.write_bytes(content[:length])
+            self.refused(path, root=root)
+        path.write_bytes(b"\x93NUMPY\x02\x00\xff\xff\xff\xff" + content)
+        self.refused(path, root=root)
+
+    def test_tables_that_cannot_be_read_are_refused(self):
+        root = root_of([0.0, 0.0, 0.0, 1.0])
+        sentences = {
+            "": "has no cells",
+            ",,;\n": "has no cells",
+            "x,y,z,level\n": "has no cells",
+            "x,y,level\n0,0,1\n": "has no column z",
+            "x,y,z\n0,0,1\n": "has no column level",
+            "0 0 0 one\n": "no table of numbers",
+            "0 0 0 1\n0 0 0\n": "no table of numbers",
+            "x,y,z,level,side\n0,0,0,1\n": "4 fields in a line, but 5 names",
+            "0 0 0 0.5": "cell 0 has the level 0.5",
+            "0 0 0 1\n0 0 0 20": "cell 1 has the level 20",
+            "0 0 0 nan": "has the level nan",
+        }
+        for text, sentence in sentences.items():
+            self.assertIn(sentence, self.refused(self.table(text), root=root))
+        self.assertIn("--root", self.refused(self.table("0 0 0 1")))
+        self.assertIn("need a column level", self.refused(self.table("x,y,z,edge\n0,0,0,1"), position="index"))
+        self.assertIn("has no column body", self.refused(self.table("0 0 0 1"), root=root, sides="body"))
+
+    def test_sides_of_an_openfoam_mesh_are_a_list_of_labels(self):
+        copy = self.edited("foam-ascii", "cellLevel", lambda content: content)
+        shutil.copy(copy / "cellLevel", copy / "body")
+        _, _, more = read(copy, sides="body")
+        self.assertEqual(set(more["sides"].tolist()), {0, 1})
+        self.assertIn("absent", self.refused(copy, sides="absent"))
+        for name in ("cube.json", "cube.msh"):
+            self.assertIn("omit --sides", self.refused(SAMPLES / name, sides="body"))
+
+    def test_a_compressed_or_missing_file_is_named(self):
+        copy = self.edited("foam-binary", "points", lambda content: content)
+        (copy / "points").rename(copy / "points.gz")
+        self.assertIn("points.gz: is compressed: decompress it with gunzip", self.refused(copy))
+        copy = self.edited("foam-binary", "points", lambda content: content)
+        (copy / "owner").unlink()
+        self.assertIn("owner", self.refused(copy))
+
+    def files(self):
+        singles = [(name, "") for name in KNOWN if not name.startswith("foam") and name != "rounded.json"]
+        return singles + [("rounded.msh", "")] + [(name, file) for name in ("foam-ascii", "foam-binary") for file in FOAM]
+
+    def test_an_incomplete_file_is_an_error(self):
+        for name, file in self.files():
+            for part in (0, 0.1, 0.5, 0.9):
+                if name == "unitcube.csv" and part > 0:
+                    continue
+                self.refused(self.edited(name, file, lambda content: content[: int(len(content) * part)]))
+
+    def test_no_damage_is_fatal(self):
+        chance, refusals = random.Random(1), 0
+
+        def change(content):
+            begin, content = chance.randrange(len(content) - 8), bytearray(content)
+            match chance.randrange(3):
+                case 0:
+                    content[begin] = chance.randrange(256)
+                case 1:
+                    content[begin : begin + 8] = chance.choice([b"\0", b"\x7f", b"\xff", b"9"]) * 8
+                case _:
+                    del content[begin : begin + 1 + chance.randrange(7)]
+            return bytes(content)
+
+        for name, file in self.files():
+            for _ in range(60):
+                try:
+                    read(self.edited(name, file, change))
+                except (Refused, OSError, MemoryError):
+                    refusals += 1
+        self.assertGreater(refusals, 250)
+
+    def test_counts_beyond_the_file_are_errors(self):
+        for count in (b"999999999999", b"18446744073709551615", b"99999999999999999999999999"):
+            for name, file, before, after in (
+                ("foam-binary", "points", b"\n462\n", b"\n%s\n"),
+                ("foam-ascii", "owner", b"\n960\n(", b"\n%s\n("),
+            ):
+                self.replaced(name, file, before, after % count)
+        self.assertIn("states 600 items", self.replaced("foam-binary", "points", b"\n462\n", b"\n600\n"))
+
+    def test_each_error_of_a_mesh_names_its_cell(self):
+        moved = self.replaced("foam-ascii", "points", b"(0 -1 -1)", b"(0.2 -1 -1)")
+        self.assertIn("cell 0 (corner [-1.0, -1.0, -1.0]) is not a cube: its bounds", moved)
+        # The points have the numbers 0 to 461.
+        self.assertIn("none of 462 points", self.replaced("foam-ascii", "faces", b"6(1 6 158", b"6(1 6 462"))
+
+        def collapse(content):
+            at = content.index(b"\n4(")
+            end = content.index(b")", at)
+            return content[: at + 3] + b" ".join([content[at + 3 : end].split()[0]] * 4) + content[end:]
+
+        self.assertIn("is not a cube: its faces enclose", self.refused(self.edited("foam-ascii", "faces", collapse)))
+
+        def lengthen(content):
+            return content[: content.index(b"\n720\n(")] + b"\n961\n(" + b"0 " * 961 + b")"
+
+        why = self.refused(self.edited("foam-ascii", "neighbour", lengthen))
+        self.assertIn("960 faces with 960 owners and 961 neighbours: its files belong to different meshes", why)
+
+    def test_widths_that_vary_are_an_error(self):
+        for width in (b"0.25", b"0.1250005"):
+            why = self.replaced("cube.json", "", b"[[0.125, 0.125", b"[[0.125, " + width)
+            self.assertIn(f"widths 0.125 and {width.decode()} along axis 1", why)
+        self.assertIn("only cubes", self.replaced("cube.msh", "", b"0.125 0.125 0.125", b"0.125 0.250 0.125"))
+
+
+if __name__ == "__main__":
+    unittest.main()
