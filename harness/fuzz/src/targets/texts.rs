@@ -2,8 +2,8 @@
 
 use crate::Scratch;
 use bench::experiments::record;
+use bench::gate::Rules;
 use bench::gate::measures::Measures;
-use bench::gate::rules::Rules;
 use bench::track::history::{self, Record};
 use check::audit::record::AuditRecord;
 use contract::catalogue::{Catalogue, Size};
