@@ -138,7 +138,7 @@ fn describe(canvas: &Canvas, window: &Window, passage: &Passage) {
 #[cfg(test)]
 mod tests {
     use super::{Passage, *};
-    use crate::figure::palette::hex_of;
+    use crate::figure::palette::{COLOURS, hex};
     use contract::testing::words_with_sides;
     use geometry::leak::report::{Narrowest, Point, Spacing};
 
@@ -172,7 +172,7 @@ mod tests {
         assert!(svg.contains("width 1.00") && svg.contains("cell 1.00"));
         let strokes = |ink: &str| svg.matches(&format!("stroke=\"{ink}\"")).count();
         // Two segments of the path and its symbol, the ball with its symbol.
-        assert_eq!((strokes(&hex_of(0)), strokes(&hex_of(1))), (3, 2));
+        assert_eq!((strokes(&hex(COLOURS[0])), strokes(&hex(COLOURS[1]))), (3, 2));
         assert_eq!(svg.matches(CROSSING).count(), 2);
     }
 }
