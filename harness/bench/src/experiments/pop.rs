@@ -66,19 +66,13 @@ impl Efficiency {
     /// Ranks wait for each other at the end of phases, so neither their balance nor their waiting can gain time.
     fn check_invariants(&self) {
         let Self { load_balance, serialisation, transfer, computation_scaling, lambda, .. } = *self;
-        assert!(
-            load_balance <= 1.0 + ROUNDING && lambda >= 1.0 - ROUNDING,
-            "load balance of at most 1: {self:?}"
-        );
+        let is_balance = load_balance <= 1.0 + ROUNDING && lambda >= 1.0 - ROUNDING;
+        assert!(is_balance, "load balance of at most 1: {self:?}");
         assert!(serialisation <= 1.0 + ROUNDING, "serialisation of at most 1: {self:?}");
-        assert!(
-            transfer >= 0.0 && computation_scaling >= 0.0,
-            "efficiencies of at least 0: {self:?}"
-        );
-        assert!(
-            (load_balance * lambda - 1.0).abs() < ROUNDING,
-            "load balance is 1 / lambda: {self:?}"
-        );
+        let are_positive = transfer >= 0.0 && computation_scaling >= 0.0;
+        assert!(are_positive, "efficiencies of at least 0: {self:?}");
+        let is_inverse = (load_balance * lambda - 1.0).abs() < ROUNDING;
+        assert!(is_inverse, "load balance is 1 / lambda: {self:?}");
     }
 }
 

@@ -14,7 +14,7 @@ pub mod measures;
 pub mod numbers;
 pub mod phases;
 pub mod report;
-mod rules;
+pub mod rules;
 mod subject;
 mod time;
 

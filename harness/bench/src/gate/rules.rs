@@ -139,24 +139,25 @@ impl Rules {
         let mut rules: Self =
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
-        let time = &rules.time;
-        if !(time.alpha > 0.0
-            && time.alpha < 0.5
-            && time.effect_min >= 0.0
-            && time.phase_min >= 0.0)
-        {
-            return Err(wrong(
-                "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into(),
-            ));
-        }
-        rules.check_cases().map_err(wrong)?;
-        let least = rounds_min(time.alpha);
-        if time.rounds_min < least || time.rounds_max < time.rounds_min {
-            return Err(wrong(format!(
-                "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
-            )));
-        }
+        rules.check_time().and_then(|()| rules.check_cases()).map_err(wrong)?;
         Ok(rules)
+    }
+
+    fn check_time(&self) -> Result<(), String> {
+        let TimeRules { alpha, effect_min, phase_min, rounds_min: fewest, rounds_max, .. } =
+            self.time;
+        if !(alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0 && phase_min >= 0.0) {
+            return Err(
+                "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into()
+            );
+        }
+        let least = rounds_min(alpha);
+        match fewest >= least && rounds_max >= fewest {
+            true => Ok(()),
+            false => Err(format!(
+                "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
+            )),
+        }
     }
 
     /// Checks that there are cases, each with a name of its own and something to compare.

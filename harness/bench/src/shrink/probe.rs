@@ -82,6 +82,8 @@ pub enum Unknown {
 pub struct Probe {
     engine: Engine,
     reference: Engine,
+    /// What must make the same mesh, and its name; `None` if only promises are checked.
+    truth: Option<(Engine, &'static str)>,
     ranks: Ranks,
     limit: Duration,
     place: TempDir,
@@ -102,7 +104,14 @@ impl Probe {
     ) -> Result<Self, String> {
         let place = tempfile::Builder::new().prefix("harness-shrink-").tempdir();
         let place = place.map_err(|error| error.to_string())?;
-        Ok(Self { engine, reference, ranks, limit, place })
+        let promises = &engine.description().promises;
+        let truth = match ranks {
+            Ranks::Serial => promises.definition.then(|| (reference.clone(), "the reference")),
+            _ => promises
+                .is_independent_of(Independence::Ranks)
+                .then(|| (engine.clone(), "its serial run")),
+        };
+        Ok(Self { engine, reference, truth, ranks, limit, place })
     }
 
     /// The ranks of the first trial.
@@ -188,28 +197,16 @@ impl Probe {
 
     /// The mesh that the engine must make, if there is one.
     fn truth(&self, case: &Path) -> Result<Option<LeafSet>, Unknown> {
-        let Some((engine, name)) = self.truth_engine() else { return Ok(None) };
-        match self.run(engine, case, Ranks::Serial, "truth", false) {
-            Ok(mesh) => Ok(Some(mesh)),
-            Err(why) => Err(Unknown::Error(format!(
-                "no mesh to compare with, because {name} failed: {why}"
-            ))),
-        }
-    }
-
-    fn truth_engine(&self) -> Option<(&Engine, &'static str)> {
-        let promises = &self.engine.description().promises;
-        match self.ranks {
-            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
-            _ => promises
-                .is_independent_of(Independence::Ranks)
-                .then_some((&self.engine, "its serial run")),
-        }
+        let Some((engine, name)) = &self.truth else { return Ok(None) };
+        let mesh = self.run(engine, case, Ranks::Serial, "truth", false);
+        mesh.map(Some).map_err(|why| {
+            Unknown::Error(format!("no mesh to compare with, because {name} failed: {why}"))
+        })
     }
 
     /// What the engine is compared with; `None` if only its promises are checked.
     pub fn truth_name(&self) -> Option<&'static str> {
-        self.truth_engine().map(|(_, name)| name)
+        self.truth.as_ref().map(|(_, name)| *name)
     }
 
     /// Both meshes of a trial, for `harness diff`: that of the engine, and the expected one.
@@ -222,7 +219,7 @@ impl Probe {
             let made = self.run(engine, &case, ranks, name, false);
             made.map(|_| self.place.path().join(name).join("mesh")).map_err(|why| why.to_string())
         };
-        let (truth, _) = self.truth_engine().ok_or("there is no mesh to compare with")?;
+        let (truth, _) = self.truth.as_ref().ok_or("there is no mesh to compare with")?;
         Ok([run(&self.engine, trial.ranks, "engine")?, run(truth, Ranks::Serial, "truth")?])
     }
 

@@ -8,6 +8,7 @@
 pub mod file;
 pub mod judge;
 pub mod measure;
+mod series;
 mod session;
 
 pub use file::Study;

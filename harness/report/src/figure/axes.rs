@@ -2,9 +2,9 @@
 
 use super::Axis;
 use super::canvas::{At, Canvas, FAINT, WIDTH, font, width};
-use super::scale::{Scale, tick_labels, ticks};
-use plotters::coord::combinators::BindKeyPoints;
-use plotters::coord::ranged1d::Ranged;
+use super::scale::{tick_labels, ticks};
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
 
@@ -21,6 +21,26 @@ pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
     labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
 }
 
+/// A linear coordinate with these ticks.
+struct Scale(RangedCoordf64, Vec<f64>);
+
+impl Ranged for Scale {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        self.0.map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
+        self.1.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.0.range()
+    }
+}
+
 /// Where values are on the page.
 pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
 
@@ -33,14 +53,20 @@ pub fn axes(
     (from, to): (At, At),
     grid: bool,
 ) -> ToPage {
-    let scales = || [0, 1].map(|i| Scale::new(axes[i], &ends[i]));
-    let [x, y] = scales();
-    let [at_x, at_y] = [0, 1].map(|i| ticks(axes[i], &ends[i]));
-    let label = |ticks: &[f64], value: &f64| {
-        let at = ticks.iter().position(|tick| tick == value);
-        at.map_or_else(String::new, |at| tick_labels(ticks).swap_remove(at))
+    // What is linear on the page.
+    let place = |axis: &Axis, value: f64| if axis.log { value.log10() } else { value };
+    let scales = [0, 1].map(|i| {
+        let Range { start, end } = ends[i];
+        RangedCoordf64::from(place(axes[i], start)..place(axes[i], end))
+    });
+    let all = [0, 1].map(|i| ticks(axes[i], &ends[i]));
+    let labels = all.each_ref().map(|ticks| tick_labels(ticks));
+    let at = [0, 1].map(|i| all[i].iter().map(|v| place(axes[i], *v)).collect::<Vec<f64>>());
+    let label = |i: usize, value: &f64| {
+        let index = at[i].iter().position(|at| at == value);
+        index.map_or_else(String::new, |index| labels[i][index].clone())
     };
-    let (x, y) = (x.with_key_points(at_x.clone()), y.with_key_points(at_y.clone()));
+    let [x, y] = [0, 1].map(|i| Scale(scales[i].clone(), at[i].clone()));
     let space = |i: usize, space: f64| if axes[i].label.is_empty() { 0.0 } else { space };
     // The label of the vertical axis keeps clear of the edge of the page.
     let [left, below] = [space(1, left(axes[1], &ends[1]) - 14.0), space(0, BELOW)];
@@ -52,7 +78,7 @@ pub fn axes(
         .set_label_area_size(LabelAreaPosition::Bottom, below)
         .build_cartesian_2d(x, y)
         .expect("the rectangle lies on the page");
-    let (of_x, of_y) = (|value: &f64| label(&at_x, value), |value: &f64| label(&at_y, value));
+    let (of_x, of_y) = (|value: &f64| label(0, value), |value: &f64| label(1, value));
     let mut mesh = chart.configure_mesh();
     let grid = if grid { FAINT.to_rgba() } else { TRANSPARENT };
     mesh.light_line_style(TRANSPARENT).bold_line_style(grid).axis_style(BLACK.stroke_width(2));
@@ -61,12 +87,13 @@ pub fn axes(
     mesh.x_desc(axes[0].label.as_str()).y_desc(axes[1].label.as_str());
     mesh.draw().expect("a string accepts every element");
     canvas.frame(from, to);
-    let (scales, limits) = (scales(), [(from.0 as i32, to.0 as i32), (to.1 as i32, from.1 as i32)]);
+    let limits = [(from.0 as i32, to.0 as i32), (to.1 as i32, from.1 as i32)];
+    let axes = axes.map(Axis::clone);
     Box::new(move |x, y| {
         let at = |i: usize, value: f64| {
             let Range { start, end } = ends[i];
             let within = value.clamp(start.min(end), start.max(end));
-            f64::from(scales[i].map(&within, limits[i]))
+            f64::from(scales[i].map(&place(&axes[i], within), limits[i]))
         };
         (at(0, x), at(1, y))
     })

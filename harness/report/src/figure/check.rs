@@ -5,7 +5,7 @@
 //! - Bars have a value for each category and segment, and none is negative; entries of a matrix lie in it.
 //! - A point above the ideal line has a reason in the caption.
 
-use super::{Axis, Body, Figure, HeatMap, Point, Provenance, Series};
+use super::{Axis, Body, Figure, HeatMap, Layer, Point, Provenance, Series};
 use std::collections::BTreeSet;
 
 /// Asserts the invariants of the figures of a report.
@@ -31,9 +31,7 @@ pub fn check_figure(figure: &Figure) {
     match &figure.body {
         Body::Points { series, marks } => {
             assert!(marks.iter().all(|m| m.x.is_finite()), "figure {id}: a mark is nowhere");
-            for s in series {
-                s.points.iter().for_each(|p| check_point(figure, s, p));
-            }
+            series.iter().for_each(|s| check_series(figure, s));
             check_ideal(figure, series);
         }
         Body::Bars(bars) => {
@@ -41,29 +39,24 @@ pub fn check_figure(figure: &Figure) {
             let levels = bars.references.iter().map(|(_, level)| level);
             let is_length = |v: &f64| v.is_finite() && *v >= 0.0;
             assert!(values.chain(levels).all(is_length), "figure {id}: a bar has no length");
-            let are_complete =
-                bars.segments.iter().all(|(_, values)| values.len() == bars.categories.len());
-            assert!(
-                are_complete,
-                "figure {id}: a segment has more or fewer values than there are bars"
-            );
+            let count = bars.categories.len();
+            let are_complete = bars.segments.iter().all(|(_, values)| values.len() == count);
+            assert!(are_complete, "figure {id}: a segment has more or fewer values than {count}");
         }
         Body::HeatMap(map) => check_matrix(id, map),
     }
 }
 
-fn check_point(figure: &Figure, s: &Series, p: &Point) {
-    let (id, name) = (&figure.id, &s.name);
+fn check_series(figure: &Figure, s: &Series) {
+    let name = format!("figure {}, {}", figure.id, s.name);
     let can_be_drawn = |axis: &Axis, v: f64| v.is_finite() && (!axis.log || v > 0.0);
-    assert!(
-        can_be_drawn(&figure.x, p.x)
-            && can_be_drawn(&figure.y, p.y)
-            && p.low.is_finite()
-            && p.high.is_finite(),
-        "figure {id}, {name}: the axes cannot show {p:?}"
-    );
-    assert!(p.low <= p.y && p.y <= p.high, "figure {id}, {name}: {p:?} is outside of its interval");
-    assert!((0.0..=1.0).contains(&p.coverage), "figure {id}, {name}: a coverage of {}", p.coverage);
+    for p in &s.points {
+        let is_shown = can_be_drawn(&figure.x, p.x) && can_be_drawn(&figure.y, p.y);
+        let is_finite = p.low.is_finite() && p.high.is_finite();
+        assert!(is_shown && is_finite, "{name}: the axes cannot show {p:?}");
+        assert!(p.low <= p.y && p.y <= p.high, "{name}: {p:?} is outside of its interval");
+        assert!((0.0..=1.0).contains(&p.coverage), "{name}: a coverage of {}", p.coverage);
+    }
 }
 
 /// A line through the two ends of the ideal, straight on logarithmic axes.
@@ -80,25 +73,14 @@ fn check_ideal(figure: &Figure, series: &[Series]) {
     );
 }
 
-fn check_matrix(id: &str, map: &HeatMap) {
-    for layer in &map.layers {
-        let is_within = |e: &(usize, usize, f64)| {
-            e.0 < map.order && e.1 < map.order && e.2.is_finite() && e.2 >= 0.0
-        };
-        let wrong = layer.entries.iter().find(|e| !is_within(e));
-        assert!(
-            wrong.is_none(),
-            "figure {id}, {}: {wrong:?} in a matrix of {}",
-            layer.label,
-            map.order
-        );
-        let places: BTreeSet<_> = layer.entries.iter().map(|e| (e.0, e.1)).collect();
-        assert_eq!(
-            places.len(),
-            layer.entries.len(),
-            "figure {id}, {}: two entries in one place",
-            layer.label
-        );
+fn check_matrix(id: &str, HeatMap { order, layers, .. }: &HeatMap) {
+    for Layer { label, entries } in layers {
+        let is_within = |e: &(usize, usize, f64)| e.0.max(e.1) < *order && e.2 >= 0.0;
+        let wrong = entries.iter().find(|e| !is_within(e) || e.2.is_infinite());
+        assert!(wrong.is_none(), "figure {id}, {label}: {wrong:?} in a matrix of {order}");
+        let places: BTreeSet<_> = entries.iter().map(|e| (e.0, e.1)).collect();
+        let count = entries.len();
+        assert_eq!(places.len(), count, "figure {id}, {label}: two entries in one place");
     }
 }
 

@@ -22,11 +22,6 @@ pub fn colour(style: usize) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// The colour of a style in the notation of SVG.
-pub fn hex_of(style: usize) -> String {
-    hex(COLOURS[style % COLOURS.len()])
-}
-
 /// A colour in the notation of SVG.
 pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")

@@ -2,52 +2,9 @@
 
 use super::Axis;
 use bench::order::distinct;
-use plotters::coord::combinators::{IntoLogRange, LogCoord};
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
 use std::ops::Range;
-
-/// A linear or logarithmic coordinate of `plotters`.
-pub enum Scale {
-    Linear(RangedCoordf64),
-    Log(LogCoord<f64>),
-}
-
-impl Scale {
-    /// The coordinate of an axis with these ends.
-    pub fn new(axis: &Axis, ends: &Range<f64>) -> Self {
-        match axis.log {
-            true => Self::Log(ends.clone().log_scale().into()),
-            false => Self::Linear(ends.clone().into()),
-        }
-    }
-}
-
-impl Ranged for Scale {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        match self {
-            Self::Linear(linear) => linear.map(value, limit),
-            Self::Log(log) => log.map(value, limit),
-        }
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        match self {
-            Self::Linear(linear) => linear.key_points(hint),
-            Self::Log(log) => log.key_points(hint),
-        }
-    }
-
-    fn range(&self) -> Range<f64> {
-        match self {
-            Self::Linear(linear) => linear.range(),
-            Self::Log(log) => log.range(),
-        }
-    }
-}
 
 /// The ends of an axis that shows all `values`. A logarithmic one ignores values that are not positive.
 pub fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {

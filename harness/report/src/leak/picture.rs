@@ -1,7 +1,7 @@
 //! A slice through the narrowest place of a leak as SVG: the plane that contains the direction of the path and a point
 //! of the rim. It shows the leaves, the section of the facets, the largest ball that passes and the path.
 
-use crate::figure::canvas::{Anchor, Canvas, DOTTED, SIZE, WIDTH, document, width};
+use crate::figure::canvas::{Anchor, Canvas, LINE, WIDTH, document};
 use crate::figure::palette::colour;
 use crate::section::{Planar, Window};
 use contract::case::Case;
@@ -13,8 +13,8 @@ use plotters::style::colors::BLACK;
 
 /// Half of the window's edge, in widths of the narrowest place and in cells; the larger one counts.
 const HALF: (f64, f64) = (2.0, 6.0);
-/// Space above the window for the legend, and below it for the scale.
-const MARGIN: (f64, f64) = (150.0, 190.0);
+/// Space above the window for the legend, and below it for text.
+const MARGIN: (f64, f64) = (150.0, 140.0);
 /// Space at the left and at the right of the window.
 const SIDES: f64 = 40.0;
 /// Fill of crossing leaves.
@@ -34,8 +34,8 @@ pub fn svg(case: &Case, words: &[u64], passage: &Passage) -> String {
         let (left, top) = on_page(&window, [-window.half[0], window.half[1]]);
         let (right, bottom) = on_page(&window, [window.half[0], -window.half[1]]);
         canvas.frame((left, top), (right, bottom));
-        draw_legend(canvas);
-        draw_scale(canvas, &window, passage);
+        draw_legend(canvas, passage);
+        describe(canvas, &window, passage);
         (bottom + MARGIN.1) as u32
     })
 }
@@ -103,55 +103,42 @@ fn draw_passage(canvas: &mut Canvas, window: &Window, passage: &Passage) {
     canvas.line(&circle, colour(1), 6, None);
 }
 
-fn draw_legend(canvas: &mut Canvas) {
-    let lines = [("facets", BLACK), ("projected path", colour(0)), ("largest ball", colour(1))];
-    let names = lines.map(|line| line.0);
-    let names = [&["leaf crossed by facets"], &names[..]].concat();
+fn draw_legend(canvas: &mut Canvas, passage: &Passage) {
+    let ball = format!("largest ball, width {}", number(passage.narrowest.width));
+    let names = ["leaf crossed by facets", "facets", "projected path", &ball];
+    let lines = [BLACK, colour(0), colour(1)];
     canvas.legend([SIDES; 2], &names, |canvas, (x, y), i| match i {
         0 => {
             let [left, right, top, bottom] = [x, x + 50.0, y - 22.0, y + 22.0];
             let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
             canvas.polygons(&[corners.to_vec()], CROSSING, FAINT);
         }
-        _ => canvas.line(&[(x, y), (x + 50.0, y)], lines[i - 1].1, 6, None),
+        _ => canvas.line(&[(x, y), (x + 50.0, y)], lines[i - 1], 6, None),
     });
 }
 
-/// A bar as long as a cell of the base tree and one as long as the width, and the place and orientation of the plane.
-fn draw_scale(canvas: &mut Canvas, window: &Window, passage: &Passage) {
-    let narrowest = &passage.narrowest;
-    let (left, bottom) = on_page(window, window.half.map(|h| -h));
-    let length = |l: f64| on_page(window, [l, 0.0]).0 - on_page(window, [0.0, 0.0]).0;
-    let bars = [
-        (format!("width {}", number(narrowest.width)), narrowest.width, colour(1), None),
-        (
-            format!("cell {}", number(passage.spacing.spacing)),
-            passage.spacing.spacing,
-            BLACK,
-            DOTTED,
-        ),
-    ];
-    let (mut x, y) = (left, bottom + 46.0);
-    for (name, long, ink, dashes) in bars {
-        canvas.line(&[(x, y), (x + length(long), y)], ink, 8, dashes);
-        canvas.text(&name, (x + length(long) + 16.0, y), Anchor::Start);
-        x += length(long) + width(&name) + 70.0;
-    }
+/// The edge of a cell of the base tree, and the place and orientation of the plane.
+fn describe(canvas: &Canvas, window: &Window, passage: &Passage) {
     let vector = |v: [f64; 3]| {
         let [x, y, z] = v.map(|c| format!("{:?}", (c * 1e3).round() / 1e3 + 0.0));
         format!("({x}, {y}, {z})")
     };
-    let centre = narrowest.at.map(|c| format!("{:?}", c as f32)).join(", ");
+    let centre = window.centre.map(|c| format!("{:?}", c as f32)).join(", ");
     let [along, across] = window.axes.map(vector);
-    canvas.text(&format!("centre ({centre})"), (left, y + SIZE + 10.0), Anchor::Start);
-    let axes = format!("to the right {along}, upwards {across}");
-    canvas.text(&axes, (left, y + 2.0 * (SIZE + 8.0)), Anchor::Start);
+    let cell = number(passage.spacing.spacing);
+    let (left, bottom) = on_page(window, window.half.map(|h| -h));
+    for (line, text) in (1..).zip([
+        format!("cell {cell}, centre ({centre})"),
+        format!("to the right {along}, upwards {across}"),
+    ]) {
+        canvas.text(&text, (left, bottom + f64::from(line) * LINE), Anchor::Start);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Passage, *};
-    use crate::figure::palette::hex_of;
+    use crate::figure::palette::{COLOURS, hex};
     use contract::testing::words_with_sides;
     use geometry::leak::report::{Narrowest, Point, Spacing};
 
@@ -184,8 +171,8 @@ mod tests {
         let svg = svg(&case, &words, &passage);
         assert!(svg.contains("width 1.00") && svg.contains("cell 1.00"));
         let strokes = |ink: &str| svg.matches(&format!("stroke=\"{ink}\"")).count();
-        // Two segments of the path and its symbol, the ball with its symbol and the bar.
-        assert_eq!((strokes(&hex_of(0)), strokes(&hex_of(1))), (3, 3));
+        // Two segments of the path and its symbol, the ball with its symbol.
+        assert_eq!((strokes(&hex(COLOURS[0])), strokes(&hex(COLOURS[1]))), (3, 2));
         assert_eq!(svg.matches(CROSSING).count(), 2);
     }
 }

@@ -210,18 +210,12 @@ impl Picture {
     /// # Panics
     /// If that is not so.
     pub fn check_invariants(&self) {
-        let [low, high] = self.window;
-        let slack = self.root.edge * 1e-6;
-        let axes = plane_axes(self.slice.axis);
-        for i in 0..2 {
-            let (from, to) =
-                (self.root.origin[axes[i]], self.root.origin[axes[i]] + self.root.edge);
-            let is_inside = from - slack <= low[i] && low[i] < high[i] && high[i] <= to + slack;
-            assert!(
-                is_inside,
-                "the window {:?} is not within the root from {from} to {to}",
-                self.window
-            );
+        let (root, [low, high]) = (&self.root, self.window);
+        let (slack, axes) = (root.edge * 1e-6, plane_axes(self.slice.axis));
+        for (i, from) in axes.map(|axis| root.origin[axis] - slack).into_iter().enumerate() {
+            let until = from + root.edge + 2.0 * slack;
+            let is_inside = from <= low[i] && low[i] < high[i] && high[i] <= until;
+            assert!(is_inside, "the window {:?} is not within the root", self.window);
         }
         for square in &self.squares.squares {
             let [from, to] = self.corners(square);

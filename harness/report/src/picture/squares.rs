@@ -137,12 +137,8 @@ impl Squares {
     /// # Panics
     /// If that is not so.
     pub fn check_invariants(&self, detail: &Detail) {
-        let count = self.squares.len();
-        assert!(
-            count <= detail.squares_max.max(1),
-            "{count} squares of at most {}",
-            detail.squares_max
-        );
+        let (count, most) = (self.squares.len(), detail.squares_max);
+        assert!(count <= most.max(1), "{count} squares of at most {most}");
         let leaves: u64 = self.squares.iter().map(|s| s.leaves).sum();
         assert_eq!(leaves, self.leaves, "leaves of all squares and of the slice");
         // The Morton codes of octants in the lowest layer of the root.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::testing::study as read;
+use run::engine::description::Description;
 
 const FILE: &str = r#"
     [mesh.cube]
