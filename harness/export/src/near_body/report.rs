@@ -182,12 +182,11 @@ fn spreads(root: &Root, faces: &[Face], gaps: &[Gap]) -> Option<BTreeMap<&'stati
         let unit = |face: &Face| if in_cells { edge_of_level(root, face.leaf_level) } else { 1.0 };
         Spread::of(gaps.iter().zip(faces).map(|(gap, face)| distance(gap) / unit(face)).collect())
     };
-    let (least, centre): (fn(&Gap) -> f64, fn(&Gap) -> f64) = (|gap| gap.least, |gap| gap.centre);
     Some(BTreeMap::from([
-        ("least", spread(least, false)?),
-        ("least_cells", spread(least, true)?),
-        ("centre", spread(centre, false)?),
-        ("centre_cells", spread(centre, true)?),
+        ("least", spread(|gap| gap.least, false)?),
+        ("least_cells", spread(|gap| gap.least, true)?),
+        ("centre", spread(|gap| gap.centre, false)?),
+        ("centre_cells", spread(|gap| gap.centre, true)?),
     ]))
 }
 

@@ -172,15 +172,16 @@ fn a_clip_box_is_the_window() {
 
 #[test]
 fn a_picture_without_cells_and_unknown_sides_are_errors() {
-    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
+    let (place, mesh) = on_disk(vec![eight_and_seven()]);
     let sentence = |mesh: &Mesh, shown: &Request| {
         Picture::collect(mesh, shown, &VECTOR).unwrap_err().to_string()
     };
     let selection = Selection { level_max: Some(0), ..Selection::default() };
     let empty = Request { selection, ..request(Colour::Level) };
     assert!(sentence(&mesh, &empty).contains("no leaf of the selection"));
-    let mut unknown = mesh;
-    unknown.manifest.sides = contract::manifest::Sides::Unknown;
+    let sides = contract::manifest::Sides::Unknown;
+    contract::manifest::Manifest { sides, ..mesh.manifest.clone() }.write(place.path()).unwrap();
+    let unknown = Mesh::open(place.path()).unwrap();
     assert!(sentence(&unknown, &request(Colour::Side)).contains("unknown"));
 }
 
