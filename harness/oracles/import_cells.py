@@ -210,7 +210,8 @@ class Foam:
         head = re.match(rb"(?:\s|//[^\n]*|/\*.*?\*/)*FoamFile\s*\{(.*?)\}", data, re.DOTALL)
         if not head:
             self.refuse("does not begin with a dictionary FoamFile")
-        entries = dict(re.findall(rb'(\w+)\s+"?([^";]*|[^"]*)"?\s*;', head[1]))
+        found = re.findall(rb'(\w+)\s+(?:"([^"]*)"|([^";]*))\s*;', head[1])
+        entries = {key: quoted or plain for key, quoted, plain in found}
         self.is_binary, self.kind = entries.get(b"format") == b"binary", entries.get(b"class")
         architecture = entries.get(b"arch", b"").decode(errors="replace")
         for field in map(str.strip, architecture.split(";")):

@@ -128,8 +128,8 @@ fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
     let out = fixture.path().join("out");
     fs::create_dir(&out).unwrap();
     let outputs: [&[&str]; 4] = [
-        &["export", "mesh", "out/case/constant/polyMesh", "--ascii"],
-        &["export", "mesh", "out/constant/polyMesh", "--ascii", "--processors", "3", "--jobs", "1"],
+        &["export", "mesh", "out/case/constant/polyMesh"],
+        &["export", "mesh", "out/constant/polyMesh", "--processors", "3", "--jobs", "1"],
         &["export", "mesh", "out/mesh.pvtu", "--jobs", "1"],
         &["picture", "case.toml", "--paper", "--out", "out/set", "--mesher", "./copier"],
     ];

@@ -10,7 +10,7 @@ pub const UNITS_PER_EDGE: i64 = 1 << 27;
 pub type FacetLattice = [[i64; 3]; 3];
 
 /// The root cube, in the user's units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Root {
     /// Minimum corner.

@@ -45,12 +45,13 @@ pub enum Enclosed {
 }
 
 /// The tree that a leaf set holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tree {
     /// All leaves of the base tree T0 with their sides, before deletion.
     Base,
     /// The final mesh.
+    #[default]
     Final,
 }
 
@@ -182,7 +183,7 @@ pub struct Part {
 }
 
 /// The manifest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// [`SCHEMA`].
@@ -243,31 +244,16 @@ pub struct Manifest {
 impl Manifest {
     /// The manifest of a mesh without rules and leaves: everything is kept, and no level is required.
     pub fn without_leaves(tree: Tree, root: Root, program: String) -> Self {
-        let Tally { leaves, by_level, by_side, digest, octants } = Tally::default();
         Self {
             schema: SCHEMA.to_owned(),
             program,
             tree,
             root,
-            level_surface: 0,
             layer_cells_min: 1,
             keep: Keep::All,
             keep_crossing: true,
-            boxes: Vec::new(),
-            seeds: Vec::new(),
-            enclosed: Enclosed::default(),
-            sides: Sides::Known,
-            geometry: None,
-            leaks: None,
-            leaves,
-            leaves_by_level: by_level,
-            leaves_by_side: by_side,
-            components: None,
-            components_ambiguous: Ambiguous::default(),
-            digest,
-            octant_digests: octants,
-            parts: Vec::new(),
-            hyper_tree_grid: None,
+            octant_digests: vec![Digest::default(); OCTANTS],
+            ..Self::default()
         }
     }
 

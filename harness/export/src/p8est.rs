@@ -48,11 +48,10 @@ pub fn write(
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
-    let counts = Counts::of(mesh, selection, options)?;
-    if counts.leaves == 0 {
+    let (leaves, ends) = counted(mesh, selection, options)?;
+    if leaves == 0 {
         return Err(nothing_selected(mesh));
     }
-    let ends = counts.saved_partition();
     let total = ends[ends.len() - 1];
     let named = |error| ExportError::write(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
@@ -71,12 +70,12 @@ pub fn write(
             written.add(&quadrant.octant, quadrant.data != FILLER);
             out.write_all(&quadrant.record()).map_err(named)
         })?;
-        written.check_invariants(mesh, selection, counts.leaves);
+        written.check_invariants(mesh, selection, leaves);
         assert_eq!((done, written.volume), (total, KEY_END), "quadrants, which tile the root");
         out.flush().map_err(named)?;
         Ok(start.len() as u64 + total * RECORD_BYTES as u64)
     })?;
-    Ok(Summary { leaves: counts.leaves, files: 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
 
 /// An octant of the forest, its data, and the part of the mesh in which it, or the next leaf, is.
@@ -137,39 +136,27 @@ fn fill(
     Ok(())
 }
 
-/// Numbers of quadrants.
-struct Counts {
-    leaves: u64,
-    /// Quadrants of each part, fillers included.
-    by_part: Vec<u64>,
-}
-
-impl Counts {
-    fn of(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Self, ExportError> {
-        let parts = mesh.leaves_by_rank()?.len().max(1);
-        let mut counts = Self { leaves: 0, by_part: vec![0; parts] };
-        let mut done = 0;
-        quadrants(mesh, selection, &mut |quadrant| {
-            if done % STEP == 0 {
-                options.check()?;
-            }
-            done += 1;
-            counts.leaves += u64::from(quadrant.data != FILLER);
-            counts.by_part[quadrant.part as usize] += 1;
-            Ok(())
-        })?;
-        Ok(counts)
+/// Number of leaves, and of quadrants up to the end of each saved part, fillers included.
+fn counted(
+    mesh: &Mesh,
+    selection: &Selection,
+    options: &Options<'_>,
+) -> Result<(u64, Vec<u64>), ExportError> {
+    let mut ends = vec![0; mesh.leaves_by_rank()?.len().max(1)];
+    let (mut leaves, mut done) = (0, 0u64);
+    quadrants(mesh, selection, &mut |quadrant| {
+        if done.is_multiple_of(STEP) {
+            options.check()?;
+        }
+        done += 1;
+        leaves += u64::from(quadrant.data != FILLER);
+        ends[quadrant.part as usize] += 1;
+        Ok(())
+    })?;
+    for part in 1..ends.len() {
+        ends[part] += ends[part - 1];
     }
-
-    /// Number of quadrants up to the end of each saved part.
-    fn saved_partition(&self) -> Vec<u64> {
-        let mut sum = 0;
-        let add = |count: &u64| {
-            sum += count;
-            sum
-        };
-        self.by_part.iter().map(add).collect()
-    }
+    Ok((leaves, ends))
 }
 
 /// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their

@@ -150,10 +150,10 @@ proptest! {
             for key in [0, 1 << 54, 5 << 51, (1 << 57) - 1] {
                 let _ = cursor.leaves_before(key);
                 let mut found = Vec::new();
-                let _ = cursor.words(key, 2, &mut found);
+                let _ = cursor.words(key, 2, &mut found, &mut Vec::new());
             }
             let mut found = Vec::new();
-            if let (Ok(()), Ok(streamed)) = (cursor.words(0, 0, &mut found), &streamed) {
+            if let (Ok(()), Ok(streamed)) = (cursor.words(0, 0, &mut found, &mut Vec::new()), &streamed) {
                 prop_assert_eq!(&found, streamed);
             }
         }

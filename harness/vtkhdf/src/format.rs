@@ -1,7 +1,5 @@
 //! What the writer and the reader know of HDF5: signatures, codes of messages, types of elements, and arrays in chunks.
 
-use std::fmt;
-
 /// The first bytes of every file.
 pub const SIGNATURE: [u8; 8] = *b"\x89HDF\r\n\x1a\n";
 /// Bytes of the superblock, version 3.
@@ -131,30 +129,15 @@ impl Chunked {
 }
 
 /// Why a file was not read: the predicate of a sentence whose subject is the file.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// It cannot be read.
-    Io(std::io::Error),
-    /// It is not what the writer makes: another HDF5 file, or none, or one whose metadata are damaged.
+    #[error("cannot be read: {0}")]
+    Io(#[from] std::io::Error),
+    /// It is not what the writer makes: another HDF5 file, or none.
+    #[error("is not a tree as this program writes it: {0}")]
     Unknown(String),
     /// It is damaged.
+    #[error("is damaged: {0}")]
     Damaged(String),
-}
-
-impl fmt::Display for ReadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Io(e) => write!(f, "cannot be read: {e}"),
-            Self::Unknown(what) => write!(f, "is not a tree as this program writes it: {what}"),
-            Self::Damaged(what) => write!(f, "is damaged: {what}"),
-        }
-    }
-}
-
-impl std::error::Error for ReadError {}
-
-impl From<std::io::Error> for ReadError {
-    fn from(e: std::io::Error) -> Self {
-        Self::Io(e)
-    }
 }

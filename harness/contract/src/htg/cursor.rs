@@ -46,19 +46,12 @@ impl<'a> Cursor<'a> {
         if key >= KEY_END { Ok(self.index.leaves) } else { Ok(self.descend(key)?.before) }
     }
 
-    /// Appends the words of the leaves of an octant, given by its Morton code and level; if a coarser leaf begins there, that one.
+    /// Appends the words of the leaves of an octant, given by its Morton code and level; if a coarser leaf begins there, that one. If the tree
+    /// has ranks, appends those of the leaves.
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn words(&mut self, key: u64, level: u8, into: &mut Vec<u64>) -> Result<()> {
-        self.words_and_ranks(key, level, into, &mut Vec::new())
-    }
-
-    /// The same, and the rank of each leaf, if the tree has ranks.
-    ///
-    /// # Errors
-    /// If the file is damaged.
-    pub fn words_and_ranks(
+    pub fn words(
         &mut self,
         key: u64,
         level: u8,

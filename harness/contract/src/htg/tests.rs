@@ -113,7 +113,7 @@ fn a_tree_in_several_chunks_is_read_as_a_whole_and_octant_by_octant() {
             let first = words.partition_point(|&w| key(w) < begin);
             let last = words.partition_point(|&w| key(w) < end);
             let mut found = Vec::new();
-            cursor.words(begin, level, &mut found).unwrap();
+            cursor.words(begin, level, &mut found, &mut Vec::new()).unwrap();
             assert_eq!(found, words[first..last], "octant {octant} of level {level}");
             assert_eq!(cursor.leaves_before(begin).unwrap(), first as u64);
         }
@@ -152,7 +152,7 @@ fn ranks_are_read_with_the_words_if_there_is_one_for_each_node() {
     let read = |tree: &TreeFile| {
         let (mut found, mut ranks) = (Vec::new(), Vec::new());
         let index = tree.index().unwrap();
-        let read = Cursor::new(tree, &index).words_and_ranks(0, 0, &mut found, &mut ranks);
+        let read = Cursor::new(tree, &index).words(0, 0, &mut found, &mut ranks);
         read.map(|()| (found, ranks))
     };
     let (tree, nodes, _file) = ranked(true, |node| node as i32 % 77);

@@ -117,6 +117,10 @@ impl<'a> Input<'a> {
             .collect())
     }
 
+    fn array<const N: usize>(&mut self) -> Result<[u64; N], ImportError> {
+        Ok(self.numbers(N as u64)?.try_into().expect("as many numbers as were read"))
+    }
+
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
     fn align(&mut self) -> Result<(), ImportError> {
         let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
@@ -130,7 +134,6 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
         return Err(damaged("it does not begin with p8est"));
     }
     input.items(24, 1)?;
-    let head = input.numbers(10)?;
     let [
         format,
         index_bytes,
@@ -142,10 +145,7 @@ fn connectivity(input: &mut Input) -> Result<Cells, ImportError> {
         corner_trees,
         attribute_bytes,
         _,
-    ] = head[..]
-    else {
-        unreachable!("ten numbers were read");
-    };
+    ] = input.array::<10>()?;
     if format.swap_bytes() == FORMAT {
         return Err(damaged("its bytes are swapped: a big-endian machine wrote it"));
     }
@@ -215,10 +215,7 @@ fn cubes(coordinates: &[u8], tree_to_vertex: &[u8]) -> Result<Cells, ImportError
 
 /// Number of quadrants up to the end of each tree, and bytes of user data per quadrant.
 fn forest_header(input: &mut Input, trees: usize) -> Result<(Vec<u64>, u64), ImportError> {
-    let head = input.numbers(6)?;
-    let [format, coordinate_bytes, _, data_bytes, _, ranks] = head[..] else {
-        unreachable!("six numbers were read");
-    };
+    let [format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
     if format != FORMAT || coordinate_bytes != 4 {
         return Err(damaged("the header of the forest has another format than the connectivity"));
     }

@@ -169,7 +169,7 @@ fn append(
         return Ok(());
     }
     if interval.start <= first && end <= interval.end {
-        return cursor.words_and_ranks(key, octant.level, words, ranks);
+        return cursor.words(key, octant.level, words, ranks);
     }
     (0..8).try_for_each(|digit| append(cursor, &octant.child(digit), interval, words, ranks))
 }

@@ -75,7 +75,7 @@ fn the_leaves_of_an_octant_are_read_without_those_before_it() {
             let expected: Vec<u64> = all.iter().filter(within).copied().collect();
             let before = all.iter().filter(|word| key(**word) < begin).count() as u64;
             let mut found = Vec::new();
-            cursor.words(begin, level, &mut found).unwrap();
+            cursor.words(begin, level, &mut found, &mut Vec::new()).unwrap();
             assert_eq!(found, expected, "octant {octant} of level {level}");
             assert_eq!(cursor.leaves_before(begin).unwrap(), before, "{octant}, {level}");
         }

@@ -18,8 +18,17 @@ pub fn notes(mesh: &Mesh, parts: &[Directory], regions: &[Size]) -> Vec<String> 
     let faces = mesh.faces.starts.windows(2).map(|ends| ends[1] - ends[0]);
     let totals: Vec<(&str, usize)> =
         mesh.patches.names.iter().map(String::as_str).zip(faces).collect();
-    let mut notes = vec![patches(&totals)];
-    notes.extend(without_faces(&totals));
+    let (with, without): (Vec<_>, Vec<_>) = totals.into_iter().partition(|(_, faces)| *faces > 0);
+    let with: Vec<_> = with.iter().map(|(name, faces)| format!("{name} {faces}")).collect();
+    let mut notes = vec![format!("faces of each patch: {}", with.join(", "))];
+    let is_solid = |name: &&str| !SIDES.contains(name) && *name != CUT;
+    let empty: Vec<_> = without.into_iter().map(|(name, _)| name).filter(is_solid).collect();
+    if !empty.is_empty() {
+        notes.push(format!(
+            "warning: patches without faces, which are no walls of this mesh: {}",
+            empty.join(", ")
+        ));
+    }
     notes.extend((parts.len() > 1).then(|| processors(parts)));
     notes.extend((regions.len() > 1).then(|| unconnected(regions, mesh.options.foam.regions)));
     if parts.len() > 1 && !mesh.has_addressing() {
@@ -35,25 +44,6 @@ pub fn crossing(mesh: &mesh::Mesh, selection: &Selection) -> Option<String> {
         "warning: the geometry crosses cells of this mesh, and a flow passes through walls inside them: mesh with \
          keep_crossing = false for a solver"
             .to_owned()
-    })
-}
-
-/// The patches that have faces.
-fn patches(totals: &[(&str, usize)]) -> String {
-    let listed = totals.iter().filter(|(_, faces)| *faces > 0);
-    let listed: Vec<_> = listed.map(|(name, faces)| format!("{name} {faces}")).collect();
-    format!("faces of each patch: {}", listed.join(", "))
-}
-
-/// A warning about solids without faces.
-fn without_faces(totals: &[(&str, usize)]) -> Option<String> {
-    let solids = totals.iter().filter(|(name, _)| !SIDES.contains(name) && *name != CUT);
-    let empty: Vec<_> = solids.filter(|(_, faces)| *faces == 0).map(|(name, _)| *name).collect();
-    (!empty.is_empty()).then(|| {
-        format!(
-            "warning: patches without faces, which are no walls of this mesh: {}",
-            empty.join(", ")
-        )
     })
 }
 

@@ -44,7 +44,9 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let mut again = Vec::new();
     let mut cursor = Cursor::new(&tree, &index);
     (0..8u64).for_each(|octant| {
-        cursor.words(octant * word::span(1), 1, &mut again).expect("a tree that was read");
+        cursor
+            .words(octant * word::span(1), 1, &mut again, &mut Vec::new())
+            .expect("a tree that was read");
     });
     assert_eq!(again, words);
     true
