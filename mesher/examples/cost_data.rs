@@ -31,7 +31,7 @@ fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let counts = Counts::of_rank(&tree, &ownership);
 
     let start = ThreadTime::now();
-    let (sides, _) = sides::decide(&tree, &ownership, &facets, &rules, &options, true, comm)?;
+    let sides = sides::decide(&tree, &ownership, &facets, &rules, &options, true, comm)?.sides;
     let time_sides = start.elapsed();
     let start = ThreadTime::now();
     let kept = Kept::new(sides.deleted());

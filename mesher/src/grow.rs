@@ -13,7 +13,7 @@ use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts};
 use crate::refine;
 use crate::refine::voxelise::{BinnedFacets, Work};
-use crate::sides::{self, leaks, openness};
+use crate::sides::{self, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::tree::Tree;
@@ -88,15 +88,17 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let is_closed = job.phase("leaks", |comm| openness::is_closed(facets.borrow(), comm));
-    let (sides, regions) = job.phase("sides", |comm| {
+    let decided = job.phase("sides", |comm| {
         sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
     job.check(|comm| {
-        check::sides(&sides, &tree, &rules, &ownership, comm);
+        check::sides::components(&decided, (&rules, facets.borrow()), &ownership, comm);
+        check::sides(&decided.sides, &tree, &rules, &ownership, comm);
         if is_whole {
-            check::sides::agree_over_faces(&sides, &tree, &ownership, comm);
+            check::sides::agree_over_faces(&decided.sides, &tree, &ownership, comm);
         }
     });
+    let Decided { sides, regions, .. } = decided;
     let (leaks, bounds_nothing) = job.phase("leaks", |comm| {
         let facets = facets.borrow();
         let leaks =

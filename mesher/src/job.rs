@@ -1,7 +1,7 @@
 //! A run on one rank: what its phases share.
 
-use crate::mesh::Options;
-use crate::output::report::Counters;
+use crate::counters::Counters;
+use crate::options::Options;
 use crate::record::Recorder;
 use ranks::{Comm, uncounted};
 

@@ -9,21 +9,25 @@
 #![deny(missing_docs)]
 
 pub mod check;
+mod counters;
 pub mod error;
 pub mod grade;
 mod grow;
 pub mod input;
 mod job;
 mod mesh;
+mod options;
 pub mod output;
 pub mod partition;
 pub mod record;
 pub mod refine;
 pub mod sides;
 
+pub use counters::Counters;
 pub use grow::grow;
 pub use job::Job;
-pub use mesh::{Mesh, Options};
+pub use mesh::Mesh;
+pub use options::Options;
 
 use error::Error;
 use files::interrupt::stop_at;

@@ -1,41 +1,14 @@
-//! The options of a run, and the mesh as the phases pass it on.
+//! The mesh as the phases pass it on.
 
 use crate::input::lattice::Rules;
 use crate::input::quantise::FacetCounts;
 use crate::output::stream::Leaves;
-use crate::output::write::Output;
+use crate::partition::Partitioner;
 use crate::partition::ownership::Ownership;
-use crate::partition::{Division, Partitioner};
 use crate::sides::Sides;
 use crate::sides::leaks::Leaks;
 use bricks::octant::Level;
 use bricks::tree::PerLevel;
-
-/// Options that have no effect on the mesh, but for `ungraded`.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// How to divide the work among ranks.
-    pub division: Division,
-    /// Stop after sides: the mesh is the base tree T0, with all its leaves.
-    pub ungraded: bool,
-    /// What to write, and where.
-    pub out: Option<Output>,
-    /// Check invariants after each phase, which debug builds do in any case.
-    pub check: bool,
-    /// Count the [exposed faces](crate::grade::exposed), each of which weighs as much as this many leaves in the last repartition.
-    pub weight_exposed: Option<u32>,
-    /// Fail if the geometry leaks.
-    pub strict: bool,
-    /// What to call the case in advice to the user.
-    pub case_name: String,
-}
-
-impl Options {
-    /// Whether checks run: in debug builds, and in release builds on request.
-    pub fn checks(&self) -> bool {
-        cfg!(debug_assertions) || self.check
-    }
-}
 
 /// A mesh as one rank holds it.
 pub struct Mesh {

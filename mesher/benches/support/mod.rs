@@ -231,5 +231,7 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, &options(), true, &Solo).expect("a case without seeds").0
+    decide(tree, ownership, facets, rules, &options(), true, &Solo)
+        .expect("a case without seeds")
+        .sides
 }

@@ -4,10 +4,8 @@
 use super::{face_neighbours, is_in_leaf, to_owners};
 use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
-use crate::sides::enclosed::Region;
 use crate::sides::nodes::open_bricks;
-use crate::sides::vote::FirstLeaf;
-use crate::sides::{Sides, Verdict};
+use crate::sides::{Decided, Sides};
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
@@ -47,18 +45,16 @@ pub fn agree_over_faces(sides: &Sides, tree: &Tree, ownership: &Ownership, comm:
 /// The first leaf of each component is stored as its verdict asks; without seeds, the verdict is that of its rays if all six agree.
 /// Collective.
 pub fn components(
-    parts: &[FirstLeaf],
-    (verdict, region): (&Verdict, &Region),
-    sides: &Sides,
+    Decided { sides, components, verdict, reach, .. }: &Decided,
     (rules, facets): (&Rules, &[Facet]),
     ownership: &Ownership,
     comm: &dyn Comm,
 ) {
-    for &(label, first) in parts {
+    for &(label, first) in components {
         let (l, code) = first.leaf();
         let is_inside = verdict.inside.contains(&label);
         let is_stored = match sides.keep {
-            Keep::Outside => is_inside || region.enclosed.contains(&label),
+            Keep::Outside => is_inside || reach.enclosed.contains(&label),
             Keep::Inside => !is_inside,
             Keep::All => is_inside,
         };
@@ -75,7 +71,7 @@ pub fn components(
         assert!((1..=rules.seeds.len() as u64).contains(&flow), "{flow} components have seeds");
         return;
     }
-    let some = &parts[..parts.len().min(COMPONENTS_MAX)];
+    let some = &components[..components.len().min(COMPONENTS_MAX)];
     let odd: Vec<u64> = some.iter().map(|part| odd_rays(facets, part.1.centroid())).collect();
     let all = comm.all_gather(&odd);
     for (i, &(label, first)) in some.iter().enumerate() {

@@ -23,10 +23,9 @@ pub mod rays;
 pub mod seeds;
 pub mod vote;
 
-use crate::check;
 use crate::error::Error;
 use crate::input::lattice::{Keep, Rules};
-use crate::mesh::Options;
+use crate::options::Options;
 use crate::partition::ownership::Ownership;
 use bricks::brick::Brick;
 use bricks::facet::Facet;
@@ -35,7 +34,7 @@ use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
 use enclosed::Region;
 use global::Label;
 use nodes::{Component, Nodes};
-use ranks::{Comm, uncounted};
+use ranks::Comm;
 use std::collections::HashSet;
 use std::sync::LazyLock;
 use vote::{FirstLeaf, FirstLeaves};
@@ -145,9 +144,22 @@ enum Class {
     Enclosed,
 }
 
+/// What the phase decides, and on which grounds.
+pub struct Decided {
+    /// The sides of the leaves.
+    pub sides: Sides,
+    /// Where to look for leaks.
+    pub regions: Vec<leaks::Region>,
+    /// All components of the tree: the same on all ranks.
+    pub components: Vec<FirstLeaf>,
+    /// Their sides.
+    pub verdict: Verdict,
+    /// Which of them the far field reaches.
+    pub reach: Region,
+}
+
 /// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
-/// one rank. Nothing is deleted if the options ask for T0. Also returns the regions in which to look for leaks, of which a surface that
-/// `is_closed` has none. Collective.
+/// one rank. Nothing is deleted if the options ask for T0. There are no regions to look for leaks in if the surface `is_closed`. Collective.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf; the same on all ranks.
@@ -159,7 +171,7 @@ pub fn decide(
     options: &Options,
     is_closed: bool,
     comm: &dyn Comm,
-) -> Result<(Sides, Vec<leaks::Region>), Error> {
+) -> Result<Decided, Error> {
     let mut components = Components::new(tree, ownership, comm);
     if options.checks() {
         components.nodes.check_invariants();
@@ -202,14 +214,7 @@ pub fn decide(
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
     let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership, &mut regions);
     sides.summary.enclosed = region.summary(&all, leaves_enclosed, comm);
-    if options.checks() {
-        let decided = (&verdict, &region);
-        let check = || {
-            check::sides::components(&all, decided, &sides, (rules, facets), ownership, comm);
-        };
-        uncounted(comm, check);
-    }
-    Ok((sides, regions))
+    Ok(Decided { sides, regions, components: all, verdict, reach: region })
 }
 
 impl Sides {
@@ -261,7 +266,7 @@ impl Sides {
     }
 
     /// Checks the first invariant on the bricks that this rank holds;
-    /// [`check::sides`](fn@check::sides) executes the last.
+    /// [`check::sides`](fn@crate::check::sides) executes the last.
     ///
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
@@ -273,6 +278,7 @@ impl Sides {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check;
     use crate::tests::set;
     use crate::tests::{rules, small};
     use ranks::Solo;
@@ -282,8 +288,8 @@ mod tests {
         let tree = small();
         let rules = Rules { keep, ..rules() };
         let options = crate::tests::options();
-        let (sides, _) =
-            decide(&tree, &Ownership::solo(), &[], &rules, &options, true, &Solo).unwrap();
+        let decided = decide(&tree, &Ownership::solo(), &[], &rules, &options, true, &Solo);
+        let sides = decided.unwrap().sides;
         sides.check_invariants(&tree);
         (tree, sides)
     }

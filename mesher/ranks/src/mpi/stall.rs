@@ -114,6 +114,6 @@ impl Watch {
         // A launcher puts lines of its own between two writes.
         let _ = stderr().write_all(line.as_bytes());
         interrupt::abandon();
-        crate::launch::abort(STALLED)
+        self.side.abort(STALLED)
     }
 }

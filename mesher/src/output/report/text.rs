@@ -52,7 +52,7 @@ impl fmt::Display for Report {
                 Some(Partitioner::Morton) => ", partitioned along the curve",
             }
         )?;
-        if let Some(faces) = self.counters.get(super::EXPOSED_FACES) {
+        if let Some(faces) = self.counters.get(crate::counters::EXPOSED_FACES) {
             writeln!(
                 f,
                 "exposed faces  {}, max/mean {:.3}",
