@@ -70,7 +70,7 @@ fn squares_are_where_the_leaves_are() {
         assert!(svg.contains(path), "{path} is missing in {svg}");
     }
     assert_eq!((svg.matches("h340v340").count(), svg.matches("h680v680").count()), (4, 3));
-    assert!(svg.contains(">z = 1<") && svg.contains(">7 cells in the plane<"), "{svg}");
+    assert!(svg.contains(">z = 1; 7 cells in the plane<"), "{svg}");
     assert!(svg.contains(">level<") && !svg.contains("geometry"), "{svg}");
     // Above the small leaves.
     let shown = Request { selection: at(2, 4.0), ..shown };
@@ -156,7 +156,7 @@ fn small_leaves_are_merged_and_the_greatest_value_counts() {
     let shown = Request { level_max: 6, colour: Colour::Level, ..shown };
     let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
     assert_eq!((picture.squares.squares.len(), picture.key[0].value), (1, 6));
-    assert!(svg(&picture).contains(">1 cell in the plane<"));
+    assert!(svg(&picture).contains("; 1 cell in the plane<"));
 }
 
 #[test]
