@@ -101,9 +101,11 @@ fn hits(
                 let shares = edges.corners[other as usize].iter().any(|v| corners.contains(v));
                 !shares && may_be(facet, other)
             };
-            let Some((other, width)) = tree.first_hit(&ray, reach, is_obstacle) else { continue };
-            let faces = tree.triangle(other).normal().is_some_and(|n| n.dot(normal) <= OPPOSITE);
-            if faces && width > TOUCHING {
+            let (first, width) = tree.first_hits(&ray, reach, is_obstacle);
+            let faces = |other: &u32| {
+                tree.triangle(*other).normal().is_some_and(|n| n.dot(normal) <= OPPOSITE)
+            };
+            if let Some(other) = first.into_iter().find(faces).filter(|_| width > TOUCHING) {
                 let area = triangle.area() / starts.len() as f64;
                 let middle = ray.point_at(width / 2.0);
                 hits.push(Hit {

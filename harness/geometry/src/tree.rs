@@ -8,6 +8,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use parry3d_f64::query::details::distance_segment_segment;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{Segment, Triangle};
+use std::cell::RefCell;
 
 /// The facets. Those without area count too: they cross leaves like all others.
 #[derive(Debug)]
@@ -69,16 +70,30 @@ impl FacetTree {
         self.boxes.intersect_aabb(&self.triangle(facet).local_aabb()).collect()
     }
 
-    /// The first facet that a ray meets within `reach`, among those that `is_obstacle` accepts, and its distance.
-    pub fn first_hit(
+    /// The first facets that a ray meets within `reach`, among those that `is_obstacle` accepts, and their distance: several if they
+    /// coincide there. Neither depends on the order of facets.
+    pub fn first_hits(
         &self,
         ray: &Ray,
         reach: f64,
         is_obstacle: impl Fn(u32) -> bool,
-    ) -> Option<(u32, f64)> {
-        self.boxes.cast_ray(ray, reach, |facet, best| {
-            self.triangle(facet).cast_local_ray(ray, best, false).filter(|_| is_obstacle(facet))
-        })
+    ) -> (Vec<u32>, f64) {
+        let hits = RefCell::new(Vec::new());
+        self.boxes.cast_ray(ray, reach, |facet, farthest| {
+            let distance = self.triangle(facet).cast_local_ray(ray, farthest, false)?;
+            if !is_obstacle(facet) {
+                return None;
+            }
+            hits.borrow_mut().push((facet, distance));
+            // Others at the same distance are visited, too.
+            Some(distance + 1.0)
+        });
+        let hits = hits.into_inner();
+        let least = hits.iter().map(|hit| hit.1).fold(f64::INFINITY, f64::min);
+        let mut first: Vec<u32> =
+            hits.iter().filter(|hit| hit.1 == least).map(|hit| hit.0).collect();
+        first.sort_unstable();
+        (first, least)
     }
 
     /// The facet nearest to anything in a box, by its distance from a triangle.
@@ -96,8 +111,11 @@ impl FacetTree {
     }
 }
 
-/// A facet in f64.
+/// A facet in f64. It begins with its least vertex, so that rounding does not depend on where a file begins it.
 pub fn triangle(facet: &FacetLattice) -> Triangle {
+    let mut facet = *facet;
+    let least = (0..3).min_by_key(|&i| facet[i]).unwrap_or(0);
+    facet.rotate_left(least);
     let [a, b, c] = facet.map(|v| Point::from_array(v.map(|c| c as f64)));
     Triangle::new(a, b, c)
 }
@@ -182,10 +200,11 @@ mod tests {
         fn a_ray_meets_the_first_facet_on_its_way(facets in facets(), at in prop::array::uniform3(0.0f64..4000.0), axis in 0usize..3) {
             let tree = FacetTree::new(&facets);
             let ray = Ray::new(Point::from_array(at), [Point::X, Point::Y, Point::Z][axis]);
-            let Some((facet, distance)) = tree.first_hit(&ray, 5000.0, |_| true) else { return Ok(()) };
+            let (first, distance) = tree.first_hits(&ray, 5000.0, |_| true);
+            let [facet, ..] = first[..] else { return Ok(()) };
             prop_assert!(from_point(ray.point_at(distance), tree.triangle(facet)) < 1e-3);
-            let next = tree.first_hit(&ray, 5000.0, |other| other != facet);
-            prop_assert!(next.is_none_or(|(_, farther)| farther >= distance));
+            let (_, farther) = tree.first_hits(&ray, 5000.0, |other| !first.contains(&other));
+            prop_assert!(farther > distance);
         }
     }
 }
