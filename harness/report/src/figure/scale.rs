@@ -57,7 +57,7 @@ pub fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     all.into_iter().step_by(every).collect()
 }
 
-/// The labels of ticks, with as many digits as tell them apart.
+/// The labels of ticks, with as many digits as distinguish them.
 pub fn tick_labels(ticks: &[f64]) -> Vec<String> {
     let short: Vec<String> = ticks.iter().map(|tick| tick_label(*tick)).collect();
     if distinct(&short).len() == ticks.len() {
