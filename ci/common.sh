@@ -32,11 +32,15 @@ step() {
     [ "$code" = 0 ] || fail "$code" "failed: $name"
 }
 
-# build_programs: all programs, with the features with which tests are built: others would compile dependencies again.
+# build_programs: all programs. Those of the profile `dev` are made with the tests: alone, crates would be compiled again without what
+# only tests use.
 build_programs() {
     local features=()
     if command -v mpicc >/dev/null; then features=(--features mesher/mpi); fi
-    cargo build --quiet --profile "$profile" --workspace "${features[@]}"
+    case "$profile" in
+    dev) cargo test --quiet --workspace "${features[@]}" --no-run ;;
+    *) cargo build --quiet --profile "$profile" --workspace "${features[@]}" ;;
+    esac
 }
 
 # fail CODE MESSAGE...: prints one sentence and exits with CODE: 2 for invalid input, 3 if something is missing.

@@ -25,4 +25,4 @@ def sides(points, facets):
 
 
 if __name__ == "__main__":
-    protocol.run("open3d", open3d.__version__, sides)
+    protocol.run(sides)

@@ -1,18 +1,20 @@
 """The protocol of all oracles.
 
-    python <oracle>.py POINTS.npy BODY.stl SIDES.npy
+    python <oracle>.py
 
-POINTS.npy contains float64 coordinates of shape (N, 3), and BODY.stl is a binary STL file. The oracle writes N bytes
-to SIDES.npy, 1 for each point that it finds inside the body and 0 for each point outside, and prints its name and
-version on one line. Exit codes: 0 success; 2 invalid arguments; 3 the package of the oracle is missing; any other
-code is a failure of the oracle itself.
+An oracle stays, because its packages take seconds to import. Each line of its standard input is a question, a JSON array of three
+paths: POINTS.npy contains float64 coordinates of shape (N, 3), and BODY.stl is a binary STL file. The oracle writes N bytes to
+SIDES.npy, 1 for each point that it finds inside the body and 0 for each point outside, and answers with a line: 0, or 1 if it failed,
+with the reason on the standard error. It ends with its input, or with exit code 3 if its package is missing.
 
 An oracle is a function sides(points, facets) -> array of N bools. Points and facets are translated so that the
 bounding box of the body is centred on the origin. embree and open3d compute in float32, which would lose digits for a
 body far from the origin; the translation here is in float64.
 """
 
+import json
 import sys
+import traceback
 
 import numpy as np
 
@@ -26,23 +28,33 @@ def read_facets(path):
         count = int(np.fromfile(file, "<u4", 1)[0])
         facets = np.fromfile(file, STL_FACET, count)
     if len(facets) != count:
-        raise SystemExit(f"{path} contains {len(facets)} of the {count} facets of its header")
+        raise ValueError(f"{path} contains {len(facets)} of the {count} facets of its header")
     return facets["vertices"].astype(np.float64)
 
 
-def run(name, version, sides):
-    """The main function of an oracle: runs the protocol with its function `sides`."""
-    if len(sys.argv) != 4:
-        print(f"usage: {sys.argv[0]} POINTS.npy BODY.stl SIDES.npy", file=sys.stderr)
-        raise SystemExit(2)
-    points = np.load(sys.argv[1])
-    facets = read_facets(sys.argv[2])
+def answer(sides, points, body, out):
+    """Answers one question with the function `sides`."""
+    points = np.load(points)
+    facets = read_facets(body)
     centre = (facets.min(axis=(0, 1)) + facets.max(axis=(0, 1))) / 2 if len(facets) else np.zeros(3)
-    answer = np.zeros(len(points), np.uint8)
+    inside = np.zeros(len(points), np.uint8)
     if len(facets) and len(points):
-        answer[:] = sides(points - centre, facets - centre)
-    np.save(sys.argv[3], answer)
-    print(f"{name} {version}")
+        inside[:] = sides(points - centre, facets - centre)
+    np.save(out, inside)
+
+
+def run(sides):
+    """The main function of an oracle: answers questions with its function `sides`."""
+    # Packages print where they like.
+    answers, sys.stdout = sys.stdout, sys.stderr
+    for line in sys.stdin:
+        code = 0
+        try:
+            answer(sides, *json.loads(line))
+        except Exception:
+            traceback.print_exc()
+            code = 1
+        print(code, file=answers, flush=True)
 
 
 def missing(error):

@@ -29,4 +29,4 @@ def sides(points, facets):
 
 
 if __name__ == "__main__":
-    protocol.run("pyvista", pyvista.__version__, sides)
+    protocol.run(sides)

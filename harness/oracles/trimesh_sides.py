@@ -24,4 +24,4 @@ def sides(points, facets):
 
 
 if __name__ == "__main__":
-    protocol.run("trimesh", trimesh.__version__, sides)
+    protocol.run(sides)

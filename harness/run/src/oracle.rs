@@ -3,7 +3,9 @@
 
 use crate::engine::failure::{End, Failure};
 use crate::engine::paths::Paths;
+use crate::engine::process::Watch;
 use crate::engine::python;
+use crate::engine::service::Services;
 use check::oracle::vote::Answer;
 use contract::case::Facet;
 use contract::{files, npy};
@@ -48,20 +50,48 @@ impl Question {
         Ok(question)
     }
 
-    /// Runs one oracle.
+    /// Asks several oracles at the same time, in services that stay.
     ///
     /// # Errors
-    /// [`End::Missing`] if the oracle or Python is missing; another end if the oracle fails or does not give one side
-    /// per point.
-    pub fn ask(&self, oracle: &str, paths: &Paths, limit: Duration) -> Result<Answer, Failure> {
-        let failure = |end| Failure::new(oracle, end);
-        let sides = self.place.join(format!("{oracle}.npy"));
-        let script = format!("{oracle}_sides.py");
-        let files = [&self.points, &self.body, &sides];
-        python::run(oracle, &script, files, paths, limit, &self.place)?;
-        let inside = read_sides(&sides, self.count).map_err(|why| failure(End::Unusable(why)))?;
-        Ok(Answer { name: oracle.to_owned(), inside })
+    /// For each oracle: [`End::Missing`] if it or Python is missing; another end if it fails or does not give one side per point.
+    pub fn ask<'o>(
+        &self,
+        oracles: &[&'o str],
+        services: &Services,
+        paths: &Paths,
+        limit: Duration,
+    ) -> Vec<(&'o str, Result<Answer, Failure>)> {
+        let sides = |oracle: &str| self.place.join(format!("{oracle}.npy"));
+        let started = oracles.iter().map(|&oracle| {
+            let started = start(oracle, services, paths);
+            let files = [&self.points, &self.body, &sides(oracle)];
+            services.send(oracle, &files.map(|file| file.to_string_lossy().into_owned()));
+            (oracle, started)
+        });
+        let started: Vec<_> = started.collect();
+        let answered = started.into_iter().map(|(oracle, started)| {
+            let watch = Watch::new(oracle, limit, &self.place);
+            let answer = started
+                .and_then(|()| services.wait(oracle, &watch))
+                .map_err(python::explained)
+                .and_then(|_| {
+                    let unusable = |why| Failure::new(oracle, End::Unusable(why));
+                    let inside = read_sides(&sides(oracle), self.count).map_err(unusable)?;
+                    Ok(Answer { name: oracle.to_owned(), inside })
+                });
+            (oracle, answer)
+        });
+        answered.collect()
     }
+}
+
+/// Starts an oracle, unless it runs.
+///
+/// # Errors
+/// [`End::Missing`] if Python is missing.
+pub fn start(oracle: &str, services: &Services, paths: &Paths) -> Result<(), Failure> {
+    let command = python::command(oracle, &format!("{oracle}_sides.py"), paths)?;
+    services.start(oracle, || (command, None))
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
@@ -96,20 +126,23 @@ mod tests {
     const POINTS: [[f64; 3]; 2] = [[0.5, -1.0, 1e300], [2.0, 3.0, 4.0]];
     const BODY: [Facet; 1] = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
 
-    /// Runs a shell script instead of Python, with the protocol's arguments as $3, $4 and $5.
+    /// Runs a shell script instead of Python, with the words of a question as $1, $2 and $3.
     fn ask(script: &str) -> Result<Vec<bool>, Failure> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
-        fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();
+        let words = r#"read -r line; eval "set -- $(echo "$line" | tr '[],' '   ')""#;
+        fs::write(&python, format!("#!/bin/sh\n{words}\n{script}\necho 0\n")).unwrap();
         fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
         let paths = Paths { python, ..Paths::find() };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        question.ask("trimesh", &paths, Duration::from_millis(2000)).map(|answer| answer.inside)
+        let limit = Duration::from_millis(2000);
+        let (_, answer) = question.ask(&["trimesh"], &Services::default(), &paths, limit).remove(0);
+        answer.map(|answer| answer.inside)
     }
 
     fn answering(bytes: &[u8]) -> String {
         let header = npy::header("|u1", &format!("({},)", bytes.len()));
-        format!("printf '{}' > \"$5\"", octal(&[&header, bytes].concat()))
+        format!("printf '{}' > \"$3\"", octal(&[&header, bytes].concat()))
     }
 
     fn octal(bytes: &[u8]) -> String {
@@ -118,7 +151,7 @@ mod tests {
 
     #[test]
     fn points_body_and_sides_are_exchanged_through_files() {
-        let check = "[ $(wc -c < \"$3\") = 176 ] && [ $(wc -c < \"$4\") = 134 ] || exit 9";
+        let check = "[ $(wc -c < \"$1\") = 176 ] && [ $(wc -c < \"$2\") = 134 ] || exit 9";
         assert_eq!(ask(&format!("{check}\n{}", answering(&[1, 0]))), Ok(vec![true, false]));
     }
 
@@ -143,9 +176,12 @@ mod tests {
         assert_eq!(sentence(&answering(&[1])), "trimesh classified 1 of 2 points");
         let side = "trimesh gave the side 2, and the sides are 0 and 1";
         assert_eq!(sentence(&answering(&[1, 2])), side);
-        assert!(sentence("exit 0").contains("wrote no answer"));
-        assert!(sentence("echo x > \"$5\"").contains("not an array"));
-        assert!(sentence("mkfifo \"$5\"").contains("a pipe"));
+        assert_eq!(sentence("exit 0"), "trimesh ended without an answer");
+        assert_eq!(sentence("echo bang >&2; echo 1; exit"), "trimesh ended with code 1: bang");
+        assert_eq!(sentence("echo well; exit"), "trimesh gave no exit code");
+        assert!(sentence("").contains("wrote no answer"));
+        assert!(sentence("echo x > \"$3\"").contains("not an array"));
+        assert!(sentence("mkfifo \"$3\"").contains("a pipe"));
         let promising = answering(&[1]).replace(
             &octal(&npy::header("|u1", "(1,)")),
             &octal(&npy::header("|u1", "(999999999999,)")),
@@ -158,7 +194,9 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let paths = Paths { python: "/nowhere/python".into(), ..Paths::find() };
         let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let failure = question.ask("open3d", &paths, Duration::from_secs(1)).map(drop).unwrap_err();
+        let limit = Duration::from_secs(1);
+        let (_, answer) = question.ask(&["open3d"], &Services::default(), &paths, limit).remove(0);
+        let failure = answer.map(drop).unwrap_err();
         assert!(matches!(failure.end, End::Missing(why) if why.contains("/nowhere/python")));
     }
 }

@@ -1,6 +1,6 @@
 //! The end of a program on a signal: at once, in whatever it does, and without unfinished files.
 
-use crate::unfinished::{abandon_all, abandon_others, complete};
+use crate::unfinished::{abandon_all, abandon_others, begin_again, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
@@ -83,6 +83,11 @@ pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
 /// Notes that the program's outcome is decided: from now on a first signal changes nothing.
 pub fn decided() {
     complete();
+}
+
+/// Notes that another run begins, whose outcome is open: for a program that stays for several runs.
+pub fn begin() {
+    begin_again();
 }
 
 /// Removes all unfinished files: before the process ends because of a bug.

@@ -94,6 +94,11 @@ pub fn complete() {
     IS_COMPLETE.store(true, Ordering::Release);
 }
 
+/// Notes that further output is begun, of another run.
+pub fn begin_again() {
+    IS_COMPLETE.store(false, Ordering::Release);
+}
+
 /// Removes all unfinished output, the latest first, unless some output is complete: the process is about to end anyway, and with
 /// success. Returns whether some is. Async-signal-safe.
 pub fn abandon_all() -> bool {

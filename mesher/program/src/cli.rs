@@ -205,6 +205,25 @@ fn command() -> Command {
                 .help("Print the completion script for a shell"),
         )
         .arg(prints("man").action(ArgAction::SetTrue).help("Print the man page, in roff"))
+        .arg(
+            Arg::new("serve")
+                .long("serve")
+                .exclusive(true)
+                .action(ArgAction::SetTrue)
+                .help("Run the command lines on standard input: spares the start of MPI")
+                .long_help(
+                    "Run one command line after another: each is a line of standard input, a JSON array of the words after the program's \
+                     name, and answered by its exit code on a line of standard output",
+                ),
+        )
+}
+
+/// What the command line asks for.
+pub enum Asked {
+    /// One run.
+    Run(Box<Args>),
+    /// The runs whose command lines are on the standard input.
+    Serve,
 }
 
 /// The command line. Help, version, completions and the man page are printed here, on the first rank of a job, and end the
@@ -212,7 +231,9 @@ fn command() -> Command {
 ///
 /// # Errors
 /// In one sentence, as all other errors.
-pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> Result<Args, Error> {
+pub fn parse<W: Into<OsString> + Clone>(
+    words: impl IntoIterator<Item = W>,
+) -> Result<Asked, Error> {
     let parsed = command().try_get_matches_from(words).and_then(|mut m| {
         if let Some(&shell) = m.get_one::<Shell>("completions") {
             let mut script = Vec::new();
@@ -225,7 +246,10 @@ pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> R
             rendered.expect("memory can be written to");
             print_and_exit(|| io::stdout().write_all(&page));
         }
-        Args::from_arg_matches_mut(&mut m)
+        if m.get_flag("serve") {
+            return Ok(Asked::Serve);
+        }
+        Args::from_arg_matches_mut(&mut m).map(|args| Asked::Run(Box::new(args)))
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {

@@ -6,7 +6,7 @@ mod cli;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod heap;
 
-use cli::{Args, CommChoice, UNPRINTED, case, parse};
+use cli::{Args, Asked, CommChoice, UNPRINTED, case, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::Options;
 use mesher::error::Error;
@@ -20,7 +20,7 @@ use planner::Plan;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
 use serde::Serialize;
 use std::fmt::Display;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
@@ -40,7 +40,7 @@ const LINGER: Duration = Duration::from_millis(300);
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     heap::fix_thresholds();
-    let args = parse(std::env::args_os());
+    let asked = parse(std::env::args_os());
     let message = match (launch::is_first(), stderr().is_terminal()) {
         (false, _) => "",
         (true, false) => "mesher: interrupted\n",
@@ -50,16 +50,20 @@ fn main() {
     // Without handlers, signals end the process the default way.
     let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
     let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
-    match choose(args.as_ref().map_or(CommChoice::Auto, |a| a.comm)) {
-        Ok(CommChoice::Mpi) => run_mpi(&args),
+    let comm = match &asked {
+        Ok(Asked::Run(args)) => args.comm,
+        _ => CommChoice::Auto,
+    };
+    match choose(comm) {
+        Ok(CommChoice::Mpi) => run_mpi(&asked),
         Ok(CommChoice::Sim { ranks, seed }) => {
             abort_on_panic(|| exit(BUG));
-            let codes = sim::run(ranks, seed, |comm| run(&args, comm));
+            let codes = sim::run(ranks, seed, |comm| obey(&asked, comm));
             exit(codes.into_iter().max().unwrap_or(0));
         }
         Ok(_) => {
             abort_on_panic(|| exit(BUG));
-            exit(run(&args, &Solo));
+            exit(obey(&asked, &Solo));
         }
         Err(e) => exit(fail(&e, launch::is_first())),
     }
@@ -89,7 +93,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
 const ADDRESS_SPACE_MPI: f64 = 384e6;
 
-fn run_mpi(args: &Result<Args, Error>) {
+fn run_mpi(asked: &Result<Asked, Error>) {
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(
@@ -109,7 +113,7 @@ fn run_mpi(args: &Result<Args, Error>) {
     abort_on_panic(|| launch::abort(BUG));
     files::ends_with(launch::abort);
     let code = match launch::check_size(&*comm) {
-        Ok(()) => run(args, &*comm),
+        Ok(()) => obey(asked, &*comm),
         Err(e) => fail(&Error::Input(e), launch::is_first()),
     };
     drop(comm);
@@ -178,7 +182,7 @@ fn print(outcome: &Outcome) -> i32 {
 }
 
 /// The command line of rank 0, which all ranks follow, if it differs from this rank's. Collective.
-fn args_of_first(comm: &dyn Comm) -> Option<Result<Args, Error>> {
+fn asked_of_first(comm: &dyn Comm) -> Option<Result<Asked, Error>> {
     let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
     let mine = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
     let mine = mine.join("\0");
@@ -203,17 +207,62 @@ fn args_of_first(comm: &dyn Comm) -> Option<Result<Args, Error>> {
     }
 }
 
-/// One rank's run; returns the exit code, the same on all ranks.
-fn run(args: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
-    let first = comm.rank() == 0;
-    let of_first = uncounted(comm, || args_of_first(comm));
-    let args = match of_first.as_ref().map_or(args, |of_first| of_first) {
-        Ok(args) => args,
+/// Does what the command line asks for, on one rank; returns the exit code, the same on all ranks. Collective.
+fn obey(asked: &Result<Asked, Error>, comm: &dyn Comm) -> i32 {
+    let of_first = uncounted(comm, || asked_of_first(comm));
+    match of_first.as_ref().unwrap_or(asked) {
+        Ok(Asked::Run(args)) => run(args, comm),
+        Ok(Asked::Serve) => serve(comm),
         Err(e) => {
             interrupt::decided();
-            return fail(e, first);
+            fail(e, comm.rank() == 0)
         }
-    };
+    }
+}
+
+/// Runs the command lines that rank 0 reads from its standard input; returns the exit code of this service. Collective.
+fn serve(comm: &dyn Comm) -> i32 {
+    let mut lines = stdin().lines();
+    loop {
+        let line = match comm.rank() {
+            0 => lines.next().and_then(Result::ok).unwrap_or_default(),
+            _ => String::new(),
+        };
+        comm.next_run();
+        let line = uncounted(comm, || text_of_first(comm, &line));
+        if line.is_empty() {
+            return 0;
+        }
+        interrupt::begin();
+        // The peak of this run alone; where that is impossible, it includes those before it.
+        let _ = std::fs::write("/proc/self/clear_refs", "5");
+        let code = match served(&line) {
+            Ok(args) => run(&args, comm),
+            Err(e) => fail(&e, comm.rank() == 0),
+        };
+        if comm.rank() == 0 {
+            // Who does not read answers asks for no further run.
+            let _ = writeln!(stdout(), "{code}");
+        }
+    }
+}
+
+/// The run that a line of a service asks for.
+fn served(line: &str) -> Result<Args, Error> {
+    let words: Vec<String> = serde_json::from_str(line)
+        .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
+    match parse(std::iter::once("mesher".to_owned()).chain(words))? {
+        Asked::Run(mut args) if args.stall_limit.is_none() => {
+            args.quiet = true;
+            Ok(*args)
+        }
+        _ => Err(Error::input("--serve and --stall-limit belong to a job, not to one of its runs")),
+    }
+}
+
+/// One rank's run; returns the exit code, the same on all ranks. Collective.
+fn run(args: &Args, comm: &dyn Comm) -> i32 {
+    let first = comm.rank() == 0;
     if let Some(limit) = args.stall_limit {
         comm.limit_calls(limit);
     }

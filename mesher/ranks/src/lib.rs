@@ -72,6 +72,10 @@ pub trait Comm {
         body();
     }
 
+    /// Begins another run in the same job: returns after rank 0 has called it as well, and counts messages from zero from then on.
+    /// The other ranks sleep meanwhile: rank 0 may wait for its next run for hours. Collective.
+    fn next_run(&self) {}
+
     /// Ends the job if a rank keeps the others waiting in a call for longer than `limit`; ranks of one process never do. Collective.
     fn limit_calls(&self, _limit: Duration) {}
 

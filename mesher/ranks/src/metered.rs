@@ -122,6 +122,12 @@ impl<C: Comm> Comm for Metered<C> {
         self.is_paused.set(before);
     }
 
+    fn next_run(&self) {
+        self.comm.next_run();
+        self.total.take();
+        self.row.take();
+    }
+
     fn limit_calls(&self, limit: Duration) {
         self.comm.limit_calls(limit);
     }

@@ -16,12 +16,17 @@ use mpi::request::{Request, Scope};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
 use stall::Watch;
 use std::cell::{Cell, OnceCell};
+use std::thread::sleep;
 use std::time::Duration;
 
 /// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
 const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
 /// Greatest number of words in one allgather, summed over the ranks.
 const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
+/// Tag of the message that begins another run. Sparse all-to-alls have 0 and 1.
+const NEXT_RUN: i32 = 2;
+/// Longest sleep of a rank between two runs.
+const PAUSE_MAX: Duration = Duration::from_millis(50);
 
 /// One rank of an MPI job.
 pub struct Mpi {
@@ -139,6 +144,23 @@ impl Comm for Mpi {
             }
         });
         received
+    }
+
+    fn next_run(&self) {
+        if self.rank() == 0 {
+            for rank in 1..self.size() {
+                self.world.process_at_rank(rank as i32).send_with_tag(&0u64, NEXT_RUN);
+            }
+            return;
+        }
+        // MPI itself would wait by computing.
+        let first = self.world.process_at_rank(0);
+        let mut pause = Duration::from_micros(100);
+        while first.immediate_probe_with_tag(NEXT_RUN).is_none() {
+            sleep(pause);
+            pause = (pause * 3 / 2).min(PAUSE_MAX);
+        }
+        first.receive_with_tag::<u64>(NEXT_RUN);
     }
 
     fn limit_calls(&self, limit: Duration) {

@@ -87,9 +87,9 @@ pub fn family() {
     for lie in [
         (
             "puts all points inside",
-            "head -c $((($(wc -c < \"$3\") - 128) / 24)) /dev/zero | tr '\\0' '\\1' > sides",
+            "head -c $((($(wc -c < \"$1\") - 128) / 24)) /dev/zero | tr '\\0' '\\1' > sides.$$",
         ),
-        ("gives too few sides", "echo > sides"),
+        ("gives too few sides", "echo > sides.$$"),
     ] {
         table.push(test.oracle((lie.0, &format!("{}\n{NPY}", lie.1))));
     }
@@ -97,9 +97,12 @@ pub fn family() {
     table.finish("programs that hang, flood or lie");
 }
 
-/// Writes the bytes of the file `sides` as a NumPy array.
-const NPY: &str = "n=$(wc -c < sides); text=\"{'descr': '|u1', 'fortran_order': False, 'shape': ($n,), }\"\n\
-                   { printf '\\223NUMPY\\001\\000\\166\\000'; printf '%-117s\\n' \"$text\"; cat sides; } > \"$5\"; rm sides";
+/// Writes the bytes of the file `sides.PID` as a NumPy array.
+const NPY: &str = "n=$(wc -c < sides.$$); text=\"{'descr': '|u1', 'fortran_order': False, 'shape': ($n,), }\"\n\
+                   { printf '\\223NUMPY\\001\\000\\166\\000'; printf '%-117s\\n' \"$text\"; cat sides.$$; } > \"$3\"; rm sides.$$";
+
+/// Reads a question, whose words become the arguments.
+const QUESTION: &str = r#"read -r line; eval "set -- $(echo "$line" | tr '[],' '   ')""#;
 
 /// Commands that run a mesher, with the exit codes that they may have.
 const COMMANDS: [(&str, &str, &[i32]); 5] = [
@@ -144,7 +147,7 @@ impl Test<'_> {
         self.place.reset(&self.before);
         // It exists, as the harness finds out with one point.
         let script = format!(
-            "[ $(wc -c < \"$3\") -gt 200 ] || {{ head -c 1 /dev/zero > sides\n{NPY}\nexit; }}\n{}",
+            "{QUESTION}\nhead -c 1 /dev/zero > sides.$$\n{NPY}\necho 0\n{QUESTION}\n{}\necho 0",
             lie.1
         );
         let python = self.script("python", &script);

@@ -51,6 +51,12 @@ pub struct Outcome {
     pub printed: String,
 }
 
+/// Makes a script that is a mesher stay, and run the lines of its standard input.
+const SERVE: &str = r#"if [ "$1" = --serve ]; then
+    while read -r line; do eval "set -- $(echo "$line" | tr '[],' '   ')"; "$0" "$@"; echo $?; done
+    exit
+fi"#;
+
 /// The directory, removed on drop.
 pub struct Fixture(TempDir);
 
@@ -86,7 +92,7 @@ impl Fixture {
 
     /// Replaces a program by a script.
     pub fn script(&self, program: &str, script: &str) {
-        self.write(program, &format!("#!/bin/sh\n{script}\n"));
+        self.write(program, &format!("#!/bin/sh\n{SERVE}\n{script}\n"));
         fs::set_permissions(self.path(program), fs::Permissions::from_mode(0o755)).unwrap();
     }
 

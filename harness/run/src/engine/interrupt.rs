@@ -40,6 +40,8 @@ static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
 struct Leftovers {
     /// Leaders of the sessions of child processes.
     children: Vec<u32>,
+    /// Those of them that stay while others come and go.
+    services: Vec<u32>,
     /// Directories; those that were removed already may remain in the list.
     directories: Vec<PathBuf>,
     /// The directory of all temporary files.
@@ -113,13 +115,21 @@ pub(super) fn note_child(id: u32) {
     leftovers().children.push(id);
 }
 
+/// Notes a child process that leads a session and stays while others come and go.
+pub(super) fn note_service(id: u32) {
+    let mut leftovers = leftovers();
+    leftovers.children.push(id);
+    leftovers.services.push(id);
+}
+
 /// Forgets a child process that has ended, and ends its descendants that have left its session.
 pub(super) fn forget_child(id: u32) {
     let mut leftovers = leftovers();
     leftovers.children.retain(|&child| child != id);
+    leftovers.services.retain(|&service| service != id);
     // Those of a run on another thread are ended after that.
-    if leftovers.children.is_empty() {
-        session::end_adopted();
+    if leftovers.children == leftovers.services {
+        session::end_adopted(&leftovers.services);
     }
 }
 
@@ -163,7 +173,7 @@ pub fn clean() {
         waited += pause;
     }
     children.iter().for_each(|&child| session::signal(child, Signal::KILL));
-    session::end_adopted();
+    session::end_adopted(&[]);
     // Until the process ends, nothing else is published.
     let staged = contract::files::publications();
     interrupt::abandon_unfinished();

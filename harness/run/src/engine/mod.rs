@@ -20,6 +20,7 @@ pub mod python;
 mod reap;
 pub mod report;
 pub mod runner;
+pub mod service;
 mod session;
 pub mod takes;
 pub mod templates;

@@ -1,5 +1,6 @@
 //! The options of a run: its files, choices and limits.
 
+use super::service::Services;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -23,6 +24,8 @@ pub struct RunOptions<'a> {
     pub ungraded: bool,
     /// Sample the memory of an engine that does not report it.
     pub sample_memory: bool,
+    /// Where runs on MPI use the engine's service, if it has one.
+    pub services: Option<&'a Services>,
 }
 
 impl<'a> RunOptions<'a> {
@@ -37,6 +40,7 @@ impl<'a> RunOptions<'a> {
             status: false,
             ungraded: false,
             sample_memory: false,
+            services: None,
         }
     }
 

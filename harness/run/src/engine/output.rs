@@ -41,10 +41,24 @@ impl Output {
         self.file.try_clone().map(Stdio::from)
     }
 
+    /// What was written so far, in bytes.
+    pub(super) fn length(&self) -> u64 {
+        self.file.metadata().map_or(0, |metadata| metadata.len())
+    }
+
+    /// The end of what was written after the first `before` bytes.
+    pub(super) fn since(&self, before: u64) -> String {
+        let length = self.length();
+        let start = before.max(length.saturating_sub(KEPT));
+        let mut end = vec![0; (length - start.min(length)) as usize];
+        let _ = self.file.read_exact_at(&mut end, start);
+        String::from_utf8_lossy(&end).into_owned()
+    }
+
     /// Frees the disk space of what is neither at the beginning nor at the end. On a file system without holes in files, this
     /// has no effect.
     pub(super) fn discard_middle(&mut self) {
-        let until = self.file.metadata().map_or(0, |m| m.len()).saturating_sub(KEPT);
+        let until = self.length().saturating_sub(KEPT);
         if until > self.discarded + KEPT {
             let flags = FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE;
             let _ = fallocate(&self.file, flags, self.discarded, until - self.discarded);

@@ -55,8 +55,13 @@ impl<'a> Watch<'a> {
         Self { name, limit, logs, status: None, sample_memory: false }
     }
 
-    fn log(&self, stream: &str) -> PathBuf {
+    pub(super) fn log(&self, stream: &str) -> PathBuf {
         self.logs.join(format!("{}.{stream}", self.name))
+    }
+
+    /// What the ranks are doing, if they report it.
+    pub(super) fn activity(&self) -> Option<String> {
+        self.status.map(|status| describe_activity(&read_status(status)))
     }
 }
 
@@ -95,12 +100,17 @@ pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
 fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child, [Output; 2])> {
     let outputs = [Output::create(&watch.log("stdout"))?, Output::create(&watch.log("stderr"))?];
     command.stdin(Stdio::null()).stdout(outputs[0].stdio()?).stderr(outputs[1].stdio()?);
-    // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
-    unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
+    lead_session(command);
     let start = Instant::now();
     let child = command.spawn()?;
     interrupt::note_child(child.id());
     Ok((start, child, outputs))
+}
+
+/// Makes the child lead a session of its own.
+pub(super) fn lead_session(command: &mut Command) {
+    // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
+    unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
 }
 
 /// The CPU time of a child that exited with code 0, or how it ended otherwise.
@@ -115,16 +125,17 @@ fn wait(
     let mut pause = Duration::from_millis(1);
     loop {
         if let Some((status, time_cpu_s)) = try_reap(child)? {
+            let errors = || outputs[1].since(0);
             // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
             let interrupted = interrupt::requested().then_some(End::Interrupted);
-            return Ok(interrupted.or_else(|| judge(status, watch)).map_or(Ok(time_cpu_s), Err));
+            return Ok(interrupted.or_else(|| judge(status, errors)).map_or(Ok(time_cpu_s), Err));
         }
         if interrupt::requested() {
             end_child(child)?;
             return Ok(Err(End::Interrupted));
         }
         if start.elapsed() >= watch.limit {
-            let activity = watch.status.map(|status| describe_activity(&read_status(status)));
+            let activity = watch.activity();
             end_child(child)?;
             return Ok(Err(End::TimedOut { limit: watch.limit, activity }));
         }
@@ -139,13 +150,11 @@ fn wait(
     }
 }
 
-fn judge(status: ExitStatus, watch: &Watch) -> Option<End> {
+/// How a child failed, from its status and its standard error.
+pub(super) fn judge(status: ExitStatus, errors: impl FnOnce() -> String) -> Option<End> {
     match status.code() {
         Some(0) => None,
-        Some(code) => {
-            let text = fs::read(watch.log("stderr")).unwrap_or_default();
-            Some(End::Exited { code, error: last_lines(&String::from_utf8_lossy(&text)) })
-        }
+        Some(code) => Some(End::Exited { code, error: last_lines(&errors()) }),
         None => Some(End::Signalled(status.signal().unwrap_or(0))),
     }
 }
@@ -155,7 +164,7 @@ const LINES_SHOWN: usize = 3;
 
 /// The last lines of a standard error, in one line: programs print the error at the end. Lines without a word are
 /// ignored, and so are the paragraphs between rules of dashes and the messages that `mpirun` adds after the program's own error.
-fn last_lines(text: &str) -> String {
+pub(super) fn last_lines(text: &str) -> String {
     let mut of_mpirun = false;
     let is_own = |line: &&str| {
         let rule = line.len() >= 60 && line.chars().all(|c| c == '-');
@@ -186,7 +195,7 @@ fn start_of(line: &&str) -> String {
 }
 
 /// Sends SIGTERM to the child and all its descendants, ranks included, and kills those that do not end in time.
-fn end_child(child: &Child) -> io::Result<()> {
+pub(super) fn end_child(child: &Child) -> io::Result<()> {
     session::signal(child.id(), Signal::TERM);
     let patience = Instant::now() + interrupt::PATIENCE;
     while Instant::now() < patience {
@@ -204,7 +213,7 @@ fn end_child(child: &Child) -> io::Result<()> {
 
 /// Kills every process of the session that `leader` led. Processes may be started while the session is being killed,
 /// so this repeats until none is found.
-fn kill_session(leader: u32) {
+pub(super) fn kill_session(leader: u32) {
     for _ in 0..100 {
         if session::members(leader).is_empty() {
             return;

@@ -23,22 +23,31 @@ pub fn run<A: AsRef<OsStr>>(
     limit: Duration,
     place: &Path,
 ) -> Result<Finished, Failure> {
-    let missing = |why| Failure::new(name, End::Missing(why));
+    let mut command = command(name, script, paths)?;
+    process::run(command.args(arguments), &Watch::new(name, limit, place)).map_err(explained)
+}
+
+/// The command of a script without arguments.
+///
+/// # Errors
+/// [`End::Missing`] if Python is missing.
+pub fn command(name: &str, script: &str, paths: &Paths) -> Result<Command, Failure> {
     let python = &paths.python;
     if !python.is_file() {
-        return Err(missing(format!(
-            "needs Python at {} (ci/setup installs it)",
-            python.display()
-        )));
+        let why = format!("needs Python at {} (ci/setup installs it)", python.display());
+        return Err(Failure::new(name, End::Missing(why)));
     }
     let mut command = Command::new(python);
-    command.arg("-B").arg(paths.oracles.join(script)).args(arguments);
-    process::run(&mut command, &Watch::new(name, limit, place)).map_err(|failure| {
-        match failure.end {
-            End::Exited { code: CODE_MISSING, error } => {
-                missing(format!("is not installed: {error}"))
-            }
-            _ => failure,
+    command.arg("-B").arg(paths.oracles.join(script));
+    Ok(command)
+}
+
+/// The failure of a script, in which a missing package is called so.
+pub fn explained(failure: Failure) -> Failure {
+    match failure.end {
+        End::Exited { code: CODE_MISSING, error } => {
+            Failure::new(failure.program, End::Missing(format!("is not installed: {error}")))
         }
-    })
+        _ => failure,
+    }
 }

@@ -10,6 +10,7 @@ use super::paths::{Paths, on_path};
 use super::placeholders::{LAUNCHER, Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
+use super::service::Services;
 use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{self, Tree};
@@ -229,16 +230,6 @@ impl Engine {
         ranks: Ranks,
         options: &RunOptions,
     ) -> Result<Finished, Failure> {
-        let shared = match ranks {
-            Ranks::Mpi(_) => self.launcher.shared_memory(),
-            _ => None,
-        };
-        if matches!(ranks, Ranks::Mpi(_)) {
-            launcher::set_environment(command);
-        }
-        if let Some(shared) = &shared {
-            shared.add_to(command);
-        }
         let status = options.status_path();
         if options.status {
             fs::create_dir_all(&status)
@@ -250,7 +241,52 @@ impl Engine {
             sample_memory: options.sample_memory && !self.description.reports_memory,
             ..Watch::new(&label, options.limit, options.place)
         };
+        let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
+        if let Some(services) = options.services
+            && let Some(name) = self.start_ranks(count, services)?
+        {
+            let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
+            let of_program = |word: &String| Path::new(word) != self.program;
+            let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
+            services.send(&name, &words);
+            let time_wall_s = services.wait(&name, &watch)?;
+            let stdout = watch.log("stdout");
+            // The CPU time of a request is not measured.
+            return Ok(Finished {
+                time_wall_s,
+                time_cpu_s: f64::NAN,
+                stdout,
+                peak_rss_bytes: None,
+            });
+        }
+        launcher::set_environment(command);
+        let shared = self.launcher.shared_memory();
+        shared.iter().for_each(|shared| shared.add_to(command));
         process::run(command, &watch)
+    }
+
+    /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none; returns their name.
+    ///
+    /// # Errors
+    /// If they cannot be started.
+    pub fn start_ranks(
+        &self,
+        count: usize,
+        services: &Services,
+    ) -> Result<Option<String>, Failure> {
+        let templates = &self.description.run;
+        // The environment may depend on the run.
+        let serve = templates.serve.as_ref().filter(|_| templates.environment.is_empty());
+        let Some(serve) = serve else { return Ok(None) };
+        let name = format!("{} on {count} ranks", self.program.display());
+        services.start(&name, || {
+            let mut command = self.launcher.command(count, &self.program);
+            command.args(serve);
+            let shared = self.launcher.shared_memory();
+            shared.iter().for_each(|shared| shared.add_to(&mut command));
+            (command, shared)
+        })?;
+        Ok(Some(name))
     }
 
     fn failure(&self, end: End) -> Failure {

@@ -42,10 +42,11 @@ pub(super) fn signal(leader: u32, signal: Signal) {
 }
 
 /// Ends the processes that this one has adopted, and waits for them: children that it has not started itself, which are of other
-/// sessions. Their descendants are adopted in turn, so this repeats until none is found. Not while a child that leads a session runs.
-pub(super) fn end_adopted() {
+/// sessions. Their descendants are adopted in turn, so this repeats until none is found. Not while a child that leads a session runs,
+/// but for those `except`.
+pub(super) fn end_adopted(except: &[u32]) {
     for _ in 0..ATTEMPTS {
-        let adopted = adopted();
+        let adopted = adopted(except);
         if adopted.is_empty() {
             return;
         }
@@ -57,14 +58,15 @@ pub(super) fn end_adopted() {
     }
 }
 
-fn adopted() -> Vec<Pid> {
+fn adopted(except: &[u32]) -> Vec<Pid> {
     let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let children = threads.flat_map(|thread| {
         let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
         text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>()
     });
     let own = session(0);
-    children.filter(|&child| session(child) != own).filter_map(pid_of).collect()
+    let adopted = children.filter(|&child| session(child) != own && !except.contains(&child));
+    adopted.filter_map(pid_of).collect()
 }
 
 /// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.

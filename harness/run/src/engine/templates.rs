@@ -14,6 +14,9 @@ pub struct Templates {
     pub serial: Vec<String>,
     /// A run on `{ranks}` processes, started by `{launcher}`.
     pub parallel: Option<Vec<String>>,
+    /// Appended to `{launcher} {program}` in place of a run's arguments, so that the ranks stay and run the command lines of their
+    /// standard input (`harness/engines/README.md`). Not with `environment`.
+    pub serve: Option<Vec<String>>,
     /// A run on `{ranks}` ranks within one process, scheduled by `{seed}`.
     pub simulated: Option<Vec<String>>,
     /// Appended to write the leaf-set directory `{out}`. Without it, the commands themselves contain `{out}`, and every
@@ -97,9 +100,10 @@ impl Templates {
             None => (&["out"], &["seed", "out"]),
             Some(_) => (&[], &["seed"]),
         };
-        let templates: [(_, _, &[&str]); 14] = [
+        let templates: [(_, _, &[&str]); 15] = [
             ("serial", Some(&self.serial), in_command),
             ("parallel", self.parallel.as_ref(), in_command),
+            ("serve", self.serve.as_ref(), &[]),
             ("simulated", self.simulated.as_ref(), in_simulated),
             ("out", self.out.as_ref(), &["out"]),
             ("json", self.json.as_ref(), &["json"]),

@@ -63,7 +63,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         return Err(VerifyError::Input(why));
     }
     let mut workplace = Workplace::new(options)?;
-    let mut needs = Needs::probe(options, programs, workplace.root());
+    let mut needs = Needs::probe(options, programs);
     let progress = Progress::new(&selected);
     let mut cases = Vec::new();
     for one in &selected {
@@ -80,7 +80,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyEr
         program: format!("harness {}", env!("CARGO_PKG_VERSION")),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         asked: asked(&selected, options, programs),
-        missing: needs.missing(options, cases.len()),
+        missing: needs.missing(options, &programs.paths, cases.len()),
         cases,
         interrupted,
         time_s: start.elapsed().as_secs_f64(),

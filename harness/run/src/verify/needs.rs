@@ -5,24 +5,25 @@ use super::report::Missing;
 use crate::engine::failure::Failure;
 use crate::engine::paths::Paths;
 use crate::engine::programs::Programs;
-use crate::oracle::{ORACLES, Question};
+use crate::engine::service::Services;
+use crate::oracle::{self, ORACLES, Question};
 use check::promises::Independence;
-use std::path::Path;
+use std::cell::OnceCell;
 use std::time::Duration;
 
-/// Prerequisites, each with the reason if it is missing.
-#[derive(Clone, Debug, Default)]
+/// Prerequisites, each with the reason if it is missing, and the programs that stay for the whole verification.
+#[derive(Debug, Default)]
 pub struct Needs {
     /// Why MPI is unavailable.
     pub mpi: Option<String>,
     /// Whether the ranks that were asked for, or a promise about ranks, require MPI.
     mpi_required: bool,
-    /// Why no oracle can be used.
-    pub oracles: Option<String>,
-    /// Oracles that can be used.
-    pub oracles_found: Vec<&'static str>,
-    /// Failures of the other oracles.
-    oracles_missing: Vec<Failure>,
+    /// Programs that stay.
+    pub services: Services,
+    /// The oracles, once they were tried: their packages are imported while the first case is meshed.
+    oracles: OnceCell<Oracles>,
+    /// Oracles that gave no answer on a case.
+    oracles_silent: Vec<Failure>,
     /// Why p4est is unavailable.
     pub p4est: Option<String>,
     /// Why geometries are missing, one reason each.
@@ -31,16 +32,23 @@ pub struct Needs {
     unchecked: Vec<String>,
 }
 
+/// The oracles of this machine.
+#[derive(Debug, Default)]
+pub struct Oracles {
+    /// Those that can be used.
+    pub found: Vec<&'static str>,
+    /// Why none can be used.
+    pub lacking: Option<String>,
+    /// Failures of the others.
+    missing: Vec<Failure>,
+}
+
 /// Longest time for a probe.
 const PROBE_LIMIT_MAX: Duration = Duration::from_secs(60);
 
-fn probe_limit(options: &Options) -> Duration {
-    options.limit().min(PROBE_LIMIT_MAX)
-}
-
 impl Needs {
     /// Tries the prerequisites of these options.
-    pub fn probe(options: &Options, programs: &Programs, place: &Path) -> Self {
+    pub fn probe(options: &Options, programs: &Programs) -> Self {
         let engine = programs.engine.description();
         let promised = engine.promises.is_independent_of(Independence::Ranks);
         let mut needs = Self {
@@ -52,6 +60,11 @@ impl Needs {
                 && (options.ranks.is_some() || promised && engine.run.parallel.is_some()),
             ..Self::default()
         };
+        if needs.mpi.is_none() {
+            // All start at the same time, while the first case is meshed serially. What fails is found by the first run.
+            let counts = options.rank_counts().into_iter();
+            counts.for_each(|ranks| drop(programs.engine.start_ranks(ranks, &needs.services)));
+        }
         let p4est = &programs.paths.p4est;
         needs.p4est = match (options.no_p4est, p4est.is_file()) {
             (true, _) => Some("--no-p4est was given".to_owned()),
@@ -59,36 +72,27 @@ impl Needs {
             (_, true) => None,
         };
         match options.no_oracles {
-            false => needs.probe_oracles(&programs.paths, place, probe_limit(options)),
-            true => needs.oracles = Some("--no-oracles was given".to_owned()),
+            // Those that cannot be started are found when they are tried.
+            false => ORACLES
+                .iter()
+                .for_each(|o| drop(oracle::start(o, &needs.services, &programs.paths))),
+            true => {
+                let lacking = Some("--no-oracles was given".to_owned());
+                needs.oracles = OnceCell::from(Oracles { lacking, ..Oracles::default() });
+            }
         }
         needs
     }
 
-    fn probe_oracles(&mut self, paths: &Paths, place: &Path, limit: Duration) {
-        let written = tempfile::tempdir_in(place).and_then(|probe| {
-            let question = Question::write(&[[0.0; 3]], &[], probe.path())?;
-            Ok((probe, question))
-        });
-        let (_probe, question) = match written {
-            Ok(written) => written,
-            Err(error) => return self.oracles = Some(error.to_string()),
-        };
-        for oracle in ORACLES {
-            match question.ask(oracle, paths, limit) {
-                Ok(_) => self.oracles_found.push(oracle),
-                Err(failure) if failure.is_interrupt() => return,
-                Err(failure) => self.oracles_missing.push(failure),
-            }
-        }
-        if self.oracles_found.is_empty() {
-            self.oracles = self.oracles_missing.first().map(Failure::to_string);
-        }
+    /// The oracles. The first call waits until they have imported their packages.
+    pub fn oracles(&self, options: &Options, paths: &Paths) -> &Oracles {
+        let limit = options.limit().min(PROBE_LIMIT_MAX);
+        self.oracles.get_or_init(|| probe_oracles(&self.services, paths, limit))
     }
 
     /// Records oracles that gave no answer on a case: a required vote needs all of them.
     pub fn note_silent_oracles(&mut self, failures: Vec<Failure>) {
-        self.oracles_missing.extend(failures);
+        self.oracles_silent.extend(failures);
     }
 
     /// Records that no check of a case was run.
@@ -102,10 +106,12 @@ impl Needs {
     }
 
     /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.
-    pub fn missing(&self, options: &Options, cases: usize) -> Vec<Missing> {
+    pub fn missing(&self, options: &Options, paths: &Paths, cases: usize) -> Vec<Missing> {
+        let oracles = self.oracles(options, paths);
         // The vote needs all oracles, so one that is missing counts as all.
-        let one = || self.oracles_missing.first().map(Failure::to_string);
-        let oracles = self.oracles.clone().or_else(one);
+        let one =
+            || oracles.missing.iter().chain(&self.oracles_silent).next().map(Failure::to_string);
+        let oracles = oracles.lacking.clone().or_else(one);
         let geometries = match self.geometries.len() {
             0 => None,
             count => Some(format!(
@@ -133,4 +139,26 @@ impl Needs {
         });
         missing.collect()
     }
+}
+
+fn probe_oracles(services: &Services, paths: &Paths, limit: Duration) -> Oracles {
+    let mut oracles = Oracles::default();
+    let written = tempfile::tempdir().and_then(|probe| {
+        let question = Question::write(&[[0.0; 3]], &[], probe.path())?;
+        Ok((probe, question))
+    });
+    let (_probe, question) = match written {
+        Ok(written) => written,
+        Err(error) => return Oracles { lacking: Some(error.to_string()), ..oracles },
+    };
+    for (oracle, answer) in question.ask(&ORACLES, services, paths, limit) {
+        match answer {
+            Ok(_) => oracles.found.push(oracle),
+            Err(failure) => oracles.missing.push(failure),
+        }
+    }
+    if oracles.found.is_empty() {
+        oracles.lacking = oracles.missing.first().map(Failure::to_string);
+    }
+    oracles
 }

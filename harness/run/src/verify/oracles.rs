@@ -27,8 +27,8 @@ const POINTS_OF_SMALL: usize = 400_000;
 impl CaseRun<'_> {
     /// Chooses points, has the oracles classify them, and counts the votes.
     pub fn verify_oracles(&mut self, case: &Case, base: &Base) {
-        if let Some(why) = &self.needs.oracles {
-            let why = why.clone();
+        let oracles = self.needs.oracles(self.options, &self.programs.paths);
+        if let Some(why) = &oracles.lacking {
             return self.add(Check::new(SUBJECT, NAME, Outcome::left_out(why)), None);
         }
         let start = Instant::now();
@@ -37,7 +37,7 @@ impl CaseRun<'_> {
             _ => self.options.oracle_points,
         };
         let sample = sample::choose(case, &base.tree.words, most, self.options.seed);
-        let (answers, failures) = match self.ask(case, &sample) {
+        let (answers, failures) = match self.ask(case, &sample, &oracles.found) {
             Ok(answered) => answered,
             Err(failure) if failure.is_interrupt() => return,
             Err(failure) => {
@@ -54,7 +54,12 @@ impl CaseRun<'_> {
     }
 
     /// The answers, and the failures of the oracles that gave none. At least one oracle answered.
-    fn ask(&self, case: &Case, sample: &Sample) -> Result<(Vec<Answer>, Vec<Failure>), Failure> {
+    fn ask(
+        &self,
+        case: &Case,
+        sample: &Sample,
+        oracles: &[&'static str],
+    ) -> Result<(Vec<Answer>, Vec<Failure>), Failure> {
         let place = self.place.join("oracles");
         let question = fs::create_dir_all(&place)
             .and_then(|()| Question::write(&sample.points, &case.facets, &place))
@@ -62,9 +67,10 @@ impl CaseRun<'_> {
                 Failure::new("the oracles", End::Unusable(format!("have no input files: {error}")))
             })?;
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
-        for oracle in &self.needs.oracles_found {
-            self.progress.step(format!("oracle {oracle}"));
-            match question.ask(oracle, &self.programs.paths, self.options.limit()) {
+        self.progress.step("oracles");
+        let (paths, limit) = (&self.programs.paths, self.options.limit());
+        for (_, answer) in question.ask(oracles, &self.needs.services, paths, limit) {
+            match answer {
                 Ok(answer) => answers.push(answer),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(failure) => failures.push(failure),

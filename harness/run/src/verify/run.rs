@@ -67,6 +67,7 @@ impl CaseRun<'_> {
             status: true,
             ungraded: request.ungraded,
             sample_memory: true,
+            services: Some(&self.needs.services),
             ..RunOptions::new(&place, self.options.limit())
         };
         let completed = engine.run(request.case, request.layout, &options)?;

@@ -41,11 +41,6 @@ impl Workplace {
         Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary), kept: false })
     }
 
-    /// The directory itself.
-    pub fn root(&self) -> &Path {
-        &self.root
-    }
-
     /// Makes the directory of a case, and replaces one that an earlier verification left.
     ///
     /// # Errors
@@ -99,7 +94,7 @@ mod tests {
     fn a_temporary_directory_is_kept_only_if_a_case_is_kept() {
         for keep in [false, true] {
             let mut workplace = Workplace::new(&options()).unwrap();
-            let root = workplace.root().to_owned();
+            let root = workplace.root.clone();
             let place = workplace.enter("cube").unwrap();
             assert_eq!(workplace.leave(&place, keep).is_some(), keep);
             workplace.close(false);

@@ -69,6 +69,54 @@ fn an_error_on_one_rank_ends_all_ranks() {
     }
 }
 
+/// Neither an error nor what ran before changes a run, its counters included.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_run_of_a_service_is_a_run_of_its_own() {
+    let workspace = Workspace::new();
+    workspace.write("case.toml", CASE);
+    let lines = [
+        r#"["case.toml", "--json", "first.json", "--out", "first"]"#,
+        r#"["absent.toml", "--json", "absent.json"]"#,
+        r#"["case.toml", "--json", "metis.json", "--partitioner", "metis", "--out", "first"]"#,
+        r#"["case.toml", "--stall-limit", "9"]"#,
+        "case.toml",
+        r#"["case.toml", "--json", "last.json", "--out", "last"]"#,
+    ];
+    workspace.write("lines", lines.join("\n"));
+    for ranks in [1, 3] {
+        let mpirun = workspace.mpirun(ranks, &["--serve"]);
+        let words = [mpirun.get_program()].into_iter().chain(mpirun.get_args());
+        let words: Vec<&str> = words.map(|word| word.to_str().expect("text")).collect();
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("exec {} < lines", words.join(" "))]);
+        let served = run(workspace.as_mpi(command));
+        assert_eq!(
+            (served.code, served.stdout.as_str()),
+            (Some(0), "0\n2\n2\n2\n2\n0\n"),
+            "{served:?}"
+        );
+        for word in ["absent.toml", "first", "--stall-limit", "`case.toml` is no JSON"] {
+            let ours = |line: &&str| line.starts_with("mesher: ") && line.contains(word);
+            assert_eq!(served.stderr.lines().filter(ours).count(), 1, "{word}: {served:?}");
+        }
+        let args = ["case.toml", "--quiet", "--json", "own.json", "--out", "own"];
+        run(workspace.mpirun(ranks, &args)).succeeds();
+        let own = workspace.json("own.json");
+        for name in ["first", "last"] {
+            let report = workspace.json(&format!("{name}.json"));
+            for same in ["ranks", "cells", "digest", "counters", "cells_by_level"] {
+                assert_eq!(report[same], own[same], "{same} of the {name} run on {ranks} ranks");
+            }
+            let manifest = |name: &str| workspace.json(&format!("{name}/mesh.json"));
+            assert_eq!(manifest(name), manifest("own"));
+        }
+        for name in ["first", "last", "own"] {
+            std::fs::remove_dir_all(workspace.path().join(name)).expect("the mesh exists");
+        }
+    }
+}
+
 /// Each rank may write 100 blocks: all of them fail, and one of them prints the error.
 #[test]
 #[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]

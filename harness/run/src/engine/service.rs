@@ -1,0 +1,202 @@
+//! Programs that stay and run one command line after another: to start MPI or to import a package of Python takes longer than a
+//! small case.
+//!
+//! A request is a line on the program's standard input, a JSON array of words. The answer is a line on its standard output: the exit
+//! code that these words would have given a process of their own. Errors are on the standard error. A program that ends or hangs
+//! instead costs that request, and the next one starts it anew.
+
+use super::failure::{End, Failure};
+use super::interrupt;
+use super::launcher::SharedMemory;
+use super::output::Output;
+use super::process::{self, Watch, end_child, kill_session};
+use super::reap::try_reap;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Longest answer, in bytes.
+const ANSWER_MAX: usize = 100;
+/// Time for a program to end after its last request.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest time between two looks at the clock and at signals.
+const PAUSE: Timespec = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
+
+/// How a service is started: its command, and the directory of its shared memory.
+pub type Start = (Command, Option<SharedMemory>);
+
+/// Services by name. All end with it.
+#[derive(Debug, Default)]
+pub struct Services(RefCell<BTreeMap<String, Service>>);
+
+#[derive(Debug)]
+struct Service {
+    child: Child,
+    /// Its end is the end of the service.
+    requests: Option<ChildStdin>,
+    answers: ChildStdout,
+    errors: Output,
+    /// Length of the standard error at the last answer.
+    errors_before: u64,
+    sent: Instant,
+    _shared: Option<SharedMemory>,
+}
+
+impl Services {
+    /// Starts the service, unless it runs.
+    ///
+    /// # Errors
+    /// [`End::Missing`] if it cannot be started.
+    pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), Failure> {
+        let mut services = self.0.borrow_mut();
+        if !services.contains_key(name) {
+            let (mut command, shared) = start();
+            let service = Service::start(&mut command, shared).map_err(|error| {
+                let program = command.get_program().to_string_lossy();
+                Failure::new(name, End::Missing(format!("cannot be started: {program}: {error}")))
+            })?;
+            services.insert(name.to_owned(), service);
+        }
+        Ok(())
+    }
+
+    /// Sends a request to a service that was started.
+    pub fn send(&self, name: &str, words: &[String]) {
+        if let Some(service) = self.0.borrow_mut().get_mut(name) {
+            service.send(words);
+        }
+    }
+
+    /// Waits for the answer. The watch's limit counts from the request. Returns the wall time, in seconds.
+    ///
+    /// # Errors
+    /// If the answer is not 0, or the service ends or hangs; it then has to be started again.
+    pub fn wait(&self, name: &str, watch: &Watch) -> Result<f64, Failure> {
+        let mut services = self.0.borrow_mut();
+        let service = services.get_mut(name).expect("the service was started");
+        let answer = service.wait(watch);
+        let time_s = service.sent.elapsed().as_secs_f64();
+        let error = service.error();
+        service.errors_before = service.errors.length();
+        if answer == Ok(0) {
+            return Ok(time_s);
+        }
+        let _ = fs::write(watch.log("stderr"), &error);
+        if answer.is_err() {
+            let _ = end_child(&service.child);
+            services.remove(name);
+        }
+        let exited = |code| End::Exited { code, error: process::last_lines(&error) };
+        Err(Failure::new(watch.name, answer.map_or_else(|end| end, exited)))
+    }
+}
+
+impl Drop for Services {
+    fn drop(&mut self) {
+        // All end at the same time.
+        self.0.borrow_mut().values_mut().for_each(|service| drop(service.requests.take()));
+    }
+}
+
+impl Service {
+    fn start(command: &mut Command, shared: Option<SharedMemory>) -> io::Result<Self> {
+        let place = tempfile::Builder::new().prefix("harness-service-").tempdir()?;
+        let errors = Output::create(&place.path().join("stderr"))?;
+        // The open file stays.
+        drop(place);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors.stdio()?);
+        process::lead_session(command);
+        let mut child = command.spawn()?;
+        interrupt::note_service(child.id());
+        let requests = child.stdin.take();
+        let answers = child.stdout.take().expect("it is a pipe");
+        let sent = Instant::now();
+        Ok(Self { child, requests, answers, errors, errors_before: 0, sent, _shared: shared })
+    }
+
+    fn send(&mut self, words: &[String]) {
+        self.sent = Instant::now();
+        let line = serde_json::to_string(words).expect("words are text");
+        // That the program has ended is found when it is waited for.
+        let _ = self.requests.as_mut().map(|requests| writeln!(requests, "{line}"));
+    }
+
+    /// The answer, or how the service ended without one.
+    fn wait(&mut self, watch: &Watch) -> Result<i32, End> {
+        let mut answer = Vec::new();
+        loop {
+            let unusable = |why: &str| End::Unusable(why.to_owned());
+            if let Some(byte) = self.next_byte() {
+                match byte {
+                    b'\n' => {
+                        let text = String::from_utf8_lossy(&answer);
+                        return text.parse().map_err(|_| unusable("gave no exit code"));
+                    }
+                    _ if answer.len() == ANSWER_MAX => return Err(unusable("gave no exit code")),
+                    _ => answer.push(byte),
+                }
+                continue;
+            }
+            if interrupt::requested() {
+                return Err(End::Interrupted);
+            }
+            match try_reap(&self.child) {
+                Ok(None) => {}
+                Ok(Some((status, _))) => {
+                    let end = process::judge(status, || self.error());
+                    return Err(end.unwrap_or_else(|| unusable("ended without an answer")));
+                }
+                Err(error) => return Err(unusable(&format!("could not be waited for: {error}"))),
+            }
+            if self.sent.elapsed() >= watch.limit {
+                return Err(End::TimedOut { limit: watch.limit, activity: watch.activity() });
+            }
+            self.errors.discard_middle();
+        }
+    }
+
+    /// The next byte of an answer, if there is one soon.
+    fn next_byte(&mut self) -> Option<u8> {
+        let mut fds = [PollFd::new(&self.answers, PollFlags::IN)];
+        let found = poll(&mut fds, Some(&PAUSE)).unwrap_or(0);
+        if found == 0 {
+            return None;
+        }
+        let mut byte = [0];
+        match self.answers.read(&mut byte) {
+            Ok(1) => Some(byte[0]),
+            // The end of its output: its own end follows.
+            _ => {
+                sleep(Duration::from_millis(2));
+                None
+            }
+        }
+    }
+
+    /// What it has written to the standard error since the last answer.
+    fn error(&self) -> String {
+        self.errors.since(self.errors_before)
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        drop(self.requests.take());
+        let patience = Instant::now() + PATIENCE;
+        let runs = |child: &Child| matches!(try_reap(child), Ok(None));
+        while runs(&self.child) {
+            if interrupt::requested() || Instant::now() > patience {
+                let _ = end_child(&self.child);
+                break;
+            }
+            sleep(Duration::from_millis(5));
+        }
+        kill_session(self.child.id());
+        interrupt::forget_child(self.child.id());
+    }
+}
