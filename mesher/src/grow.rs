@@ -12,7 +12,7 @@ use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition::{self, LeafCounts};
 use crate::refine;
-use crate::refine::voxelise::{BinnedFacets, Work};
+use crate::refine::voxelise::BinnedFacets;
 use crate::sides::{self, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
@@ -36,19 +36,12 @@ pub fn grow<F: Borrow<[Facet]>>(
     let is_parallel = comm.size() > 1;
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
-    let mut work_top = Work::default();
-    let mark = |level| {
-        let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
-        work_top = work;
-        tree.split
-    };
-    let Partition { mut ownership, base_starts, level_base, partitioner } = match is_parallel {
+    let Partition { mut ownership, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
         true => job.phase("base tree", |comm| {
-            initial::partition(facets.borrow(), &rules, division, mark, comm)
+            initial::partition(facets.borrow(), &rules, division, comm)
         })?,
     };
-    job.counters.add_voxelised(&work_top);
     job.check(|comm| check::ownership(&ownership, comm));
 
     // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
@@ -115,7 +108,6 @@ pub fn grow<F: Borrow<[Facet]>>(
         rules,
         ownership,
         level_base,
-        base_starts,
         partitioner,
         split,
         crossing,
