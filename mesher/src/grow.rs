@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 use crate::output::report::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
-use crate::partition::repartition::{self, LeafCounts};
+use crate::partition::repartition;
 use crate::refine;
 use crate::refine::voxelise::BinnedFacets;
 use crate::sides::{self, Decided, leaks, openness};
@@ -176,12 +176,12 @@ fn repartition_by_leaves(
 ) {
     let gone = [mesh.sides.deleted(), &mesh.crossing];
     let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
-    let mut counts = LeafCounts::new(&mesh.split, gone, &mesh.ownership, mesh.level_base);
-    if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
-        let weights =
-            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
-        counts.add(weights, &mesh.ownership, mesh.level_base);
-    }
+    let exposed = weighted.iter().flat_map(|(faces, weight)| {
+        faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)))
+    });
+    let (split, before) = (&mesh.split, &mesh.ownership);
+    let new = repartition::after_gradation(split, gone, exposed, before, mesh.level_base, comm);
     let sets = &mut [&mut mesh.split, &mut mesh.crossing, &mut mesh.sides.stored];
-    mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
+    repartition::migrate(sets, &mesh.ownership, &new, comm);
+    mesh.ownership = new;
 }

@@ -9,7 +9,7 @@ pub mod voxelise;
 
 use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
-use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
+use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Work};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge};
 use bricks::tree::Tree;
@@ -17,10 +17,7 @@ use ranks::{Comm, MessageBuffer};
 
 /// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
 pub fn refine(facets: &BinnedFacets, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
-    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let start = |(level, code)| SubtreeRoot { level, code };
-    let starts: Vec<SubtreeRoot> = ownership.octants().into_iter().map(start).collect();
-    voxelise::refine(facets, &depth, &starts)
+    voxelise::refine(facets, rules, &ownership.octants())
 }
 
 /// Sends every facet to the owners of the octants that its extent reaches. Returns the facets for this rank. Collective.

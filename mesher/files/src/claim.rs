@@ -154,10 +154,10 @@ impl Claim {
         others: impl IntoIterator<Item = String>,
         is_new: bool,
     ) -> io::Result<Self> {
-        let entry = Unfinished::new(Output::Directory {
+        let entry = Unfinished::new(Output {
             dir: dir.as_raw_fd(),
             created: is_new.then(|| c_string(path)).transpose()?,
-            last: last.1.clone(),
+            names: last.1.clone(),
             file: last.0.as_raw_fd(),
             others: others.into_iter().flat_map(|name| names_of(&name)).collect(),
         });

@@ -2,13 +2,14 @@
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::output::manifest::{self, Manifest, Part};
+use crate::output::manifest::{self, Manifest, PartWords};
 use crate::output::report::Report;
 use crate::output::stream::Counts;
-use crate::output::write::{OutDir, Written};
+use crate::output::write::{OutDir, Part, Written, part_name};
 use bricks::octant::{LEVEL_MAX, Level};
 use files::interrupt::stop_at;
 use ranks::{Comm, agree};
+use std::io;
 
 /// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Also returns the number of
 /// leaves in its heaviest base leaf. Collective.
@@ -20,8 +21,9 @@ pub fn emit(
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
     let mut heaviest = Heaviest::new(level);
+    let name = part_name(comm.rank());
     let mut work = || {
-        let begin = |out: &OutDir| out.part(comm.rank());
+        let begin = |out: &OutDir| Part::new(out.file(&name)?);
         let mut part = out.filter(|out| out.output.words).map(begin).transpose()?;
         let mut written = Written::default();
         let counts = mesh.leaves().emit(|words| {
@@ -32,8 +34,8 @@ pub fn emit(
         part.map_or(Ok(()), |part| part.finish(written.leaves))?;
         Ok((counts, written))
     };
-    let result: Result<_, Error> = work();
-    let (counts, written) = agree(comm, result)?;
+    let failed = |e: io::Error| out.expect("only files can fail").failed(&name)(e);
+    let (counts, written) = agree(comm, work().map_err(failed))?;
     Ok((counts, written, heaviest.max))
 }
 
@@ -45,7 +47,7 @@ pub fn finish(
     written: &Written,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<(Report, Vec<Part>), Error> {
+) -> Result<(Report, Vec<PartWords>), Error> {
     let counts = counts.gather(comm);
     let (digests, parts) = manifest::gather(written, comm);
     let report = Report::new(mesh, &counts, &digests, comm.size());
@@ -63,7 +65,7 @@ pub fn finish(
 /// The number of leaves in this rank's heaviest octant of a level, as they are streamed in Morton order. It bounds the load balance of
 /// any partition between such octants.
 struct Heaviest {
-    /// Bits of a leaf word within an octant.
+    /// Bits of a leaf's code within an octant.
     shift: u32,
     /// The current octant, and its leaves so far.
     octant: u64,
@@ -73,16 +75,16 @@ struct Heaviest {
 
 impl Heaviest {
     fn new(level: Level) -> Self {
-        Self { shift: 3 * (LEVEL_MAX - level) + 7, octant: 0, leaves: 0, max: 0 }
+        Self { shift: 3 * (LEVEL_MAX - level), octant: 0, leaves: 0, max: 0 }
     }
 
     /// Counts the next leaves. One that is larger than an octant counts for the first in it.
     fn add(&mut self, mut words: &[u64]) {
-        while let Some(octant) = words.first().map(|w| w >> self.shift) {
+        while let Some(octant) = words.first().map(|w| w >> 7 >> self.shift) {
             if octant != self.octant {
                 (self.octant, self.leaves) = (octant, 0);
             }
-            let count = words.partition_point(|w| w >> self.shift <= octant);
+            let count = words.partition_point(|w| w >> 7 >> self.shift <= octant);
             self.leaves += count as u64;
             self.max = self.max.max(self.leaves);
             words = &words[count..];

@@ -85,10 +85,10 @@ impl LeakEntry {
 }
 
 /// A part: its number of leaves, and the upper and the lower half of its digest.
-pub type Part = [u64; 3];
+pub type PartWords = [u64; 3];
 
 /// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
-pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<Part>) {
+pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     let split = |d: u128| [(d >> 64) as u64, d as u64];
     let whole = split(mine.digests.whole());
     let mut words = vec![mine.leaves, whole[0], whole[1]];
@@ -113,11 +113,11 @@ impl<'a> Manifest<'a> {
         mesh: &'a Mesh,
         report: &'a Report,
         digests: &Digests,
-        parts: &[Part],
+        parts: &[PartWords],
     ) -> Self {
         let rules = &mesh.rules;
         let [outside, inside, crossing] = report.cells_by_side;
-        let part = |(rank, &[leaves, high, low]): (usize, &Part)| {
+        let part = |(rank, &[leaves, high, low]): (usize, &PartWords)| {
             let digest = hex(u128::from(high) << 64 | u128::from(low));
             json!({ "file": part_name(rank), "leaves": leaves, "digest": digest })
         };

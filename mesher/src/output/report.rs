@@ -11,7 +11,6 @@ pub(crate) mod warnings;
 
 pub use text::grouped;
 
-use crate::counters::{COUNTERS, EXPOSED_FACES};
 use crate::job::Job;
 use crate::mesh::Mesh;
 use crate::output::manifest::{Geometry, LeakEntry};
@@ -98,7 +97,7 @@ pub struct Report {
     /// Times by phase and rank.
     pub phases: Vec<PhaseEntry>,
     /// Counters by rank.
-    pub counters: BTreeMap<&'static str, Vec<u64>>,
+    pub counters: BTreeMap<String, Vec<u64>>,
     /// Sender, receiver, messages and bytes for every pair of ranks that exchanged messages; only on request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub message_matrix: Option<Vec<matrix::Entry>>,
@@ -146,7 +145,8 @@ impl Report {
     pub(crate) fn with_ranks(mut self, job: &Job) -> Self {
         let Job { comm, record, counters, .. } = job;
         let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
-        words.extend(COUNTERS.iter().map(|(_, value)| value(counters)));
+        let counters = counters.by_name();
+        words.extend(counters.values());
         words.extend(record.phases().iter().flat_map(|p| {
             let t = p.traffic;
             let [wall, cpu, comm_wall, comm_cpu] =
@@ -158,10 +158,7 @@ impl Report {
         let mut columns = (0..).map(|i| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>());
         let mut column = || columns.next().expect("columns have no end");
         self.peak_rss_bytes = column();
-        self.counters = COUNTERS.iter().map(|(name, _)| (*name, column())).collect();
-        if counters.exposed_faces.is_none() {
-            self.counters.remove(EXPOSED_FACES);
-        }
+        self.counters = counters.into_keys().map(|name| (name, column())).collect();
         for phase in record.phases() {
             let mut seconds = || column().into_iter().map(f64::from_bits).collect::<Vec<f64>>();
             self.phases.push(PhaseEntry {

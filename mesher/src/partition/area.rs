@@ -5,7 +5,7 @@
 //! cell. A facet larger than the octants of interest is split in four until it is not.
 
 use crate::input::lattice::{ExtentBox, Rules};
-use crate::partition::curve::Bin;
+use crate::partition::curve::{self, Bin};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use std::ops::Range;
@@ -69,41 +69,26 @@ fn norm(f: &Facet) -> f64 {
     f.normal().iter().map(|c| (*c as f64).abs()).sum::<f64>() * 0.5
 }
 
-/// Octants, a power of two, whose latest bins are remembered: facets often come in strips that alternate between a few.
-const REMEMBERED: usize = 8192;
-
 /// Number of facets in the sample, if there are many small ones.
 const SAMPLE: usize = 2048;
 
-/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. An octant may have several bins. Of
-/// many facets that are smaller than such an octant, a sample is measured.
+/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. Of many facets that are smaller than such an
+/// octant, a sample is measured.
 pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
-    let cell = edge(rules.level_surface) as f64;
+    let (cell, size) = (edge(rules.level_surface) as f64, edge(level));
     let (shift, scale) = (3 * (LEVEL_MAX - level), FRACTIONS as f64 / (cell * cell));
     let mut bins: Vec<Bin> = Vec::new();
-    // Index of the latest bin, by the low bits of the octant's code.
-    let mut latest = vec![0u32; REMEMBERED];
-    let mut add = |start: u64, area: f64| {
-        let (code, area) = (start >> shift, (area * scale) as u64);
-        let latest = &mut latest[code as usize % REMEMBERED];
-        match bins.get_mut(*latest as usize).filter(|bin| bin.0 == code << shift) {
-            Some(bin) => bin.1 += area,
-            None => {
-                *latest = bins.len() as u32;
-                bins.push((code << shift, area));
-            }
-        }
-    };
+    let mut add =
+        |start: u64, area: f64| bins.push((start >> shift << shift, (area * scale) as u64));
     // Odd, as facets come in pairs.
     let every = (facets.len() / SAMPLE) | 1;
     for some in facets.chunks(every) {
-        some.iter()
-            .filter(|f| is_wide(f, edge(level)))
-            .for_each(|f| spread(f, edge(level), &mut add));
-        if !is_wide(&some[0], edge(level)) {
-            spread(&some[0], edge(level), &mut |start, area| add(start, area * every as f64));
+        some.iter().filter(|f| is_wide(f, size)).for_each(|f| spread(f, size, &mut add));
+        if !is_wide(&some[0], size) {
+            spread(&some[0], size, &mut |start, area| add(start, area * every as f64));
         }
     }
+    curve::merge(&mut bins);
     bins
 }
 
@@ -144,7 +129,6 @@ fn centre(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::input::lattice::Keep;
-    use crate::partition::curve;
     use crate::tests::rules as plain_rules;
 
     fn rules(level_surface: Level) -> Rules {
@@ -186,8 +170,7 @@ mod tests {
         // Not the facet that the sample takes.
         all.insert(7, Facet { v: [[h, h, 1], [2 * h - 1, h, 1], [h, 2 * h - 1, 1]] });
         assert!(all.len() / SAMPLE > 10);
-        let mut sampled = of(&all, &rules(9), level);
-        curve::merge(&mut sampled);
+        let sampled = of(&all, &rules(9), level);
         let mut exact: Vec<Bin> =
             all.chunks(SAMPLE / 2).flat_map(|f| of(f, &rules(9), level)).collect();
         curve::merge(&mut exact);

@@ -153,7 +153,6 @@ fn estimated(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let mut bins = area::of(facets, rules, level);
     let each = area::leaves_per_surface_cell(rules);
     bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
-    curve::merge(&mut bins);
     bins
 }
 

@@ -129,6 +129,11 @@ impl Ownership {
         self.intervals.of(self.rank)
     }
 
+    /// The longest of them; at the start of the curve if this rank owns nothing.
+    pub fn longest(&self) -> Range<u64> {
+        if self.own.is_empty() { 0..1 } else { self.own.clone() }
+    }
+
     /// The boundaries between the intervals of all ranks.
     pub fn boundaries(&self) -> impl Iterator<Item = Boundary> + '_ {
         self.intervals.starts.iter().copied().zip(self.intervals.owners.iter().copied())
