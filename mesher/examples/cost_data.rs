@@ -21,9 +21,8 @@ fn measure(case: &Case, comm: &dyn Comm) -> Result<(Counts, [u64; 2]), Error> {
     let slice = ingest::read(&case.source, comm)?;
     let quantise::Quantised { rules, facets, .. } = quantise::quantise(case, slice, comm)?;
     let options = Options::default();
-    let mark = |level| refine::refine_top(&facets, &rules, level).0.split;
     let Partition { ownership, level_base, .. } =
-        initial::partition(&facets, &rules, &options.division, mark, comm)?;
+        initial::partition(&facets, &rules, &options.division, comm)?;
     let binned = BinnedFacets::new(&refine::route(&facets, &ownership, comm));
     let (mut tree, _) = refine::refine(&binned, &rules, &ownership);
     let ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);

@@ -16,7 +16,8 @@ use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
 use crate::mesh::Mesh;
 use crate::options::Options;
-use crate::output::leaves::Totals;
+use crate::output::manifest::PartWords;
+use crate::output::report::Report;
 use crate::output::stream::Counts;
 use crate::output::write::Written;
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
@@ -296,10 +297,10 @@ fn level_of(word: u64) -> Level {
 }
 
 /// The numbers of leaves by level, by rank and of this rank add up.
-pub fn totals(totals: &Totals, written: &Written, comm: &dyn Comm) {
-    let by_rank: u64 = totals.parts.iter().map(|p| p[0]).sum();
-    assert_eq!(totals.counts.total(), by_rank, "leaves by level and by rank must add up");
-    assert_eq!(totals.parts[comm.rank()][0], written.leaves, "parts must be in the order of ranks");
+pub fn totals(report: &Report, parts: &[PartWords], written: &Written, comm: &dyn Comm) {
+    let by_rank: u64 = parts.iter().map(|p| p[0]).sum();
+    assert_eq!(report.cells, by_rank, "leaves by level and by rank must add up");
+    assert_eq!(parts[comm.rank()][0], written.leaves, "parts must be in the order of ranks");
 }
 
 #[cfg(test)]

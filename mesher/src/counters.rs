@@ -3,9 +3,11 @@
 use crate::grade;
 use crate::refine::voxelise;
 use ranks::Traffic;
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Work done by one rank, in numbers that repeat exactly.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Counters {
     /// Tests of a facet against the 64 octants of a brick.
     pub facet_brick_tests: u64,
@@ -28,31 +30,17 @@ pub struct Counters {
     /// Leaves in the rank's heaviest base leaf.
     pub base_leaf_cells_max: u64,
     /// Faces exposed to crossing leaves; only on request.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub exposed_faces: Option<u64>,
 }
 
-/// Name of the counter that exists only on request.
-pub const EXPOSED_FACES: &str = "exposed_faces";
-
-/// A counter's name in the report, and its value.
-pub type Counter = (&'static str, fn(&Counters) -> u64);
-
-/// All counters of the report.
-pub const COUNTERS: [Counter; 11] = [
-    ("facet_brick_tests", |c| c.facet_brick_tests),
-    ("bricks_voxelised", |c| c.bricks_voxelised),
-    ("rays", |c| c.rays),
-    ("octants_split_graded", |c| c.octants_split_graded),
-    ("words_dilated", |c| c.words_dilated),
-    ("halo_bricks", |c| c.halo_bricks),
-    ("messages", |c| c.messages),
-    ("message_bytes", |c| c.message_bytes),
-    ("leaves", |c| c.leaves),
-    ("base_leaf_cells_max", |c| c.base_leaf_cells_max),
-    (EXPOSED_FACES, |c| c.exposed_faces.unwrap_or(0)),
-];
-
 impl Counters {
+    /// The counters by name. The names are the same on all ranks.
+    pub fn by_name(&self) -> BTreeMap<String, u64> {
+        let named = serde_json::to_value(self).and_then(serde_json::from_value);
+        named.expect("counters are numbers with names")
+    }
+
     /// Adds work of voxelisation.
     pub fn add_voxelised(&mut self, w: &voxelise::Work) {
         self.facet_brick_tests += w.facet_brick_tests;

@@ -10,9 +10,9 @@ use crate::mesh::Mesh;
 use crate::output::report::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
-use crate::partition::repartition::{self, LeafCounts};
+use crate::partition::repartition;
 use crate::refine;
-use crate::refine::voxelise::{BinnedFacets, Work};
+use crate::refine::voxelise::BinnedFacets;
 use crate::sides::{self, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
@@ -36,19 +36,12 @@ pub fn grow<F: Borrow<[Facet]>>(
     let is_parallel = comm.size() > 1;
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
-    let mut work_top = Work::default();
-    let mark = |level| {
-        let (tree, work) = refine::refine_top(facets.borrow(), &rules, level);
-        work_top = work;
-        tree.split
-    };
-    let Partition { mut ownership, base_starts, level_base, partitioner } = match is_parallel {
+    let Partition { mut ownership, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
         true => job.phase("base tree", |comm| {
-            initial::partition(facets.borrow(), &rules, division, mark, comm)
+            initial::partition(facets.borrow(), &rules, division, comm)
         })?,
     };
-    job.counters.add_voxelised(&work_top);
     job.check(|comm| check::ownership(&ownership, comm));
 
     // 4. Refine: the facets go to the owners of the octants that they reach, which refine down to T0.
@@ -115,7 +108,6 @@ pub fn grow<F: Borrow<[Facet]>>(
         rules,
         ownership,
         level_base,
-        base_starts,
         partitioner,
         split,
         crossing,
@@ -184,12 +176,12 @@ fn repartition_by_leaves(
 ) {
     let gone = [mesh.sides.deleted(), &mesh.crossing];
     let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
-    let mut counts = LeafCounts::new(&mesh.split, gone, &mesh.ownership, mesh.level_base);
-    if let Some((faces, weight)) = weighted.filter(|(_, weight)| *weight > 0) {
-        let weights =
-            faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)));
-        counts.add(weights, &mesh.ownership, mesh.level_base);
-    }
+    let exposed = weighted.iter().flat_map(|(faces, weight)| {
+        faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)))
+    });
+    let (split, before) = (&mesh.split, &mesh.ownership);
+    let new = repartition::after_gradation(split, gone, exposed, before, mesh.level_base, comm);
     let sets = &mut [&mut mesh.split, &mut mesh.crossing, &mut mesh.sides.stored];
-    mesh.ownership = counts.after_gradation(sets, &mesh.ownership, comm);
+    repartition::migrate(sets, &mesh.ownership, &new, comm);
+    mesh.ownership = new;
 }

@@ -124,14 +124,15 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
     }
 
     // 10. Finish: sums over the ranks, and the manifest.
-    let totals = job.phase("finish", |comm| leaves::finish(mesh, &counts, &written, out, comm))?;
+    let (report, parts) =
+        job.phase("finish", |comm| leaves::finish(mesh, &counts, &written, out, comm))?;
     job.counters.leaves = written.leaves;
     job.counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };
     job.counters.add_traffic(job.comm.traffic());
-    job.check(|comm| check::totals(&totals, &written, comm));
-    Ok(Report::gather(mesh, &totals, job))
+    job.check(|comm| check::totals(&report, &parts, &written, comm));
+    Ok(report.with_ranks(job))
 }
 
 #[cfg(test)]

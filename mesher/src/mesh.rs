@@ -20,8 +20,6 @@ pub struct Mesh {
     pub ownership: Ownership,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
-    /// Level-19 codes at which base leaves begin; none if they are all octants of that level.
-    pub base_starts: Vec<u64>,
     /// The partitioner that was used; none for a single rank.
     pub partitioner: Option<Partitioner>,
     /// Split octants: of the graded tree, or of T0 if gradation was not asked for.

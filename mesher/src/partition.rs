@@ -2,8 +2,8 @@
 //!
 //! [`initial`] partitions T0 before it is refined, by an estimate of the leaves. [`repartition`] shifts the boundaries after
 //! refinement and after gradation, when the work is known better. Both rest on [`ownership`], which maps octants to ranks,
-//! and on [`curve`], which divides the Morton curve into intervals of equal weight. The paper's own method, *base leaves* given to
-//! ranks by METIS, is in [`base_leaves`]. No module here imports a phase of the mesher.
+//! and on [`curve`], which divides the Morton curve into intervals of equal weight. The paper's own method, METIS on the graph of *base
+//! leaves*, is an option of [`initial`]. No module here imports a phase of the mesher.
 //!
 //! Invariants:
 //! - every rank has the same map from the curve to owners, and the intervals of all ranks tile the curve;
@@ -11,7 +11,6 @@
 //! - after [`synchronise_replicas`](ownership::Ownership::synchronise_replicas) all replicas of a brick are equal.
 
 pub mod area;
-pub mod base_leaves;
 pub mod cost;
 pub mod curve;
 pub mod initial;

@@ -7,9 +7,9 @@
 
 pub mod voxelise;
 
-use crate::input::lattice::{ExtentBox, Rules};
+use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
-use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Depth, SubtreeRoot, Work};
+use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Work};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge};
 use bricks::tree::Tree;
@@ -17,17 +17,7 @@ use ranks::{Comm, MessageBuffer};
 
 /// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
 pub fn refine(facets: &BinnedFacets, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
-    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let start = |(level, code)| SubtreeRoot { level, code };
-    let starts: Vec<SubtreeRoot> = ownership.octants().into_iter().map(start).collect();
-    voxelise::refine(facets, &depth, &starts)
-}
-
-/// Refines the whole root around some facets, down to a level at most.
-pub fn refine_top(facets: &[Facet], rules: &Rules, level: Level) -> (Tree, Work) {
-    let boxes = rules.boxes.iter().map(|b| ExtentBox { level: b.level.min(level), ..*b });
-    let depth = Depth { surface: rules.level_surface.min(level), boxes: boxes.collect() };
-    voxelise::refine(&BinnedFacets::new(facets), &depth, &[SubtreeRoot { level: 0, code: 0 }])
+    voxelise::refine(facets, rules, &ownership.octants())
 }
 
 /// Sends every facet to the owners of the octants that its extent reaches. Returns the facets for this rank. Collective.
@@ -79,18 +69,17 @@ pub(crate) fn owners_reached(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::partition::ownership::BaseLeaf;
+    use bricks::octant::start57;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
     /// The children of the root, and instead of some their children, each with an owner of its own.
-    fn two_levels(split: u8) -> Vec<BaseLeaf> {
+    fn two_levels(split: u8) -> Vec<(Level, u64)> {
         let octants = (0..8u64).flat_map(|c| match split >> c & 1 {
             0 => vec![(1, c)],
             _ => (0..8).map(|d| (2, c << 3 | d)).collect(),
         });
-        let leaf = |(owner, (level, code))| BaseLeaf { level, code, owner };
-        octants.enumerate().map(leaf).collect()
+        octants.collect()
     }
 
     proptest! {
@@ -102,16 +91,17 @@ mod tests {
             // Vertices on the faces of octants, next to them, and outside the root.
             let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
             let (f, leaves) = (Facet { v }, two_levels(split));
-            let ownership = Ownership::new(0, leaves.len(), &leaves);
-            let reached = |b: &BaseLeaf| (0..3).all(|a| {
-                let at = corner(b.level, b.code)[a];
-                f.range(a).0 <= at + edge(b.level) && f.range(a).1 >= at
+            let starts = leaves.iter().map(|&(level, code)| start57(level, code));
+            let ownership = Ownership::along(0, leaves.len(), starts.zip(0..));
+            let reached = |(level, code): (Level, u64)| (0..3).all(|a| {
+                let at = corner(level, code)[a];
+                f.range(a).0 <= at + edge(level) && f.range(a).1 >= at
             });
             // Facets outside the root have no containing octant.
-            prop_assume!(reached(&BaseLeaf { level: 0, code: 0, owner: 0 }));
+            prop_assume!(reached((0, 0)));
             let mut found = BTreeSet::new();
             owners_reached(&ownership, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
-            let want = leaves.iter().filter(|b| reached(b)).map(|b| b.owner);
+            let want = (0..).zip(&leaves).filter(|(_, leaf)| reached(**leaf)).map(|(owner, _)| owner);
             prop_assert!(found.into_iter().eq(want));
         }
     }

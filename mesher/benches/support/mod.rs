@@ -16,7 +16,7 @@ use mesher::input::stl;
 use mesher::output::stream::Leaves;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
-use mesher::refine::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
+use mesher::refine::voxelise::{BinnedFacets, refine};
 use mesher::sides::{Sides, decide};
 use mesher::{Options, grade};
 use ranks::Solo;
@@ -64,7 +64,6 @@ struct Phases {
     rules: Rules,
     ownership: Ownership,
     binned: BinnedFacets,
-    depth: Depth,
     tree: Tree,
     sides: Sides,
     graded: PerLevel,
@@ -81,13 +80,12 @@ impl Phases {
             .expect("near the root");
         let ownership = Ownership::solo();
         let binned = BinnedFacets::new(&facets);
-        let depth = Depth { surface: rules.level_surface, boxes: vec![] };
-        let (tree, _) = refine(&binned, &depth, &[SubtreeRoot { level: 0, code: 0 }]);
+        let (tree, _) = refine(&binned, &rules, &[(0, 0)]);
         let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(sides.deleted());
         let (graded, _) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
-        Self { given, facets, rules, ownership, binned, depth, tree, sides, graded }
+        Self { given, facets, rules, ownership, binned, tree, sides, graded }
     }
 
     fn leaves(&self) -> Leaves<'_> {
@@ -132,11 +130,7 @@ pub fn kernels() -> Vec<Kernel> {
         kernel(
             "refine",
             facets,
-            Box::new(|| {
-                refine(&p.binned, &p.depth, &[SubtreeRoot { level: 0, code: 0 }])
-                    .1
-                    .facet_brick_tests
-            }),
+            Box::new(|| refine(&p.binned, &p.rules, &[(0, 0)]).1.facet_brick_tests),
         ),
         kernel("flood", bricks, Box::new(move || floods(p.surface(), surface))),
         kernel(

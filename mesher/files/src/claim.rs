@@ -154,10 +154,10 @@ impl Claim {
         others: impl IntoIterator<Item = String>,
         is_new: bool,
     ) -> io::Result<Self> {
-        let entry = Unfinished::new(Output::Directory {
+        let entry = Unfinished::new(Output {
             dir: dir.as_raw_fd(),
             created: is_new.then(|| c_string(path)).transpose()?,
-            last: last.1.clone(),
+            names: last.1.clone(),
             file: last.0.as_raw_fd(),
             others: others.into_iter().flat_map(|name| names_of(&name)).collect(),
         });
@@ -192,7 +192,7 @@ impl Claim {
         rename_to_new(self.dir.as_fd(), draft, name)?;
         match rustix::fs::fsync(&self.dir) {
             // Some network file systems cannot.
-            Ok(()) | Err(Errno::INVAL) => unfinished::complete(),
+            Ok(()) | Err(Errno::INVAL) => unfinished::complete(true),
             Err(e) => {
                 // Without its last file the directory is unfinished, and will be removed.
                 let _ = unlinkat(&self.dir, name, AtFlags::empty());
@@ -204,7 +204,7 @@ impl Claim {
 
     /// Keeps the files. In every process of the run, after [`commit`](Self::commit).
     pub fn keep(mut self) {
-        unfinished::complete();
+        unfinished::complete(true);
         self.is_kept = true;
     }
 }

@@ -3,7 +3,7 @@
 use crate::interrupt::uninterrupted;
 use crate::unfinished::{self, Output, Unfinished};
 use crate::uses::register_output;
-use rustix::fs::{RenameFlags, renameat, renameat_with};
+use rustix::fs::{CWD, RenameFlags, renameat, renameat_with};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
 use std::fs::{self, File, Metadata, OpenOptions};
@@ -68,7 +68,13 @@ impl Draft {
         let file = Builder::new().make_in(folder, |draft| options.open(draft))?;
         let (file, draft) = file.into_parts();
         let (from, to) = (c_string(&draft)?, c_string(&path)?);
-        let output = Output::File { draft: from, name: to, file: file.as_raw_fd() };
+        let output = Output {
+            dir: CWD.as_raw_fd(),
+            names: [from, to],
+            file: file.as_raw_fd(),
+            others: Vec::new(),
+            created: None,
+        };
         Ok(Self { place: Place::Beside { entry: Unfinished::new(output), draft, path }, file })
     }
 
@@ -108,7 +114,7 @@ impl Draft {
             Place::Beside { entry, draft, path } => {
                 file.sync_all()?;
                 draft.persist(&path).map_err(|e| e.error)?;
-                unfinished::complete();
+                unfinished::complete(true);
                 // The handler compares the final name with the open file until here.
                 drop(entry);
             }

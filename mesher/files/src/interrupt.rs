@@ -1,6 +1,6 @@
 //! The end of a program on a signal: at once, in whatever it does, and without unfinished files.
 
-use crate::unfinished::{abandon_all, abandon_others, begin_again, complete};
+use crate::unfinished::{abandon_all, complete};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
@@ -38,7 +38,7 @@ pub fn install(message: &str, linger: Duration) -> io::Result<()> {
         let (message, is_second) = (message.clone(), is_second.clone());
         let end = move || {
             let is_second = is_second.swap(true, Ordering::AcqRel);
-            if abandon_all() && !is_second {
+            if abandon_all(true) && !is_second {
                 return;
             }
             print(&message);
@@ -82,22 +82,22 @@ pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
 
 /// Notes that the program's outcome is decided: from now on a first signal changes nothing.
 pub fn decided() {
-    complete();
+    complete(true);
 }
 
 /// Notes that another run begins, whose outcome is open: for a program that stays for several runs.
 pub fn begin() {
-    begin_again();
+    complete(false);
 }
 
 /// Removes all unfinished files: before the process ends because of a bug.
 pub fn abandon() {
-    abandon_all();
+    abandon_all(true);
 }
 
 /// Removes all files that are unfinished, also if others are complete: for a program with several outputs.
 pub fn abandon_unfinished() {
-    abandon_others();
+    abandon_all(false);
 }
 
 /// Stops the process, as SIGSTOP does, if the environment variable `STOP_AT` is this point. Tests then send signals, and let it

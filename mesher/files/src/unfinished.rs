@@ -23,30 +23,19 @@ struct Entry {
     before: *const Entry,
 }
 
-/// Unfinished output. Descriptors belong to the caller, who keeps them open as long as the entry lives.
-pub enum Output {
-    /// A file under a temporary name.
-    File {
-        /// Its temporary name.
-        draft: CString,
-        /// Its final name.
-        name: CString,
-        /// The file.
-        file: RawFd,
-    },
-    /// The files of a [`Claim`](crate::Claim).
-    Directory {
-        /// The directory.
-        dir: RawFd,
-        /// The directory's path if it was created for this output.
-        created: Option<CString>,
-        /// The temporary and the final name of the last file.
-        last: [CString; 2],
-        /// The last file.
-        file: RawFd,
-        /// Names of files to remove, temporary and final.
-        others: Vec<CString>,
-    },
+/// Unfinished output: a file, perhaps with others that are finished before it. Descriptors belong to the caller, who keeps them open as
+/// long as the entry lives.
+pub struct Output {
+    /// The directory of the names.
+    pub dir: RawFd,
+    /// The file's temporary and final name.
+    pub names: [CString; 2],
+    /// The file.
+    pub file: RawFd,
+    /// Names of other files to remove, temporary and final.
+    pub others: Vec<CString>,
+    /// The directory's path if it was created for this output.
+    pub created: Option<CString>,
 }
 
 /// Keeps an entry alive.
@@ -89,65 +78,42 @@ impl Drop for Unfinished {
     }
 }
 
-/// Notes that output has its final name. From now on [`abandon_all`] removes nothing.
-pub fn complete() {
-    IS_COMPLETE.store(true, Ordering::Release);
+/// Notes that output has its final name, from when on [`abandon_all`] removes nothing; or that another run begins.
+pub fn complete(is_complete: bool) {
+    IS_COMPLETE.store(is_complete, Ordering::Release);
 }
 
-/// Notes that further output is begun, of another run.
-pub fn begin_again() {
-    IS_COMPLETE.store(false, Ordering::Release);
-}
-
-/// Removes all unfinished output, the latest first, unless some output is complete: the process is about to end anyway, and with
-/// success. Returns whether some is. Async-signal-safe.
-pub fn abandon_all() -> bool {
+/// Removes all unfinished output, the latest first. If the process `ends`, only unless some output is complete: it would end with success
+/// anyway. Returns whether some is. Async-signal-safe.
+pub fn abandon_all(ends: bool) -> bool {
     let mut next = LATEST.load(Ordering::Acquire).cast_const();
-    let mut is_complete = IS_COMPLETE.load(Ordering::Acquire);
+    let mut is_complete = ends && IS_COMPLETE.load(Ordering::Acquire);
     // SAFETY: entries are never freed.
     while let Some(entry) = unsafe { next.as_ref() }.filter(|_| !is_complete) {
-        is_complete = entry.is_live.load(Ordering::Acquire) && entry.output.abandon();
+        is_complete = entry.is_live.load(Ordering::Acquire) && entry.output.abandon() && ends;
         next = entry.before;
     }
     is_complete
 }
 
-/// Removes all unfinished output, also if some other is complete. Async-signal-safe.
-pub fn abandon_others() {
-    let mut next = LATEST.load(Ordering::Acquire).cast_const();
-    // SAFETY: entries are never freed.
-    while let Some(entry) = unsafe { next.as_ref() } {
-        if entry.is_live.load(Ordering::Acquire) {
-            entry.output.abandon();
-        }
-        next = entry.before;
-    }
-}
-
 impl Output {
     /// Removes the output, unless it is complete. Returns whether it is.
     fn abandon(&self) -> bool {
-        match self {
-            Self::File { draft, name, file } => {
-                unlinkat(CWD, draft, AtFlags::empty()).is_err() && is_name_of(CWD, name, *file)
-            }
-            Self::Directory { dir, created, last: [draft, name], file, others } => {
-                // SAFETY: the caller keeps the descriptor open.
-                let dir = unsafe { BorrowedFd::borrow_raw(*dir) };
-                let remove = |name: &CStr| unlinkat(dir, name, AtFlags::empty()).is_ok();
-                // One process of the run succeeds: the others find the file gone.
-                let is_first = is_name_of(dir, draft, *file) && remove(draft);
-                if !is_first && is_name_of(dir, name, *file) {
-                    return true;
-                }
-                others.iter().for_each(|name| _ = remove(name));
-                if let Some(path) = created {
-                    // The last process of the run succeeds; a directory that is not empty stays.
-                    let _ = unlinkat(CWD, path, AtFlags::REMOVEDIR);
-                }
-                false
-            }
+        // SAFETY: the caller keeps the descriptor open.
+        let dir = unsafe { BorrowedFd::borrow_raw(self.dir) };
+        let [draft, name] = &self.names;
+        let remove = |name: &CStr| unlinkat(dir, name, AtFlags::empty()).is_ok();
+        // One process of the run succeeds: the others find the file gone.
+        let is_first = is_name_of(dir, draft, self.file) && remove(draft);
+        if !is_first && is_name_of(dir, name, self.file) {
+            return true;
         }
+        self.others.iter().for_each(|name| _ = remove(name));
+        if let Some(path) = &self.created {
+            // The last process of the run succeeds; a directory that is not empty stays.
+            let _ = unlinkat(CWD, path, AtFlags::REMOVEDIR);
+        }
+        false
     }
 }
 

@@ -1,6 +1,6 @@
 //! A plan for people: a table, a line, and the sentence that refuses a run.
 
-use super::{Limit, Plan, Source};
+use super::{Limit, Plan, Source, Tightest};
 use mesher::error::Error;
 use mesher::output::report::grouped;
 use std::fmt;
@@ -37,21 +37,16 @@ impl Plan {
             Source::Pilots => format!("about {:.1e}", self.cells as f64),
         }
     }
-
-    fn memory_max(&self) -> f64 {
-        self.memory_peak_bytes.iter().copied().max().unwrap_or(0) as f64
-    }
 }
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for p in &self.pilots {
-            let cells = grouped(p.cells);
+            let (cells, time) = (grouped(p.cells), seconds(p.time_cpu_s));
             let spacings = match p.spacing_factor {
                 1.0 => "the run itself".to_owned(),
                 factor => format!("run at {factor} times the spacings"),
             };
-            let time = seconds(p.time_cpu_s);
             writeln!(f, "pilot          {spacings}: {cells} cells, {time} of CPU time")?;
         }
         writeln!(f, "cells          {}", self.about())?;
@@ -60,38 +55,30 @@ impl fmt::Display for Plan {
             ranks => format!("over {ranks} ranks"),
         };
         writeln!(f, "time           {} of CPU time {ranks}", seconds(self.time_cpu_s))?;
-        let all: u64 = self.memory_peak_bytes.iter().sum();
-        writeln!(
-            f,
-            "peak memory    {} over all ranks, {} on a rank at most",
-            bytes(all as f64),
-            bytes(self.memory_max())
-        )?;
-        writeln!(
-            f,
-            "files          leaf words of {} per rank; or a tree of {}",
-            bytes(self.words_bytes[0] as f64),
-            bytes(self.tree_bytes as f64)
-        )?;
-        match self.tightest {
-            None => write!(f, "limit          none is known"),
-            Some(_) if !self.fits => write!(f, "fits           no"),
-            Some(t) => {
-                let what = match t.limit {
-                    Limit::AddressSpace => "address space of a process",
-                    Limit::ControlGroup => "control group",
-                    Limit::Machine => "memory of the machine",
-                };
-                let (needed, left) = (bytes(t.needed_bytes as f64), bytes(t.left_bytes as f64));
-                write!(f, "fits           yes: ")?;
-                match t.needed_bytes {
-                    0 => write!(
-                        f,
-                        "needs no more than this program holds already; {left} are left ({what})"
-                    ),
-                    _ => write!(f, "needs {needed} more, of {left} that are left ({what})"),
-                }
+        let (all, most) =
+            self.memory_peak_bytes.iter().fold((0, 0), |(sum, most), &n| (sum + n, n.max(most)));
+        let [all, most, words, tree] =
+            [all, most, self.words_bytes[0], self.tree_bytes].map(|n| bytes(n as f64));
+        writeln!(f, "peak memory    {all} over all ranks, {most} on a rank at most")?;
+        writeln!(f, "files          leaf words of {words} per rank; or a tree of {tree}")?;
+        let Some(Tightest { limit, left_bytes, needed_bytes }) = self.tightest else {
+            return write!(f, "limit          none is known");
+        };
+        if !self.fits {
+            return write!(f, "fits           no");
+        }
+        let what = match limit {
+            Limit::AddressSpace => "address space of a process",
+            Limit::ControlGroup => "control group",
+            Limit::Machine => "memory of the machine",
+        };
+        let [needed, left] = [needed_bytes, left_bytes].map(|n| bytes(n as f64));
+        write!(f, "fits           yes: ")?;
+        match needed_bytes {
+            0 => {
+                write!(f, "needs no more than this program holds already; {left} are left ({what})")
             }
+            _ => write!(f, "needs {needed} more, of {left} that are left ({what})"),
         }
     }
 }
@@ -113,7 +100,7 @@ fn seconds(s: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{PilotEntry, Tightest};
+    use crate::PilotEntry;
 
     #[test]
     fn bytes_have_units() {

@@ -15,7 +15,7 @@ use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
 use std::cell::Cell;
 use std::sync::{Condvar, Mutex, MutexGuard};
-use world::{Delivery, UNEQUAL, Words};
+use world::Call;
 
 /// One rank of a simulated group.
 pub struct Sim<'a> {
@@ -37,7 +37,7 @@ pub trait Token {
 /// # Panics
 /// With the panic of the lowest rank that panicked; the other ranks are stopped.
 pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + Sync) -> Vec<T> {
-    let world = World::new(size, Adversary::new(seed, size));
+    let world = World::new(size, Adversary::new(seed));
     let turns = (0..size).map(|_| Condvar::new()).collect();
     let threads = Threads { next: Mutex::new(world.next()), turns, world };
     let results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
@@ -127,11 +127,16 @@ impl<'a> Sim<'a> {
         Self { rank, world, token, calls: Cell::new(0) }
     }
 
-    fn call(&self, words: Words) -> Delivery {
-        let call = self.calls.replace(self.calls.get() + 1);
-        self.world.post(self.rank, call, words);
+    fn call(&self, call: Call, words: MessageBuffer) -> Gathered {
+        let number = self.calls.replace(self.calls.get() + 1);
+        self.world.post(self.rank, number, call, words);
         self.token.pass(self.rank);
         self.world.result(self.rank)
+    }
+
+    /// The same for words that all ranks receive.
+    fn to_all(&self, call: Call, words: &[u64]) -> Gathered {
+        self.call(call, [(self.rank, words.iter().copied())].into_iter().collect())
     }
 }
 
@@ -145,24 +150,15 @@ impl Comm for Sim<'_> {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {
-        match self.call(Words::Gather(mine.to_vec())) {
-            Delivery::Gathered(all) => all,
-            _ => unreachable!("{UNEQUAL}"),
-        }
+        self.to_all(Call::Gather, mine)
     }
 
     fn sums(&self, mine: &[u64]) -> Vec<u64> {
-        match self.call(Words::Sum(mine.to_vec())) {
-            Delivery::Summed(sums) => sums,
-            _ => unreachable!("{UNEQUAL}"),
-        }
+        self.to_all(Call::Sum, mine).words().to_vec()
     }
 
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
-        match self.call(Words::Send(to)) {
-            Delivery::Received(messages) => messages,
-            _ => unreachable!("{UNEQUAL}"),
-        }
+        Gathered::unwrap_or_clone(self.call(Call::Send, to))
     }
 
     fn ranks_in_process(&self) -> usize {

@@ -498,8 +498,9 @@ fn a_deleted_octant_that_is_no_leaf_is_found() {
 fn totals_that_differ_are_found() {
     let m = mesh(false, &Solo);
     let (counts, written, _) = finished::emit(&m, None, &Solo).expect("no interrupt");
-    let mut all = finished::finish(&m, &counts, &written, None, &Solo).expect("no output");
-    totals(&all, &written, &Solo);
-    all.parts[0][0] += 1;
-    totals(&all, &written, &Solo);
+    let (report, mut parts) =
+        finished::finish(&m, &counts, &written, None, &Solo).expect("no output");
+    totals(&report, &parts, &written, &Solo);
+    parts[0][0] += 1;
+    totals(&report, &parts, &written, &Solo);
 }

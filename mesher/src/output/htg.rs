@@ -10,13 +10,18 @@ mod siblings;
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::output::write::{OutDir, TreeFile};
+use crate::output::write::{OutDir, TREE};
+use files::Draft;
 use numbering::Numbering;
 use ranks::{Comm, MessageBuffer, pack_bytes, unpack_bytes};
-use siblings::{OwnSiblings, root};
+use siblings::{own_siblings, root};
+use std::io::{self, BufWriter};
+use std::iter::Peekable;
 use std::ops::Range;
-use vtkhdf::tree::{Shape, Siblings, Window, groups};
+use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window, groups};
 use vtkhdf::write::Deflater;
+
+type TreeFile = TreeWriter<BufWriter<Draft>>;
 
 /// Greatest number of windows of a round. One rank may have to send all of their nodes, half a byte each.
 const WINDOWS_MAX: u64 = 256;
@@ -30,9 +35,11 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
     let (origin, edge) = (mesh.rules.root.origin, mesh.rules.root.edge);
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
     let is_first = comm.rank() == 0;
-    let file = is_first.then(|| out.tree(shape.clone(), with_ranks)).transpose();
+    let begin = || TreeWriter::new(out.file(TREE)?, shape.clone(), with_ranks);
+    let failed = out.failed(TREE);
+    let file = is_first.then(begin).transpose().map_err(&failed);
     let mut file = ranks::agree(comm, file)?;
-    let mut own = Source { siblings: OwnSiblings::new(mesh, &numbering), last: None };
+    let mut own = Source { siblings: own_siblings(mesh, &numbering).peekable(), last: None };
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
     let mut begin = 0;
@@ -47,20 +54,21 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
         }
         let compressed = comm.sparse_all_to_all(chunks);
         let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
-        ranks::agree(comm, written)?;
+        ranks::agree(comm, written.map_err(&failed))?;
         begin = windows.end;
     }
-    ranks::agree(comm, file.map_or(Ok(()), TreeFile::finish))
+    let publish = |file: TreeFile| file.finish()?.into_inner()?.publish();
+    ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
 }
 
 /// The nodes that this rank owns, sent window by window.
-struct Source<'a> {
-    siblings: OwnSiblings<'a>,
+struct Source<S: Iterator<Item = (u64, Siblings)>> {
+    siblings: Peekable<S>,
     /// The last siblings sent: some of them may belong to the following window.
     last: Option<(u64, Siblings)>,
 }
 
-impl Source<'_> {
+impl<S: Iterator<Item = (u64, Siblings)>> Source<S> {
     /// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
     /// runs of siblings: number of the first, how many, and the siblings in pairs.
     fn messages(&mut self, windows: Range<u64>) -> MessageBuffer {
@@ -70,7 +78,7 @@ impl Source<'_> {
             let range = groups(window);
             found.clear();
             found.extend(self.last.filter(|(group, _)| range.contains(group)));
-            while let Some(next) = self.siblings.next_before(range.end) {
+            while let Some(next) = self.siblings.next_if(|(group, _)| *group < range.end) {
                 found.push(next);
             }
             self.last = found.last().copied();
@@ -127,7 +135,7 @@ fn pack(window: u64, chunks: &[Option<Vec<u8>>], messages: &mut MessageBuffer) {
 }
 
 /// Writes the chunks that all ranks have sent, in the order of their windows.
-fn add(messages: &MessageBuffer, file: &mut TreeFile) -> Result<(), Error> {
+fn add(messages: &MessageBuffer, file: &mut TreeFile) -> io::Result<()> {
     let mut messages: Vec<&[u64]> = messages.messages().map(|(_, words)| words).collect();
     messages.sort_by_key(|words| words[0]);
     for words in messages {
@@ -137,7 +145,8 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> Result<(), Error> {
             rest = after;
             (!chunk.is_empty()).then_some(chunk)
         });
-        file.add(words[0], &chunks.collect::<Vec<_>>())?;
+        let chunks: Vec<_> = chunks.collect();
+        file.add(words[0], chunks.iter().map(Option::as_deref))?;
     }
     Ok(())
 }

@@ -2,23 +2,14 @@
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::output::manifest::{self, Manifest};
+use crate::output::manifest::{self, Manifest, PartWords};
+use crate::output::report::Report;
 use crate::output::stream::Counts;
-use crate::output::write::{OutDir, Written};
-use crate::partition::base_leaves::Heaviest;
-use bricks::digest::Digests;
+use crate::output::write::{OutDir, Part, Written, part_name};
+use bricks::octant::{LEVEL_MAX, Level};
 use files::interrupt::stop_at;
 use ranks::{Comm, agree};
-
-/// Sums over all ranks.
-pub struct Totals {
-    /// Leaves by level and side.
-    pub counts: Counts,
-    /// Digests of the mesh.
-    pub digests: Digests,
-    /// For each rank the number of its leaves, and the two halves of their digest.
-    pub parts: Vec<[u64; 3]>,
-}
+use std::io;
 
 /// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Also returns the number of
 /// leaves in its heaviest base leaf. Collective.
@@ -29,9 +20,10 @@ pub fn emit(
 ) -> Result<(Counts, Written, u64), Error> {
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
-    let mut heaviest = Heaviest::new(&mesh.base_starts, level);
+    let mut heaviest = Heaviest::new(level);
+    let name = part_name(comm.rank());
     let mut work = || {
-        let begin = |out: &OutDir| out.part(comm.rank());
+        let begin = |out: &OutDir| Part::new(out.file(&name)?);
         let mut part = out.filter(|out| out.output.words).map(begin).transpose()?;
         let mut written = Written::default();
         let counts = mesh.leaves().emit(|words| {
@@ -42,28 +34,82 @@ pub fn emit(
         part.map_or(Ok(()), |part| part.finish(written.leaves))?;
         Ok((counts, written))
     };
-    let result: Result<_, Error> = work();
-    let (counts, written) = agree(comm, result)?;
-    Ok((counts, written, heaviest.max()))
+    let failed = |e: io::Error| out.expect("only files can fail").failed(&name)(e);
+    let (counts, written) = agree(comm, work().map_err(failed))?;
+    Ok((counts, written, heaviest.max))
 }
 
-/// Sums over the ranks, and writes the manifest if a directory is given. Collective.
+/// Sums over the ranks, and writes the manifest if a directory is given. Returns the report without times and counters, and the parts
+/// of all ranks. Collective.
 pub fn finish(
     mesh: &Mesh,
     counts: &Counts,
     written: &Written,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<Totals, Error> {
+) -> Result<(Report, Vec<PartWords>), Error> {
     let counts = counts.gather(comm);
     let (digests, parts) = manifest::gather(written, comm);
+    let report = Report::new(mesh, &counts, &digests, comm.size());
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
             stop_at(format_args!("manifest:0"));
-            out.manifest(&Manifest::new(&out.output, mesh, &counts, &digests, &parts))
+            out.manifest(&Manifest::new(&out.output, mesh, &report, &digests, &parts))
         }
         _ => Ok(()),
     };
     agree(comm, publish())?;
-    Ok(Totals { counts, digests, parts })
+    Ok((report, parts))
+}
+
+/// The number of leaves in this rank's heaviest octant of a level, as they are streamed in Morton order. It bounds the load balance of
+/// any partition between such octants.
+struct Heaviest {
+    /// Bits of a leaf's code within an octant.
+    shift: u32,
+    /// The current octant, and its leaves so far.
+    octant: u64,
+    leaves: u64,
+    max: u64,
+}
+
+impl Heaviest {
+    fn new(level: Level) -> Self {
+        Self { shift: 3 * (LEVEL_MAX - level), octant: 0, leaves: 0, max: 0 }
+    }
+
+    /// Counts the next leaves. One that is larger than an octant counts for the first in it.
+    fn add(&mut self, mut words: &[u64]) {
+        while let Some(octant) = words.first().map(|w| w >> 7 >> self.shift) {
+            if octant != self.octant {
+                (self.octant, self.leaves) = (octant, 0);
+            }
+            let count = words.partition_point(|w| w >> 7 >> self.shift <= octant);
+            self.leaves += count as u64;
+            self.max = self.max.max(self.leaves);
+            words = &words[count..];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bricks::octant::{Side, word};
+
+    #[test]
+    fn leaves_are_counted_by_octant_whatever_the_pieces() {
+        let of = |l, codes: &[u64]| -> Vec<u64> {
+            codes.iter().map(|c| word(l, *c, Side::Outside)).collect()
+        };
+        let words =
+            [of(2, &[1, 3]), of(1, &[1]), of(3, &[128, 129, 130, 200]), of(2, &[32, 63])].concat();
+        for (level, want) in [(1, 3), (0, 9), (2, 3)] {
+            for piece in 1..=words.len() {
+                let mut heaviest = Heaviest::new(level);
+                words.chunks(piece).for_each(|piece| heaviest.add(piece));
+                assert_eq!(heaviest.max, want, "level {level}, pieces of {piece}");
+            }
+        }
+    }
 }

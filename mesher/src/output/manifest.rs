@@ -3,39 +3,39 @@
 use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
 use crate::input::quantise::FacetCounts;
 use crate::mesh::Mesh;
-use crate::output::stream::Counts;
+use crate::output::report::Report;
 use crate::output::write::{Output, TREE, Written, part_name};
-use crate::sides::Summary;
 use crate::sides::leaks::Leak;
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
 use ranks::Comm;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Contents of `mesh.json`. Boxes are in lattice units, the root is in the geometry's unit.
 #[derive(Clone, Debug, Serialize)]
-pub struct Manifest {
+pub struct Manifest<'a> {
     schema: &'static str,
-    program: String,
+    program: &'static str,
     tree: &'static str,
     root: Root,
     level_surface: u32,
     layer_cells_min: u32,
     keep: Keep,
     keep_crossing: bool,
-    boxes: Vec<ExtentBox>,
-    geometry: Geometry,
-    leaks: Vec<LeakEntry>,
+    boxes: &'a [ExtentBox],
+    geometry: &'a Geometry,
+    leaks: &'a [LeakEntry],
     leaves: u64,
-    leaves_by_level: Vec<u64>,
-    leaves_by_side: SideEntry,
+    leaves_by_level: &'a [u64],
+    leaves_by_side: Value,
     seeds: Vec<[i64; 3]>,
     enclosed: Enclosed,
-    components: ComponentsEntry,
-    components_ambiguous: AmbiguousEntry,
-    digest: String,
+    components: Value,
+    components_ambiguous: Value,
+    digest: &'a str,
     octant_digests: Vec<String>,
-    parts: Vec<PartEntry>,
+    parts: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     hyper_tree_grid: Option<&'static str>,
 }
@@ -84,42 +84,8 @@ impl LeakEntry {
     }
 }
 
-#[derive(Clone, Debug, Serialize)]
-struct SideEntry {
-    outside: u64,
-    inside: u64,
-    crossing: u64,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct ComponentsEntry {
-    outside: u64,
-    inside: u64,
-    enclosed: EnclosedEntry,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct EnclosedEntry {
-    count: u64,
-    leaves: u64,
-    example: Option<[f64; 3]>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct AmbiguousEntry {
-    count: u64,
-    example: Option<[f64; 3]>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct PartEntry {
-    file: String,
-    leaves: u64,
-    digest: String,
-}
-
 /// A part: its number of leaves, and the upper and the lower half of its digest.
-type PartWords = [u64; 3];
+pub type PartWords = [u64; 3];
 
 /// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
 pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
@@ -140,59 +106,54 @@ pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     (digests, parts)
 }
 
-impl Manifest {
-    /// The manifest of a mesh with these leaves, digests and parts; parts and tree are named as far as `output` has them.
+impl<'a> Manifest<'a> {
+    /// The manifest of a mesh with these numbers, digests and parts; parts and tree are named as far as `output` has them.
     pub fn new(
         output: &Output,
-        mesh: &Mesh,
-        counts: &Counts,
+        mesh: &'a Mesh,
+        report: &'a Report,
         digests: &Digests,
         parts: &[PartWords],
     ) -> Self {
         let rules = &mesh.rules;
-        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.sides.summary;
-        let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
-        let entry = |(i, p): (usize, &PartWords)| PartEntry {
-            file: part_name(i),
-            leaves: p[0],
-            digest: hex(u128::from(p[1]) << 64 | u128::from(p[2])),
+        let [outside, inside, crossing] = report.cells_by_side;
+        let part = |(rank, &[leaves, high, low]): (usize, &PartWords)| {
+            let digest = hex(u128::from(high) << 64 | u128::from(low));
+            json!({ "file": part_name(rank), "leaves": leaves, "digest": digest })
         };
         Self {
             schema: "octree-leaf-set/1",
-            program: concat!("mesher ", env!("CARGO_PKG_VERSION")).into(),
+            program: report.program,
             tree: if mesh.is_base { "base" } else { "final" },
             root: rules.root,
             level_surface: rules.level_surface,
             layer_cells_min: rules.layer_cells_min,
             keep: rules.keep,
             keep_crossing: rules.keep_crossing,
-            boxes: rules.boxes.clone(),
-            geometry: Geometry::of(&mesh.facets),
-            leaks: LeakEntry::of(mesh),
-            leaves: counts.total(),
-            leaves_by_level: counts.by_level[..=LEVEL_MAX as usize]
-                .iter()
-                .map(|l| l.iter().sum())
-                .collect(),
-            leaves_by_side: SideEntry { outside: side(0), inside: side(1), crossing: side(2) },
+            boxes: &rules.boxes,
+            geometry: &report.geometry,
+            leaks: &report.leaks,
+            leaves: report.cells,
+            leaves_by_level: &report.cells_by_level,
+            leaves_by_side: json!({ "outside": outside, "inside": inside, "crossing": crossing }),
             seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
             enclosed: rules.enclosed,
-            components: ComponentsEntry {
-                outside,
-                inside,
-                enclosed: EnclosedEntry {
-                    count: enclosed.map_or(0, |e| e.count),
-                    leaves: enclosed.map_or(0, |e| e.leaves),
-                    example: enclosed.map(|e| rules.root.locate(e.example)),
+            components: json!({
+                "outside": report.components_outside,
+                "inside": report.components_inside,
+                "enclosed": {
+                    "count": report.components_enclosed,
+                    "leaves": report.enclosed_leaves,
+                    "example": report.enclosed_example,
                 },
-            },
-            components_ambiguous: AmbiguousEntry {
-                count: ambiguous.map_or(0, |a| a.count),
-                example: ambiguous.map(|a| rules.root.locate(a.example)),
-            },
-            digest: hex(digests.whole()),
+            }),
+            components_ambiguous: json!({
+                "count": report.components_ambiguous,
+                "example": report.ambiguous_example,
+            }),
+            digest: &report.digest,
             octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
-            parts: parts.iter().enumerate().filter(|_| output.words).map(entry).collect(),
+            parts: parts.iter().enumerate().filter(|_| output.words).map(part).collect(),
             hyper_tree_grid: output.tree.then_some(TREE),
         }
     }

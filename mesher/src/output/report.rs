@@ -11,15 +11,14 @@ pub(crate) mod warnings;
 
 pub use text::grouped;
 
-use crate::counters::{COUNTERS, EXPOSED_FACES};
 use crate::job::Job;
 use crate::mesh::Mesh;
-use crate::output::leaves::Totals;
 use crate::output::manifest::{Geometry, LeakEntry};
+use crate::output::stream::Counts;
 use crate::partition::Partitioner;
-use crate::record::{Phase, peak_rss_bytes};
+use crate::record::peak_rss_bytes;
 use crate::sides::Summary;
-use bricks::digest::hex;
+use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
 use ranks::{Comm, matrix};
 use serde::Serialize;
@@ -44,14 +43,11 @@ pub struct PhaseEntry {
     pub message_bytes: Vec<u64>,
 }
 
-/// Words per phase in the message of the report.
-const PHASE_WORDS: usize = 6;
-
 /// A run's results. In JSON, under `schema`, `octree-mesher-run/1`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     schema: &'static str,
-    program: &'static str,
+    pub(crate) program: &'static str,
     /// Facets in the geometry.
     pub facets: u64,
     /// The same, with their digest.
@@ -101,57 +97,26 @@ pub struct Report {
     /// Times by phase and rank.
     pub phases: Vec<PhaseEntry>,
     /// Counters by rank.
-    pub counters: BTreeMap<&'static str, Vec<u64>>,
+    pub counters: BTreeMap<String, Vec<u64>>,
     /// Sender, receiver, messages and bytes for every pair of ranks that exchanged messages; only on request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub message_matrix: Option<Vec<matrix::Entry>>,
 }
 
 impl Report {
-    /// Gathers the counters and times of all ranks. Collective.
-    pub(crate) fn gather(mesh: &Mesh, totals: &Totals, job: &Job) -> Self {
-        let Job { comm, record, counters, .. } = job;
+    /// The report of a mesh with these leaves on `ranks` ranks, without times and counters.
+    pub(crate) fn new(mesh: &Mesh, counts: &Counts, digests: &Digests, ranks: usize) -> Self {
         let Mesh { rules, sides, .. } = mesh;
-        let Totals { counts, digests, .. } = totals;
-        let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
-        words.extend(COUNTERS.iter().map(|(_, value)| value(counters)));
-        words.extend(record.phases().iter().flat_map(|p| {
-            let t = p.traffic;
-            let times =
-                [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s].map(f64::to_bits);
-            [times[0], times[1], times[2], times[3], t.messages, t.bytes] as [u64; PHASE_WORDS]
-        }));
-        let all = comm.all_gather(&words);
-        let column = |i: usize| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>();
-        let seconds = |i: usize| column(i).into_iter().map(f64::from_bits).collect::<Vec<f64>>();
-        let first = 1 + COUNTERS.len();
-        let entry = |(i, p): (usize, &Phase)| {
-            let start = first + PHASE_WORDS * i;
-            PhaseEntry {
-                name: p.name.into(),
-                time_wall_s: seconds(start),
-                time_cpu_s: seconds(start + 1),
-                time_comm_wall_s: seconds(start + 2),
-                time_comm_cpu_s: seconds(start + 3),
-                messages: column(start + 4),
-                message_bytes: column(start + 5),
-            }
-        };
-        let phases: Vec<PhaseEntry> = record.phases().iter().enumerate().map(entry).collect();
-        let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
-        let side = |s: usize| counts.by_level.iter().map(|l| l[s]).sum();
+        let by_level = &counts.by_level[..=LEVEL_MAX as usize];
         let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
-        let report = Self {
+        Self {
             schema: "octree-mesher-run/1",
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             facets: mesh.facets.total,
             geometry: Geometry::of(&mesh.facets),
             cells: counts.total(),
-            cells_by_level: counts.by_level[..=LEVEL_MAX as usize]
-                .iter()
-                .map(|l| l.iter().sum())
-                .collect(),
-            cells_by_side: std::array::from_fn(side),
+            cells_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
+            cells_by_side: [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum()),
             digest: hex(digests.whole()),
             root_edge: rules.root.edge,
             level_surface: rules.level_surface,
@@ -167,19 +132,49 @@ impl Report {
             ambiguous_example: ambiguous.map(|a| rules.root.locate(a.example)),
             leaks: LeakEntry::of(mesh),
             warnings: warnings::of(mesh),
-            ranks: comm.size(),
-            time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
-            peak_rss_bytes: column(0),
-            phases,
-            counters: (1..)
-                .zip(COUNTERS)
-                .filter(|(_, (name, _))| *name != EXPOSED_FACES || counters.exposed_faces.is_some())
-                .map(|(i, (name, _))| (name, column(i)))
-                .collect(),
+            ranks,
+            time_wall_s: 0.0,
+            peak_rss_bytes: Vec::new(),
+            phases: Vec::new(),
+            counters: BTreeMap::new(),
             message_matrix: None,
-        };
-        report.check_invariants();
-        report
+        }
+    }
+
+    /// Adds the counters and times of all ranks. Collective.
+    pub(crate) fn with_ranks(mut self, job: &Job) -> Self {
+        let Job { comm, record, counters, .. } = job;
+        let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
+        let counters = counters.by_name();
+        words.extend(counters.values());
+        words.extend(record.phases().iter().flat_map(|p| {
+            let t = p.traffic;
+            let [wall, cpu, comm_wall, comm_cpu] =
+                [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s].map(f64::to_bits);
+            [wall, cpu, comm_wall, comm_cpu, t.messages, t.bytes]
+        }));
+        let all = comm.all_gather(&words);
+        // The columns of the table that has a row for each rank.
+        let mut columns = (0..).map(|i| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>());
+        let mut column = || columns.next().expect("columns have no end");
+        self.peak_rss_bytes = column();
+        self.counters = counters.into_keys().map(|name| (name, column())).collect();
+        for phase in record.phases() {
+            let mut seconds = || column().into_iter().map(f64::from_bits).collect::<Vec<f64>>();
+            self.phases.push(PhaseEntry {
+                name: phase.name.into(),
+                time_wall_s: seconds(),
+                time_cpu_s: seconds(),
+                time_comm_wall_s: seconds(),
+                time_comm_cpu_s: seconds(),
+                messages: column(),
+                message_bytes: column(),
+            });
+        }
+        let total = |r: usize| self.phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
+        self.time_wall_s = (0..self.ranks).map(total).fold(0.0, f64::max);
+        self.check_invariants();
+        self
     }
 
     /// # Panics

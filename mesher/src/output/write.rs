@@ -11,9 +11,9 @@ use bricks::digest::Digests;
 use files::{Claim, ClaimError, Draft};
 use ranks::{Comm, agree};
 use serde::Serialize;
+use std::fmt::Display;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use vtkhdf::tree::{Shape, TreeWriter};
 
 /// File name of the manifest.
 pub const MANIFEST: &str = "mesh.json";
@@ -54,7 +54,7 @@ pub struct OutDir {
     claim: Claim,
 }
 
-fn output(path: &Path, e: &dyn std::fmt::Display) -> Error {
+fn output(path: &Path, e: impl Display) -> Error {
     Error::output(format!(
         "{}: {e}: no mesh was written there; choose another --out or free disk space",
         path.display()
@@ -73,7 +73,7 @@ impl OutDir {
         let created = agree(
             comm,
             created.map_err(|e| match e {
-                ClaimError::Io(e) => output(path, &e),
+                ClaimError::Io(e) => output(path, e),
                 taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
             }),
         )?;
@@ -83,39 +83,23 @@ impl OutDir {
         let mine = [0, comm.rank()].into_iter().flat_map(names);
         let claim = match created {
             Some(claim) => Ok(claim),
-            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| output(path, &e)),
+            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| output(path, e)),
         };
         Ok(Self { output: files.clone(), path: path.clone(), claim: agree(comm, claim)? })
     }
 
-    /// Begins this rank's part.
+    /// Begins a file of the mesh.
     ///
     /// # Errors
-    /// If its file cannot be created.
-    pub fn part(&self, rank: usize) -> Result<Part, Error> {
-        let name = part_name(rank);
-        let begin = || -> io::Result<BufWriter<Draft>> {
-            let mut file = BufWriter::with_capacity(1 << 20, self.claim.draft(&name)?);
-            file.write_all(&header(u64::MAX))?;
-            Ok(file)
-        };
-        let file = begin().map_err(|e| output(&self.path, &e))?;
-        let path = self.path.join(name);
-        Ok(Part { path, file })
+    /// If it cannot be created.
+    pub fn file(&self, name: &str) -> io::Result<BufWriter<Draft>> {
+        Ok(BufWriter::with_capacity(1 << 20, self.claim.draft(name)?))
     }
 
-    /// Begins the file of the tree. On one rank only.
-    ///
-    /// # Errors
-    /// If the file cannot be created.
-    pub fn tree(&self, shape: Shape, with_ranks: bool) -> Result<TreeFile, Error> {
-        let path = self.path.join(TREE);
-        let begin = || {
-            let file = BufWriter::with_capacity(1 << 20, self.claim.draft(TREE)?);
-            TreeWriter::new(file, shape, with_ranks)
-        };
-        let file = begin().map_err(|e| output(&path, &e))?;
-        Ok(TreeFile { path, file })
+    /// What to report of a file of the mesh that cannot be written.
+    pub fn failed(&self, name: &str) -> impl Fn(io::Error) -> Error {
+        let path = self.path.join(name);
+        move |e| output(&path, e)
     }
 
     /// Writes the manifest. On one rank only, after all ranks have finished their parts.
@@ -124,7 +108,7 @@ impl OutDir {
     /// If the file cannot be written.
     pub fn manifest(&self, manifest: &impl Serialize) -> Result<(), Error> {
         let write = |to: &mut dyn Write| write_json(to, manifest);
-        self.claim.commit(write).map_err(|e| output(&self.path, &e))
+        self.claim.commit(write).map_err(|e| output(&self.path, e))
     }
 
     /// Keeps the mesh. On all ranks, after the [manifest](Self::manifest).
@@ -140,39 +124,6 @@ impl OutDir {
 pub fn write_json(mut to: &mut dyn Write, value: &impl Serialize) -> io::Result<()> {
     serde_json::to_writer_pretty(&mut to, value)?;
     to.write_all(b"\n")
-}
-
-/// The file of the tree while it is being written.
-pub struct TreeFile {
-    path: PathBuf,
-    file: TreeWriter<BufWriter<Draft>>,
-}
-
-impl TreeFile {
-    /// Writes the compressed chunks of a window.
-    ///
-    /// # Errors
-    /// If they cannot be written.
-    pub fn add(&mut self, window: u64, chunks: &[Option<Vec<u8>>]) -> Result<(), Error> {
-        let added = self.file.add(window, chunks.iter().map(Option::as_deref));
-        added.map_err(|e| output(&self.path, &e))
-    }
-
-    /// Completes the file and gives it its final name.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn finish(self) -> Result<(), Error> {
-        let Self { path, file } = self;
-        let close = || -> io::Result<()> { file.finish()?.into_inner()?.publish() };
-        close().map_err(|e| output(&path, &e))
-    }
-}
-
-/// A rank's part while it is being written.
-pub struct Part {
-    path: PathBuf,
-    file: BufWriter<Draft>,
 }
 
 /// The leaves of a rank.
@@ -192,33 +143,40 @@ impl Written {
     }
 }
 
+/// A rank's leaf words while they are being written.
+pub struct Part(BufWriter<Draft>);
+
 impl Part {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn new(mut file: BufWriter<Draft>) -> io::Result<Self> {
+        file.write_all(&header(u64::MAX))?;
+        Ok(Self(file))
+    }
+
     /// Appends words.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn add(&mut self, words: &[u64]) -> Result<(), Error> {
+    pub fn add(&mut self, words: &[u64]) -> io::Result<()> {
         // The words' bytes in memory: to write word by word takes longer than meshing.
-        let written = match cfg!(target_endian = "little") {
-            true => self.file.write_all(bytemuck::cast_slice(words)),
-            false => words.iter().try_for_each(|w| self.file.write_all(&w.to_le_bytes())),
-        };
-        written.map_err(|e| output(&self.path, &e))
+        match cfg!(target_endian = "little") {
+            true => self.0.write_all(bytemuck::cast_slice(words)),
+            false => words.iter().try_for_each(|w| self.0.write_all(&w.to_le_bytes())),
+        }
     }
 
     /// Completes the file of `leaves` words and gives it its final name.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(self, leaves: u64) -> Result<(), Error> {
-        let Self { path, file } = self;
-        let close = || -> io::Result<()> {
-            let mut file = file.into_inner()?;
-            file.seek(SeekFrom::Start(0))?;
-            file.write_all(&header(leaves))?;
-            file.publish()
-        };
-        close().map_err(|e| output(&path, &e))
+    pub fn finish(self, leaves: u64) -> io::Result<()> {
+        let mut file = self.0.into_inner()?;
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(&header(leaves))?;
+        file.publish()
     }
 }
 
@@ -243,7 +201,7 @@ mod tests {
             let files = Output { directory, words: true, tree: false, cell_ranks: false };
             let out = OutDir::claim(&files, &Solo).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
-            let mut part = out.part(3).unwrap();
+            let mut part = Part::new(out.file(&part_name(3)).unwrap()).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());
             part.finish(n as u64).unwrap();
             let bytes = std::fs::read(out.path.join(part_name(3))).unwrap();

@@ -5,10 +5,9 @@
 //! cell. A facet larger than the octants of interest is split in four until it is not.
 
 use crate::input::lattice::{ExtentBox, Rules};
-use crate::partition::curve::Bin;
+use crate::partition::curve::{self, Bin};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
-use ranks::{Comm, Entry, all_gather_reduced};
 use std::ops::Range;
 
 /// Fractions of a finest cell's face that areas are counted in: sums of integers do not depend on their order.
@@ -20,7 +19,7 @@ pub fn leaves_per_surface_cell(rules: &Rules) -> u64 {
 }
 
 /// The number of leaves that the boxes ask for in an octant.
-pub fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
+fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
     if rules.boxes.is_empty() {
         return 0;
     }
@@ -61,15 +60,6 @@ pub fn add_boxes(
     }
 }
 
-/// The area in each octant of one level, the same on all ranks.
-#[derive(Debug, Default)]
-pub struct Areas {
-    /// Level-19 codes of octants with area, ascending.
-    starts: Vec<u64>,
-    /// Sum of the areas of all octants before each of them; and the sum of all at the end.
-    before: Vec<u64>,
-}
-
 /// The sum of the areas of facets, in lattice units squared.
 pub fn total(facets: &[Facet]) -> f64 {
     facets.iter().map(norm).sum()
@@ -79,77 +69,26 @@ fn norm(f: &Facet) -> f64 {
     f.normal().iter().map(|c| (*c as f64).abs()).sum::<f64>() * 0.5
 }
 
-impl Areas {
-    /// Sums the areas of all ranks' facets by octants of a level. Collective.
-    pub fn gather(facets: &[Facet], rules: &Rules, level: Level, comm: &dyn Comm) -> Self {
-        let local = of(facets, rules, level).into_iter().map(Entry::from).collect();
-        let entries = all_gather_reduced(local, |a, b| a + b, comm);
-        let mut areas = Self { starts: entries.iter().map(|e| e[0]).collect(), before: vec![0] };
-        areas.before.extend(entries.iter().scan(0, |sum, e| {
-            *sum += e[1];
-            Some(*sum)
-        }));
-        areas
-    }
-
-    /// The indices of all entries.
-    pub fn all(&self) -> Range<usize> {
-        0..self.starts.len()
-    }
-
-    /// The indices, among some, of the entries in an interval of the curve (level-19 codes).
-    pub fn within(&self, among: &Range<usize>, span: Range<u64>) -> Range<usize> {
-        let part = &self.starts[among.clone()];
-        let first = part.partition_point(|s| *s < span.start);
-        let count = part[first..].partition_point(|s| *s < span.end);
-        among.start + first..among.start + first + count
-    }
-
-    /// The area of some entries, in faces of a finest cell.
-    pub fn cells(&self, entries: &Range<usize>) -> u64 {
-        // Unit weights gather no areas.
-        if entries.is_empty() {
-            return 0;
-        }
-        (self.before[entries.end] - self.before[entries.start]) / FRACTIONS
-    }
-}
-
-/// Octants, a power of two, whose latest bins are remembered: facets often come in strips that alternate between a few.
-const REMEMBERED: usize = 8192;
-
 /// Number of facets in the sample, if there are many small ones.
 const SAMPLE: usize = 2048;
 
-/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. An octant may have several bins. Of
-/// many facets that are smaller than such an octant, a sample is measured.
+/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. Of many facets that are smaller than such an
+/// octant, a sample is measured.
 pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
-    let cell = edge(rules.level_surface) as f64;
+    let (cell, size) = (edge(rules.level_surface) as f64, edge(level));
     let (shift, scale) = (3 * (LEVEL_MAX - level), FRACTIONS as f64 / (cell * cell));
     let mut bins: Vec<Bin> = Vec::new();
-    // Index of the latest bin, by the low bits of the octant's code.
-    let mut latest = vec![0u32; REMEMBERED];
-    let mut add = |start: u64, area: f64| {
-        let (code, area) = (start >> shift, (area * scale) as u64);
-        let latest = &mut latest[code as usize % REMEMBERED];
-        match bins.get_mut(*latest as usize).filter(|bin| bin.0 == code << shift) {
-            Some(bin) => bin.1 += area,
-            None => {
-                *latest = bins.len() as u32;
-                bins.push((code << shift, area));
-            }
-        }
-    };
+    let mut add =
+        |start: u64, area: f64| bins.push((start >> shift << shift, (area * scale) as u64));
     // Odd, as facets come in pairs.
     let every = (facets.len() / SAMPLE) | 1;
     for some in facets.chunks(every) {
-        some.iter()
-            .filter(|f| is_wide(f, edge(level)))
-            .for_each(|f| spread(f, edge(level), &mut add));
-        if !is_wide(&some[0], edge(level)) {
-            spread(&some[0], edge(level), &mut |start, area| add(start, area * every as f64));
+        some.iter().filter(|f| is_wide(f, size)).for_each(|f| spread(f, size, &mut add));
+        if !is_wide(&some[0], size) {
+            spread(&some[0], size, &mut |start, area| add(start, area * every as f64));
         }
     }
+    curve::merge(&mut bins);
     bins
 }
 
@@ -190,9 +129,7 @@ fn centre(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::input::lattice::Keep;
-    use crate::partition::curve;
     use crate::tests::rules as plain_rules;
-    use ranks::Solo;
 
     fn rules(level_surface: Level) -> Rules {
         Rules { level_surface, layer_cells_min: 4, keep: Keep::Outside, ..plain_rules() }
@@ -203,10 +140,10 @@ mod tests {
         // Half of the face of an octant of level 1, in the plane z = 1.
         let h = (ROOT_EDGE / 2) as i32;
         let f = Facet { v: [[0, 0, 1], [h, 0, 1], [0, h, 1]] };
-        let areas = Areas::gather(&[f], &rules(6), 4, &Solo);
+        let bins = of(&[f], &rules(6), 4);
         let cells = |l: Level, code: u64| {
             let span = start57(l, code)..start57(l, code + 1);
-            areas.cells(&areas.within(&areas.all(), span))
+            bins.iter().filter(|b| span.contains(&b.0)).map(|b| b.1).sum::<u64>() / FRACTIONS
         };
         // 32 x 32 finest cells, half of them covered.
         assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
@@ -233,8 +170,7 @@ mod tests {
         // Not the facet that the sample takes.
         all.insert(7, Facet { v: [[h, h, 1], [2 * h - 1, h, 1], [h, 2 * h - 1, 1]] });
         assert!(all.len() / SAMPLE > 10);
-        let mut sampled = of(&all, &rules(9), level);
-        curve::merge(&mut sampled);
+        let sampled = of(&all, &rules(9), level);
         let mut exact: Vec<Bin> =
             all.chunks(SAMPLE / 2).flat_map(|f| of(f, &rules(9), level)).collect();
         curve::merge(&mut exact);

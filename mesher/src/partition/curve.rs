@@ -77,18 +77,6 @@ pub fn partition_known(bins: &[Bin], ranks: usize) -> Option<Vec<Boundary>> {
     (total > 0).then(|| without_repeats(local().into_iter()))
 }
 
-/// Assigns each base leaf to the rank in whose interval of equal weight its middle lies. Weights are not all zero.
-pub fn assign_morton(weights: &[u64], ranks: usize) -> Vec<usize> {
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
-    let mut before = 0u128;
-    let mut owner = |w: &u64| {
-        let middle = 2 * before + u128::from(*w);
-        before += u128::from(*w);
-        ((middle * ranks as u128 / (2 * total)) as usize).min(ranks - 1)
-    };
-    weights.iter().map(&mut owner).collect()
-}
-
 /// The cumulative weight at which each rank begins, where all loads are equal.
 fn equal(total: u128, ranks: usize) -> Vec<u128> {
     (0..ranks as u128).map(|r| total * r / ranks as u128).collect()

@@ -5,33 +5,31 @@
 //! the owners in the rough partition. So each rank knows one interval of the curve in detail, and the final boundaries
 //! follow from the sums over the intervals.
 //!
-//! METIS, weights of 1 and a given `level_base` need base leaves: see [`base_leaves`].
+//! METIS, weights of 1 and a given `level_base` need *base leaves*, the paper's subtrees of T0 that are assigned to ranks as a whole.
+//! Here they are the octants of one level in which facets or boxes have weight, the same on all ranks; an octant without weight goes
+//! with the base leaf before it.
 
 use crate::error::Error;
 use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::area::{self, FRACTIONS};
-use crate::partition::curve::{self, Bin};
+use crate::partition::curve::{self, Bin, Boundary};
+#[cfg(feature = "metis")]
+use crate::partition::metis;
 use crate::partition::ownership::Ownership;
-use crate::partition::{Division, Partitioner, base_leaves};
+use crate::partition::{Division, Partitioner, Weights};
 use bricks::facet::Facet;
-use bricks::octant::{LEVEL_MAX, Level, edge, start57};
-use bricks::tree::PerLevel;
+use bricks::octant::{LEVEL_MAX, Level, edge};
 use ranks::{Comm, MessageBuffer, all_gather_reduced};
 
-/// Fine octants per rank, about: boundaries of the curve lie between them.
+/// Fine octants per rank, about, which are the base leaves: boundaries lie between them.
 const FINE_PER_RANK: u64 = 16;
 /// Coarse octants per rank, about. Few, as all ranks gather them; the rough partition then gives several ranks' loads to some.
 const COARSE_PER_RANK: f64 = 0.25;
-/// Deepest `level_base` that is chosen automatically.
-const LEVEL_BASE_AUTO_MAX: Level = 12;
-
 /// The partition of T0 as one rank knows it.
 pub struct Partition {
     /// The owner of every octant.
     pub ownership: Ownership,
-    /// Level-19 codes at which the base leaves begin, in order; none where boundaries may be anywhere on the curve.
-    pub base_starts: Vec<u64>,
-    /// Level of the deepest base leaves, or of the octants between which the boundaries of the curve lie.
+    /// Level of the base leaves, or of the octants between which the boundaries of the curve lie.
     pub level_base: Level,
     /// The partitioner that was used; none for a single rank.
     pub partitioner: Option<Partitioner>,
@@ -40,44 +38,27 @@ pub struct Partition {
 impl Partition {
     /// The partition of a single rank.
     pub fn solo() -> Self {
-        Self {
-            ownership: Ownership::solo(),
-            base_starts: Vec::new(),
-            level_base: 0,
-            partitioner: None,
-        }
+        Self { ownership: Ownership::solo(), level_base: 0, partitioner: None }
     }
 }
 
-/// Partitions T0. `facets` are this rank's slice; `mark` returns the octants above a level that they and the boxes split.
-/// Collective.
+/// Partitions T0. `facets` are this rank's slice. Collective.
 pub fn partition(
     facets: &[Facet],
     rules: &Rules,
     division: &Division,
-    mark: impl FnOnce(Level) -> PerLevel,
     comm: &dyn Comm,
 ) -> Result<Partition, Error> {
-    if division.is_of_curve() {
-        let levels = levels(facets, rules, [COARSE_PER_RANK, FINE_PER_RANK as f64], comm);
-        let ownership = by_area(facets, rules, levels, comm);
-        let partitioner = Some(Partitioner::Morton);
-        let level_base = levels[1];
-        return Ok(Partition { ownership, base_starts: Vec::new(), level_base, partitioner });
-    }
-    let level = match division.level_base {
-        Some(level) => level.min(level_last(rules)),
-        None => {
-            let per_rank = base_leaves::SUBTREES_PER_RANK as f64;
-            levels(facets, rules, [per_rank], comm)[0].min(LEVEL_BASE_AUTO_MAX)
-        }
+    let auto = || levels(facets, rules, comm);
+    let (ownership, level_base, partitioner) = if division.is_of_curve() {
+        let levels = auto();
+        (by_area(facets, rules, levels, comm), levels[1], Partitioner::Morton)
+    } else {
+        let level = division.level_base.unwrap_or_else(|| auto()[1]).min(level_last(rules));
+        let (ownership, partitioner) = by_base_leaves(facets, rules, division, level, comm)?;
+        (ownership, level, partitioner)
     };
-    let (leaves, partitioner) =
-        base_leaves::partition(facets, &mark(level), rules, division, level, comm)?;
-    let ownership = Ownership::new(comm.rank(), comm.size(), &leaves);
-    let level_base = leaves.iter().map(|b| b.level).max().unwrap_or(0);
-    let base_starts = leaves.iter().map(|b| start57(b.level, b.code)).collect();
-    Ok(Partition { ownership, base_starts, level_base, partitioner: Some(partitioner) })
+    Ok(Partition { ownership, level_base, partitioner: Some(partitioner) })
 }
 
 /// Deepest level that base leaves may have.
@@ -85,21 +66,16 @@ fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
 }
 
-/// The levels at which the octants near facets and in boxes number about `per_rank` on each rank, where the facets are densest.
-/// Collective.
-fn levels<const N: usize>(
-    facets: &[Facet],
-    rules: &Rules,
-    per_rank: [f64; N],
-    comm: &dyn Comm,
-) -> [Level; N] {
+/// The coarse and the fine level, of which octants near facets and in boxes number about [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] on
+/// each rank, where the facets are densest. Collective.
+fn levels(facets: &[Facet], rules: &Rules, comm: &dyn Comm) -> [Level; 2] {
     // Whole faces of finest cells: a sum of integers does not depend on its order.
     let face = (edge(rules.level_surface) as f64).powi(2);
     let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
     let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
     let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
     let volume = volumes.fold(0.0, f64::max);
-    per_rank.map(|per_rank| {
+    [COARSE_PER_RANK, FINE_PER_RANK as f64].map(|per_rank| {
         // Four sheets of facets in one octant are not unusual: wings, fins.
         let octants = comm.size() as f64 * per_rank * 4.0;
         let small = |l: &Level| {
@@ -110,6 +86,44 @@ fn levels<const N: usize>(
     })
 }
 
+/// The base leaves of a level with their owners, and the partitioner that chose them: METIS is not used where there are too few base
+/// leaves for it. Collective.
+fn by_base_leaves(
+    facets: &[Facet],
+    rules: &Rules,
+    division: &Division,
+    level: Level,
+    comm: &dyn Comm,
+) -> Result<(Ownership, Partitioner), Error> {
+    let local = estimated(facets, rules, level);
+    let (mut leaves, _) = all_bins(&local, rules, level, FINE_PER_RANK, comm);
+    if division.weights == Weights::Unit {
+        leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
+    }
+    let by_metis = match division.partitioner {
+        Partitioner::Metis => assign_metis(&leaves, level, comm)?,
+        Partitioner::Morton => None,
+    };
+    let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
+    let along_curve = || curve::partition_known(&leaves, comm.size());
+    let boundaries = by_metis.or_else(along_curve).unwrap_or_else(all_to_rank_0);
+    Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
+}
+
+#[cfg(feature = "metis")]
+use metis::assign as assign_metis;
+
+#[cfg(not(feature = "metis"))]
+fn assign_metis(_: &[Bin], _: Level, _: &dyn Comm) -> Result<Option<Vec<Boundary>>, Error> {
+    Err(Error::input(
+        "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
+    ))
+}
+
+fn all_to_rank_0() -> Vec<Boundary> {
+    vec![(0, 0)]
+}
+
 /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
 fn by_area(
     facets: &[Facet],
@@ -118,8 +132,7 @@ fn by_area(
     comm: &dyn Comm,
 ) -> Ownership {
     let local = estimated(facets, rules, fine);
-    let (bins, light) = coarse_bins(&local, rules, coarse, comm);
-    let all_to_rank_0 = || vec![(0, 0)];
+    let (bins, light) = all_bins(&local, rules, coarse, 1, comm);
     let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
     let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
     let entry = |(start, weight)| (rough.owner_at(start), [start, weight]);
@@ -140,19 +153,24 @@ fn estimated(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let mut bins = area::of(facets, rules, level);
     let each = area::leaves_per_surface_cell(rules);
     bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
-    curve::merge(&mut bins);
     bins
 }
 
-/// The bins of all ranks by octants of a level, the same on all ranks, with the number of leaves that need not be resolved
-/// further. Collective.
-fn coarse_bins(local: &[Bin], rules: &Rules, level: Level, comm: &dyn Comm) -> (Vec<Bin>, u64) {
+/// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
+/// that need not be resolved further. Collective.
+fn all_bins(
+    local: &[Bin],
+    rules: &Rules,
+    level: Level,
+    per_rank: u64,
+    comm: &dyn Comm,
+) -> (Vec<Bin>, u64) {
     let shift = 3 * (LEVEL_MAX - level);
     let coarse = local.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
     let all = all_gather_reduced(coarse, |a, b| a + b, comm);
     let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
     let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
-    let light = leaves(&bins) / comm.size() as u64;
+    let light = leaves(&bins) / (comm.size() as u64 * per_rank);
     area::add_boxes(&mut bins, rules, level, light, FRACTIONS, &curve::ALL);
     curve::merge(&mut bins);
     let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
@@ -227,6 +245,37 @@ mod tests {
             let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
             let far = |&w: &u64| (w as f64 / mean - 1.0).abs() > 0.1;
             assert!(!sums.iter().any(far), "{sums:?}");
+        }
+    }
+
+    #[test]
+    fn base_leaves_of_equal_weight_are_divided_along_the_curve() {
+        let rules = rules(vec![]);
+        let division =
+            |weights, level_base| Division { weights, level_base, ..Division::default() };
+        let of = |division: Division| {
+            let known = sim::run(RANKS, 5, |comm| {
+                let mine: Vec<Facet> =
+                    sheet().into_iter().skip(comm.rank()).step_by(RANKS).collect();
+                partition(&mine, &rules, &division, comm).expect("no METIS")
+            });
+            let same = |p: &Partition| p.ownership.boundaries().eq(known[0].ownership.boundaries());
+            assert!(known.iter().all(same), "all ranks have the same partition");
+            known.into_iter().next().expect("a rank")
+        };
+        let area = of(division(Weights::Area, Some(FINE)));
+        assert_eq!(area.level_base, FINE);
+        let owners: Vec<usize> =
+            (0..1 << (3 * FINE)).map(|c| area.ownership.owner_at(start57(FINE, c))).collect();
+        let sums = weights(&rules, &owners);
+        let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
+        assert!(sums.iter().all(|&w| (w as f64 / mean - 1.0).abs() < 0.1), "{sums:?}");
+        let unit = of(division(Weights::Unit, Some(FINE)));
+        assert!(!unit.ownership.boundaries().eq(area.ownership.boundaries()));
+        for level in [0, 2] {
+            let coarse = of(division(Weights::Rebalance, Some(level)));
+            let is_between = |(at, _)| at % start57(level, 1) == 0;
+            assert!(coarse.ownership.boundaries().all(is_between) && coarse.level_base == level);
         }
     }
 

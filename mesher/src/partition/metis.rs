@@ -1,7 +1,9 @@
 //! METIS: parts of equal weight with few faces between them.
 
 use crate::error::Error;
-use bricks::octant::{Level, neighbour, start57};
+use crate::partition::curve::{Bin, Boundary};
+use bricks::octant::{LEVEL_MAX, Level, neighbour};
+use ranks::{Comm, agree, gather};
 use std::sync::{Mutex, PoisonError};
 
 /// METIS keeps its random state per process: threads that share it would change each other's parts.
@@ -10,23 +12,40 @@ static TURN: Mutex<()> = Mutex::new(());
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
 const LEAVES_PER_RANK_MIN: usize = 8;
 
-/// Whether base leaves of these weights are enough for METIS, which bisects recursively, and prints complaints on standard
-/// output about empty parts. With few leaves per rank, or few that have nearly all the weight, intervals of the curve are as good.
-pub fn has_enough(weights: &[u64], ranks: usize) -> bool {
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
-    let even: f64 = weights.iter().map(|&w| (w as f64 / total as f64).powi(2)).sum();
-    ((LEAVES_PER_RANK_MIN * ranks) as f64) * even <= 1.0
+/// The boundaries between base leaves, octants of a level, by METIS on rank 0; none if it is not used. The leaves are the same on all
+/// ranks. Collective; the result is the same on all ranks.
+pub fn assign(
+    leaves: &[Bin],
+    level: Level,
+    comm: &dyn Comm,
+) -> Result<Option<Vec<Boundary>>, Error> {
+    if comm.size() == 1 || !has_enough(leaves, comm.size()) {
+        return Ok(None);
+    }
+    let on_rank_0 = || parts(leaves, level, comm.size());
+    let parts = agree(comm, if comm.rank() == 0 { on_rank_0() } else { Ok(Vec::new()) })?;
+    let starts = leaves.iter().map(|leaf| leaf.0);
+    let owners = gather(comm, &parts).into_iter().map(|part| part as usize);
+    let mut boundaries: Vec<Boundary> = starts.zip(owners).collect();
+    boundaries[0].0 = 0;
+    Ok(Some(boundaries))
 }
 
-/// The owner of each base leaf, given by level and code.
-pub fn assign(leaves: &[(Level, u64)], weights: &[u64], ranks: usize) -> Result<Vec<usize>, Error> {
-    let total: u128 = weights.iter().map(|&w| u128::from(w)).sum();
-    let starts: Vec<u64> = leaves.iter().map(|&(l, code)| start57(l, code)).collect();
-    let pairs = face_neighbours(leaves, |s| starts.partition_point(|&t| t <= s) - 1);
-    let (xadj, adjncy) = adjacency(leaves.len(), &pairs);
+/// Whether base leaves are enough for METIS, which bisects recursively, and prints complaints on standard
+/// output about empty parts. With few leaves per rank, or few that have nearly all the weight, intervals of the curve are as good.
+fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
+    let total: u128 = leaves.iter().map(|leaf| u128::from(leaf.1)).sum();
+    let even: f64 = leaves.iter().map(|leaf| (leaf.1 as f64 / total as f64).powi(2)).sum();
+    total > 0 && ((LEAVES_PER_RANK_MIN * ranks) as f64) * even <= 1.0
+}
+
+/// The part of each base leaf.
+fn parts(leaves: &[Bin], level: Level, ranks: usize) -> Result<Vec<u64>, Error> {
+    let total: u128 = leaves.iter().map(|leaf| u128::from(leaf.1)).sum();
+    let (xadj, adjncy) = graph(leaves, level);
     // METIS sums weights in i32 without a check for overflow.
     let scale = |w: u64| (u128::from(w) * (1 << 30) / total.max(1 << 30)).max(1) as metis::Idx;
-    let scaled: Vec<metis::Idx> = weights.iter().map(|&w| scale(w)).collect();
+    let scaled: Vec<metis::Idx> = leaves.iter().map(|leaf| scale(leaf.1)).collect();
     let mut parts = vec![0 as metis::Idx; leaves.len()];
     let failed = |e: &dyn std::fmt::Display| {
         Error::input(format!("METIS failed ({e}): use --partitioner morton"))
@@ -38,60 +57,40 @@ pub fn assign(leaves: &[(Level, u64)], weights: &[u64], ranks: usize) -> Result<
         .set_option(metis::option::Seed(1))
         .part_kway(&mut parts)
         .map_err(|e| failed(&e))?;
-    Ok(parts.into_iter().map(|p| p as usize).collect())
+    Ok(parts.into_iter().map(|part| part as u64).collect())
 }
 
-/// Pairs of base leaves that share part of a face, each once, the lower number first.
-fn face_neighbours(
-    leaves: &[(Level, u64)],
-    leaf_index: impl Fn(u64) -> usize,
-) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for (i, &(level, code)) in leaves.iter().enumerate() {
-        for axis in 0..3 {
-            for up in [false, true] {
-                let Some(n) = neighbour(level, code, axis, up) else {
-                    continue;
-                };
-                let j = leaf_index(start57(level, n));
-                // A finer neighbour adds the pair itself.
-                if leaves[j].0 <= level {
-                    pairs.push((i.min(j), i.max(j)));
-                }
-            }
-        }
+/// The graph of base leaves that share a face, in the compressed form of METIS.
+fn graph(leaves: &[Bin], level: Level) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
+    let shift = 3 * (LEVEL_MAX - level);
+    let index = |code: u64| leaves.binary_search_by_key(&(code << shift), |leaf| leaf.0).ok();
+    let (mut xadj, mut adjncy) = (vec![0], Vec::new());
+    for leaf in leaves {
+        let across = |(axis, up)| neighbour(level, leaf.0 >> shift, axis, up).and_then(index);
+        let faces = (0..3).flat_map(|axis| [(axis, false), (axis, true)]);
+        adjncy.extend(faces.filter_map(across).map(|at| at as metis::Idx));
+        xadj.push(adjncy.len() as metis::Idx);
     }
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
-}
-
-/// The graph in the compressed form of METIS.
-fn adjacency(vertices: usize, pairs: &[(usize, usize)]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
-    let mut lists = vec![Vec::new(); vertices];
-    for &(a, b) in pairs {
-        lists[a].push(b as metis::Idx);
-        lists[b].push(a as metis::Idx);
-    }
-    let mut xadj = vec![0];
-    for list in &lists {
-        xadj.push(xadj[xadj.len() - 1] + list.len() as metis::Idx);
-    }
-    (xadj, lists.concat())
+    (xadj, adjncy)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bricks::octant::{LEVEL_MAX, position};
+    use bricks::octant::{position, start57};
+
+    const LEVEL: Level = 3;
+
+    fn cube(weight: u64) -> Vec<Bin> {
+        (0..512).map(|code| (start57(LEVEL, code), weight)).collect()
+    }
 
     #[test]
     fn parts_are_equal_whatever_the_sum_of_weights() {
-        let leaves: Vec<(Level, u64)> = (0..512).map(|code| (3, code)).collect();
         for weight in [1, 1 << 40] {
-            let owners = assign(&leaves, &[weight; 512], 8).unwrap();
+            let parts = parts(&cube(weight), LEVEL, 8).unwrap();
             for r in 0..8 {
-                let n = owners.iter().filter(|&&o| o == r).count();
+                let n = parts.iter().filter(|&&part| part == r).count();
                 assert!((55..=75).contains(&n), "{n} of 64");
             }
         }
@@ -100,21 +99,23 @@ mod tests {
     #[test]
     fn few_leaves_and_few_heavy_ones_are_divided_along_the_curve() {
         // As many equal leaves as 8 for each rank suffice.
-        assert!(!has_enough(&[7; 31], 4) && has_enough(&[7; 32], 4));
-        let mut heavy = [7; 512];
-        heavy[99] = 512 * 7;
+        assert!(!has_enough(&cube(7)[..31], 4) && has_enough(&cube(7)[..32], 4));
+        let mut heavy = cube(7);
+        heavy[99].1 = 512 * 7;
         assert!(!has_enough(&heavy, 4), "half of the weight is in one leaf");
+        assert!(!has_enough(&[], 1));
     }
 
     #[test]
-    fn a_uniform_base_tree_has_three_pairs_per_octant_but_for_its_faces() {
-        let leaves: Vec<(Level, u64)> = (0..64).map(|code| (2, code)).collect();
-        let pairs = face_neighbours(&leaves, |s| (s >> (3 * (LEVEL_MAX - 2))) as usize);
-        assert_eq!(pairs.len(), 3 * 3 * 16);
-        let apart = |a: usize, b: usize| -> i64 {
-            let (p, q) = (position(a as u64), position(b as u64));
-            (0..3).map(|i| (i64::from(p[i]) - i64::from(q[i])).abs()).sum()
-        };
-        assert!(pairs.iter().all(|&(a, b)| apart(a, b) == 1));
+    fn leaves_that_share_a_face_are_joined() {
+        let (xadj, adjncy) = graph(&cube(1), LEVEL);
+        assert_eq!(adjncy.len(), 2 * 3 * 7 * 64, "three planes of faces within the cube");
+        for (a, range) in xadj.windows(2).enumerate() {
+            for &b in &adjncy[range[0] as usize..range[1] as usize] {
+                let (p, q) = (position(a as u64), position(b as u64));
+                let apart: u32 = (0..3).map(|i| p[i].abs_diff(q[i])).sum();
+                assert_eq!(apart, 1);
+            }
+        }
     }
 }

@@ -23,22 +23,6 @@ use std::sync::Arc;
 /// messages; with more, all ranks gather it, which costs every rank time.
 pub const OWNERS_MANY: usize = 9;
 
-/// A leaf of the base tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BaseLeaf {
-    /// Its level.
-    pub level: Level,
-    /// Its Morton code.
-    pub code: u64,
-    /// The rank that owns it.
-    pub owner: usize,
-}
-
-impl BaseLeaf {
-    /// The root, a single rank's.
-    pub const ROOT: Self = Self { level: 0, code: 0, owner: 0 };
-}
-
 /// Which ranks hold a brick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placement {
@@ -82,21 +66,7 @@ const RANK_NONE: usize = usize::MAX;
 impl Ownership {
     /// The ownership of a single rank.
     pub fn solo() -> Self {
-        Self::new(0, 1, &[BaseLeaf::ROOT])
-    }
-
-    /// The ownership given by base leaves, which tile the root in Morton order.
-    ///
-    /// # Panics
-    /// If the leaves are not contiguous, or an owner is not a rank.
-    pub fn new(rank: usize, ranks: usize, leaves: &[BaseLeaf]) -> Self {
-        let mut end = 0;
-        for b in leaves {
-            assert_eq!(start57(b.level, b.code), end, "base leaves must be contiguous");
-            end = start57(b.level, b.code + 1);
-        }
-        assert_eq!(end, 1 << (3 * LEVEL_MAX), "base leaves must tile the root");
-        Self::along(rank, ranks, leaves.iter().map(|b| (start57(b.level, b.code), b.owner)))
+        Self::along(0, 1, [(0, 0)])
     }
 
     /// The ownership given by boundaries: level-19 codes, ascending from 0, each with the owner from there on.
@@ -157,6 +127,11 @@ impl Ownership {
     /// The level-19 codes that this rank owns, in order.
     pub fn intervals(&self) -> impl Iterator<Item = Range<u64>> + '_ {
         self.intervals.of(self.rank)
+    }
+
+    /// The longest of them; at the start of the curve if this rank owns nothing.
+    pub fn longest(&self) -> Range<u64> {
+        if self.own.is_empty() { 0..1 } else { self.own.clone() }
     }
 
     /// The boundaries between the intervals of all ranks.

@@ -16,7 +16,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::input::lattice::{ExtentBox, box_mask};
+use crate::input::lattice::{ExtentBox, Rules, box_mask};
 use bricks::brick;
 use bricks::brickset::ones;
 use bricks::facet::{Facet, crossed};
@@ -122,23 +122,8 @@ impl BinnedFacets {
     }
 }
 
-/// Target levels of the refinement.
-#[derive(Clone, Debug)]
-pub struct Depth {
-    /// Level of the leaves that a facet crosses, unless a box asks for deeper ones.
-    pub surface: Level,
-    /// Extent boxes with the levels that they ask for.
-    pub boxes: Vec<ExtentBox>,
-}
-
-/// The root of a subtree that a rank refines.
-#[derive(Clone, Copy, Debug)]
-pub struct SubtreeRoot {
-    /// The octant's level.
-    pub level: Level,
-    /// The octant's Morton code.
-    pub code: u64,
-}
+/// An octant below which a rank refines: its level and Morton code.
+type Root = (Level, u64);
 
 /// The work done on this rank; repeats exactly.
 #[derive(Clone, Copy, Debug, Default)]
@@ -152,18 +137,18 @@ pub struct Work {
 /// Refines the subtrees below `roots`, which are ascending and disjoint octants. Returns the splits and the
 /// crossing leaves of T0 in these subtrees, and those splits of their ancestors that the subtrees alone
 /// ask for. The union over roots that tile the root cube, and over all facets, is T0.
-pub fn refine(binned: &BinnedFacets, depth: &Depth, roots: &[SubtreeRoot]) -> (Tree, Work) {
+pub fn refine(binned: &BinnedFacets, rules: &Rules, roots: &[Root]) -> (Tree, Work) {
     let mut v = Voxeliser {
         binned,
-        surface: depth.surface,
-        boxes: &depth.boxes,
+        surface: rules.level_surface,
+        boxes: &rules.boxes,
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
         work: Work::default(),
     };
     let straddling = v.straddling(roots);
-    for (root, list) in roots.iter().zip(straddling) {
+    for (&root, list) in roots.iter().zip(straddling) {
         v.subtree(root, list);
     }
     (v.tree, v.work)
@@ -189,17 +174,16 @@ struct BrickFacets {
 
 impl Voxeliser<'_> {
     /// For each subtree root the facets that are contained in an ancestor and whose extent meets it.
-    fn straddling(&self, roots: &[SubtreeRoot]) -> Vec<Vec<u32>> {
+    fn straddling(&self, roots: &[Root]) -> Vec<Vec<u32>> {
         let mut lists = vec![Vec::new(); roots.len()];
-        let begins: Vec<u64> = roots.iter().map(|s| start57(s.level, s.code)).collect();
+        let begins: Vec<u64> = roots.iter().map(|&(level, code)| start57(level, code)).collect();
         for (i, octant) in (0..).zip(&self.binned.containing) {
             // The roots inside the octant; none if it lies inside a root, or in another rank's part.
             let end = octant.start() + (1 << (3 * (LEVEL_MAX - octant.level())));
             let from = begins.partition_point(|&b| b < octant.start());
             let inside = begins[from..].partition_point(|&b| b < end);
             for s in from..from + inside {
-                if roots[s].level > octant.level()
-                    && reaches(&self.binned.facets[i as usize], &roots[s])
+                if roots[s].0 > octant.level() && reaches(&self.binned.facets[i as usize], roots[s])
                 {
                     lists[s].push(i);
                 }
@@ -208,11 +192,10 @@ impl Voxeliser<'_> {
         lists
     }
 
-    fn subtree(&mut self, root: &SubtreeRoot, straddling: Vec<u32>) {
-        let SubtreeRoot { level: m, code } = *root;
+    fn subtree(&mut self, (m, code): Root, straddling: Vec<u32>) {
         let contained = self.binned.contained(m, code);
         // For the root cube itself, the brick of level 0 or 1 decides whether it is split.
-        if m > 0 && !self.path_to(root, &contained, &straddling) {
+        if m > 0 && !self.path_to((m, code), &contained, &straddling) {
             return;
         }
         let begin = self.lists.len();
@@ -230,13 +213,7 @@ impl Voxeliser<'_> {
 
     /// Records the splits that a subtree root asks for, from the root cube down to itself. Returns whether
     /// it is split.
-    fn path_to(
-        &mut self,
-        root: &SubtreeRoot,
-        contained: &Range<usize>,
-        straddling: &[u32],
-    ) -> bool {
-        let SubtreeRoot { level: m, code } = *root;
+    fn path_to(&mut self, (m, code): Root, contained: &Range<usize>, straddling: &[u32]) -> bool {
         let min_corner = corner(m, code);
         let crosses = |i: &u32| crossed(&self.binned.facets[*i as usize], min_corner, m) & 1 == 1;
         let crossing = !contained.is_empty() || straddling.iter().any(crosses);
@@ -380,8 +357,8 @@ fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
 }
 
 /// Whether the facet's extent meets the closed octant.
-fn reaches(f: &Facet, o: &SubtreeRoot) -> bool {
-    let (min_corner, h) = (corner(o.level, o.code), edge(o.level));
+fn reaches(f: &Facet, (level, code): Root) -> bool {
+    let (min_corner, h) = (corner(level, code), edge(level));
     (0..3).all(|a| {
         let (lo, hi) = f.range(a);
         lo <= min_corner[a] + h && hi >= min_corner[a]

@@ -5,12 +5,13 @@
 //! with the components' labels. Where labels differ across a face, the pair is an edge of a graph; only
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
-use super::components::{self, FacedOctants, MergedComponents, UnionFind};
+use super::components::{self, FacedOctants, MergedComponents};
 use super::nodes::{Component, Nodes};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use ranks::{Comm, MessageBuffer, gather};
+use std::collections::BTreeMap;
 
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
@@ -42,9 +43,9 @@ fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
     let mut messages = MessageBuffer::default();
-    messages.write_values(first, &Unions::of(&pairs).spanning_forest());
+    messages.write_values(first, &Unions::of(&pairs).pairs());
     let received: Vec<_> = comm.sparse_all_to_all(messages).values().collect();
-    Unions::of(&received).spanning_forest()
+    Unions::of(&received).pairs()
 }
 
 /// Labels the merged components that have a part in a fully replicated brick by the number of this part's
@@ -125,37 +126,37 @@ fn replicated_components(nodes: &Nodes) -> Vec<Component> {
     out
 }
 
-/// The sets into which pairs unite labels. The least label represents a set.
-struct Unions {
-    /// All labels of the pairs, ascending.
-    labels: Vec<Label>,
-    /// By the positions of the labels.
-    sets: UnionFind,
-}
+/// The sets into which pairs unite labels, as a forest: labels with others of their sets, which are less. The least label, which has
+/// none, represents a set.
+#[derive(Default)]
+struct Unions(BTreeMap<Label, Label>);
 
 impl Unions {
     fn of(pairs: &[[Label; 2]]) -> Self {
-        let mut labels = pairs.as_flattened().to_vec();
-        labels.sort_unstable();
-        labels.dedup();
-        let mut sets = UnionFind::new(labels.len() as u32);
-        let at = |label| labels.partition_point(|l| *l < label) as u32;
-        pairs.iter().for_each(|&[a, b]| sets.unite(at(a), at(b)));
-        Self { labels, sets }
-    }
-
-    fn find(&mut self, label: Label) -> Label {
-        match self.labels.binary_search(&label) {
-            Ok(at) => self.labels[self.sets.find(at as u32) as usize],
-            Err(_) => label,
+        let mut unions = Self::default();
+        for &[a, b] in pairs {
+            let (a, b) = (unions.find(a), unions.find(b));
+            if a != b {
+                unions.0.insert(a.max(b), a.min(b));
+            }
         }
+        unions
     }
 
-    /// A spanning forest: each label with the representative of its set, if that is another one.
-    fn spanning_forest(&mut self) -> Vec<[Label; 2]> {
-        let labels = self.labels.clone();
-        let pairs = labels.into_iter().map(|label| [label, self.find(label)]);
-        pairs.filter(|[label, first]| label != first).collect()
+    fn find(&mut self, mut label: Label) -> Label {
+        while let Some(&up) = self.0.get(&label) {
+            // Shortens the path for later searches.
+            if let Some(&further) = self.0.get(&up) {
+                self.0.insert(label, further);
+            }
+            label = up;
+        }
+        label
+    }
+
+    /// The forest: pairs that unite the same labels.
+    fn pairs(self) -> Vec<[Label; 2]> {
+        self.0.into_iter().map(|(label, up)| [label, up]).collect()
     }
 }
 
@@ -168,6 +169,8 @@ mod tests {
         let mut j = Unions::of(&[[9, 8], [5, 6], [8, 6], [1, 2], [7, 9]]);
         assert!([5, 6, 7, 8, 9].iter().all(|&n| j.find(n) == 5));
         assert_eq!((j.find(2), j.find(1), j.find(3)), (1, 1, 3));
-        assert_eq!(j.spanning_forest(), [[2, 1], [6, 5], [7, 5], [8, 5], [9, 5]]);
+        let pairs = j.pairs();
+        assert_eq!(pairs.len(), 5, "one for each label but the least of its set");
+        assert_eq!(Unions::of(&pairs).find(9), 5);
     }
 }

@@ -13,6 +13,7 @@ use bricks::octant::{Level, corner, edge};
 use bricks::tree::{LEVELS, Tree};
 use ranks::{Comm, all_gather_reduced, gather};
 use std::collections::BTreeMap;
+use std::mem::take;
 
 /// Maximum number of leaves of a component whose rays are cast before the majority decides.
 pub const CANDIDATES: usize = 32;
@@ -101,13 +102,6 @@ fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLe
     all
 }
 
-/// A component that is not decided yet.
-struct Open {
-    label: Label,
-    /// Number of its rays so far that met an odd number of facets.
-    votes: u32,
-}
-
 /// Decides all `components`. Nearly always the rays of a component's first leaf agree, so the other candidates are
 /// gathered only for those whose rays do not. Each rank tests the rays against its own
 /// facets; `mine` are this rank's [`candidates`]. Collective; the result is the same on all ranks.
@@ -118,54 +112,46 @@ pub fn decide(
     comm: &dyn Comm,
 ) -> Verdict {
     let mut verdict = Verdict::default();
-    let cast = |queries: Vec<(Open, Candidate)>, verdict: &mut Verdict| -> Vec<Open> {
-        let points: Vec<[i64; 3]> = queries.iter().map(|(_, c)| c.centroid()).collect();
-        verdict.rays += 6 * points.len() as u64;
-        let odd = xor_over_ranks(parities(facets, &points), comm);
-        let undecided = queries.into_iter().zip(odd).filter_map(|((open, _), rays)| {
-            if rays == 63 {
-                verdict.inside.insert(open.label);
-            }
-            let votes = open.votes + rays.count_ones();
-            (rays != 0 && rays != 63).then_some(Open { votes, ..open })
-        });
-        undecided.collect()
-    };
-    let queries = components.iter().map(|&(label, first)| (Open { label, votes: 0 }, first));
-    let mut open = cast(queries.collect(), &mut verdict);
-    if open.is_empty() {
-        return verdict;
-    }
-    let lists = gather_candidates(mine, &open, comm);
-    // The components that have no more leaves to try.
+    let mut lists: FirstLeaves =
+        components.iter().map(|&(label, first)| (label, vec![first])).collect();
+    // The components that are not decided yet, with the number of their rays so far that met an odd number of facets; and those that
+    // have no more leaves to try.
+    let mut open: Vec<(Label, usize)> = components.iter().map(|c| (c.0, 0)).collect();
     let mut exhausted = Vec::new();
-    for round in 1..CANDIDATES {
-        let (next, done) = open.into_iter().partition(|c: &Open| lists[&c.label].len() > round);
-        open = next;
-        exhausted.extend::<Vec<Open>>(done);
-        if open.is_empty() {
+    for round in 0..CANDIDATES {
+        if round == 1 && !open.is_empty() {
+            lists = gather_candidates(mine, &open, comm);
+        }
+        let (next, done): (Vec<_>, Vec<_>) =
+            take(&mut open).into_iter().partition(|(label, _)| lists[label].len() > round);
+        exhausted.extend(done);
+        if next.is_empty() {
             break;
         }
-        let queries = open.into_iter().map(|c| {
-            let candidate = lists[&c.label][round];
-            (c, candidate)
+        let points: Vec<_> = next.iter().map(|(label, _)| lists[label][round].centroid()).collect();
+        verdict.rays += 6 * points.len() as u64;
+        let odd = xor_over_ranks(parities(facets, &points), comm);
+        let undecided = next.into_iter().zip(odd).filter_map(|((label, votes), rays)| {
+            if rays == 63 {
+                verdict.inside.insert(label);
+            }
+            let votes = votes + rays.count_ones() as usize;
+            (rays != 0 && rays != 63).then_some((label, votes))
         });
-        open = cast(queries.collect(), &mut verdict);
+        open = undecided.collect();
     }
     exhausted.extend(open);
-    let list = |c: &Open| &lists[&c.label];
-    let first = exhausted.iter().map(|c| list(c)[0]).min();
+    let first = exhausted.iter().map(|(label, _)| lists[label][0]).min();
     verdict.ambiguous =
         first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
-    verdict
-        .inside
-        .extend(exhausted.iter().filter(|c| c.votes as usize > 3 * list(c).len()).map(|c| c.label));
+    let is_inside = |&(label, votes): &(Label, usize)| votes > 3 * lists[&label].len();
+    verdict.inside.extend(exhausted.into_iter().filter(is_inside).map(|c| c.0));
     verdict
 }
 
 /// The candidates of some components, from all ranks. Collective; the result is the same on all ranks.
-fn gather_candidates(mine: &FirstLeaves, open: &[Open], comm: &dyn Comm) -> FirstLeaves {
-    let lists = open.iter().filter_map(|c| Some((c.label, mine.get(&c.label)?)));
+fn gather_candidates(mine: &FirstLeaves, open: &[(Label, usize)], comm: &dyn Comm) -> FirstLeaves {
+    let lists = open.iter().filter_map(|(label, _)| Some((*label, mine.get(label)?)));
     let pairs: Vec<[u64; 2]> =
         lists.flat_map(|(label, list)| list.iter().map(move |c| [label, c.0])).collect();
     let all = gather(comm, &pairs).into_iter();

@@ -5,7 +5,7 @@ use crate::support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 use bricks::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Root};
 use mesher::partition::ownership::Ownership;
-use mesher::refine::voxelise::{BinnedFacets, Depth, SubtreeRoot, refine};
+use mesher::refine::voxelise::{BinnedFacets, refine};
 use mesher::sides::{components, global, nodes::Nodes, vote};
 use proptest::prelude::*;
 use ranks::Solo;
@@ -20,9 +20,7 @@ fn by_mesher(case: &Small) -> Firsts {
         .root
         .facets(case.facets.clone(), &Bounds::of(&case.facets), 0)
         .expect("near the root");
-    let depth = Depth { surface: rules.level_surface, boxes: rules.boxes.clone() };
-    let (tree, _) =
-        refine(&BinnedFacets::new(&facets), &depth, &[SubtreeRoot { level: 0, code: 0 }]);
+    let (tree, _) = refine(&BinnedFacets::new(&facets), &rules, &[(0, 0)]);
     tree.check_structure();
     let ownership = Ownership::solo();
     let nodes = Nodes::new(&tree, &ownership);

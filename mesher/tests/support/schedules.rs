@@ -76,7 +76,7 @@ impl Serial {
 
     /// The same under the schedule of the run's seed.
     pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, whole: bool) -> Result<Meshed, Error> {
-        let schedule = Adversary::new(run.seed, run.ranks);
+        let schedule = Adversary::new(run.seed);
         self.on_ranks(fibres, run, schedule, whole, |sim, work| work(sim))
     }
 }

@@ -121,7 +121,7 @@ fn meshed(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Meshed
     let parts = match run.ranks {
         1 => vec![part(&case, &options, whole, &Solo)],
         ranks => FIBRES.with_borrow_mut(|fibres| {
-            fibres.run(ranks, Adversary::new(run.seed, ranks), move |sim: &Sim| {
+            fibres.run(ranks, Adversary::new(run.seed), move |sim: &Sim| {
                 let mut mine = None;
                 // Counting messages needs the clocks, which take longer than passing the token on.
                 sim.uncounted(&mut || mine = Some(part(&case, &options, whole, sim)));

@@ -33,7 +33,7 @@ struct State {
     /// The contribution of each rank to the current call.
     posted: Vec<Option<Post>>,
     /// The result of the current call for each rank.
-    results: Vec<Option<Delivery>>,
+    results: Vec<Option<Gathered>>,
     schedule: Box<dyn Schedule>,
     /// Scratch: the ranks that can run.
     ready: Vec<usize>,
@@ -42,25 +42,20 @@ struct State {
 
 struct Post {
     /// The number of the call.
-    call: u64,
-    words: Words,
+    number: u64,
+    call: Call,
+    words: MessageBuffer,
 }
 
-/// The contribution of a rank to a call.
-pub(super) enum Words {
-    /// Gathered by all ranks.
-    Gather(Vec<u64>),
-    /// Summed over the ranks.
-    Sum(Vec<u64>),
-    /// Messages by receiver.
-    Send(MessageBuffer),
-}
-
-/// The result of a call for a rank.
-pub(super) enum Delivery {
-    Gathered(Gathered),
-    Summed(Vec<u64>),
-    Received(MessageBuffer),
+/// A collective call.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Call {
+    /// The words of each rank are received by all.
+    Gather,
+    /// The sums of the words are received by all.
+    Sum,
+    /// Messages, by receiver.
+    Send,
 }
 
 pub(super) const UNEQUAL: &str = "ranks must make the same collective calls in the same order";
@@ -113,15 +108,15 @@ impl World {
     }
 
     /// A rank's contribution to its next call, which completes the call if it is the last one.
-    pub(super) fn post(&self, rank: usize, call: u64, words: Words) {
+    pub(super) fn post(&self, rank: usize, number: u64, call: Call, words: MessageBuffer) {
         let mut state = self.lock();
-        state.posted[rank] = Some(Post { call, words });
+        state.posted[rank] = Some(Post { number, call, words });
         state.ranks[rank] = RankState::Waiting;
         state.deliver();
     }
 
     /// The result of a completed call for a rank.
-    pub(super) fn result(&self, rank: usize) -> Delivery {
+    pub(super) fn result(&self, rank: usize) -> Gathered {
         self.lock().results[rank].take().expect("a completed call has a result for every rank")
     }
 
@@ -138,39 +133,27 @@ impl State {
             return;
         }
         let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
-        let (ranks, call) = (posts.len(), posts[0].call);
-        let (mut gathered, mut summed, mut sent) = (Vec::new(), Vec::new(), Vec::new());
-        for post in posts {
-            assert!(post.call == call, "{UNEQUAL}");
-            match post.words {
-                Words::Gather(words) => gathered.push(words),
-                Words::Sum(words) => summed.push(words),
-                Words::Send(messages) => sent.push(messages),
+        let call = posts[0].call;
+        assert!(posts.iter().all(|p| (p.number, p.call) == (posts[0].number, call)), "{UNEQUAL}");
+        let words = || posts.iter().map(|post| post.words.words());
+        let by_all = |words: MessageBuffer| vec![Some(Gathered::new(words)); posts.len()];
+        self.results = match call {
+            Call::Gather => by_all(
+                words().enumerate().map(|(rank, words)| (rank, words.iter().copied())).collect(),
+            ),
+            Call::Sum => by_all([(0, sums(words()))].into_iter().collect()),
+            Call::Send => {
+                self.delivered(&posts).into_iter().map(|m| Some(Gathered::new(m))).collect()
             }
-        }
-        self.results = match [gathered.len(), summed.len(), sent.len()].map(|n| n == ranks) {
-            [true, false, false] => {
-                let all: Gathered =
-                    gathered.into_iter().enumerate().collect::<MessageBuffer>().into();
-                (0..ranks).map(|_| Some(Delivery::Gathered(all.clone()))).collect()
-            }
-            [false, true, false] => {
-                let sums = sums_of(&summed);
-                (0..ranks).map(|_| Some(Delivery::Summed(sums.clone()))).collect()
-            }
-            [false, false, true] => {
-                self.delivered(&sent).into_iter().map(|m| Some(Delivery::Received(m))).collect()
-            }
-            _ => panic!("{UNEQUAL}"),
         };
         self.ranks.iter_mut().for_each(|d| *d = RankState::Ready);
     }
 
     /// Messages by receiver, in an order that the schedule chooses, from those by sender.
-    fn delivered(&mut self, sent: &[MessageBuffer]) -> Vec<MessageBuffer> {
+    fn delivered(&mut self, sent: &[Post]) -> Vec<MessageBuffer> {
         let mut by_receiver: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
-        for (from, messages) in sent.iter().enumerate() {
-            for (to, words) in messages.messages() {
+        for (from, post) in sent.iter().enumerate() {
+            for (to, words) in post.words.messages() {
                 assert!(
                     by_receiver[to].last().is_none_or(|l| l.0 != from),
                     "at most one message to a receiver"
@@ -193,12 +176,12 @@ impl State {
     }
 }
 
-/// The sums over the ranks.
-fn sums_of(ranks: &[Vec<u64>]) -> Vec<u64> {
-    let mut sums = vec![0u64; ranks[0].len()];
-    for words in ranks {
+/// The sums of equally many words of each rank.
+fn sums<'a>(ranks: impl Iterator<Item = &'a [u64]>) -> Vec<u64> {
+    let add = |mut sums: Vec<u64>, words: &[u64]| {
         assert!(words.len() == sums.len(), "{UNEQUAL}");
         sums.iter_mut().zip(words).for_each(|(sum, w)| *sum = sum.wrapping_add(*w));
-    }
-    sums
+        sums
+    };
+    ranks.map(<[u64]>::to_vec).reduce(|sums, words| add(sums, &words)).unwrap_or_default()
 }

@@ -3,83 +3,34 @@
 use super::numbering::{Interval, Numbering};
 use crate::mesh::Mesh;
 use crate::output::stream::{LevelCursors, Octants};
-use bricks::brick::{byte, children};
-use bricks::brickset::{BrickSet, ChildBricks};
+use bricks::brick::{byte, children, parents};
+use bricks::brickset::ones;
 use bricks::octant::Level;
 use bricks::tree::LEVELS;
 use vtkhdf::tree::Siblings;
 
-/// Siblings with their numbers, in ascending order: those of the bricks that this rank owns.
-pub(super) struct OwnSiblings<'a> {
+/// The siblings in the bricks that this rank owns, with their numbers, in ascending order.
+pub(super) fn own_siblings<'a>(
     mesh: &'a Mesh,
     numbering: &'a Numbering,
-    level: Level,
-    bricks: ChildBricks<'a>,
-    path: Path<'a>,
-    at: Interval,
-    /// The interval of the last brick.
-    interval: Option<usize>,
-    brick: Octants,
-    /// Groups of siblings of the current brick that remain.
-    left: u8,
-    /// The number of the next siblings.
-    next: u64,
-}
-
-impl<'a> OwnSiblings<'a> {
-    pub(super) fn new(mesh: &'a Mesh, numbering: &'a Numbering) -> Self {
-        static NONE: BrickSet = BrickSet::EMPTY;
-        Self {
-            mesh,
-            numbering,
-            level: 0,
-            bricks: NONE.child_bricks(),
-            path: Path::new(mesh, 0),
-            at: Interval::default(),
-            interval: None,
-            brick: Octants::default(),
-            left: 0,
-            next: 0,
-        }
-    }
-
-    /// The next siblings, if their number is less than `end`.
-    #[inline]
-    pub(super) fn next_before(&mut self, end: u64) -> Option<(u64, Siblings)> {
-        while self.left == 0 {
-            self.advance()?;
-        }
-        if self.next >= end {
-            return None;
-        }
-        let j = u64::from(self.left.trailing_zeros());
-        self.left &= self.left - 1;
-        self.next += 1;
-        Some((self.next - 1, siblings(self.brick, self.mesh, j)))
-    }
-
-    /// Goes to the next brick; none after the last.
-    fn advance(&mut self) -> Option<()> {
-        let Some(b) = self.bricks.next() else {
-            if self.level as usize + 1 == LEVELS {
-                return None;
+) -> impl Iterator<Item = (u64, Siblings)> + 'a {
+    let of_level = move |l: Level| {
+        let (mut path, mut at) = (Path::new(mesh, l), Interval::default());
+        // The interval of the last brick, and the number of the next siblings.
+        let (mut interval, mut next) = (None, 0);
+        let bricks = mesh.split[l as usize - 1].child_bricks();
+        bricks.filter(move |b| mesh.ownership.owns(l, b.key)).flat_map(move |b| {
+            let (found, first) = numbering.first(&mut at, l, b.key);
+            if interval.replace(found) != Some(found) {
+                next = first;
             }
-            self.bricks = self.mesh.split[self.level as usize].child_bricks();
-            self.level += 1;
-            self.path = Path::new(self.mesh, self.level);
-            (self.at, self.interval) = (Interval::default(), None);
-            return Some(());
-        };
-        if self.mesh.ownership.owns(self.level, b.key) {
-            let (interval, first) = self.numbering.first(&mut self.at, self.level, b.key);
-            if self.interval != Some(interval) {
-                (self.interval, self.next) = (Some(interval), first);
-            }
-            self.brick = self.path.load(self.level, b.key);
-            self.left = bricks::brick::parents(b.bits);
-        }
-        Some(())
-    }
+            let (brick, groups, first) = (path.load(l, b.key), parents(b.bits), next);
+            next += u64::from(groups.count_ones());
+            let of_group = move |j| siblings(brick, mesh, u64::from(j));
+            (first..).zip(ones(u64::from(groups)).map(of_group))
+        })
+    };
+    (1..LEVELS as Level).flat_map(of_level)
 }
 
 /// The root.

@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::Report;
+use super::{PhaseEntry, Report};
 use crate::partition::Partitioner;
 use std::fmt;
 
@@ -12,97 +12,68 @@ fn imbalance(values: &[f64]) -> f64 {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [outside, inside, crossing] = self.cells_by_side;
-        let peak: u64 = self.peak_rss_bytes.iter().sum();
-        let cells = self.cells.max(1) as f64;
-        writeln!(f, "facets         {}", grouped(self.facets))?;
-        writeln!(
-            f,
-            "root edge      {} (level 0), surface level {}",
-            self.root_edge, self.level_surface
-        )?;
-        writeln!(f, "cells          {}", grouped(self.cells))?;
-        writeln!(
-            f,
-            "  by side      outside {}, inside {}, crossing {}",
-            grouped(outside),
-            grouped(inside),
-            grouped(crossing)
-        )?;
+        let Self { root_edge, level_surface, level_base, ranks, digest, .. } = self;
+        let [outside, inside, crossing] = self.cells_by_side.map(grouped);
+        let [facets, cells] = [self.facets, self.cells].map(grouped);
+        writeln!(f, "facets         {facets}")?;
+        writeln!(f, "root edge      {root_edge} (level 0), surface level {level_surface}")?;
+        writeln!(f, "cells          {cells}")?;
+        writeln!(f, "  by side      outside {outside}, inside {inside}, crossing {crossing}")?;
         for (l, &n) in self.cells_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
-            writeln!(
-                f,
-                "  level {l:>2}     {:>16}   edge {:e}",
-                grouped(n),
-                self.root_edge / f64::from(1u32 << l)
-            )?;
+            let (cells, edge) = (grouped(n), root_edge / f64::from(1u32 << l));
+            writeln!(f, "  level {l:>2}     {cells:>16}   edge {edge:e}")?;
         }
         writeln!(f, "components     {}", components(self))?;
-        writeln!(f, "digest         {}", self.digest)?;
-        let by_rank = |counts: &Vec<u64>| counts.iter().map(|n| *n as f64).collect::<Vec<f64>>();
+        writeln!(f, "digest         {digest}")?;
+        let by_rank =
+            |counts: &[u64]| imbalance(&counts.iter().map(|n| *n as f64).collect::<Vec<_>>());
+        let lambda = by_rank(&self.counters["leaves"]);
+        let partitioned = match self.partitioner {
+            None => "",
+            Some(Partitioner::Metis) => ", partitioned by METIS",
+            Some(Partitioner::Morton) => ", partitioned along the curve",
+        };
         writeln!(
             f,
-            "ranks          {}, cells max/mean {:.3}, base level {}{}",
-            self.ranks,
-            imbalance(&by_rank(&self.counters["leaves"])),
-            self.level_base,
-            match self.partitioner {
-                None => "",
-                Some(Partitioner::Metis) => ", partitioned by METIS",
-                Some(Partitioner::Morton) => ", partitioned along the curve",
-            }
+            "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}{partitioned}"
         )?;
-        if let Some(faces) = self.counters.get(crate::counters::EXPOSED_FACES) {
-            writeln!(
-                f,
-                "exposed faces  {}, max/mean {:.3}",
-                grouped(faces.iter().sum()),
-                imbalance(&by_rank(faces))
-            )?;
+        if let Some(faces) = self.counters.get("exposed_faces") {
+            let (all, lambda) = (grouped(faces.iter().sum()), by_rank(faces));
+            writeln!(f, "exposed faces  {all}, max/mean {lambda:.3}")?;
         }
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
-        for p in &self.phases {
-            let wall = p.time_wall_s.iter().fold(0.0, |m: f64, v| m.max(*v));
-            let cpu: f64 = p.time_cpu_s.iter().sum();
-            writeln!(
-                f,
-                "  {:<12} {wall:>10.3} {cpu:>9.3}   {:>8.3}",
-                p.name,
-                imbalance(&p.time_cpu_s)
-            )?;
+        for PhaseEntry { name, time_wall_s, time_cpu_s, .. } in &self.phases {
+            let wall = time_wall_s.iter().copied().fold(0.0, f64::max);
+            let (cpu, lambda) = (time_cpu_s.iter().sum::<f64>(), imbalance(time_cpu_s));
+            writeln!(f, "  {name:<12} {wall:>10.3} {cpu:>9.3}   {lambda:>8.3}")?;
         }
-        writeln!(
-            f,
-            "time           {:.3} s wall, {:.2} M cells/s",
-            self.time_wall_s,
-            cells / self.time_wall_s.max(1e-9) / 1e6
-        )?;
-        write!(
-            f,
-            "peak memory    {:.1} MB over all ranks, {:.2} bytes per cell",
-            peak as f64 / 1e6,
-            peak as f64 / cells
-        )
+        let (cells, wall) = (self.cells.max(1) as f64, self.time_wall_s);
+        let rate = cells / wall.max(1e-9) / 1e6;
+        writeln!(f, "time           {wall:.3} s wall, {rate:.2} M cells/s")?;
+        let peak = self.peak_rss_bytes.iter().sum::<u64>() as f64;
+        let (peak_mb, per_cell) = (peak / 1e6, peak / cells);
+        write!(f, "peak memory    {peak_mb:.1} MB over all ranks, {per_cell:.2} bytes per cell")
     }
 }
 
 /// The components in one line: by side, and those that were deleted as enclosed or decided by majority.
 fn components(report: &Report) -> String {
-    let mut line = format!(
-        "outside {}, inside {}",
-        grouped(report.components_outside),
-        grouped(report.components_inside)
-    );
+    let [outside, inside, enclosed, leaves, ambiguous] = [
+        report.components_outside,
+        report.components_inside,
+        report.components_enclosed,
+        report.enclosed_leaves,
+        report.components_ambiguous,
+    ]
+    .map(grouped);
+    let mut line = format!("outside {outside}, inside {inside}");
     if let Some([x, y, z]) = report.enclosed_example {
         line += &format!(
-            "; {} outside deleted as enclosed ({} leaves of the base tree, one at ({x}, {y}, {z}))",
-            grouped(report.components_enclosed),
-            grouped(report.enclosed_leaves)
+            "; {enclosed} outside deleted as enclosed ({leaves} leaves of the base tree, one at ({x}, {y}, {z}))"
         );
     }
     if let Some([x, y, z]) = report.ambiguous_example {
-        let count = grouped(report.components_ambiguous);
-        line += &format!("; {count} decided by majority, one at ({x}, {y}, {z})");
+        line += &format!("; {ambiguous} decided by majority, one at ({x}, {y}, {z})");
     }
     line
 }
@@ -140,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_report_shows_its_numbers() {
-        use super::super::{Geometry, PhaseEntry};
+        use super::super::Geometry;
         let phase = PhaseEntry {
             name: "sides".into(),
             time_wall_s: vec![0.25, 0.5],
@@ -177,7 +148,7 @@ mod tests {
             time_wall_s: 0.5,
             peak_rss_bytes: vec![2_000_000, 4_000_000],
             phases: vec![phase],
-            counters: [("leaves", vec![1, 3])].into(),
+            counters: [("leaves".into(), vec![1, 3])].into(),
             message_matrix: None,
         };
         let text = "facets         1,280\n\
@@ -195,7 +166,7 @@ mod tests {
         (report.components_enclosed, report.enclosed_leaves) = (1000, 2000);
         report.enclosed_example = Some([1.0, 2.0, 0.5]);
         (report.components_ambiguous, report.ambiguous_example) = (7, Some([0.0, 1.0, 4.0]));
-        report.counters.insert("exposed_faces", vec![1000, 3000]);
+        report.counters.insert("exposed_faces".into(), vec![1000, 3000]);
         let added = [
             "outside 1,500, inside 1; 1,000 outside deleted as enclosed (2,000 leaves of the base tree, one at (1, 2, 0.5)); \
              7 decided by majority, one at (0, 1, 4)\n",

@@ -132,15 +132,3 @@ proptest! {
         }
     }
 }
-
-#[test]
-fn intervals_of_the_curve_are_in_order_and_equally_heavy() {
-    let owners = assign_morton(&[1; 100], 7);
-    assert!(owners.is_sorted());
-    for r in 0..7 {
-        let n = owners.iter().filter(|&&o| o == r).count();
-        assert!((14..=15).contains(&n), "{n}");
-    }
-    assert!(assign_morton(&[1, 1], 5).iter().all(|&o| o < 5));
-    assert_eq!(assign_morton(&[1 << 63, 1 << 63, 1 << 63], 3), [0, 1, 2]);
-}

@@ -22,9 +22,8 @@ pub fn owners() -> impl Strategy<Value = Vec<usize>> {
 }
 
 pub fn ownership(rank: usize, owners: &[usize]) -> Ownership {
-    let leaf = |(code, &owner)| BaseLeaf { level: FINE, code, owner };
-    let leaves: Vec<BaseLeaf> = (0..).zip(owners).map(leaf).collect();
-    Ownership::new(rank, RANKS, &leaves)
+    let starts = (0..).map(|code| start57(FINE, code));
+    Ownership::along(rank, RANKS, starts.zip(owners.iter().copied()))
 }
 
 /// All bricks down to one level below the finest that could be replicated, and the owners of the intervals in each.
