@@ -39,7 +39,7 @@ impl Bits {
             let left = count.saturating_sub(8 * begin);
             if left < 8 * chunk.len() as u64 {
                 chunk.truncate(left.div_ceil(8) as usize);
-                if let Some(last) = chunk.last_mut().filter(|_| left % 8 > 0) {
+                if let Some(last) = chunk.last_mut().filter(|_| !left.is_multiple_of(8)) {
                     *last &= !(0xff >> (left % 8));
                 }
             }
