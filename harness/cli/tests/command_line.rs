@@ -125,7 +125,7 @@ fn why_answers_for_a_directory_and_finds_needless_splits() {
     write_mesh((0..8).map(|digit| digit << 61 | 1 << 2).collect(), Path::new(&needless));
     let answer = printed(&["why", &least, "-0.5,0,0.25", "--json", &json]);
     assert!(answer.contains("the leaf is the root"), "{answer}");
-    assert!(std::fs::read_to_string(&json).unwrap().contains("\"octree-why/3\""));
+    assert!(std::fs::read_to_string(&json).unwrap().contains("\"octree-why/4\""));
     assert!(printed(&["why", "--unneeded", &least]).contains("every split has a cause"));
     let found = harness(&["why", "--unneeded", &needless]);
     assert_eq!(found.status.code(), Some(1), "{found:?}");

@@ -1,24 +1,25 @@
 //! Hyper-tree grids in VTKHDF, as `mesher --write htg` and `harness export` write them: the leaves of a tree of any size, in Morton
 //! order.
 //!
-//! The file has the nodes level by level ([`vtkhdf::tree`] describes it). A walk from the root down reads each level once from
-//! its begin to its end, because the children of a level's split nodes are the next level. So one chunk of each array and
-//! level is in memory.
+//! The file has the nodes level by level ([`vtkhdf::tree`] describes it). Its bits, of which nodes are split and which leaves are not in the mesh,
+//! are in memory, at most 0.3 bytes per leaf. Sides and ranks are not: a walk from the root down reads those of each level once from its begin to its
+//! end, because the children of a level's split nodes are the next level. So one chunk of them is in memory for each level.
 //!
-//! Reading verifies the whole structure: every node has a parent, every side exists, and masked nodes are leaves. Damage to the file itself
-//! shows in its checksums.
+//! Opening a file verifies the whole structure: every node but the root has a parent, and masked nodes are leaves. Sides and ranks are verified as they are
+//! read. Damage to the file itself shows in its checksums.
 
+mod bits;
 mod bytes;
 mod cursor;
-mod index;
-mod level;
 #[cfg(test)]
 mod tests;
 
 use crate::lattice::Root;
 use crate::word;
-use level::LevelReader;
+use bits::Bits;
+use bytes::Bytes;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use vtkhdf::format::{Chunked, ReadError};
 use vtkhdf::read::TreeReader;
@@ -27,19 +28,28 @@ use vtkhdf::tree::Shape;
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
 
+/// The least number that is no rank, so that counting leaves by rank takes little memory whatever a file contains.
+const RANKS_MAX: u32 = 1 << 24;
+
 pub use cursor::Cursor;
-pub use index::Index;
 /// The cell data with the sides.
 pub use vtkhdf::tree::SIDE;
 
-/// A hyper-tree grid whose shape was read and is valid. No node has been read.
+/// A hyper-tree grid whose structure was read and is valid.
 #[derive(Debug)]
 pub struct TreeFile {
     path: PathBuf,
     file: TreeReader,
     /// The root cube.
     pub root: Root,
+    /// Number of leaves.
+    pub leaves: u64,
     with_sides: bool,
+    /// The nodes of each level.
+    levels: Vec<Range<u64>>,
+    split: Bits,
+    /// Leaves that are not in the mesh.
+    masked: Bits,
 }
 
 /// Why a file is not a usable hyper-tree grid: the predicate of a sentence whose subject is the file.
@@ -85,7 +95,30 @@ impl TreeFile {
         if !is_cube {
             return layout(format!("its root is no cube: corner {origin:?}, edge {edge}"));
         }
-        Ok(Self { path: path.to_owned(), file, root: Root { origin, edge }, with_sides })
+        let (mut levels, mut end) = (Vec::new(), 0);
+        for count in &file.shape.nodes {
+            levels.push(end..end + count);
+            end += count;
+        }
+        let described = levels.last().map_or(0, |last| last.start);
+        let split = Bits::read(&file, &file.split, described)?;
+        let masked = file.masked.as_ref().map(|array| Bits::read(&file, array, end)).transpose()?;
+        let masked = masked.unwrap_or_default();
+        for (level, counts) in levels.windows(2).enumerate() {
+            let parents = split.ones_before(counts[0].end) - split.ones_before(counts[0].start);
+            let children = counts[1].end - counts[1].start;
+            if 8 * parents != children {
+                return nodes(format!(
+                    "{parents} nodes of level {level} are split, and {children} are on the next"
+                ));
+            }
+        }
+        if !split.are_disjoint(&masked) {
+            return nodes("a node is masked and split");
+        }
+        let leaves = end - split.ones_before(end) - masked.ones_before(end);
+        let (path, root) = (path.to_owned(), Root { origin, edge });
+        Ok(Self { path, file, root, leaves, with_sides, levels, split, masked })
     }
 
     /// Its path.
@@ -103,72 +136,86 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        let levels =
-            (0..self.file.shape.nodes.len()).map(|level| self.level(level, None)).collect();
         let run = &mut |words: &[u64], _: &[u32]| run(words);
-        let mut walk = Walk::new(levels);
-        if !(walk.siblings(0, 0, 1, run)? && walk.flush(run)) {
-            return Ok(());
+        let mut walk = Walk::new(self, None);
+        if walk.siblings(0, 0, 1, run)? {
+            walk.flush(run);
         }
-        match walk.levels.iter().position(|level| !level.is_at_end()) {
-            None => Ok(()),
-            Some(level) => nodes(format!("nodes of level {level} have no parent")),
-        }
-    }
-
-    /// Counts the nodes, so that the leaves of any octant can be read with a [`Cursor`].
-    ///
-    /// # Errors
-    /// If the file is damaged.
-    pub fn index(&self) -> Result<Index> {
-        Index::new(&self.file)
-    }
-
-    /// A reader of a level, with ranks if they are given.
-    fn level<'a>(&'a self, level: usize, ranks: Option<&'a Chunked>) -> LevelReader<'a> {
-        let nodes = &self.file.shape.nodes;
-        let begin = nodes[..level].iter().sum();
-        let split = (level + 1 < nodes.len()).then_some(&self.file.split);
-        let sides = self.with_sides.then_some(&self.file.sides);
-        let arrays = [split, self.file.masked.as_ref(), sides, ranks];
-        LevelReader::new(&self.file, begin..begin + nodes[level], arrays)
+        Ok(())
     }
 }
 
-/// What is given the words of leaves, and their ranks if the readers have ranks. A walk ends when it returns false.
+/// What is given the words of leaves, and their ranks if the walk reads ranks. A walk ends when it returns false.
 type Run<'r> = dyn FnMut(&[u64], &[u32]) -> bool + 'r;
+
+/// The position of a walk on a level.
+struct Level<'a> {
+    next: u64,
+    sides: Option<Bytes<'a>>,
+    ranks: Option<Bytes<'a>>,
+}
 
 /// A walk in Morton order.
 struct Walk<'a> {
-    levels: Vec<LevelReader<'a>>,
+    tree: &'a TreeFile,
+    levels: Vec<Level<'a>>,
     words: Vec<u64>,
     ranks: Vec<u32>,
 }
 
 impl<'a> Walk<'a> {
-    fn new(levels: Vec<LevelReader<'a>>) -> Self {
-        Self { levels, words: Vec::with_capacity(RUN + 8), ranks: Vec::new() }
+    /// A walk from the root, with ranks if they are given.
+    fn new(tree: &'a TreeFile, ranks: Option<&'a Chunked>) -> Self {
+        let bytes = |array| Bytes::new(&tree.file, array);
+        let level = |nodes: &Range<u64>| Level {
+            next: nodes.start,
+            sides: tree.with_sides.then(|| bytes(&tree.file.sides)),
+            ranks: ranks.map(bytes),
+        };
+        let levels = tree.levels.iter().map(level).collect();
+        Self { tree, levels, words: Vec::with_capacity(RUN + 8), ranks: Vec::new() }
+    }
+
+    /// Continues with these nodes.
+    fn seek(&mut self, next: &[u64]) {
+        self.levels.iter_mut().zip(next).for_each(|(level, next)| level.next = *next);
     }
 
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.
     fn siblings(&mut self, level: usize, key: u64, count: u32, run: &mut Run) -> Result<bool> {
-        let siblings = self.levels[level].next(count)?;
-        let (edge, code) = (word::span(level as u8), (level as u64) << 2);
+        let first = self.levels[level].next;
+        self.levels[level].next += u64::from(count);
+        let [split, masked] =
+            [&self.tree.split, &self.tree.masked].map(|bits| bits.get(first, count));
         for i in 0..count {
-            let key = key + u64::from(i) * edge;
-            if siblings.split >> i & 1 == 1 {
-                if level + 1 == self.levels.len() {
-                    return nodes(format!("a node of level {level} is split"));
-                }
+            let key = key + u64::from(i) * word::span(level as u8);
+            if split >> i & 1 == 1 {
                 if !self.siblings(level + 1, key, 8, run)? {
                     return Ok(false);
                 }
-            } else if siblings.masked >> i & 1 == 0 {
-                self.words.push(key << 7 | code | u64::from(siblings.sides[i as usize]));
-                self.ranks.extend(siblings.ranks.map(|ranks| ranks[i as usize]));
+            } else if masked >> i & 1 == 0 {
+                self.leaf(level, key, first + u64::from(i))?;
             }
         }
         Ok(self.words.len() < RUN || self.flush(run))
+    }
+
+    /// Adds a leaf.
+    fn leaf(&mut self, level: usize, key: u64, node: u64) -> Result<()> {
+        let Level { sides, ranks, .. } = &mut self.levels[level];
+        let side = sides.as_mut().map_or(Ok(0), |sides| sides.at(node))?;
+        if side > 2 {
+            return nodes(format!("node {node} has the side {side}"));
+        }
+        self.words.push(key << 7 | (level as u64) << 2 | u64::from(side));
+        if let Some(ranks) = ranks {
+            let found = ranks.int(node)?;
+            match u32::try_from(found).ok().filter(|&rank| rank < RANKS_MAX) {
+                Some(rank) => self.ranks.push(rank),
+                None => return nodes(format!("node {node} has the rank {found}")),
+            }
+        }
+        Ok(())
     }
 
     fn flush(&mut self, run: &mut Run) -> bool {

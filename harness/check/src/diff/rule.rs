@@ -6,7 +6,7 @@
 use crate::checks::Terms;
 use crate::checks::identical::describe;
 use crate::why::Mesh;
-use crate::why::answer::SideReason;
+use crate::why::answer::LOST;
 use contract::lattice::Root;
 use contract::octant::Octant;
 use contract::tree::Kind;
@@ -43,27 +43,21 @@ impl Dispute<'_> {
     fn side(&self, x: &Leaf, y: &Leaf) -> String {
         let centre = self.terms.root.to_user(x.octant.centre());
         let answer = self.a.at(centre).expect("the centre of an octant is in the root");
-        let (side, why) = match answer.side_decided_by {
-            SideReason::Facets { facets, .. } => {
-                (Side::Crossing, format!("facet {} crosses it", facets[0]))
-            }
-            SideReason::Component { side, decision, .. } => (side, decision),
-            SideReason::Unknown => {
-                return "section 4 (side): give the case file (--case) to decide it".to_owned();
-            }
+        let Some(reason) = answer.side_decided_by else {
+            return "section 4 (side): give the case file (--case) to decide it".to_owned();
         };
-        let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
+        let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == reason.side);
         let right = right.map_or("neither", |(_, name)| name);
-        format!("section 4: {why}, so it is {side}: {right} is right")
+        format!("section 4: {}, so it is {}: {right} is right", reason.decision, reason.side)
     }
 
     /// The rule for a leaf that the other mesh does not have in any form.
     fn absence(&self, leaf: &Leaf, (has, _): Named, (lacks, mesh): Named) -> String {
         let centre = self.terms.root.to_user(leaf.octant.centre());
         let answer = mesh.at(centre).expect("the centre of an octant is in the root");
-        if let Some(deletion) = answer.deleted_by {
-            let right = if deletion.is_lost() { has } else { lacks };
-            return format!("section {}: {}: {right} is right", deletion.section, deletion.rule);
+        if let Some(rule) = answer.deleted_by {
+            let right = if rule.ends_with(LOST) { has } else { lacks };
+            return format!("{rule}: {right} is right");
         }
         let (keep, side) = (format!("{:?}", self.terms.keep).to_lowercase(), leaf.side);
         match (side, self.terms.keeps(side as Kind)) {

@@ -1,22 +1,25 @@
-//! The answer to a question about a point; JSON of the schema `octree-why/3` when serialised.
+//! The answer to a question about a point; JSON of the schema `octree-why/4` when serialised.
 //!
-//! Invariants: the leaf and the leaf of T0 contain the point; every ancestor of the leaf has its split, in order. A chain begins
-//! with the octant that is split; each leaf is finer and near enough for its rule; each further octant is the parent of
+//! The size of a leaf is explained by the split of its parent: whatever requires that split requires those of all coarser octants,
+//! too. A chain goes from the parent to the parent of a leaf that forces it to split, until T0 or the extra layer splits one. Of the
+//! leaves that do, the first one of the finest level is taken, so that chains are short. Levels rise from link to link, so a chain ends.
+//!
+//! Invariants: the leaf and the leaf of T0 contain the point; the octant that is split is the parent of the leaf. A chain begins
+//! with this octant; each leaf is finer and near enough for its rule; each further octant is the parent of
 //! the leaf before it, and the cause is one of the last octant. A cause has a facet or a box. Only a point without a leaf is
 //! in a deleted part.
 
 use super::Mesh;
-use super::base::Cause;
-use super::chain::{Link, Rule};
+use super::gradation::parent;
+use super::text::facets_that_cross;
 use crate::checks::components::{Component, Decision};
-use contract::lattice::Root;
-use contract::manifest::{self, Keep};
-use contract::octant::{Octant, UNITS_PER_CELL};
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
 use contract::word::Side;
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-why/3";
+const SCHEMA: &str = "octree-why/4";
 
 /// Facets that are listed for a cause; further ones are counted only.
 const FACETS_LISTED: usize = 8;
@@ -45,17 +48,10 @@ impl Place {
     }
 }
 
-/// A place as text.
-pub(super) fn user_place(place: &Place) -> String {
-    let point = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
-    let Place { path, level, min, max, .. } = place;
-    format!("octant {path} (level {level}), {} to {}", point(*min), point(*max))
-}
-
 /// The answer.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
-    /// [`SCHEMA`].
+    /// Name and version of the JSON form.
     pub schema: &'static str,
     /// The point, in the user's units.
     pub point: [f64; 3],
@@ -65,16 +61,16 @@ pub struct Answer {
     pub base_leaf: Option<Place>,
     /// The side of the leaf in the mesh.
     pub side: Option<Side>,
-    /// What decides the side.
-    pub side_decided_by: SideReason,
+    /// What decides the side; none if the facets are not known.
+    pub side_decided_by: Option<SideReason>,
     /// Deleted parts: the rule that deletes the leaf of T0.
-    pub deleted_by: Option<Deletion>,
-    /// Every octant from the root to the parent of the leaf, with the cause of its split.
-    pub splits: Vec<Split>,
+    pub deleted_by: Option<String>,
+    /// The split of the leaf's parent; none for the root.
+    pub split: Option<Split>,
     /// What could not be explained, and why.
     pub left_out: Vec<String>,
     #[serde(skip)]
-    pub(super) layer_cells_min: u32,
+    layer_cells_min: u32,
 }
 
 /// An octant that is split, and why.
@@ -83,18 +79,28 @@ pub struct Split {
     /// The octant.
     pub octant: Place,
     /// The leaves from the octant to the cause; none if T0 splits the octant.
-    pub links: Vec<LinkRecord>,
+    pub links: Vec<Link>,
     /// The cause in the inputs; none if no rule requires the split.
-    pub cause: Option<CauseRecord>,
+    pub cause: Option<Cause>,
+}
+
+/// The rule by which a leaf forces an octant to split (section 6 of reference/DEFINITION.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// The leaf is a deleted crossing leaf of T0, and the octant touches it.
+    ExtraLayer,
+    /// The layer of the leaf reaches the octant.
+    Layer,
+    /// The octant touches the leaf, which is at least two levels finer.
+    Balance,
 }
 
 /// A leaf that forces the previous octant of a chain to split.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LinkRecord {
-    /// The rule: `extra_layer`, `layer` or `balance`.
-    pub rule: &'static str,
-    /// Section of reference/DEFINITION.md, with the step.
-    pub section: &'static str,
+pub struct Link {
+    /// The rule.
+    pub rule: Rule,
     /// The octant that is forced to split: that of the chain, or the parent of the previous leaf.
     pub octant: Place,
     /// The leaf that forces it.
@@ -103,13 +109,11 @@ pub struct LinkRecord {
     pub distance_cells: i64,
 }
 
-/// A cause in the inputs. Each facet and each box alone is sufficient.
+/// A cause in the inputs (section 3). Each facet and each box alone is sufficient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CauseRecord {
-    /// Section of reference/DEFINITION.md.
-    pub section: &'static str,
-    /// The octant that facets cross and boxes meet: the split octant, a descendant, the parent of the last leaf, or the
-    /// last leaf itself after the extra layer.
+pub struct Cause {
+    /// The octant that facets cross and boxes meet: the split octant, the parent of the last leaf, or the last leaf itself after
+    /// the extra layer.
     pub octant: Place,
     /// The first facets, counted from 0.
     pub facets: Vec<u32>,
@@ -121,94 +125,45 @@ pub struct CauseRecord {
     pub boxes: Vec<usize>,
 }
 
-/// What decides the side of a leaf.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum SideReason {
-    /// Facets cross the leaf of T0.
-    Facets {
-        /// The first facets, counted from 0.
-        facets: Vec<u32>,
-        /// Their number.
-        facets_count: u64,
-    },
-    /// The component of the leaf has a side.
-    Component {
-        /// The side.
-        side: Side,
-        /// What decides it, in words.
-        decision: String,
-        /// The candidate whose rays decide.
-        candidate: Option<Place>,
-        /// For its rays +x, -x, +y, -y, +z, -z: whether the number of facets is odd.
-        rays_odd: Option<[bool; 6]>,
-        /// The index of the seed that decides.
-        seed: Option<usize>,
-        /// Number of leaves of the component.
-        leaves: u64,
-    },
-    /// The facets are not known.
-    Unknown,
-}
-
-/// The rule that deletes a leaf.
+/// What decides the side of a leaf (section 4).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Deletion {
-    /// Section of reference/DEFINITION.md.
-    pub section: &'static str,
-    /// The rule in words.
-    pub rule: String,
+pub struct SideReason {
+    /// The side.
+    pub side: Side,
+    /// What decides it, in words.
+    pub decision: String,
+    /// Number of leaves of the component; none for a crossing leaf.
+    pub leaves: Option<u64>,
 }
 
 /// The rule in place of one that deletes a leaf.
-const LOST: &str = "no rule deletes it: the mesh has lost a leaf";
-
-impl Deletion {
-    /// Whether no rule deletes the leaf.
-    pub fn is_lost(&self) -> bool {
-        self.rule == LOST
-    }
-}
+pub(crate) const LOST: &str = "no rule deletes it: the mesh has lost a leaf";
 
 impl Answer {
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
-        let Self { point, leaf, base_leaf, side, deleted_by, splits, .. } = self;
+        let Self { point, leaf, base_leaf, side, deleted_by, split, .. } = self;
         for place in leaf.iter().chain(base_leaf) {
             // The point is rounded to the lattice, and printed coordinates to some decimals.
             let near = |a: usize| {
                 let slack = (place.max[a] - place.min[a]) / 128.0;
                 (place.min[a] - slack..=place.max[a] + slack).contains(&point[a])
             };
-            assert!((0..3).all(near), "{point:?} is not in the {}", user_place(place));
+            assert!((0..3).all(near), "{point:?} is not in the {place}");
         }
         if let (Some(leaf), Some(base)) = (leaf, base_leaf) {
             let (leaf, base) = (&leaf.octant, &base.octant);
-            assert!(
-                leaf.contains(base) || base.contains(leaf),
-                "{leaf} is apart from {base} of T0"
-            );
+            let is_nested = leaf.contains(base) || base.contains(leaf);
+            assert!(is_nested, "{leaf} is apart from {base} of T0");
         }
         assert_eq!(leaf.is_some(), side.is_some(), "a leaf has a side, and only a leaf");
-        assert!(
-            deleted_by.is_none() || leaf.is_none(),
-            "the leaf {leaf:?} was deleted: {deleted_by:?}"
-        );
+        let is_apart = deleted_by.is_none() || leaf.is_none();
+        assert!(is_apart, "the leaf {leaf:?} was deleted: {deleted_by:?}");
         let end = leaf.as_ref().or(base_leaf.as_ref()).map(|place| place.octant);
-        assert_eq!(
-            splits.len(),
-            end.map_or(0, |end| usize::from(end.level)),
-            "splits above {end:?}"
-        );
-        for (split, level) in splits.iter().zip(0..) {
-            let octant = &split.octant.octant;
-            assert_eq!(
-                end.map(|end| end.ancestor(level)),
-                Some(*octant),
-                "the split of level {level}"
-            );
-            split.check_invariants(self.layer_cells_min);
-        }
+        let above = end.filter(|end| end.level > 0).map(|end| parent(&end));
+        let octant = split.as_ref().map(|split| split.octant.octant);
+        assert_eq!(octant, above, "the split above {end:?}");
+        split.iter().for_each(|split| split.check_invariants(self.layer_cells_min));
     }
 }
 
@@ -224,30 +179,23 @@ impl Split {
             let distance = octant.distance(&leaf);
             let reach = i64::from(layer_cells_min - 1) * i64::from(leaf.edge());
             let is_right = match link.rule {
-                "layer" => leaf.level > octant.level && distance < reach,
-                "balance" => leaf.level > octant.level + 1 && distance == 0,
-                _ => distance == 0,
+                Rule::Layer => leaf.level > octant.level && distance < reach,
+                Rule::Balance => leaf.level > octant.level + 1 && distance == 0,
+                Rule::ExtraLayer => distance == 0,
             };
+            ends = link.rule == Rule::ExtraLayer;
             // The parent of a source is split before the layer of the source's level is made.
-            let is_early =
-                !is_source || leaf.level > octant.level + 1 || link.rule == "extra_layer";
+            let is_early = !is_source || leaf.level > octant.level + 1 || ends;
             assert!(is_right && is_early, "{link:?} does not force the split of {octant}");
             assert_eq!(link.distance_cells, distance / i64::from(leaf.edge()), "{link:?}");
-            (is_source, ends) = (link.rule == "layer", link.rule == "extra_layer");
-            octant = if ends { leaf } else { leaf.ancestor(leaf.level - 1) };
+            is_source = link.rule == Rule::Layer;
+            octant = if ends { leaf } else { parent(&leaf) };
         }
-        let CauseRecord { octant: at, facets, facets_count, is_crossed, boxes, .. } = cause;
-        let is_of_octant = match self.links.is_empty() {
-            true => octant.contains(&at.octant),
-            false => octant == at.octant,
-        };
-        assert!(is_of_octant, "the cause of {octant} is one of {}", at.octant);
+        let Cause { octant: at, facets, facets_count, is_crossed, boxes } = cause;
+        assert_eq!(octant, at.octant, "the cause of {octant} is one of {}", at.octant);
         assert!(*is_crossed || !boxes.is_empty(), "{octant} is split without a facet or a box");
-        assert_eq!(
-            facets.len() as u64,
-            (*facets_count).min(FACETS_LISTED as u64),
-            "facets of {octant}"
-        );
+        let listed = (*facets_count).min(FACETS_LISTED as u64);
+        assert_eq!(facets.len() as u64, listed, "facets of {octant}");
         assert!(*is_crossed || *facets_count == 0, "{facets_count} facets do not cross {octant}");
     }
 }
@@ -260,125 +208,120 @@ impl Mesh<'_> {
     pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
         let root = &self.terms.root;
         let lattice = root.quantise_seed(point).ok_or_else(|| {
-            let (from, to) = (root.origin, root.to_user([contract::lattice::UNITS_PER_EDGE; 3]));
+            let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
             format!("the point {point:?} lies outside the root, which is from {from:?} to {to:?}; give a point inside")
         })?;
-        let cell = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
-        let leaf = self.leaves.leaf_at(cell);
-        let base = self.knows_surface().then(|| self.base_leaf_at(cell));
-        let octant = leaf.map(|(octant, _)| octant).or(base);
-        let mut answer = Answer {
+        let corner = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
+        let leaf = self.tree.locate(corner);
+        let cell = Octant { corner, level: LEVEL_MAX };
+        let base = self.knows_surface().then(|| self.base_leaf(&cell).expect("never split"));
+        let octant = leaf.map(|(octant, _)| octant).or(base).filter(|octant| octant.level > 0);
+        let (side_decided_by, deletion) = base.and_then(|base| self.side_of(&base)).unzip();
+        let answer = Answer {
             schema: SCHEMA,
             point,
             leaf: leaf.map(|(octant, _)| self.place(&octant)),
             base_leaf: base.map(|base| self.place(&base)),
             side: leaf.map(|(_, kind)| Side::ALL[usize::from(kind)]),
-            side_decided_by: SideReason::Unknown,
-            deleted_by: None,
-            splits: octant.map_or(Vec::new(), |octant| self.splits_above(&octant)),
-            left_out: Vec::new(),
+            side_decided_by,
+            deleted_by: deletion.filter(|_| leaf.is_none()),
+            split: octant.map(|octant| self.split(&parent(&octant))),
+            left_out: self.left_out(),
             layer_cells_min: self.terms.layer_cells_min,
         };
-        self.explain_side(base, &mut answer);
-        self.leave_out(&mut answer);
         answer.check_invariants();
         Ok(answer)
     }
 
-    /// The ancestors of an octant, from the root. All that T0 splits have the cause of the finest of them, because what
-    /// crosses or meets an octant does so with its ancestors.
-    fn splits_above(&self, octant: &Octant) -> Vec<Split> {
-        let ancestors = (0..octant.level).map(|level| octant.ancestor(level));
-        let of_base = ancestors.clone().take_while(|ancestor| self.base_splits(ancestor)).count();
-        let cause = of_base.checked_sub(1).and_then(|level| {
-            self.base_cause(&octant.ancestor(level as u8)).map(|cause| self.cause(&cause))
-        });
-        let split = |ancestor: Octant| match usize::from(ancestor.level) < of_base {
-            true => {
-                Split { octant: self.place(&ancestor), links: Vec::new(), cause: cause.clone() }
-            }
-            false => self.split(&ancestor),
-        };
-        ancestors.map(split).collect()
-    }
-
-    /// An octant that is split, with the chain to a cause.
+    /// An octant that is split, with a chain to a cause.
     pub(crate) fn split(&self, octant: &Octant) -> Split {
-        let chain = self.chain(octant);
-        let links = chain.iter().flat_map(|chain| &chain.links).map(|link| self.link(link));
-        let cause = chain.as_ref().map(|chain| self.cause(&chain.cause));
-        Split { octant: self.place(octant), links: links.collect(), cause }
-    }
-
-    fn link(&self, link: &Link) -> LinkRecord {
-        let (rule, section) = match link.rule {
-            Rule::ExtraLayer => ("extra_layer", "6"),
-            Rule::Layer => ("layer", "6, step 2"),
-            Rule::Balance => ("balance", "6, step 3"),
+        let (mut at, mut is_deep, mut links) = (*octant, false, Vec::new());
+        let cause = loop {
+            if self.base_splits(&at) {
+                break Some(self.cause(&at));
+            }
+            if let Some(leaf) = self.extra_layer(&at) {
+                links.push(self.link(Rule::ExtraLayer, &at, &leaf));
+                break Some(self.cause(&leaf));
+            }
+            let Some((rule, leaf)) = self.finest_that_forces(&at, is_deep) else { break None };
+            links.push(self.link(rule, &at, &leaf));
+            // After balance, any leaf may follow that may follow after a layer.
+            (at, is_deep) = (parent(&leaf), rule == Rule::Layer);
         };
-        LinkRecord {
-            rule,
-            section,
-            octant: self.place(&link.octant),
-            leaf: self.place(&link.leaf),
-            distance_cells: link.octant.distance(&link.leaf) / i64::from(link.leaf.edge()),
+        Split { octant: self.place(octant), links, cause }
+    }
+
+    /// A leaf of the finest possible level that forces the split of an octant, which must be deep or not.
+    fn finest_that_forces(&self, octant: &Octant, is_deep: bool) -> Option<(Rule, Octant)> {
+        let coarsest = octant.level + if is_deep { 2 } else { 1 };
+        let mut found = None;
+        (coarsest..=self.level_deepest).rev().find(|&level| {
+            self.any_leaf_near(octant, level..=level, &mut |leaf| {
+                found = self.rule_of(&leaf, octant).map(|rule| (rule, leaf));
+                found.is_some()
+            })
+        });
+        found
+    }
+
+    fn link(&self, rule: Rule, octant: &Octant, leaf: &Octant) -> Link {
+        let distance_cells = octant.distance(leaf) / i64::from(leaf.edge());
+        Link { rule, octant: self.place(octant), leaf: self.place(leaf), distance_cells }
+    }
+
+    /// What splits an octant of T0, or makes a leaf of it a crossing one.
+    fn cause(&self, octant: &Octant) -> Cause {
+        let may_cross = octant.level < self.terms.level_surface || !self.base_splits(octant);
+        let is_crossed = may_cross && self.is_crossed(octant);
+        let facets = if is_crossed { self.facets_of(octant) } else { Vec::new() };
+        let boxes = (0..).zip(&self.terms.boxes);
+        let splits = boxes.filter(|(_, b)| b.level > octant.level && b.meets(octant));
+        Cause {
+            octant: self.place(octant),
+            facets_count: facets.len() as u64,
+            facets: facets.into_iter().take(FACETS_LISTED).collect(),
+            is_crossed,
+            boxes: splits.map(|(index, _)| index).collect(),
         }
     }
 
-    fn cause(&self, cause: &Cause) -> CauseRecord {
-        CauseRecord {
-            section: "3",
-            octant: self.place(&cause.octant),
-            facets: cause.facets.iter().copied().take(FACETS_LISTED).collect(),
-            facets_count: cause.facets.len() as u64,
-            is_crossed: !cause.facets.is_empty()
-                || cause.octant.level < self.terms.level_surface && self.is_crossed(&cause.octant),
-            boxes: cause.boxes.clone(),
-        }
-    }
-
-    /// Adds what decides the side of the leaf of T0 and, if it was deleted, the rule for that.
-    fn explain_side(&self, base: Option<Octant>, answer: &mut Answer) {
-        let Some((base, (_, truth))) = base.zip(self.body) else { return };
-        let facets = self.facets_of(&base);
-        if !facets.is_empty() {
-            answer.side_decided_by = SideReason::Facets {
-                facets_count: facets.len() as u64,
-                facets: facets.into_iter().take(FACETS_LISTED).collect(),
+    /// What decides the side of a leaf of T0, and the rule that deletes it if it was deleted.
+    fn side_of(&self, base: &Octant) -> Option<(SideReason, String)> {
+        let (_, truth) = self.body?;
+        let Some(component) = truth.component_at(base) else {
+            let facets = self.facets_of(base);
+            let listed = &facets[..facets.len().min(FACETS_LISTED)];
+            let decision = format!("{} it", facets_that_cross(listed, facets.len() as u64));
+            let rule = match self.terms.keep_crossing {
+                false => "keep_crossing is false, so crossing leaves are deleted after gradation",
+                true => LOST,
             };
-            if answer.leaf.is_none() {
-                let rule = match self.terms.keep_crossing {
-                    false => {
-                        "keep_crossing is false, so crossing leaves are deleted after gradation"
-                    }
-                    true => LOST,
-                };
-                answer.deleted_by = Some(Deletion { section: "7", rule: rule.to_owned() });
-            }
-            return;
-        }
-        let Some(component) = truth.component_at(&base) else { return };
-        let side = component.side;
-        if answer.leaf.is_none() {
-            answer.deleted_by = Some(self.deletion(component));
-        }
-        let (mut candidate, mut rays_odd, mut seed) = (None, None, None);
-        let text = match component.decision {
-            Decision::Seed(index) => {
-                seed = Some(index);
-                format!("seed {index} lies in its component")
-            }
+            let reason = SideReason { side: Side::Crossing, decision, leaves: None };
+            return Some((reason, format!("section 7: {rule}")));
+        };
+        let reason = SideReason {
+            side: component.side,
+            decision: self.decision(component),
+            leaves: Some(component.leaves.len() as u64),
+        };
+        Some((reason, format!("section 5: {}", self.deletion(component))))
+    }
+
+    /// What decides the side of a component, as a sentence.
+    fn decision(&self, component: &Component) -> String {
+        match component.decision {
+            Decision::Seed(index) => format!("seed {index} lies in its component"),
             Decision::NoSeed => "no seed lies in its component".to_owned(),
-            Decision::Rays(octant, before) => {
-                let is_odd = side == Side::Inside;
-                (candidate, rays_odd) = (Some(self.place(&octant)), Some([is_odd; 6]));
-                let parity = if is_odd { "an odd" } else { "an even" };
+            Decision::Rays(candidate, before) => {
+                let parity = if component.side == Side::Inside { "an odd" } else { "an even" };
                 let skipped = match before {
                     0 => String::new(),
                     n => format!(", after {n} candidates whose rays disagree"),
                 };
+                let candidate = self.place(&candidate);
                 format!(
-                    "each of the six rays of the candidate intersects {parity} number of facets{skipped}"
+                    "each of the six rays of the candidate {candidate} intersects {parity} number of facets{skipped}"
                 )
             }
             Decision::Majority(candidates, odd) => format!(
@@ -386,50 +329,34 @@ impl Mesh<'_> {
                  candidates are odd",
                 6 * candidates
             ),
-        };
-        answer.side_decided_by = SideReason::Component {
-            side,
-            decision: text,
-            candidate,
-            rays_odd,
-            seed,
-            leaves: component.leaves.len() as u64,
-        };
+        }
     }
 
     /// The rule that deletes the leaves of a component.
-    fn deletion(&self, &Component { side, enclosed, .. }: &Component) -> Deletion {
-        let terms = &self.terms;
-        let keep = match terms.keep {
-            Keep::Outside => "outside",
-            Keep::Inside => "inside",
-            Keep::All => "all",
-        };
-        let rule = if !terms.keeps(side as u8) {
+    fn deletion(&self, &Component { side, enclosed, .. }: &Component) -> String {
+        let keep = format!("{:?}", self.terms.keep).to_lowercase();
+        if !self.terms.keeps(side as u8) {
             format!("keep is {keep}, so leaves that are {side} are deleted")
         } else if enclosed {
             "enclosed is delete, and no leaf of its component has a face on the root's boundary"
                 .to_owned()
         } else {
             LOST.to_owned()
-        };
-        Deletion { section: "5", rule }
+        }
     }
 
-    /// Adds what the answer lacks, and why.
-    fn leave_out(&self, answer: &mut Answer) {
-        let mut add = |what: &str| answer.left_out.push(what.to_owned());
-        if self.body.is_none() {
-            add(match self.knows_surface() {
-                true => "facet numbers and the decision on the side: give the case with --case",
-                false => {
-                    "everything that depends on facets or on crossing leaves, which the mesh does not contain: give \
-                     the case with --case"
-                }
-            });
-        }
-        if self.manifest.tree == manifest::Tree::Base {
-            add("gradation: the mesh is a base tree");
-        }
+    /// What an answer lacks, and why.
+    fn left_out(&self) -> Vec<String> {
+        let of_case = match (self.body, self.knows_surface()) {
+            (Some(_), _) => None,
+            (None, true) => {
+                Some("facet numbers and the decision on the side: give the case with --case")
+            }
+            (None, false) => Some(
+                "everything that depends on facets or on crossing leaves, which the mesh does not contain: give the case with --case",
+            ),
+        };
+        let of_base = self.is_base.then_some("gradation: the mesh is a base tree");
+        of_case.into_iter().chain(of_base).map(str::to_owned).collect()
     }
 }

@@ -5,29 +5,15 @@
 
 use super::Mesh;
 use contract::octant::{LEVEL_MAX, Octant};
+use contract::tree::OFFSETS;
 use contract::word::Side;
-
-/// The causes of an octant in the inputs. Each alone is sufficient.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cause {
-    /// The octant that the facets cross and the boxes meet.
-    pub octant: Octant,
-    /// Facets that cross it, ascending; empty if facets are not known.
-    pub facets: Vec<u32>,
-    /// Boxes of a deeper level that meet it, by index.
-    pub boxes: Vec<usize>,
-}
 
 impl Mesh<'_> {
     /// Whether the surface crosses an octant that is a leaf of T0 or contains some. Without facets the answer holds for octants coarser
     /// than D only: such an octant contains a crossing leaf iff a facet crosses it.
     pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
-        match self.body {
-            Some((_, truth)) => {
-                truth.tree.kinds(truth.tree.at(octant)) & 1 << Side::Crossing as u8 != 0
-            }
-            None => self.leaves.has_crossing(octant),
-        }
+        let tree = self.body.map_or(self.tree, |(_, truth)| &truth.tree);
+        tree.kinds(tree.at(octant)) & 1 << Side::Crossing as u8 != 0
     }
 
     /// Whether T0 splits an octant.
@@ -40,22 +26,6 @@ impl Mesh<'_> {
                         || octant.level < self.terms.level_surface && self.is_crossed(octant))
             }
         }
-    }
-
-    /// The facets and boxes that require an octant to be split; `None` if none does.
-    pub(super) fn base_cause(&self, octant: &Octant) -> Option<Cause> {
-        self.base_splits(octant).then(|| {
-            let facets = match octant.level < self.terms.level_surface {
-                true => self.facets_of(octant),
-                false => Vec::new(),
-            };
-            let splits = |b: usize| {
-                let extent = &self.terms.boxes[b];
-                extent.level > octant.level && extent.meets(octant)
-            };
-            let boxes = (0..self.terms.boxes.len()).filter(|&b| splits(b)).collect();
-            Cause { octant: *octant, facets, boxes }
-        })
     }
 
     /// The facets that cross an octant, ascending; empty if facets are not known.
@@ -73,12 +43,6 @@ impl Mesh<'_> {
         Some(octant.ancestor(split_above.map_or(0, |level| level + 1)))
     }
 
-    /// The leaf of T0 that contains a level-19 cell.
-    pub(super) fn base_leaf_at(&self, cell: [u32; 3]) -> Octant {
-        let cell = Octant { corner: cell, level: LEVEL_MAX };
-        self.base_leaf(&cell).expect("level 19 is never split")
-    }
-
     /// Whether crossing leaves were deleted after gradation and are known from the facets.
     pub(super) fn has_deleted_crossing(&self) -> bool {
         !self.terms.keep_crossing && self.body.is_some()
@@ -90,7 +54,7 @@ impl Mesh<'_> {
         if !applies || octant.level >= self.terms.level_surface || self.base_splits(octant) {
             return None;
         }
-        let around = contract::tree::OFFSETS.iter().filter(|offset| **offset != [0; 3]);
+        let around = OFFSETS.iter().filter(|offset| **offset != [0; 3]);
         let mut neighbours = around.filter_map(|&offset| octant.neighbour(offset));
         neighbours.find_map(|neighbour| self.crossing_leaf_touching(octant, &neighbour))
     }

@@ -20,13 +20,26 @@
 use std::ops::RangeInclusive;
 
 use super::Mesh;
-use super::leaves::{Node, id, parent};
+use super::answer::Rule;
 use contract::octant::{CELLS_PER_EDGE, Octant};
-use contract::tree::OFFSETS;
+use contract::tree::{Handle, OFFSETS};
+use contract::word;
 
 /// Edge of a cell of a level, in level-19 cells.
 fn edge(level: u8) -> i64 {
     i64::from(CELLS_PER_EDGE >> level)
+}
+
+/// The parent of an octant other than the root.
+pub(super) fn parent(octant: &Octant) -> Octant {
+    octant.ancestor(octant.level - 1)
+}
+
+/// A question about an octant that is asked often.
+#[derive(Clone, Copy)]
+enum Question {
+    Deep,
+    Justified,
 }
 
 impl Mesh<'_> {
@@ -35,51 +48,48 @@ impl Mesh<'_> {
         i64::from(self.terms.layer_cells_min - 1) * edge(level)
     }
 
-    /// Whether the layer of a finer leaf reaches an octant.
-    pub(super) fn forces_by_layer(&self, leaf: &Octant, octant: &Octant) -> bool {
-        octant.distance(leaf) < self.layer_reach(leaf.level)
-    }
-
-    /// Whether balance with a leaf requires an octant to be split.
-    pub(super) fn forces_by_balance(&self, leaf: &Octant, octant: &Octant) -> bool {
-        leaf.level > octant.level + 1 && octant.distance(leaf) == 0
-    }
-
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
     pub(super) fn is_deep(&self, octant: &Octant) -> bool {
-        let id = id(octant);
-        if let Some(&known) = self.known.deep.borrow().get(&id) {
-            return known;
-        }
-        let levels = octant.level + 2..=self.level_deepest;
-        let forces = &mut |leaf: Octant| {
-            let from = parent(&leaf);
-            self.forces_by_layer(&leaf, octant) && self.is_deep(&from)
-                || self.forces_by_balance(&leaf, octant) && self.is_justified(&from)
-        };
-        let deep = self.base_splits(octant)
-            || self.extra_layer(octant).is_some()
-            || self.any_leaf_near(octant, levels, forces);
-        self.known.deep.borrow_mut().insert(id, deep);
-        deep
+        self.remembered(Question::Deep, octant, || {
+            let levels = octant.level + 2..=self.level_deepest;
+            let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
+            self.base_splits(octant)
+                || self.extra_layer(octant).is_some()
+                || self.any_leaf_near(octant, levels, forces)
+        })
     }
 
     /// Whether a rule requires an octant to be split.
     pub(super) fn is_justified(&self, octant: &Octant) -> bool {
-        if self.is_deep(octant) {
-            return true;
-        }
-        let id = id(octant);
-        if let Some(&known) = self.known.justified.borrow().get(&id) {
+        self.is_deep(octant)
+            || self.remembered(Question::Justified, octant, || {
+                let level = octant.level + 1;
+                let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
+                level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces)
+            })
+    }
+
+    /// The answer to a question, which is sought once.
+    fn remembered(&self, question: Question, octant: &Octant, seek: impl Fn() -> bool) -> bool {
+        let id = word::key_of(octant.corner) << 6 | u64::from(octant.level) << 1 | question as u64;
+        if let Some(&known) = self.known.borrow().get(&id) {
             return known;
         }
-        let level = octant.level + 1;
-        let forces =
-            &mut |leaf: Octant| self.forces_by_layer(&leaf, octant) && self.is_deep(&parent(&leaf));
-        let justified =
-            level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces);
-        self.known.justified.borrow_mut().insert(id, justified);
-        justified
+        let found = seek();
+        self.known.borrow_mut().insert(id, found);
+        found
+    }
+
+    /// The rule by which a finer leaf forces an octant to split.
+    pub(super) fn rule_of(&self, leaf: &Octant, octant: &Octant) -> Option<Rule> {
+        let (from, distance) = (parent(leaf), octant.distance(leaf));
+        if distance < self.layer_reach(leaf.level) && self.is_deep(&from) {
+            Some(Rule::Layer)
+        } else if leaf.level > octant.level + 1 && distance == 0 && self.is_justified(&from) {
+            Some(Rule::Balance)
+        } else {
+            None
+        }
     }
 
     /// Visits the leaves of these levels outside an octant that may force it to split, until `visit` returns true.
@@ -101,31 +111,11 @@ impl Mesh<'_> {
         let mut search = Search { mesh: self, octant, first, last, visit };
         let centre = octant.ancestor(start);
         let starts = OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset));
-        starts.into_iter().any(|start| search.enter(start, self.content(&start), false))
-    }
-
-    /// The content of an octant: split, or else without leaves of a deeper level.
-    fn content(&self, octant: &Octant) -> Content {
-        if self.leaves.node(octant).is_split() { Content::Split } else { Content::Nothing }
-    }
-}
-
-/// The content of an octant in the mesh.
-#[derive(Clone, Copy, Debug)]
-enum Content {
-    Leaf,
-    Split,
-    /// No leaf: deleted, outside the kept region, or part of a coarser leaf.
-    Nothing,
-}
-
-impl Node {
-    fn content(self, digit: u8) -> Content {
-        match (self.leaves >> digit & 1, self.split >> digit & 1) {
-            (1, _) => Content::Leaf,
-            (_, 1) => Content::Split,
-            _ => Content::Nothing,
-        }
+        starts.into_iter().any(|start| {
+            // A leaf of the octant's level or a coarser one contains no leaf that is sought.
+            let found = Some(self.tree.at(&start)).filter(|handle| handle.is_node());
+            search.enter(start, found.unwrap_or(Handle::HOLE), false)
+        })
     }
 }
 
@@ -139,41 +129,40 @@ struct Search<'a, 'b> {
 }
 
 impl Search<'_, '_> {
-    /// Searches an octant. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
-    fn enter(&mut self, at: Octant, content: Content, in_deleted: bool) -> bool {
+    /// Searches an octant with this content. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
+    fn enter(&mut self, at: Octant, content: Handle, in_deleted: bool) -> bool {
         if at == *self.octant || self.is_far(&at) {
             return false;
         }
-        match content {
-            Content::Leaf => self.leaf(at),
-            Content::Split if !self.mesh.distrusts || self.counts_as_split(&at) => {
-                self.descend(&at, false)
-            }
-            Content::Split => self.leaf(at),
-            Content::Nothing if self.mesh.has_deleted_crossing() => self.hole(at, in_deleted),
-            Content::Nothing => false,
+        if content.as_leaf().is_some() {
+            self.leaf(at)
+        } else if !content.is_node() {
+            self.mesh.has_deleted_crossing() && self.hole(at, content, in_deleted)
+        } else if !self.mesh.distrusts || self.counts_as_split(&at) {
+            self.descend(&at, content, false)
+        } else {
+            self.leaf(at)
         }
     }
 
-    fn descend(&mut self, at: &Octant, in_deleted: bool) -> bool {
-        if at.level >= self.last {
-            return false;
-        }
-        let node = self.mesh.leaves.node(at);
-        (0..8).any(|digit| self.enter(at.child(digit), node.content(digit), in_deleted))
+    fn descend(&mut self, at: &Octant, content: Handle, in_deleted: bool) -> bool {
+        let child = |digit| self.mesh.tree.child(content, digit, at.level);
+        let children: [Handle; 8] = std::array::from_fn(|digit| child(digit as u8));
+        at.level < self.last
+            && (0..).zip(children).any(|(d, below)| self.enter(at.child(d), below, in_deleted))
     }
 
     /// Searches an octant without leaves for deleted crossing leaves.
-    fn hole(&mut self, at: Octant, in_deleted: bool) -> bool {
+    fn hole(&mut self, at: Octant, content: Handle, in_deleted: bool) -> bool {
         if !in_deleted {
             match self.mesh.base_leaf(&at) {
-                None => return self.mesh.is_crossed(&at) && self.descend(&at, false),
+                None => return self.mesh.is_crossed(&at) && self.descend(&at, content, false),
                 Some(leaf) if !self.mesh.is_crossed(&leaf) => return false,
                 Some(_) => {}
             }
         }
         match self.mesh.terms.has_box_finer_than_surface() && self.counts_as_split(&at) {
-            true => self.descend(&at, true),
+            true => self.descend(&at, content, true),
             false => self.leaf(at),
         }
     }

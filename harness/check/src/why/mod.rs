@@ -1,9 +1,8 @@
 //! Why a leaf has its size and its side, and which splits of a mesh have no cause.
 //!
-//! - [`leaves`]: the leaves by octant; [`base`](mod@base): T0 and its causes (section 3 of reference/DEFINITION.md);
-//! - [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`chain`]: a chain of them to a cause of T0;
-//! - [`answer`]: the result as data, [`text`]: for people; [`unneeded`]: the audit of a whole mesh.
+//! - [`base`](mod@base): T0 (section 3 of reference/DEFINITION.md); [`gradation`]: the leaves that force an octant to split (section 6);
+//! - [`answer`]: the answer about a point, with a chain of such leaves to a cause in T0; [`text`]: the answer for people;
+//! - [`unneeded`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
 //! so their parents are split by T0, by the extra layer, or by a step of a deeper level. A chain therefore goes to ever
@@ -23,14 +22,10 @@ use crate::checks::truth::Truth;
 use crate::diff::fields::differing_inputs;
 
 pub mod answer;
-pub mod base;
-pub mod chain;
-pub mod gradation;
-pub mod leaves;
-pub mod text;
+mod base;
+mod gradation;
+mod text;
 pub mod unneeded;
-
-use leaves::Leaves;
 
 /// The body of a case: its facets, and T0 with the sides of its leaves.
 #[derive(Debug)]
@@ -61,8 +56,7 @@ impl Body {
 /// A mesh with the inputs that explain it.
 #[derive(Debug)]
 pub struct Mesh<'a> {
-    manifest: &'a Manifest,
-    leaves: Leaves<'a>,
+    tree: &'a Tree,
     terms: Terms,
     /// The facets and T0, if the case is known.
     body: Option<(&'a Facets, &'a Truth)>,
@@ -72,15 +66,8 @@ pub struct Mesh<'a> {
     distrusts: bool,
     /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
     level_deepest: u8,
-    /// Answers for octants that were asked about before.
-    known: Known,
-}
-
-/// Answers by [`leaves::id`].
-#[derive(Debug, Default)]
-struct Known {
-    deep: RefCell<FxHashMap<u64, bool>>,
-    justified: RefCell<FxHashMap<u64, bool>>,
+    /// Answers to questions that were asked before.
+    known: RefCell<FxHashMap<u64, bool>>,
 }
 
 impl<'a> Mesh<'a> {
@@ -102,8 +89,8 @@ impl<'a> Mesh<'a> {
             (terms.keep, terms.keep_crossing) = (manifest::Keep::All, true);
         }
         let level_deepest = tree.finest_level(tree.root(), 0).max(required(&terms));
-        let (leaves, known) = (Leaves::new(tree), Known::default());
-        Self { manifest, leaves, terms, body, is_base, distrusts: false, level_deepest, known }
+        let known = RefCell::default();
+        Self { tree, terms, body, is_base, distrusts: false, level_deepest, known }
     }
 
     /// The same mesh, in which needless splits justify nothing.

@@ -12,20 +12,24 @@ use std::fmt;
 use std::fs;
 
 use super::Mesh;
-use super::answer::{Place, user_place};
+use super::answer::Place;
 use contract::octant::Octant;
+use contract::tree::{Handle, Tree};
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-unneeded/1";
+const SCHEMA: &str = "octree-unneeded/2";
 
 /// Memory that the audit takes for each leaf: 22 bytes were measured on 4 million cells, and tables double when they are full.
 const BYTES_PER_LEAF: u64 = 40;
 
 /// The result of the audit.
+///
+/// Invariants: needless octants have needless splits, which are some of all splits; the octants that are listed are some of the
+/// needless ones, and their leaves some of all.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unneeded {
-    /// [`SCHEMA`].
+    /// Name and version of the JSON form.
     pub schema: &'static str,
     /// Number of leaves of the mesh.
     pub leaves: u64,
@@ -39,8 +43,6 @@ pub struct Unneeded {
     pub unneeded_leaves: u64,
     /// The first of these octants, in Morton order.
     pub first: Vec<Subtree>,
-    /// The one with the most leaves.
-    pub largest: Option<Subtree>,
 }
 
 /// An octant that is split without a cause.
@@ -63,63 +65,83 @@ impl Mesh<'_> {
             return Err("the mesh has no crossing leaves, so the surface is not known; give its case with --case"
                 .to_owned());
         }
+        let counts = leaves_below(self.tree);
+        let leaves = leaves_in(self.tree.root(), &counts);
         let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
-        refuse_too_large(self.leaves.count(&Octant::ROOT), &meminfo)?;
-        let mesh = self.distrusting();
+        refuse_too_large(leaves, &meminfo)?;
         let mut found = Unneeded {
             schema: SCHEMA,
-            leaves: mesh.leaves.count(&Octant::ROOT),
+            leaves,
             splits: 0,
             unneeded: 0,
             subtrees: 0,
             unneeded_leaves: 0,
             first: Vec::new(),
-            largest: None,
         };
-        mesh.search_unneeded(&Octant::ROOT, first, &mut found);
+        let mesh = self.distrusting();
+        let mut visit = |octant: &Octant, handle: Handle| {
+            found.splits += 1;
+            if mesh.is_justified(octant) {
+                return true;
+            }
+            let (splits, leaves) = (splits_in(mesh.tree, handle), leaves_in(handle, &counts));
+            found.splits += splits - 1;
+            found.unneeded += splits;
+            found.subtrees += 1;
+            found.unneeded_leaves += leaves;
+            if found.first.len() < first {
+                found.first.push(Subtree { octant: mesh.place(octant), leaves });
+            }
+            false
+        };
+        visit_splits(mesh.tree, (Octant::ROOT, mesh.tree.root()), &mut visit);
         found.check_invariants();
         Ok(found)
     }
+}
 
-    fn search_unneeded(&self, octant: &Octant, first: usize, found: &mut Unneeded) {
-        let node = self.leaves.node(octant);
-        if !node.is_split() {
-            return;
+/// Visits the split octants of a tree in Morton order, and those in an octant for which `visit` returns true.
+fn visit_splits(
+    tree: &Tree,
+    (octant, handle): (Octant, Handle),
+    visit: &mut dyn FnMut(&Octant, Handle) -> bool,
+) {
+    if handle.is_node() && visit(&octant, handle) {
+        for digit in 0..8 {
+            let child = tree.child(handle, digit, octant.level);
+            visit_splits(tree, (octant.child(digit), child), visit);
         }
-        found.splits += 1;
-        if !self.is_justified(octant) {
-            let below = self.count_splits(octant);
-            found.splits += below - 1;
-            found.unneeded += below;
-            found.subtrees += 1;
-            let subtree = Subtree { octant: self.place(octant), leaves: self.leaves.count(octant) };
-            found.unneeded_leaves += subtree.leaves;
-            if found.largest.as_ref().is_none_or(|largest| largest.leaves < subtree.leaves) {
-                found.largest = Some(subtree.clone());
-            }
-            if found.first.len() < first {
-                found.first.push(subtree);
-            }
-            return;
-        }
-        for digit in (0..8).filter(|digit| node.split >> digit & 1 == 1) {
-            self.search_unneeded(&octant.child(digit), first, found);
-        }
-    }
-
-    /// Number of split octants in a split octant, itself included.
-    fn count_splits(&self, octant: &Octant) -> u64 {
-        let split = self.leaves.node(octant).split;
-        let children = (0..8).filter(|digit| split >> digit & 1 == 1);
-        1 + children.map(|digit| self.count_splits(&octant.child(digit))).sum::<u64>()
     }
 }
 
-/// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
+/// Number of split octants in one with this content, itself included.
+fn splits_in(tree: &Tree, handle: Handle) -> u64 {
+    let mut splits = 0;
+    visit_splits(tree, (Octant::ROOT, handle), &mut |_, _| {
+        splits += 1;
+        true
+    });
+    splits
+}
+
+/// Numbers of leaves below the distinct nodes of a tree.
+fn leaves_below(tree: &Tree) -> Vec<u64> {
+    let mut counts = Vec::with_capacity(tree.nodes());
+    for children in tree.distinct() {
+        counts.push(children.iter().map(|&child| leaves_in(child, &counts)).sum());
+    }
+    counts
+}
+
+/// Number of leaves in an octant with this content.
+fn leaves_in(handle: Handle, below: &[u64]) -> u64 {
+    handle.as_node().map_or(u64::from(handle.as_leaf().is_some()), |node| below[node])
+}
+
 impl Unneeded {
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
-        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, first, largest, .. } = self;
+        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, first, .. } = self;
         assert!(
             subtrees <= unneeded && unneeded <= splits && (*unneeded == 0) == (*subtrees == 0),
             "{unneeded} of {splits} splits in {subtrees} octants are needless"
@@ -131,15 +153,10 @@ impl Unneeded {
             "{} of {subtrees} octants are listed, with {of_first} of {unneeded_leaves} leaves",
             first.len()
         );
-        let most = first.iter().map(|subtree| subtree.leaves).max().unwrap_or(0);
-        let largest = largest.as_ref().map_or(0, |largest| largest.leaves);
-        assert!(
-            most <= largest && largest <= *unneeded_leaves,
-            "the largest of {unneeded_leaves} leaves has {largest}, and one listed has {most}"
-        );
     }
 }
 
+/// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
     let kilobytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
     let kilobytes =
@@ -163,23 +180,17 @@ impl fmt::Display for Unneeded {
         if *unneeded == 0 {
             return write!(f, "every split has a cause: {splits} splits, {leaves} leaves");
         }
-        writeln!(
+        write!(
             f,
             "{unneeded} of {splits} splits have no cause: no facet, box, layer or balance requires them. They make \
              {unneeded_leaves} leaves, in {subtrees} octants:"
         )?;
-        for subtree in &self.first {
-            writeln!(f, "  {}, {} leaves", user_place(&subtree.octant), subtree.leaves)?;
+        for Subtree { octant, leaves } in &self.first {
+            write!(f, "\n  {octant}, {leaves} leaves")?;
         }
-        if (self.first.len() as u64) < *subtrees {
-            writeln!(f, "  and {} more (--limit)", subtrees - self.first.len() as u64)?;
-        }
-        match &self.largest {
-            Some(largest) => {
-                let place = user_place(&largest.octant);
-                write!(f, "the largest: {place}, {} leaves", largest.leaves)
-            }
-            None => Ok(()),
+        match subtrees - self.first.len() as u64 {
+            0 => Ok(()),
+            more => write!(f, "\n  and {more} more (--limit)"),
         }
     }
 }
@@ -199,16 +210,14 @@ mod tests {
             unneeded: 2,
             subtrees: 1,
             unneeded_leaves: 8,
-            first: vec![subtree.clone()],
-            largest: Some(subtree),
+            first: vec![subtree],
         };
         correct.check_invariants();
-        let faults: [fn(&mut Unneeded); 6] = [
+        let faults: [fn(&mut Unneeded); 5] = [
             |u| u.unneeded = 10,
             |u| u.subtrees = 0,
             |u| u.unneeded_leaves = 65,
             |u| u.first.push(u.first[0].clone()),
-            |u| u.largest = None,
             |u| u.first[0].leaves = 9,
         ];
         for fault in faults {

@@ -54,7 +54,7 @@ proptest! {
             let centre = |octant: Octant| correct.case.root.to_user(octant.centre());
             picks.iter().map(|pick| mesh.at(centre(leaf(pick))).unwrap()).collect::<Vec<_>>()
         });
-        for split in answers.iter().flat_map(|answer| &answer.splits) {
+        for split in answers.iter().flat_map(|answer| &answer.split) {
             let octant = &split.octant.octant;
             let cause = split.cause.as_ref().unwrap();
             prop_assert_eq!(cause.facets.len() as u64, cause.facets_count);

@@ -3,7 +3,7 @@
 use super::brute::Brute;
 use super::*;
 use check::checks::Terms;
-use check::why::answer::{Answer, SideReason};
+use check::why::answer::{Answer, Rule, Split};
 use contract::octant::Octant;
 use contract::word::{self, Side};
 
@@ -16,7 +16,7 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
         let of = |w: &&u64| word::octant(**w).contains(octant) && word::side(**w) == Side::Crossing;
         correct.base.words.iter().any(|w| of(&w))
     };
-    for split in &answer.splits {
+    for split in answer.split.iter() {
         let cause = split.cause.as_ref();
         prop_assert!(cause.is_some(), "{answer}");
         let (is_crossed, facets) = cause.map_or((false, 0), |c| (c.is_crossed, c.facets_count));
@@ -30,20 +30,21 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
             prop_assert!(in_mesh || !terms.keep_crossing && crossing(&leaf), "{answer}");
             let (layer, balance) = brute.forces(&leaf, &octant);
             match link.rule {
-                "layer" => prop_assert!(layer, "{answer}"),
-                "balance" => prop_assert!(balance, "{answer}"),
-                _ => {
+                Rule::Layer => prop_assert!(layer, "{answer}"),
+                Rule::Balance => prop_assert!(balance, "{answer}"),
+                Rule::ExtraLayer => {
                     prop_assert!(octant.distance(&leaf) == 0 && octant.level < terms.level_surface)
                 }
             }
             // The extra layer precedes all levels of the sweep.
-            let is_early = link.rule == "extra_layer" || leaf.level > octant.level + 1;
+            let is_early = link.rule == Rule::ExtraLayer || leaf.level > octant.level + 1;
             prop_assert!(!is_source || is_early, "{answer}");
-            is_source = link.rule == "layer";
-            octant = if link.rule == "extra_layer" { leaf } else { leaf.ancestor(leaf.level - 1) };
+            is_source = link.rule == Rule::Layer;
+            octant =
+                if link.rule == Rule::ExtraLayer { leaf } else { leaf.ancestor(leaf.level - 1) };
         }
         match split.links.last() {
-            Some(link) if link.rule == "extra_layer" => prop_assert!(crossing(&octant)),
+            Some(link) if link.rule == Rule::ExtraLayer => prop_assert!(crossing(&octant)),
             _ => prop_assert!(brute.base_splits(&octant), "{answer}"),
         }
     }
@@ -75,14 +76,10 @@ proptest! {
             let word = correct.base.words.iter().find(|&&w| word::octant(w) == base);
             prop_assert!(word.is_some(), "{answer}");
             let side = word::side(*word.unwrap());
-            match &answer.side_decided_by {
-                SideReason::Facets { .. } => prop_assert_eq!(side, Side::Crossing),
-                SideReason::Component { side: decided, .. } => prop_assert_eq!(side, *decided),
-                SideReason::Unknown => prop_assert!(false, "{answer}"),
-            }
-            if let Some(deletion) = &answer.deleted_by {
+            prop_assert_eq!(Some(side), answer.side_decided_by.as_ref().map(|reason| reason.side), "{}", answer);
+            if let Some(rule) = &answer.deleted_by {
                 // The enclosed parts are not deleted by every version of the reference.
-                prop_assert!(!deletion.rule.contains("lost"), "{answer}");
+                prop_assert!(!rule.contains("lost"), "{answer}");
             }
             prop_assert_eq!(answer.deleted_by.is_some(), answer.leaf.is_none());
         }
@@ -103,7 +100,7 @@ fn every_link_of_a_chain_through_many_levels_is_right() {
                 with_mesh(&correct.mesh, Some(&correct.case), |mesh| mesh.at(point).unwrap());
             check(&answer, &correct).unwrap();
             links_max =
-                answer.splits.iter().map(|split| split.links.len()).fold(links_max, usize::max);
+                answer.split.iter().map(|split| split.links.len()).fold(links_max, usize::max);
         }
         assert!(links_max >= 3, "n = {n}: {links_max}");
     }
@@ -116,19 +113,22 @@ fn an_answer_that_contradicts_itself_is_a_bug() {
     let correct =
         with_mesh(&made.mesh, Some(&made.case), |mesh| mesh.at([5.9, 0.4, -1.3]).unwrap());
     correct.check_invariants();
-    let at = correct.splits.iter().position(|split| split.links.len() > 1).expect("a chain");
+    assert!(correct.split.as_ref().unwrap().links.len() > 1, "a chain");
+    fn chain(answer: &mut Answer) -> &mut Split {
+        answer.split.as_mut().unwrap()
+    }
     let faults: [&dyn Fn(&mut Answer); 11] = [
         &|a| a.point[1] += 4.0,
         &|a| a.leaf = None,
-        &|a| a.base_leaf = Some(a.splits[at].links[0].leaf.clone()),
-        &|a| drop(a.splits.pop()),
-        &|a| a.splits.swap(0, 1),
-        &|a| a.splits[at].links[0].leaf = a.leaf.clone().unwrap(),
-        &|a| a.splits[at].links[0].distance_cells += 1,
-        &|a| a.splits[at].links.swap(0, 1),
-        &|a| drop(a.splits[at].links.pop()),
-        &|a| a.splits[at].cause = None,
-        &|a| a.splits[at].cause.as_mut().unwrap().is_crossed = false,
+        &|a| a.base_leaf = Some(chain(a).links[0].leaf.clone()),
+        &|a| a.split = None,
+        &|a| chain(a).octant = chain(a).links[1].octant.clone(),
+        &|a| chain(a).links[0].leaf = a.leaf.clone().unwrap(),
+        &|a| chain(a).links[0].distance_cells += 1,
+        &|a| chain(a).links.swap(0, 1),
+        &|a| drop(chain(a).links.pop()),
+        &|a| chain(a).cause = None,
+        &|a| chain(a).cause.as_mut().unwrap().is_crossed = false,
     ];
     for (i, fault) in faults.iter().enumerate() {
         let mut wrong = correct.clone();
@@ -157,12 +157,12 @@ fn a_directory_alone_explains_the_same_sizes() {
     };
     for (with, without) in explain(Some(&correct.case)).iter().zip(&explain(None)) {
         let links = |answer: &Answer| -> Vec<Vec<Octant>> {
-            let links = answer.splits.iter().map(|split| split.links.iter());
+            let links = answer.split.iter().map(|split| split.links.iter());
             links.map(|links| links.map(|link| link.leaf.octant).collect()).collect()
         };
         assert_eq!(links(with), links(without));
         let crossed = |answer: &Answer| -> Vec<bool> {
-            answer.splits.iter().map(|split| split.cause.as_ref().unwrap().is_crossed).collect()
+            answer.split.iter().map(|split| split.cause.as_ref().unwrap().is_crossed).collect()
         };
         assert_eq!(crossed(with), crossed(without));
         assert!(with.left_out.is_empty() && without.left_out[0].contains("--case"), "{without}");

@@ -1,15 +1,13 @@
 //! Leaves of any octant, without those before it.
 //!
-//! The children of a node begin at eight times the number of split nodes before it on its level, which the [`Index`] gives.
+//! The children of a node begin at eight times the number of split nodes before it on its level.
 
-use super::index::Index;
-use super::{Result, TreeFile, Walk, nodes};
-use crate::octant::LEVEL_MAX;
+use super::{Result, TreeFile, Walk};
 use crate::word::{self, KEY_END};
 
 /// Reads the leaves of octants. Each one has buffers of its own, so every thread should have its own cursor.
 pub struct Cursor<'a> {
-    index: &'a Index,
+    tree: &'a TreeFile,
     walk: Walk<'a>,
 }
 
@@ -24,26 +22,15 @@ struct Descent {
 }
 
 impl<'a> Cursor<'a> {
-    /// A cursor for a tree and its index.
-    pub fn new(tree: &'a TreeFile, index: &'a Index) -> Self {
-        let ranks = tree.file.ranks.as_ref();
-        let levels =
-            (0..tree.file.shape.nodes.len()).map(|level| tree.level(level, ranks)).collect();
-        Self { index, walk: Walk::new(levels) }
-    }
-
-    /// Number of leaves of the tree.
-    pub fn leaves(&self) -> u64 {
-        self.index.leaves
+    /// A cursor for a tree.
+    pub fn new(tree: &'a TreeFile) -> Self {
+        Self { tree, walk: Walk::new(tree, tree.file.ranks.as_ref()) }
     }
 
     /// Number of leaves whose Morton codes are less than `key`.
-    ///
-    /// # Errors
-    /// If the file is damaged.
-    pub fn leaves_before(&mut self, key: u64) -> Result<u64> {
+    pub fn leaves_before(&self, key: u64) -> u64 {
         // There is no octant at the end of the root.
-        if key >= KEY_END { Ok(self.index.leaves) } else { Ok(self.descend(key)?.before) }
+        if key >= KEY_END { self.tree.leaves } else { self.descend(key).before }
     }
 
     /// Appends the words of the leaves of an octant, given by its Morton code and level; if a coarser leaf begins there, that one. If the tree
@@ -58,14 +45,12 @@ impl<'a> Cursor<'a> {
         into: &mut Vec<u64>,
         ranks_into: &mut Vec<u32>,
     ) -> Result<()> {
-        let Descent { next, leaf, .. } = self.descend(key)?;
+        let Descent { next, leaf, .. } = self.descend(key);
         let from = leaf.min(usize::from(level));
-        for (reader, next) in self.walk.levels.iter_mut().zip(next).skip(from) {
-            reader.seek(next);
-        }
         if !key.is_multiple_of(word::span(from as u8)) {
             return Ok(());
         }
+        self.walk.seek(&next);
         let mut run = |words: &[u64], ranks: &[u32]| {
             into.extend_from_slice(words);
             ranks_into.extend_from_slice(ranks);
@@ -76,28 +61,26 @@ impl<'a> Cursor<'a> {
         result.map(drop)
     }
 
-    fn descend(&mut self, key: u64) -> Result<Descent> {
-        let mut descent = Descent { next: Vec::new(), before: 0, leaf: self.walk.levels.len() };
+    fn descend(&self, key: u64) -> Descent {
+        let TreeFile { levels, split, masked, .. } = self.tree;
+        let mut descent = Descent { next: Vec::new(), before: 0, leaf: levels.len() };
         let mut number = 0;
-        for (level, reader) in self.walk.levels.iter_mut().enumerate() {
-            let is_on_path = level <= descent.leaf;
-            let mut node = reader.begin() + number;
-            if is_on_path && !reader.is_split(node)? {
+        for (level, nodes) in levels.iter().enumerate() {
+            let mut node = nodes.start + number;
+            if level <= descent.leaf && split.get(node, 1) == 0 {
                 descent.leaf = level;
                 let starts_before = !key.is_multiple_of(word::span(level as u8));
                 node += u64::from(starts_before);
             }
-            let [split, masked] = reader.bits_before(node, self.index)?;
-            let Some(leaves) = (node - reader.begin()).checked_sub(split + masked) else {
-                return nodes(format!("nodes of level {level} are split and masked"));
-            };
-            descent.before += leaves;
+            let splits = split.ones_before(node) - split.ones_before(nodes.start);
+            let holes = masked.ones_before(node) - masked.ones_before(nodes.start);
+            descent.before += node - nodes.start - splits - holes;
             descent.next.push(node);
-            number = 8 * split;
-            if level < descent.leaf && level < usize::from(LEVEL_MAX) {
+            number = 8 * splits;
+            if level < descent.leaf {
                 number += (key / word::span(level as u8 + 1)) & 7;
             }
         }
-        Ok(descent)
+        descent
     }
 }

@@ -41,7 +41,7 @@ impl Mesh {
         };
         let mut parts = Vec::new();
         match tree {
-            Some(tree) => parts.push(Part::of_tree(tree)?),
+            Some(tree) => parts.push(Part::Tree(Box::new(tree))),
             None => {
                 for part in &manifest.parts {
                     let path = dir.join(&part.file);
@@ -71,10 +71,9 @@ impl Mesh {
     /// If a file cannot be read, or if the tree is damaged.
     pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), ReadError> {
         match &self.parts[..] {
-            [Part::Tree(tree)] => tree
-                .0
-                .words(&mut |words| run(0, words))
-                .map_err(|error| ReadError::tree(&tree.0, error)),
+            [Part::Tree(tree)] => {
+                tree.words(&mut |words| run(0, words)).map_err(|error| ReadError::tree(tree, error))
+            }
             parts => merge::merge(parts, run),
         }
     }

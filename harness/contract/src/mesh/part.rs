@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::directory::ReadError;
-use crate::htg::{Cursor, Index, TreeError, TreeFile};
+use crate::htg::{Cursor, TreeError, TreeFile};
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::word::{self, KEY_END};
@@ -15,21 +15,15 @@ pub enum Part {
     /// A file of leaf words.
     Words(PartFile),
     /// The whole tree.
-    Tree(Box<(TreeFile, Index)>),
+    Tree(Box<TreeFile>),
 }
 
 impl Part {
-    /// The tree as a part.
-    pub fn of_tree(tree: TreeFile) -> Result<Self, ReadError> {
-        let index = tree.index().map_err(|error| ReadError::tree(&tree, error))?;
-        Ok(Self::Tree(Box::new((tree, index))))
-    }
-
     /// Its file.
     pub fn path(&self) -> &Path {
         match self {
             Self::Words(file) => file.path(),
-            Self::Tree(tree) => tree.0.path(),
+            Self::Tree(tree) => tree.path(),
         }
     }
 
@@ -37,7 +31,7 @@ impl Part {
     pub fn has_ranks(&self) -> bool {
         match self {
             Self::Words(_) => true,
-            Self::Tree(tree) => tree.0.has_ranks(),
+            Self::Tree(tree) => tree.has_ranks(),
         }
     }
 
@@ -45,7 +39,7 @@ impl Part {
     pub fn leaves(&self) -> u64 {
         match self {
             Self::Words(file) => file.len(),
-            Self::Tree(tree) => tree.1.leaves,
+            Self::Tree(tree) => tree.leaves,
         }
     }
 }
@@ -66,7 +60,7 @@ impl<'a> Readers<'a> {
     pub fn new(parts: &'a [Part]) -> Self {
         let reader = |part: &'a Part| match part {
             Part::Words(file) => Reader::Words(file),
-            Part::Tree(tree) => Reader::Tree(&tree.0, Cursor::new(&tree.0, &tree.1)),
+            Part::Tree(tree) => Reader::Tree(tree, Cursor::new(tree)),
         };
         Self(parts.iter().map(reader).collect())
     }
@@ -80,7 +74,7 @@ impl<'a> Readers<'a> {
         for part in 0..self.0.len() {
             let all = match &self.0[part] {
                 Reader::Words(file) => 0..file.len(),
-                Reader::Tree(_, cursor) => 0..cursor.leaves(),
+                Reader::Tree(tree, _) => 0..tree.leaves,
             };
             let first = self.lower_bound(part, all.clone(), keys.start)?;
             intervals.push((part, first..self.lower_bound(part, first..all.end, keys.end)?));
@@ -124,10 +118,7 @@ impl<'a> Readers<'a> {
             Reader::Words(file) => {
                 file.lower_bound(range, key << 7).map_err(|error| ReadError::part(file, error))
             }
-            Reader::Tree(tree, cursor) => {
-                let before = cursor.leaves_before(key).map_err(|e| ReadError::tree(tree, e))?;
-                Ok(before.clamp(range.start, range.end))
-            }
+            Reader::Tree(_, cursor) => Ok(cursor.leaves_before(key).clamp(range.start, range.end)),
         }
     }
 
@@ -163,8 +154,8 @@ fn append(
     ranks: &mut Vec<u32>,
 ) -> Result<(), TreeError> {
     let key = word::key_of(octant.corner);
-    let first = cursor.leaves_before(key)?;
-    let end = cursor.leaves_before(key + word::span(octant.level))?;
+    let first = cursor.leaves_before(key);
+    let end = cursor.leaves_before(key + word::span(octant.level));
     if first >= interval.end || end <= interval.start {
         return Ok(());
     }

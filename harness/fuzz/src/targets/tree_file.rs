@@ -39,10 +39,9 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     }
     assert!(words.iter().all(|&word| word::fault(word).is_none()));
     assert!(words.is_sorted_by(|&a, &b| word::key(a) + word::span(word::level(a)) <= word::key(b)));
-    let index = tree.index().expect("a tree that was read");
-    assert_eq!(index.leaves, words.len() as u64);
+    assert_eq!(tree.leaves, words.len() as u64);
     let mut again = Vec::new();
-    let mut cursor = Cursor::new(&tree, &index);
+    let mut cursor = Cursor::new(&tree);
     (0..8u64).for_each(|octant| {
         cursor
             .words(octant * word::span(1), 1, &mut again, &mut Vec::new())
