@@ -5,6 +5,7 @@
 //! - [`shrink`](mod@shrink): the smallest case that still fails;
 
 pub mod experiments;
+pub mod failure;
 pub mod gate;
 pub mod jsonl;
 pub mod order;
@@ -23,6 +24,11 @@ use std::process::Command;
 fn name_of(variant: &impl serde::Serialize) -> String {
     let name = serde_json::to_value(variant).expect("a variant without data is a string");
     name.as_str().unwrap_or_default().to_owned()
+}
+
+/// Returns the first reason that applies.
+fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
+    reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
 }
 
 /// Returns what git prints in a directory, without the end of the last line; `None` if it fails.

@@ -5,8 +5,8 @@ mod output;
 
 mod cli;
 mod commands;
-mod failure;
 
+use bench::failure;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};

@@ -81,9 +81,9 @@ fn a_case_is_meshed_on_ranks_and_drawn_with_its_geometry() {
 #[test]
 fn a_mesh_on_disk_is_drawn_without_geometry_unless_its_case_is_given() {
     let fixture = Fixture::new();
-    let (code, text) = fixture.picture("mesh --out a.tex --slice z=0.1 --side crossing");
+    let (code, text) = fixture.picture("mesh --out a.svg --slice z=0.1 --side crossing");
     assert!(code == 0 && text.contains("name its case with --case"), "{text}");
-    assert!(!fixture.read("a.tex").contains("geometry"));
+    assert!(!fixture.read("a.svg").contains("geometry"));
     let (code, text) = fixture.picture("mesh --out a.html --case case.toml --zoom 2");
     assert!(code == 0 && !text.contains("--case"), "{text}");
     assert!(fixture.read("a.html").contains("\"triangles\""));
@@ -154,7 +154,7 @@ fn the_set_has_every_picture_its_data_and_a_page_without_network() {
         let files = fs::read_dir(fixture.path("set")).unwrap().flatten().map(|f| f.path());
         files.filter(|path| path.extension().is_some_and(|e| e == extension)).count()
     };
-    assert_eq!(["svg", "tex", "csv", "html"].map(count), [13, 13, 13, 3 + 1]);
+    assert_eq!(["svg", "csv", "html"].map(count), [13, 13, 3 + 1]);
     let page = fixture.read("set/index.html");
     assert_eq!(page.matches("<figure").count(), 16);
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));

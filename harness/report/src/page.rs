@@ -22,10 +22,10 @@ pub fn page(title: &str, content: &Markup) -> String {
     page.into_string() + "\n"
 }
 
-/// A table with numbers to the right; `class` may choose another layout of the style sheet.
-pub fn table(class: Option<&str>, columns: &[&str], rows: &[Vec<Markup>]) -> Markup {
+/// A table with numbers to the right.
+pub fn table(columns: &[&str], rows: &[Vec<Markup>]) -> Markup {
     html! {
-        div.scroll { table class=[class] {
+        div.scroll { table {
             thead { tr { @for column in columns { th { (column) } } } }
             tbody { @for row in rows { "\n" tr { @for field in row { td { (field) } } } } }
         } }
@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn text_is_escaped_and_backquotes_become_code() {
         assert_eq!(with_code("a `b<c` d").into_string(), "a <code>b&lt;c</code> d");
-        let page = page("a & b", &table(None, &["<x>"], &[vec![html! { "<y>" }]]));
+        let page = page("a & b", &table(&["<x>"], &[vec![html! { "<y>" }]]));
         for part in ["<title>a &amp; b</title>", "<th>&lt;x&gt;</th>", "<td>&lt;y&gt;</td>"] {
             assert!(page.contains(part), "{part} is missing in\n{page}");
         }

@@ -85,7 +85,7 @@ impl Table {
         let rows: Vec<Vec<Markup>> = self.rows.iter().map(row).collect();
         html! {
             h3 { (self.title) }
-            (page::table(None, &self.columns, &rows))
+            (page::table(&self.columns, &rows))
             @for note in &self.notes { p { (note) } }
         }
     }

@@ -216,8 +216,8 @@ fn two_programs_are_never_in_one_series() {
     lines.extend(record().iter().map(other));
     let place = tempfile::tempdir().unwrap();
     let written = report(place.path(), &lines).unwrap();
-    // Figures over cells show both programs, all others one; three compare them on one core.
-    assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4 + 3);
+    // Figures over cells show both programs, all others one.
+    assert_eq!(written.figures, 2 * (files_of_one() - 4) + 4);
     let read = |name: &str| {
         std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
     };
@@ -229,18 +229,6 @@ fn two_programs_are_never_in_one_series() {
                 assert_eq!(text.matches(&series).count(), 4, "{series} in {name}:\n{text}");
             }
         }
-    }
-    for name in ["time", "rate", "memory"] {
-        let text = read(&format!("programs-{name}-uav-4"));
-        for engine in ["mesher", "other"] {
-            assert_eq!(
-                text.matches(&format!(",{engine},measured\n")).count(),
-                5,
-                "{name}:\n{text}"
-            );
-        }
-        let search = text.matches(",other: search,measured\n").count();
-        assert_eq!(search, if name == "time" { 5 } else { 0 }, "{text}");
     }
     assert!(has_row(&read("speedup-other-uav-50M"), "64", "other; projected,projected"));
     assert!(read("phases-weak-other-uav").contains(",64,other: grade,projected\n"));

@@ -3,10 +3,11 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use super::variant::Base;
+use crate::failure::Failure;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
-use run::engine::failure::{End, Failure};
+use run::engine::failure::{End, Failure as Ended};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
@@ -45,32 +46,6 @@ pub struct Runner<'a> {
     pub place: &'a Path,
 }
 
-/// Why a run has no result, or a session ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// Invalid input, or a program that failed, in a sentence.
-    #[error("{0}")]
-    Input(String),
-    /// Ctrl-C; the record contains all results so far.
-    #[error("interrupted: the record contains all results so far")]
-    Interrupted,
-}
-
-impl From<String> for BenchError {
-    fn from(why: String) -> Self {
-        Self::Input(why)
-    }
-}
-
-impl From<Failure> for BenchError {
-    fn from(failure: Failure) -> Self {
-        match failure.is_interrupt() {
-            true => Self::Interrupted,
-            false => Self::Input(failure.to_string()),
-        }
-    }
-}
-
 impl Runner<'_> {
     /// Runs `setup` on the case file `case`. The mesh of a warm-up run is checked against the promises of an engine that
     /// does not promise the definition.
@@ -83,7 +58,7 @@ impl Runner<'_> {
         case: &Path,
         repeat: usize,
         warm_up: bool,
-    ) -> Result<Run, BenchError> {
+    ) -> Result<Run, Failure> {
         let engine = self.engine(setup);
         let checked = warm_up && !engine.description().promises.definition;
         let mesh = self.place.join("mesh");
@@ -106,14 +81,14 @@ impl Runner<'_> {
         if setup.comm == Comm::Sim && report.phases.is_empty() {
             let why =
                 "its run report has no phases, without which simulated ranks cannot be projected";
-            return Err(BenchError::Input(why.to_owned()));
+            return Err(Failure::input(why));
         }
         if setup.partitioner == METIS
             && report.partitioner.as_deref().is_some_and(|used| used != METIS)
         {
             let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use \
                        fewer ranks or more cells";
-            return Err(BenchError::Input(why.to_owned()));
+            return Err(Failure::input(why));
         }
         Ok(Run {
             program: machine::digest_of_file(engine.program()),
@@ -136,7 +111,7 @@ impl Runner<'_> {
         base: &Base,
         spacing_min: f64,
         layer_cells_min: u32,
-    ) -> Result<u64, BenchError> {
+    ) -> Result<u64, Failure> {
         let case = base.variant(spacing_min, layer_cells_min)?;
         let setup = Setup::serial(&base.name, spacing_min, layer_cells_min);
         self.run(&setup, &case, 0, true).map(|run| run.cells)
@@ -150,9 +125,8 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// If the mesh or the audit fails. A mesh with findings is a result.
-    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, BenchError> {
-        let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk);
-        let place = place.map_err(|error| BenchError::Input(error.to_string()))?;
+    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, Failure> {
+        let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk)?;
         let mesh = place.path().join("mesh");
         let options = RunOptions {
             mesh: Some(&mesh),
@@ -166,7 +140,7 @@ impl Runner<'_> {
         command.arg("audit").arg(&mesh).arg("--json").arg(&json);
         match process::run(&mut command, &Watch::new("audit", self.limit, self.place)) {
             // 1: a check failed, which the record contains.
-            Ok(_) | Err(Failure { end: End::Exited { code: 1, .. }, .. }) => {}
+            Ok(_) | Err(Ended { end: End::Exited { code: 1, .. }, .. }) => {}
             Err(failure) => return Err(failure.into()),
         }
         let record = AuditRecord::read(&json)?;

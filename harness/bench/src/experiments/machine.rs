@@ -33,16 +33,7 @@ impl Machine {
 impl fmt::Display for Machine {
     /// All that is known of it.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { cpu, cores, memory_bytes, kernel, mpi, compiler, commit } = self;
-        let gib = *memory_bytes as f64 / f64::from(1 << 30);
-        let or = |text: &str, none: &str| {
-            if text.is_empty() { none.to_owned() } else { text.to_owned() }
-        };
-        let (mpi, commit) = (or(mpi, "no MPI"), or(commit, "unknown"));
-        write!(
-            f,
-            "{cpu}, {cores} cores, {gib:.1} GiB, {kernel}, {mpi}, {compiler}, commit {commit}"
-        )
+        write!(f, "{}, {}, commit {}", self.label(), self.compiler, self.commit)
     }
 }
 

@@ -17,6 +17,5 @@ pub mod number;
 pub mod pop;
 pub mod programs;
 pub mod record;
-pub mod session;
 pub mod sizing;
 pub mod variant;

@@ -20,8 +20,6 @@ pub struct Base {
     pub spacing_min: f64,
     /// n of the unchanged case.
     pub layer_cells_min: u32,
-    /// Facets of its geometry.
-    pub facets: u64,
     table: Table,
     origin: [f64; 3],
     edge: f64,
@@ -53,7 +51,6 @@ impl Base {
             name: case.name,
             spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
             layer_cells_min: case.layer_cells_min,
-            facets: case.facets.len() as u64,
             table,
             origin: case.root.origin,
             edge: case.root.edge,

@@ -6,7 +6,8 @@
 //!
 //! Invariant: a directory that contains the file `built` has the result of the build command in that file.
 
-use super::{GateError, GateOptions};
+use super::GateOptions;
+use crate::failure::Failure;
 use crate::git;
 use run::engine::description::Build;
 use run::engine::failure::End;
@@ -20,101 +21,83 @@ use std::time::Duration;
 /// Time after which a build is killed.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// Returns the program of the repository's working tree, after building it.
+/// Returns the program of a revision, built unless an earlier gate has kept it, or for `.` that of the repository's working tree.
 ///
 /// # Errors
 /// If it does not build.
-pub(super) fn working_tree(build: &Build, options: &GateOptions) -> Result<PathBuf, GateError> {
-    let place = absolute(&options.cache().join("working-tree"))?;
-    let tree = absolute(&options.repository)?;
-    Places::new(tree, place, options)?.make(build, "the working tree")
-}
-
-/// Returns the program of a revision, built unless an earlier gate has kept it.
-///
-/// # Errors
-/// If it does not build.
-pub(super) fn revision(
+pub(super) fn program(
     build: &Build,
+    named: &str,
     revision: &str,
     options: &GateOptions,
-) -> Result<PathBuf, GateError> {
-    let place = absolute(&options.cache().join(revision))?;
-    let done = place.join("built");
-    let places = Places::new(place.join("tree"), place, options)?;
-    let (program, command) = (places.program(build), build.command.join("\n"));
+) -> Result<PathBuf, Failure> {
+    let is_working_tree = named == ".";
+    let place = if is_working_tree { "working-tree" } else { revision };
+    let place = absolute(&options.cache().join(place))?;
+    let tree = match is_working_tree {
+        true => absolute(&options.repository)?,
+        false => place.join("tree"),
+    };
+    let text = |path: &Path| path.to_string_lossy().into_owned();
+    let values = Values::from([
+        ("target", text(&absolute(&place.join("build"))?)),
+        ("shared", text(&absolute(&options.cache().join("shared"))?)),
+        ("root", text(&tree)),
+    ]);
+    let program = PathBuf::from(fill(&build.program, &values));
+    let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
+    if is_working_tree {
+        return make(&words, &tree, &place, "the working tree", program);
+    }
+    let (done, command) = (place.join("built"), build.command.join("\n"));
     if program.is_file() && fs::read_to_string(&done).is_ok_and(|with| with == command) {
         return Ok(program);
     }
-    unpack(revision, &options.repository, &places.tree)?;
-    let program = places.make(build, &revision[..12.min(revision.len())])?;
+    unpack(revision, &options.repository, &tree)?;
+    let program = make(&words, &tree, &place, &revision[..12.min(revision.len())], program)?;
     fs::write(&done, command).map_err(|error| wrong(&done, &error))?;
     Ok(program)
 }
 
-/// The directories of a build.
-struct Places {
-    /// The files of the revision.
-    tree: PathBuf,
-    /// Where the output of the build is kept.
-    logs: PathBuf,
-    /// The values of placeholders in the description of the build.
-    values: Values<'static>,
-}
-
-impl Places {
-    fn new(tree: PathBuf, place: PathBuf, options: &GateOptions) -> Result<Self, GateError> {
-        let text = |path: &Path| path.to_string_lossy().into_owned();
-        let values = Values::from([
-            ("target", text(&absolute(&place.join("build"))?)),
-            ("shared", text(&absolute(&options.cache().join("shared"))?)),
-            ("root", text(&tree)),
-        ]);
-        Ok(Self { tree, logs: place, values })
-    }
-
-    /// Returns the path of the program, which need not exist yet.
-    fn program(&self, build: &Build) -> PathBuf {
-        PathBuf::from(fill(&build.program, &self.values))
-    }
-
-    /// Builds and returns the program; `label` is the revision, for messages.
-    fn make(&self, build: &Build, label: &str) -> Result<PathBuf, GateError> {
-        let words: Vec<String> =
-            build.command.iter().map(|word| fill(word, &self.values)).collect();
-        crate::announce(&format!("harness gate: building {label}"));
-        let (program, arguments) =
-            words.split_first().ok_or_else(|| GateError::Input("an empty build command".into()))?;
-        let mut command = Command::new(program);
-        command.args(arguments).current_dir(&self.tree);
-        let built = process::run(&mut command, &Watch::new("build", LIMIT, &self.logs));
-        built.map_err(|failure| match failure.end {
-            End::Missing(_) => GateError::Missing(failure.to_string()),
-            _ => {
-                let log = self.logs.join("build.stderr");
-                GateError::Input(format!("{label}: {failure} (full output: {})", log.display()))
-            }
-        })?;
-        let program = self.program(build);
-        match program.is_file() {
-            true => Ok(program),
-            false => Err(GateError::Input(format!(
-                "{label}: the build succeeded, but {} is missing: check [build] program",
-                program.display()
-            ))),
+/// Builds a program and returns it; `label` is the revision, for messages. The output of the build is kept in `place`.
+fn make(
+    words: &[String],
+    tree: &Path,
+    place: &Path,
+    label: &str,
+    program: PathBuf,
+) -> Result<PathBuf, Failure> {
+    crate::announce(&format!("harness gate: building {label}"));
+    let (builder, arguments) =
+        words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
+    let mut command = Command::new(builder);
+    command.args(arguments).current_dir(tree);
+    let built = process::run(&mut command, &Watch::new("build", LIMIT, place));
+    built.map_err(|failure| match failure.end {
+        End::Missing(_) => Failure::missing(failure),
+        _ => {
+            let log = place.join("build.stderr");
+            Failure::input(format!("{label}: {failure} (full output: {})", log.display()))
         }
+    })?;
+    match program.is_file() {
+        true => Ok(program),
+        false => Err(Failure::input(format!(
+            "{label}: the build succeeded, but {} is missing: check [build] program",
+            program.display()
+        ))),
     }
 }
 
 /// Returns the absolute path of a directory, after creating it if it is missing.
-fn absolute(path: &Path) -> Result<PathBuf, GateError> {
+fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     fs::create_dir_all(path)
         .and_then(|()| fs::canonicalize(path))
         .map_err(|error| wrong(path, &error))
 }
 
-fn wrong(path: &Path, error: &std::io::Error) -> GateError {
-    GateError::Input(format!("{}: {error}", path.display()))
+fn wrong(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::input(format!("{}: {error}", path.display()))
 }
 
 /// The full name of a revision.
@@ -125,7 +108,7 @@ pub(super) fn revision_of(named: &str, repository: &Path) -> Result<String, Stri
 }
 
 /// Puts a revision's files into a directory.
-fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateError> {
+fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), Failure> {
     fs::create_dir_all(tree).map_err(|error| wrong(tree, &error))?;
     let mut command = Command::new("sh");
     command.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
@@ -135,7 +118,7 @@ fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), GateErro
         true => Ok(()),
         false => {
             let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            Err(GateError::Input(format!("{revision} cannot be unpacked: {error}")))
+            Err(Failure::input(format!("{revision} cannot be unpacked: {error}")))
         }
     }
 }

@@ -4,41 +4,34 @@
 //! position (`12`, `+3`, `-1`, `*`) has the function's own cost; after a `calls=COUNT ...` line the next such line is
 //! the cost of the callee, which is not the function's own.
 
-use std::collections::HashMap;
+use super::measures::Numbers;
+use std::collections::{BTreeSet, HashMap};
 
-/// The profile of a run.
+/// The sum of the profiles of a run's processes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
-    /// Total number of instructions.
-    pub instructions: u64,
     /// Instructions by function, excluding callees.
-    pub own: HashMap<String, u64>,
+    pub own: Numbers,
     /// Number of calls by function.
-    pub calls: HashMap<String, u64>,
+    calls: Numbers,
 }
 
 /// Functions that allocate memory.
 const ALLOCATORS: [&str; 5] = ["malloc", "calloc", "realloc", "posix_memalign", "aligned_alloc"];
 
 impl Profile {
+    /// Returns the number of instructions.
+    pub fn instructions(&self) -> u64 {
+        self.own.values().sum()
+    }
+
     /// Returns the number of allocations.
     pub fn allocations(&self) -> u64 {
         ALLOCATORS.iter().filter_map(|name| self.calls.get(*name)).sum()
     }
 
-    /// Adds the profile of another process.
-    pub fn add(&mut self, other: &Self) {
-        self.instructions += other.instructions;
-        for (of, more) in [(&mut self.own, &other.own), (&mut self.calls, &other.calls)] {
-            for (name, count) in more {
-                *of.entry(name.clone()).or_default() += count;
-            }
-        }
-    }
-
-    /// Parses a callgrind file. A process that was replaced by another program has no costs.
-    pub fn parse(text: &str) -> Self {
-        let mut profile = Self::default();
+    /// Adds the content of a callgrind file. A process that was replaced by another program has no costs.
+    pub fn add(&mut self, text: &str) {
         let mut names: HashMap<&str, &str> = HashMap::new();
         let (mut function, mut callee) = ("", "");
         let mut after_calls = false;
@@ -48,33 +41,27 @@ impl Profile {
             } else if let Some(rest) = line.strip_prefix("cfn=") {
                 callee = name_of(rest, &mut names);
             } else if let Some(rest) = line.strip_prefix("calls=") {
-                let count: u64 = first_number(rest);
                 // Versions of a symbol of the C library are one function.
-                let plain =
-                    callee.split('@').next().unwrap_or(callee).split('\'').next().unwrap_or(callee);
-                *profile.calls.entry(plain.to_owned()).or_default() += count;
+                let plain = callee.split(['@', '\'']).next().unwrap_or(callee);
+                *self.calls.entry(plain.to_owned()).or_default() += first_number(rest);
                 after_calls = true;
             } else if is_cost(line) && !std::mem::take(&mut after_calls) {
                 let cost = line.split_whitespace().nth(1).map_or(0, first_number);
-                *profile.own.entry(function.to_owned()).or_default() += cost;
-                profile.instructions += cost;
+                *self.own.entry(function.to_owned()).or_default() += cost;
             }
         }
-        profile
     }
+}
 
-    /// Returns the differences of instructions by function relative to an older profile, largest first.
-    pub fn grown_since(&self, old: &Self) -> Vec<(String, i64)> {
-        let mut names: Vec<&String> = self.own.keys().chain(old.own.keys()).collect();
-        names.sort();
-        names.dedup();
-        let of = |profile: &Self, name| profile.own.get(name).copied().unwrap_or(0) as i64;
-        let mut grown: Vec<(String, i64)> =
-            names.into_iter().map(|name| (name.clone(), of(self, name) - of(old, name))).collect();
-        grown.sort_by_key(|(_, by)| std::cmp::Reverse(by.abs()));
-        grown.retain(|(_, by)| *by != 0);
-        grown
-    }
+/// Returns the differences of instructions by function, largest first.
+pub fn differences(old: &Numbers, new: &Numbers) -> Vec<(String, i64)> {
+    let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+    let of = |numbers: &Numbers, name: &String| numbers.get(name).copied().unwrap_or(0) as i64;
+    let by = |name: &String| (name.clone(), of(new, name) - of(old, name));
+    let mut all: Vec<(String, i64)> =
+        names.into_iter().map(by).filter(|(_, by)| *by != 0).collect();
+    all.sort_by_key(|(_, by)| std::cmp::Reverse(by.abs()));
+    all
 }
 
 /// Whether a line begins with a position.
@@ -106,31 +93,27 @@ mod tests {
                         calls=5 0\n* 100\n* 2\n\nfn=(2)\n0 100\ncfn=(3) _int_malloc\ncalls=5 +3\n0 7\nfn=(3)\n0 7\n\
                         totals: 116\n";
 
-    #[test]
-    fn own_costs_add_up_to_the_reported_total() {
-        let profile = Profile::parse(FILE);
-        assert_eq!(profile.instructions, 116);
-        assert_eq!((profile.own["main"], profile.own["malloc@GLIBC"]), (9, 100));
-        assert_eq!((profile.calls["malloc"], profile.allocations()), (5, 5));
-        assert_eq!(Profile::parse("events: Ir\n"), Profile::default());
+    fn profile(files: &[&str]) -> Profile {
+        let mut profile = Profile::default();
+        files.iter().for_each(|file| profile.add(file));
+        profile
     }
 
     #[test]
-    fn profiles_of_several_processes_add_up() {
-        let mut sum = Profile::parse(FILE);
-        sum.add(&Profile::parse(FILE));
-        assert_eq!((sum.instructions, sum.own["main"], sum.allocations()), (232, 18, 10));
+    fn own_costs_add_up_to_the_reported_total() {
+        let one = profile(&[FILE]);
+        assert_eq!(one.instructions(), 116);
+        assert_eq!((one.own["main"], one.own["malloc@GLIBC"]), (9, 100));
+        assert_eq!((one.calls["malloc"], one.allocations()), (5, 5));
+        assert_eq!(profile(&["events: Ir\n"]), Profile::default());
+        let sum = profile(&[FILE, FILE]);
+        assert_eq!((sum.instructions(), sum.own["main"], sum.allocations()), (232, 18, 10));
     }
 
     #[test]
     fn differences_are_sorted_by_size() {
-        let old = Profile::parse(FILE);
-        let new = Profile::parse(
-            &FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals"),
-        );
-        assert_eq!(
-            new.grown_since(&old),
-            [("main".to_owned(), 27), ("_int_malloc".to_owned(), -2)]
-        );
+        let other = FILE.replace("12 3", "12 30").replace("\n0 7\ntotals", "\n0 5\ntotals");
+        let found = differences(&profile(&[FILE]).own, &profile(&[&other]).own);
+        assert_eq!(found, [("main".to_owned(), 27), ("_int_malloc".to_owned(), -2)]);
     }
 }

@@ -2,24 +2,25 @@
 //!
 //! A mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more findings.
 
+use super::Bench;
 use super::measures::{LayerName, Measures, Numbers};
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::Selected;
 use super::subject::Baseline;
-use super::{Bench, GateError};
+use crate::failure::Failure;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
 use run::verify::options::Options;
 use run::verify::report::{CaseReport, Check, Outcome, Tally};
-use run::verify::{VerifyError, verify};
+use run::verify::verify;
 
 /// Verifies the candidate on the cases of this layer: every check of what it promises. Oracles and p4est are left to
 /// `harness verify`.
 ///
 /// # Errors
 /// If verification cannot start.
-pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Result<(), GateError> {
+pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Result<(), Failure> {
     for case in bench.cases_of(LayerName::Correctness) {
         let name = &case.rule.name;
         let report = verified(bench, &bench.candidate, case)?;
@@ -30,18 +31,16 @@ pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Resul
             Baseline::Record(_, record) => record.cases.get(name).map(|case| case.findings.clone()),
             Baseline::Program(subject) => Some(known(&verified(bench, &subject.engine, case)?)),
         };
-        match baseline {
-            Some(baseline) => layer.findings.push(against(name, &report, &baseline)),
-            None => layer.findings.extend(findings(case, &report)),
-        }
+        let baseline = baseline.unwrap_or_default();
+        layer.findings.extend(findings(name, &case.mpi, &report, &baseline));
     }
     Ok(())
 }
 
 /// Verifies a program on a case.
-fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseReport, GateError> {
+fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseReport, Failure> {
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
-    let path = case.path.clone().map_err(GateError::Input)?;
+    let path = case.path.clone()?;
     let options = Options {
         timeout: bench.options.timeout,
         // The files of a case that fails end with the gate.
@@ -53,42 +52,54 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
         level_bases: vec!["auto".to_owned()],
         ..Options::of_leaves_alone(vec![path.to_string_lossy().into_owned()])
     };
-    let report = verify(&options, &programs).map_err(|error| match error {
-        VerifyError::Input(why) => GateError::Input(why),
-        VerifyError::Missing(why) => GateError::Missing(why),
-    })?;
+    let report = verify(&options, &programs)?;
     let mut cases = report.cases.into_iter();
-    cases.next().ok_or_else(|| GateError::Input(format!("{} was not verified", case.rule.name)))
+    cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.rule.name)))
 }
 
-/// A finding for the serial mesh, and one for each number of ranks.
-fn findings(case: &Selected, report: &CaseReport) -> Vec<GateFinding> {
-    let name = &case.rule.name;
+/// A finding for the serial mesh, and one for each number of ranks. `baseline` has the findings of the baseline's failed checks.
+fn findings(
+    case: &str,
+    mpi: &[usize],
+    report: &CaseReport,
+    baseline: &Numbers,
+) -> Vec<GateFinding> {
     if let Some(why) = &report.input_error {
-        return vec![GateFinding::noted(name, CHECKS, Verdict::Regression, why)];
+        return vec![GateFinding::noted(case, CHECKS, Verdict::Regression, why)];
     }
     let of_ranks = |ranks: Option<usize>| {
         let checks: Vec<&Check> = report.checks.iter().filter(|c| c.ranks == ranks).collect();
         let metric = ranks.map_or(CHECKS.to_owned(), |ranks| format!("{ranks} MPI ranks/{CHECKS}"));
-        finding(name, &metric, &checks)
+        finding(case, &metric, &checks, baseline)
     };
-    std::iter::once(None).chain(case.mpi.iter().copied().map(Some)).map(of_ranks).collect()
+    std::iter::once(None).chain(mpi.iter().copied().map(Some)).map(of_ranks).collect()
 }
 
-fn finding(case: &str, metric: &str, checks: &[&Check]) -> GateFinding {
+fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Numbers) -> GateFinding {
     let Tally { pass, fail, .. } = checks.iter().copied().collect();
-    let failure = checks.iter().find(|check| check.failed());
+    let before = |check: &Check| baseline.get(&key(check)).copied().unwrap_or(0);
+    let old: u64 = checks.iter().map(|check| before(check)).sum();
+    let new: u64 = checks.iter().map(|check| count(check)).sum();
+    let counts = format!("{fail} checks fail with {new} findings, {old} in the baseline");
+    let without_mesh = checks.iter().find(|check| check.failed() && check.name == RUNS);
     let left_out = checks.iter().find_map(|check| match &check.outcome {
         Outcome::LeftOut { why } => Some(why.clone()),
         _ => None,
     });
-    let (verdict, note) = match failure {
-        None if pass == 0 => (Verdict::Missing, left_out.unwrap_or("no check was run".to_owned())),
-        Some(check) => {
-            let (name, why) = (key(check), first_line(check));
-            (Verdict::Regression, format!("{fail} checks fail, the first: {name}: {why}"))
+    let (verdict, note) = match checks.iter().find(|check| count(check) > before(check)) {
+        Some(worse) => {
+            let (check, why) = (key(worse), first_line(worse));
+            (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
         }
-        None => (Verdict::Unchanged, format!("{pass} checks hold")),
+        None if without_mesh.is_some() => {
+            let why = without_mesh.map_or("", |check| first_line(check));
+            let note = format!("neither program makes a mesh: {why}");
+            return GateFinding::noted(case, metric, Verdict::Missing, note);
+        }
+        None if new < old => (Verdict::Improvement, counts),
+        None if fail > 0 => (Verdict::Unchanged, counts),
+        None if pass > 0 => (Verdict::Unchanged, format!("{pass} checks hold")),
+        None => (Verdict::Missing, left_out.unwrap_or("no check was run".to_owned())),
     };
     let compared = (pass + fail) as u64;
     GateFinding { compared, ..GateFinding::noted(case, metric, verdict, note) }
@@ -106,37 +117,14 @@ fn first_line(check: &Check) -> &str {
     }
 }
 
-/// The number of findings of the failed checks of a case, by mesh and name of the check.
-fn known(case: &CaseReport) -> Numbers {
-    let failed = case.checks.iter().filter(|check| check.failed());
-    failed.map(|check| (key(check), check.counts.get("findings").copied().unwrap_or(1))).collect()
+/// The number of findings of a check, at least 1 if it fails.
+fn count(check: &Check) -> u64 {
+    if check.failed() { check.counts.get("findings").copied().unwrap_or(1) } else { 0 }
 }
 
-/// Compares a case that fails checks with the failed checks of the baseline.
-fn against(name: &str, case: &CaseReport, baseline: &Numbers) -> GateFinding {
-    let candidate = known(case);
-    let is_worse = |check: &&Check| {
-        check.failed() && baseline.get(&key(check)).is_none_or(|old| candidate[&key(check)] > *old)
-    };
-    let [old, new] = [baseline, &candidate].map(|known| (known.len(), known.values().sum::<u64>()));
-    let counts = format!(
-        "{} checks fail with {} findings, in the baseline {} with {}",
-        new.0, new.1, old.0, old.1
-    );
-    let without_mesh = case.checks.iter().find(|check| check.failed() && check.name == RUNS);
-    let (verdict, note) = match (case.checks.iter().find(is_worse), without_mesh) {
-        (Some(worse), _) => {
-            let (check, why) = (key(worse), first_line(worse));
-            (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
-        }
-        (None, Some(check)) => {
-            let note = format!("neither program makes a mesh: {}", first_line(check));
-            return GateFinding::noted(name, CHECKS, Verdict::Missing, note);
-        }
-        (None, None) if candidate == *baseline => (Verdict::Unchanged, counts),
-        (None, None) => (Verdict::Improvement, counts),
-    };
-    GateFinding::of_values(name, CHECKS, verdict, [old.1 as f64, new.1 as f64], note)
+/// The number of findings of the failed checks of a case, by mesh and name of the check.
+fn known(case: &CaseReport) -> Numbers {
+    case.checks.iter().filter(|check| check.failed()).map(|c| (key(c), count(c))).collect()
 }
 
 #[cfg(test)]
@@ -149,27 +137,35 @@ mod tests {
             Check { counts, ..Check::new("serial", *name, Outcome::fail("here\nthere")) }
         };
         let mut checks: Vec<Check> = failed.iter().map(check).collect();
-        checks.push(Check::new("serial", "balance", Outcome::held(1)));
+        for name in ["layer", "spacing", "balance"] {
+            if failed.iter().all(|(other, _)| *other != name) {
+                checks.push(Check::new("serial", name, Outcome::held(1)));
+            }
+        }
         CaseReport { name: "c".into(), checks, ..CaseReport::default() }
+    }
+
+    fn against(case: &CaseReport, baseline: &Numbers) -> GateFinding {
+        findings("c", &[], case, baseline).remove(0)
     }
 
     #[test]
     fn only_new_and_more_findings_are_a_regression() {
         let baseline = known(&case(&[("layer", 7), ("spacing", 2)]));
-        let of = |failed: &[(&str, u64)]| against("c", &case(failed), &baseline).verdict;
+        let of = |failed: &[(&str, u64)]| against(&case(failed), &baseline).verdict;
         assert_eq!(of(&[("layer", 7), ("spacing", 2)]), Verdict::Unchanged);
         assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Improvement);
         assert_eq!(of(&[("layer", 7)]), Verdict::Improvement);
         assert_eq!(of(&[("layer", 8), ("spacing", 1)]), Verdict::Regression);
         assert_eq!(of(&[("layer", 1), ("sides", 1)]), Verdict::Regression);
-        let note = against("c", &case(&[("sides", 1)]), &baseline).note;
+        let note = against(&case(&[("sides", 1)]), &baseline).note;
         assert!(note.contains("worse than the baseline: serial: sides: here"), "{note}");
     }
 
     #[test]
     fn two_programs_without_a_mesh_cannot_be_compared() {
         let baseline = known(&case(&[(RUNS, 1)]));
-        let finding = |known: &Numbers| against("c", &case(&[(RUNS, 1)]), known);
+        let finding = |known: &Numbers| against(&case(&[(RUNS, 1)]), known);
         let missing = finding(&baseline);
         assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
         assert_eq!(finding(&Numbers::new()).verdict, Verdict::Regression);

@@ -91,6 +91,9 @@ pub struct CaseMeasures {
     pub memory: Numbers,
     /// Counts by valgrind; deterministic except for hash seeds and addresses.
     pub counted: Numbers,
+    /// Instructions by function.
+    #[serde(skip)]
+    pub functions: Numbers,
     /// Number of findings by failed check.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub findings: Numbers,
@@ -98,12 +101,21 @@ pub struct CaseMeasures {
 
 impl CaseMeasures {
     /// The numbers that a layer compares.
-    pub fn of_layer(&mut self, layer: LayerName) -> &mut Numbers {
+    pub fn of_layer(&self, layer: LayerName) -> &Numbers {
         match layer {
-            LayerName::Memory => &mut self.memory,
-            LayerName::Instructions => &mut self.counted,
-            _ => &mut self.exact,
+            LayerName::Memory => &self.memory,
+            LayerName::Instructions => &self.counted,
+            _ => &self.exact,
         }
+    }
+
+    /// Adds what other runs of the same case measured.
+    pub fn add(&mut self, other: Self) {
+        self.digest = self.digest.take().or(other.digest);
+        self.geometry = self.geometry.take().or(other.geometry);
+        self.exact.extend(other.exact);
+        self.memory.extend(other.memory);
+        self.counted.extend(other.counted);
     }
 }
 

@@ -19,15 +19,15 @@ mod subject;
 mod time;
 
 use crate::experiments::machine;
+use crate::failure::Failure;
 use build::top_level;
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use measures::{LayerName, Measures};
-use numbers::Measurement;
+use measures::{CaseMeasures, LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
 pub use rules::Rules;
 use rules::Selected;
-use run::engine::failure::Failure;
+use run::engine::failure::Failure as Ended;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
@@ -99,17 +99,6 @@ fn input(path: PathBuf) -> std::io::Result<PathBuf> {
     files::register_input(&path).map(|()| path)
 }
 
-/// Why a gate could not start.
-#[derive(Debug, thiserror::Error)]
-pub enum GateError {
-    /// Invalid input.
-    #[error("{0}")]
-    Input(String),
-    /// A required program is missing.
-    #[error("{0}")]
-    Missing(String),
-}
-
 /// The input of every layer.
 struct Bench<'a> {
     options: &'a GateOptions,
@@ -121,23 +110,21 @@ struct Bench<'a> {
     /// Directory for the files of runs.
     place: &'a Path,
     /// Counters and memory, of which each layer takes its own, by program and case.
-    counted: RefCell<HashMap<(PathBuf, String), Result<Measurement, Failure>>>,
+    counted: RefCell<HashMap<(PathBuf, String), Result<CaseMeasures, Ended>>>,
 }
 
 /// Runs all requested layers and returns the report.
 ///
 /// # Errors
 /// If the gate cannot start; later failures are in the report.
-pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, GateError> {
+pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Failure> {
     let start = Instant::now();
     let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
     let rules = Rules::read(&rules)?;
     let cases = rules.select(&options.case, programs)?;
     let baseline = Baseline::find(options, &programs.engine)?;
     let candidate = Subject::candidate(options, &programs.engine, &baseline)?;
-    let place = tempfile::Builder::new().prefix("harness-gate-").tempdir();
-    let place =
-        place.map_err(|error| GateError::Input(format!("no directory for runs: {error}")))?;
+    let place = tempfile::Builder::new().prefix("harness-gate-").tempdir()?;
     let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
     let measures = Measures { machine, ..Measures::of_program(candidate.measured) };
     let mut report = GateReport::new(baseline.measured(), measures);
@@ -152,7 +139,7 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Ga
     Ok(report)
 }
 
-fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), GateError> {
+fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
     // Without a choice of layers, those are requested for which the rules have a case.
     let requested = |name: &LayerName| match bench.options.layers.is_empty() {
         true => bench.asked(*name).next().is_some(),
@@ -206,7 +193,7 @@ impl Bench<'_> {
         engine: &Engine,
         case: &Selected,
         layer: LayerName,
-    ) -> Result<Measurement, Failure> {
+    ) -> Result<CaseMeasures, Ended> {
         if layer == LayerName::Instructions {
             return numbers::instructions(self, engine, case);
         }
@@ -220,7 +207,7 @@ impl Bench<'_> {
     }
 
     /// Creates an empty directory for one run of an engine.
-    fn enter(&self, engine: &Engine, name: &str) -> Result<PathBuf, Failure> {
+    fn enter(&self, engine: &Engine, name: &str) -> Result<PathBuf, Ended> {
         let place = self.place.join(name);
         let _ = std::fs::remove_dir_all(&place);
         let created = std::fs::create_dir_all(&place);
@@ -228,7 +215,7 @@ impl Bench<'_> {
     }
 
     /// Returns the file of a case in a form that an engine reads.
-    fn prepare(&self, engine: &Engine, case: &Selected, name: &str) -> Result<PathBuf, Failure> {
+    fn prepare(&self, engine: &Engine, case: &Selected, name: &str) -> Result<PathBuf, Ended> {
         let place = self.enter(engine, name)?.join("case");
         let prepared = case.path.clone().and_then(|path| engine.prepare(&path, &place));
         prepared.map_err(|why| engine.unusable(why))

@@ -2,7 +2,7 @@
 //! counts. Numbers are compared by name; the program that lacks one that the other has is not compared in it.
 
 use super::Bench;
-use super::callgrind::Profile;
+use super::callgrind::{Profile, differences};
 use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
 use super::report::{GateFinding, Layer, Verdict, change_percent};
 use super::rules::Selected;
@@ -30,38 +30,36 @@ const INSTRUCTIONS: &str = "instructions";
 /// Beginning of the names of the profiles.
 const PROFILE: &str = "callgrind.out";
 
-/// What a program does on a case.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Measurement {
-    measures: CaseMeasures,
-    profile: Profile,
-}
-
 /// Compares the numbers of a layer.
 pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
     let name = layer.name;
     layer.left_out = left_out(bench, name, &measures.machine);
-    for case in bench.cases_of(name).take_while(|_| layer.left_out.is_none()) {
+    if layer.left_out.is_some() {
+        return;
+    }
+    for case in bench.cases_of(name) {
         let noted = |metric, verdict, why: String| {
             vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
         };
-        let findings = match bench.measured(&bench.candidate, case, name) {
+        layer.findings.extend(match bench.measured(&bench.candidate, case, name) {
             Err(why) if why.is_interrupt() => break,
             Err(why) => noted("runs", Verdict::Regression, why.to_string()),
-            Ok(mut candidate) => {
-                let entry = measures.case(&case.rule.name);
-                *entry.of_layer(name) = candidate.measures.of_layer(name).clone();
-                if name == LayerName::Counters {
-                    entry.digest.clone_from(&candidate.measures.digest);
-                    entry.geometry.clone_from(&candidate.measures.geometry);
-                }
+            Ok(new) => {
+                measures.case(&case.rule.name).add(new.clone());
                 match old(bench, case, name) {
                     Err(why) => noted("baseline", Verdict::Missing, why),
-                    Ok(old) => compare(bench, case, name, old, candidate),
+                    Ok(None) => {
+                        let compared = new.of_layer(name).len() as u64;
+                        let verdict =
+                            if compared == 0 { Verdict::Missing } else { Verdict::Measured };
+                        let finding =
+                            noted(&name.to_string(), verdict, format!("{compared} quantities"));
+                        finding.into_iter().map(|f| GateFinding { compared, ..f }).collect()
+                    }
+                    Ok(Some(old)) => compare(bench, case, name, &old, &new),
                 }
             }
-        };
-        layer.findings.extend(findings);
+        });
     }
 }
 
@@ -78,14 +76,13 @@ fn left_out(bench: &Bench, name: LayerName, machine: &str) -> Option<String> {
     })
 }
 
-/// The measurement of the baseline; `None` if there is nothing to compare with.
-fn old(bench: &Bench, case: &Selected, layer: LayerName) -> Result<Option<Measurement>, String> {
+/// The measures of the baseline; `None` if there is nothing to compare with.
+fn old(bench: &Bench, case: &Selected, layer: LayerName) -> Result<Option<CaseMeasures>, String> {
     match &bench.baseline {
         Baseline::None => Ok(None),
         Baseline::Record(_, record) => {
             let measures = record.cases.get(&case.rule.name);
-            let measures = measures.ok_or("the record does not contain this case")?.clone();
-            Ok(Some(Measurement { measures, ..Measurement::default() }))
+            Ok(Some(measures.ok_or("the record does not contain this case")?.clone()))
         }
         Baseline::Program(subject) => {
             let measured = bench.measured(&subject.engine, case, layer);
@@ -99,35 +96,27 @@ fn compare(
     bench: &Bench,
     case: &Selected,
     layer: LayerName,
-    old: Option<Measurement>,
-    mut new: Measurement,
+    old: &CaseMeasures,
+    new: &CaseMeasures,
 ) -> Vec<GateFinding> {
     let name = &case.rule.name;
-    let numbers = new.measures.of_layer(layer).clone();
-    let Some(mut old) = old else {
-        let compared = numbers.len() as u64;
-        let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
-        let note = format!("{compared} quantities");
-        let finding = GateFinding::noted(name, &layer.to_string(), verdict, note);
-        return vec![GateFinding { compared, ..finding }];
-    };
-    if let (Some(one), Some(other)) = (&old.measures.geometry, &new.measures.geometry)
+    if let (Some(one), Some(other)) = (&old.geometry, &new.geometry)
         && one != other
     {
         let why = format!("other facets were read: their digest is {other}, and was {one}");
         return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
     }
-    let before = old.measures.of_layer(layer).clone();
     let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
-    let mut findings = compared_numbers(name, layer, &before, &numbers, &tolerance);
+    let mut findings =
+        compared_numbers(name, layer, old.of_layer(layer), new.of_layer(layer), &tolerance);
     if layer == LayerName::Counters {
-        findings.insert(0, same_mesh(name, &old.measures.digest, &new.measures.digest));
+        findings.insert(0, same_mesh(name, &old.digest, &new.digest));
     }
-    let instructions = findings.iter_mut().find(|f| f.metric == INSTRUCTIONS);
-    if let Some(finding) = instructions.filter(|f| f.verdict == Verdict::Regression)
-        && old.profile.instructions > 0
-    {
-        let grown = new.profile.grown_since(&old.profile).into_iter().take(FUNCTIONS_SHOWN);
+    let grown = |f: &&mut GateFinding| {
+        f.metric == INSTRUCTIONS && f.verdict == Verdict::Regression && !old.functions.is_empty()
+    };
+    if let Some(finding) = findings.iter_mut().find(grown) {
+        let grown = differences(&old.functions, &new.functions).into_iter().take(FUNCTIONS_SHOWN);
         let grown: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
         finding.note.push_str(&format!("; mostly {}", grown.join(", ")));
     }
@@ -208,7 +197,7 @@ pub(super) fn count(
     bench: &Bench,
     engine: &Engine,
     case: &Selected,
-) -> Result<Measurement, Failure> {
+) -> Result<CaseMeasures, Failure> {
     let path = bench.prepare(engine, case, "counters")?;
     let mut measures = CaseMeasures::default();
     for ranks in case.layouts() {
@@ -233,7 +222,7 @@ pub(super) fn count(
         let total = |(name, of): (String, Vec<u64>)| (format!("{prefix}{name}"), of.iter().sum());
         measures.exact.extend(report.counters.into_iter().map(total));
     }
-    Ok(Measurement { measures, profile: Profile::default() })
+    Ok(measures)
 }
 
 /// The beginning of the names of quantities on these ranks.
@@ -251,7 +240,7 @@ pub(super) fn instructions(
     bench: &Bench,
     engine: &Engine,
     case: &Selected,
-) -> Result<Measurement, Failure> {
+) -> Result<CaseMeasures, Failure> {
     let path = bench.prepare(engine, case, "instructions")?;
     let place = bench.place.join("instructions");
     // Without output files, the count is that of meshing alone.
@@ -265,9 +254,9 @@ pub(super) fn instructions(
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place))?;
     let profile = profile_of_all(&place).map_err(|why| engine.unusable(why))?;
-    let counted = [(INSTRUCTIONS, profile.instructions), ("allocations", profile.allocations())];
+    let counted = [(INSTRUCTIONS, profile.instructions()), ("allocations", profile.allocations())];
     let counted = counted.map(|(name, count)| (name.to_owned(), count)).into();
-    Ok(Measurement { measures: CaseMeasures { counted, ..CaseMeasures::default() }, profile })
+    Ok(CaseMeasures { counted, functions: profile.own, ..CaseMeasures::default() })
 }
 
 /// The sum of the profiles of all processes.
@@ -277,10 +266,10 @@ fn profile_of_all(place: &Path) -> Result<Profile, String> {
     for entry in std::fs::read_dir(place).map_err(wrong)? {
         let entry = entry.map_err(wrong)?;
         if entry.file_name().to_string_lossy().starts_with(PROFILE) {
-            sum.add(&Profile::parse(&std::fs::read_to_string(entry.path()).map_err(wrong)?));
+            sum.add(&std::fs::read_to_string(entry.path()).map_err(wrong)?);
         }
     }
-    match sum.instructions {
+    match sum.instructions() {
         0 => Err("has no profile with costs by valgrind".into()),
         _ => Ok(sum),
     }

@@ -1,7 +1,8 @@
 //! Cases and tolerances of a gate: `engines/gate.toml`, or a user's file of the same format.
 
-use super::GateError;
 use super::measures::LayerName;
+use crate::failure::Failure;
+use crate::refuse;
 use crate::statistics::comparison::rounds_min;
 use contract::case::Case;
 use run::engine::launcher::Launcher;
@@ -133,50 +134,40 @@ impl Rules {
     ///
     /// # Errors
     /// If the file is missing or invalid.
-    pub fn read(path: &Path) -> Result<Self, GateError> {
-        let wrong = |why: String| GateError::Input(format!("{}: {why}", path.display()));
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let mut rules: Self =
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
         rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
-        rules.check_time().and_then(|()| rules.check_cases()).map_err(wrong)?;
+        rules.check().map_err(wrong)?;
         Ok(rules)
     }
 
-    fn check_time(&self) -> Result<(), String> {
+    /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
+    fn check(&self) -> Result<(), String> {
         let TimeRules { alpha, effect_min, phase_min, rounds_min: fewest, rounds_max, .. } =
             self.time;
-        if !(alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0 && phase_min >= 0.0) {
-            return Err(
-                "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0".into()
-            );
-        }
+        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0 && phase_min >= 0.0;
+        let wrong = "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0";
+        refuse(&[(!is_level, wrong)])?;
         let least = rounds_min(alpha);
-        match fewest >= least && rounds_max >= fewest {
-            true => Ok(()),
-            false => Err(format!(
-                "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
-            )),
-        }
-    }
-
-    /// Checks that there are cases, each with a name of its own and something to compare.
-    fn check_cases(&self) -> Result<(), String> {
-        if self.cases.is_empty() {
-            return Err("it has no [[case]], so there is nothing to compare".to_owned());
-        }
+        let few = format!(
+            "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
+        );
+        refuse(&[
+            (fewest < least || rounds_max < fewest, &few),
+            (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
+        ])?;
         for (i, case) in self.cases.iter().enumerate() {
-            let why = match case {
-                _ if case.layers.is_empty() => "has no layers",
-                _ if self.cases[..i].iter().any(|other| other.name == case.name) => {
-                    "is there twice"
-                }
-                _ if case.ranks.iter().chain(&case.mpi).any(|ranks| *ranks < 2) => {
-                    "has ranks below 2: the serial run is always there"
-                }
-                _ => continue,
-            };
-            return Err(format!("case {} {why}", case.name));
+            let is_second = self.cases[..i].iter().any(|other| other.name == case.name);
+            let has_one = case.ranks.iter().chain(&case.mpi).any(|ranks| *ranks < 2);
+            refuse(&[
+                (case.layers.is_empty(), "has no layers"),
+                (is_second, "is there twice"),
+                (has_one, "has ranks below 2: the serial run is always there"),
+            ])
+            .map_err(|why| format!("case {} {why}", case.name))?;
         }
         Ok(())
     }
@@ -185,15 +176,11 @@ impl Rules {
     ///
     /// # Errors
     /// If a name is missing from the rules or the catalogue.
-    pub fn select(
-        &self,
-        names: &[String],
-        programs: &Programs,
-    ) -> Result<Vec<Selected>, GateError> {
+    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<Selected>, Failure> {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
             let known = known.join(", ");
-            return Err(GateError::Input(format!(
+            return Err(Failure::input(format!(
                 "no case {name} in the gate's rules, which have {known}"
             )));
         }
@@ -201,7 +188,7 @@ impl Rules {
         self.cases.iter().filter(named).map(|rule| self.find(rule, programs)).collect()
     }
 
-    fn find(&self, rule: &CaseRule, programs: &Programs) -> Result<Selected, GateError> {
+    fn find(&self, rule: &CaseRule, programs: &Programs) -> Result<Selected, Failure> {
         let path = match rule.name.ends_with(".toml") {
             true => {
                 let path = self.directory.join(&rule.name);
@@ -209,7 +196,7 @@ impl Rules {
             }
             false => {
                 let catalogue = &programs.paths.catalogue;
-                let found = catalogue.named(&rule.name).map_err(GateError::Input)?;
+                let found = catalogue.named(&rule.name)?;
                 found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
             }
         };
@@ -223,17 +210,15 @@ impl Rules {
         if engine.run.simulated.is_none() {
             mpi.extend(simulated.drain(..).filter(|ranks| !rule.mpi.contains(ranks)));
         }
-        let no_mpi = match engine.run.parallel {
-            _ if mpi.is_empty() => None,
-            _ if !Launcher::mpirun(mpirun).is_found() => {
-                Some("mpirun is not on the PATH (ci/setup installs it)".to_owned())
-            }
-            None => {
-                let name = &engine.name;
-                Some(format!("the description of {name} has no command for ranks on MPI"))
-            }
-            Some(_) => None,
-        };
+        let none = format!("the description of {} has no command for ranks on MPI", engine.name);
+        let possible = refuse(&[
+            (
+                !Launcher::mpirun(mpirun).is_found(),
+                "mpirun is not on the PATH (ci/setup installs it)",
+            ),
+            (engine.run.parallel.is_none(), &none),
+        ]);
+        let no_mpi = possible.err().filter(|_| !mpi.is_empty());
         if no_mpi.is_some() {
             mpi.clear();
         }
@@ -265,7 +250,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("gate.toml");
         std::fs::write(&path, text).unwrap();
-        Rules::read(&path).map_err(|error| error.to_string())
+        Rules::read(&path).map_err(|failure| failure.why)
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The two programs of a gate: given as files, or built from revisions of a repository; see [`super::build`].
 
+use super::GateOptions;
 use super::build::{self, revision_of};
 use super::measures::{Measured, Measures};
-use super::{GateError, GateOptions};
 use crate::experiments::machine::digest_of_file;
+use crate::failure::Failure;
 use run::engine::runner::Engine;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -34,15 +35,14 @@ impl Baseline {
     ///
     /// # Errors
     /// If it is neither, or does not build.
-    pub fn find(options: &GateOptions, engine: &Engine) -> Result<Self, GateError> {
+    pub fn find(options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         let Some(named) = &options.baseline else { return Ok(Self::None) };
         let path = Path::new(named);
         if path.is_file() {
-            let start = contract::files::read(path)
-                .map_err(|error| GateError::Input(format!("{named}: {error}")))?;
-            if start.first() == Some(&b'{') {
-                let measures = Measures::parse(&start)
-                    .map_err(|why| GateError::Input(format!("{named}: {why}")))?;
+            let wrong = |why: String| Failure::input(format!("{named}: {why}"));
+            let bytes = contract::files::read(path).map_err(|error| wrong(error.to_string()))?;
+            if bytes.first() == Some(&b'{') {
+                let measures = Measures::parse(&bytes).map_err(wrong)?;
                 let measured = Measured { named: named.clone(), ..measures.of.clone() };
                 return Ok(Self::Record(measured, Box::new(measures)));
             }
@@ -75,7 +75,7 @@ impl Subject {
         options: &GateOptions,
         engine: &Engine,
         baseline: &Baseline,
-    ) -> Result<Self, GateError> {
+    ) -> Result<Self, Failure> {
         let built =
             matches!(baseline, Baseline::Program(subject) if subject.measured.revision.is_some());
         let named = options.candidate.clone();
@@ -85,7 +85,7 @@ impl Subject {
                 let program = engine.program().to_owned();
                 if !program.is_file() {
                     let program = program.display();
-                    return Err(GateError::Missing(format!(
+                    return Err(Failure::missing(format!(
                         "{program} is missing: build it, or give its path"
                     )));
                 }
@@ -95,32 +95,29 @@ impl Subject {
         }
     }
 
-    fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, GateError> {
+    fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         if Path::new(named).is_file() {
             let mode = fs::metadata(named).map_or(0, |metadata| metadata.permissions().mode());
             if mode & 0o111 == 0 {
                 let why =
                     "neither a record of harness gate --record nor a program that can be executed";
-                return Err(GateError::Input(format!("{named} is {why}")));
+                return Err(Failure::input(format!("{named} is {why}")));
             }
             let program =
-                fs::canonicalize(named).map_err(|error| GateError::Input(error.to_string()))?;
+                fs::canonicalize(named).map_err(|error| Failure::input(error.to_string()))?;
             return Ok(Self::new(engine.with_program(program), named.to_owned(), None));
         }
         let name = &engine.description().name;
         let build = engine.description().build.as_ref().ok_or_else(|| {
-            GateError::Input(format!(
+            Failure::input(format!(
                 "{named} is not a file, and {name} does not describe how to build a revision"
             ))
         })?;
         let head = if named == "." { "HEAD" } else { named };
         let revision = revision_of(head, &options.repository).map_err(|why| {
-            GateError::Input(format!("{named} is neither a file nor a revision: {why}"))
+            Failure::input(format!("{named} is neither a file nor a revision: {why}"))
         })?;
-        let program = match named {
-            "." => build::working_tree(build, options)?,
-            _ => build::revision(build, &revision, options)?,
-        };
+        let program = build::program(build, named, &revision, options)?;
         Ok(Self::new(engine.with_program(program), named.to_owned(), Some(revision)))
     }
 }

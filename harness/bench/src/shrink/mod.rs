@@ -10,10 +10,9 @@ pub mod bundle;
 pub mod probe;
 pub mod reduce;
 
-use contract::plain::PlainCase;
-use probe::{Failure, Judged, Probe, Trial, Unknown};
+use crate::failure::Failure;
+use probe::{Fault, Judged, Trial};
 use run::engine::interrupt;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Limits of a reduction.
@@ -31,7 +30,7 @@ pub struct Shrunk {
     /// The smallest trial that fails.
     pub trial: Trial,
     /// How it fails.
-    pub failure: Failure,
+    pub fault: Fault,
     /// Facets of the case that was given.
     pub facets_before: usize,
     /// Number of trials.
@@ -45,8 +44,8 @@ impl Shrunk {
     ///
     /// # Panics
     /// If it fails otherwise, or is larger in any respect, which is a bug.
-    fn check_invariants(&self, given: &Trial, first: &Failure, budget: &Budget) {
-        assert!(self.failure.is_same_as(first), "{} in place of {first}", self.failure);
+    fn check_invariants(&self, given: &Trial, first: &Fault, budget: &Budget) {
+        assert!(self.fault.is_same_as(first), "{} in place of {first}", self.fault);
         assert!(self.trials <= budget.trials.max(1), "{} of {} trials", self.trials, budget.trials);
         let measures = |trial: &Trial| {
             let count =
@@ -60,73 +59,39 @@ impl Shrunk {
     }
 }
 
-/// What a trial shows about a check, or about all.
-#[derive(Clone, Debug)]
-pub enum Verdict {
-    /// It fails.
-    Fails(Failure),
-    /// It holds, with all others that were run: their number, at least 1.
-    Holds(usize),
-}
-
-/// How a case fails the check of this name, or else the check that it fails first.
+/// How a trial fails the check of this name, or else the check that it fails first; `None` if it holds.
 ///
 /// # Errors
-/// If the engine declines the case, no program can be run on it, or the check is not among those that were run.
-pub fn verdict(trial: &Trial, probe: &Probe, check: Option<&str>) -> Result<Verdict, Unknown> {
-    verdict_of(probe.judge(trial, check)?, check)
-}
-
-fn verdict_of(mut judged: Vec<Judged>, check: Option<&str>) -> Result<Verdict, Unknown> {
-    let ran: Vec<&str> = judged.iter().map(|one| one.check).collect();
-    let ran = ran.join(", ");
-    judged.retain(|one| check.is_none_or(|name| one.check == name));
-    let count = judged.len();
-    match (judged.into_iter().find_map(|one| one.failure), check) {
-        (Some(failure), _) => Ok(Verdict::Fails(failure)),
-        (None, Some(name)) if count == 0 => {
-            Err(Unknown::LeftOut(format!("the check {name} was not run; those that were: {ran}")))
-        }
-        _ => Ok(Verdict::Holds(count)),
+/// If the check is not among those that were run.
+pub fn fault(judged: &[Judged], check: Option<&str>) -> Result<Option<Fault>, Failure> {
+    let mut of_name = judged.iter().filter(|one| check.is_none_or(|name| one.0 == name)).peekable();
+    if let (Some(name), None) = (check, of_name.peek()) {
+        let ran: Vec<&str> = judged.iter().map(|one| one.0).collect();
+        let ran = ran.join(", ");
+        let why = format!("left out: the check {name} was not run; those that were: {ran}");
+        return Err(Failure::missing(why));
     }
+    Ok(of_name.find_map(|one| one.1.clone()))
 }
 
-/// Reduces a case that fails the check of this name, or else the check that it fails first; returns the number of checks that hold
-/// if it does not fail.
+/// The smallest trial that fails as the given one does, as `judge` finds.
 ///
 /// # Errors
-/// If the case cannot be read, the engine declines it, or no program can be run on it.
+/// If the smallest one fails only sometimes.
 pub fn shrink(
-    case: &Path,
-    probe: &Probe,
-    check: Option<&str>,
-    budget: &Budget,
-) -> Result<Result<Shrunk, usize>, Unknown> {
-    let case = PlainCase::read(case).map_err(Unknown::Error)?;
-    let given = Trial { case, ranks: probe.ranks() };
-    let first = match verdict(&given, probe, check)? {
-        Verdict::Fails(failure) => failure,
-        Verdict::Holds(count) => return Ok(Err(count)),
-    };
-    crate::announce(&format!("harness shrink: the case fails {first}"));
-    smallest(given, &first, budget, |trial| probe.judge(trial, None)).map(Ok)
-}
-
-/// The smallest trial that fails as the given one does.
-fn smallest(
     given: Trial,
-    first: &Failure,
+    first: &Fault,
     budget: &Budget,
-    judge: impl Fn(&Trial) -> Result<Vec<Judged>, Unknown>,
-) -> Result<Shrunk, Unknown> {
+    judge: impl Fn(&Trial) -> Result<Vec<Judged>, Failure>,
+) -> Result<Shrunk, Failure> {
     let start = Instant::now();
     let mut trials = 1;
     let spent = |trials| {
         trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested()
     };
-    let same = |trial: &Trial| -> Result<Option<Failure>, Unknown> {
-        let mut failures = judge(trial)?.into_iter().filter_map(|one| one.failure);
-        Ok(failures.find(|failure| failure.is_same_as(first)))
+    let same = |trial: &Trial| -> Result<Option<Fault>, Failure> {
+        let mut faults = judge(trial)?.into_iter().filter_map(|one| one.1);
+        Ok(faults.find(|fault| fault.is_same_as(first)))
     };
     let mut fails = |trial: &Trial| {
         if spent(trials) {
@@ -134,18 +99,17 @@ fn smallest(
         }
         trials += 1;
         // A trial that cannot be run does not count as the same failure.
-        same(trial).is_ok_and(|failure| failure.is_some())
+        same(trial).is_ok_and(|fault| fault.is_some())
     };
     let trial = reduce::reduce(given.clone(), &mut fails, &mut |text| {
         crate::announce(&format!("harness shrink: {text}"))
     });
     let minimal = !spent(trials);
-    let failure = same(&trial)?.ok_or_else(|| {
-        let why = "the failure does not repeat: it depends on more than the case";
-        Unknown::Error(why.to_owned())
+    let fault = same(&trial)?.ok_or_else(|| {
+        Failure::input("the failure does not repeat: it depends on more than the case")
     })?;
     let facets_before = given.case.facets.len();
-    let shrunk = Shrunk { trial, failure, facets_before, trials, minimal };
+    let shrunk = Shrunk { trial, fault, facets_before, trials, minimal };
     shrunk.check_invariants(&given, first, budget);
     Ok(shrunk)
 }
@@ -154,24 +118,22 @@ fn smallest(
 mod tests {
     use super::*;
     use contract::case::Facet;
+    use contract::plain::PlainCase;
     use proptest::prelude::*;
     use run::engine::layout::Ranks;
     use std::collections::BTreeSet;
 
     fn judged() -> Vec<Judged> {
-        vec![
-            Judged { check: "runs", failure: None },
-            Judged { check: "balance", failure: Some(Failure::of("balance", "7 findings")) },
-        ]
+        vec![("runs", None), ("balance", Some(Fault::of("balance", "7 findings")))]
     }
 
     #[test]
     fn a_check_that_was_not_run_is_not_green() {
-        let verdict = |check| verdict_of(judged(), check);
-        assert!(matches!(verdict(None), Ok(Verdict::Fails(failure)) if failure.check == "balance"));
-        assert!(matches!(verdict(Some("runs")), Ok(Verdict::Holds(1))));
-        let Err(Unknown::LeftOut(why)) = verdict(Some("balnce")) else { panic!("a verdict") };
-        assert_eq!(why, "the check balnce was not run; those that were: runs, balance");
+        let fault = |check| fault(&judged(), check).map_err(|failure| failure.why);
+        assert_eq!(fault(None).unwrap().unwrap().check, "balance");
+        assert!(fault(Some("runs")).unwrap().is_none());
+        let why = "left out: the check balnce was not run; those that were: runs, balance";
+        assert_eq!(fault(Some("balnce")).unwrap_err(), why);
     }
 
     #[test]
@@ -179,11 +141,11 @@ mod tests {
         let table = toml::toml! { seeds = [[0.0, 0.0, 0.0]] };
         let facets = vec![[[0.0; 3]; 3]; 2];
         let given = Trial { case: PlainCase { table, facets }, ranks: Ranks::Mpi(3) };
-        let first = Failure::of("balance", "7 findings");
+        let first = Fault::of("balance", "7 findings");
         let budget = Budget { trials: 5, time: Duration::ZERO };
         let right = Shrunk {
             trial: given.clone(),
-            failure: Failure::of("balance", "2 findings"),
+            fault: Fault::of("balance", "2 findings"),
             facets_before: 2,
             trials: 5,
             minimal: true,
@@ -195,7 +157,7 @@ mod tests {
             let check = || wrong.check_invariants(&given, &first, &budget);
             std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
         };
-        assert!(refused(|s| s.failure.check = "sides".into()) && refused(|s| s.trials = 6));
+        assert!(refused(|s| s.fault.check = "sides".into()) && refused(|s| s.trials = 6));
         assert!(refused(|s| s.facets_before = 3) && refused(|s| s.trial.ranks = Ranks::Mpi(4)));
         assert!(refused(|s| s.trial.case.facets.push([[1.0; 3]; 3])));
     }
@@ -230,19 +192,19 @@ mod tests {
                 let is_needed = |number: &u16| trial.case.facets.contains(&facet(*number));
                 let fails = needed.iter().all(is_needed) && trial.ranks.count() >= least;
                 let name = if fails { "balance" } else { "sides" };
-                let failure = Some(Failure::of(name, &format!("{} findings", trial.case.facets.len())));
-                Ok(vec![Judged { check: name, failure }])
+                let failure = Some(Fault::of(name, &format!("{} findings", trial.case.facets.len())));
+                Ok(vec![(name, failure)])
             };
-            let first = Failure::of("balance", "7 findings");
+            let first = Fault::of("balance", "7 findings");
             let budget = Budget { trials: budget, time: Duration::MAX };
-            let mut shrunk = smallest(given.clone(), &first, &budget, judge).map_err(|_| TestCaseError::fail("an error"))?;
+            let mut shrunk = shrink(given.clone(), &first, &budget, judge).map_err(|_| TestCaseError::fail("an error"))?;
             let left: BTreeSet<_> = shrunk.trial.case.facets.iter().map(|f| f[0][0] as u16).collect();
             prop_assert!(needed.is_subset(&left) && shrunk.trial.ranks.count() >= least);
             if shrunk.minimal {
                 prop_assert_eq!((&left, shrunk.trial.ranks.count()), (&needed, least));
             }
             match wrong {
-                0 => shrunk.failure = Failure::of("sides", "1 finding"),
+                0 => shrunk.fault = Fault::of("sides", "1 finding"),
                 1 => shrunk.trials = budget.trials + 1,
                 2 => shrunk.facets_before += 1,
                 3 => shrunk.trial.ranks = Ranks::Mpi(ranks + 1),

@@ -17,10 +17,16 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
     loop {
         let before = smallest.clone();
         smallest = facets(depth(smallest, fails), fails);
-        for simpler in [plain, crossing, enclosed, thinner, fewer_ranks] {
-            let simpler = simpler(&smallest);
-            smallest = first(smallest, fails, simpler);
+        // With all leaves kept, crossing and enclosed ones too, deletion is ruled out as a cause.
+        let all = Some(Value::String("all".into()));
+        for (key, value) in [("keep", all), ("keep_crossing", None), ("enclosed", None)] {
+            let simpler = with(&smallest, key, value);
+            smallest = first(smallest, fails, [simpler]);
         }
+        let thinner = thinner(&smallest);
+        smallest = first(smallest, fails, thinner);
+        let fewer_ranks = fewer_ranks(&smallest);
+        smallest = first(smallest, fails, fewer_ranks);
         // Seeds that remain stay where they are: a case in which one has come to lie in a crossing leaf is refused by every program and
         // does not fail.
         for list in ["box", "seeds"] {
@@ -122,19 +128,6 @@ fn facets(trial: Trial, fails: Fails) -> Trial {
         chunk = if chunk == 1 { 0 } else { chunk.div_ceil(2) };
     }
     of(kept)
-}
-
-/// Keeps all leaves, including crossing and enclosed ones: deletion is then ruled out as a cause.
-fn plain(trial: &Trial) -> Vec<Trial> {
-    vec![with(trial, "keep", Some(Value::String("all".into())))]
-}
-
-fn crossing(trial: &Trial) -> Vec<Trial> {
-    vec![with(trial, "keep_crossing", None)]
-}
-
-fn enclosed(trial: &Trial) -> Vec<Trial> {
-    vec![with(trial, "enclosed", None)]
 }
 
 /// Reduces the layer to the smallest n.

@@ -3,11 +3,12 @@
 //! Invariants of the [`Study`] that [`Study::read`] returns: it has a series or a row; every name that is used is declared; a row
 //! has exactly the runs, the other run and the phase that its measure requires.
 
-use super::measure::{Input, Measure};
-use super::series::{CELLS, are_ranks, mesher, one, refuse};
+use super::measure::{self, Input, Measure};
+use super::series::{CELLS, are_ranks, mesher, one};
 pub use super::series::{Experiment, Series};
 use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
+use crate::refuse;
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// The [`Setup::experiment`] of runs for targets.
 pub const EXPERIMENT: &str = "targets";
 /// A study file.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
     /// Meshes by name.
@@ -88,7 +89,7 @@ fn mpi() -> Comm {
 }
 
 /// A target.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
     /// The name, used by `--only`.
@@ -99,6 +100,7 @@ pub struct Row {
     /// The run with which it is compared.
     pub against: Option<String>,
     /// The measure.
+    #[serde(deserialize_with = "measure::named")]
     pub measure: &'static Measure,
     /// The phase or phases, for measures of phases.
     #[serde(default, deserialize_with = "one_or_many")]

@@ -16,23 +16,22 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
-/// Returns the lines without the runs, audits and failures of sessions on other machines or commits than the last one, and
-/// without those of other builds of the program than the last run's.
+/// Returns the lines of sessions on the same machine and commit as the last one, without runs of other builds of the program than the
+/// last run's.
 fn of_last_origin(lines: &[Line]) -> Vec<Line> {
-    let machine = |line: &Line| {
-        line.session().map(|session| (session.machine.label(), session.machine.commit.clone()))
-    };
+    let origin =
+        |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
     let program = |line: &Line| match &line.entry {
         Entry::Run(run) => Some(run.program.clone()),
         _ => None,
     };
-    let last = lines.iter().rev().find_map(machine);
+    let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
     let built = lines.iter().rev().find_map(program);
-    let of_last = lines.iter().filter(|line| machine(line).is_some() && machine(line) == last);
+    let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
     let is_of = |line: &&Line| {
-        let same_build = program(line).is_none() || program(line) == built;
-        same_build && (last.is_none() || sessions.contains(&line.session.as_str()))
+        sessions.contains(&line.session.as_str())
+            && (program(line).is_none() || program(line) == built)
     };
     lines.iter().filter(is_of).cloned().collect()
 }
@@ -111,6 +110,14 @@ fn measured(
     lines: &[Line],
 ) -> Result<(f64, &'static str, String), String> {
     let absent = |name: &String| format!("run {name} is not in the record");
+    let groups = Groups::of(lines);
+    let mut sample = Sample {
+        runs: &[],
+        against: None,
+        phases: &row.phase,
+        network: &groups.network,
+        audits: &[],
+    };
     if row.measure.input == Input::Audit {
         let name = &row.run[0];
         let audit = |line: &'_ Line| match &line.entry {
@@ -121,16 +128,16 @@ fn measured(
         if audits.is_empty() {
             return Err(absent(name));
         }
-        return Ok((row.measure.of_audits(&audits)?, "audited", String::new()));
+        sample.audits = &audits;
+        return Ok(((row.measure.of)(&sample)?, "audited", String::new()));
     }
-    let groups = Groups::of(lines);
     let find = |name: &String| {
         let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
         found.ok_or_else(|| absent(name))
     };
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
-    let sample = Sample { runs: &runs, against, phases: &row.phase, network: &groups.network };
+    (sample.runs, sample.against) = (&runs, Some(against));
     let efficiencies = runs.iter().map(|run| run.efficiency(against, &groups.network));
     let efficiencies: Vec<Efficiency> =
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
@@ -139,7 +146,7 @@ fn measured(
     let rank =
         |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
-    Ok((row.measure.of(&sample)?, how, why))
+    Ok(((row.measure.of)(&sample)?, how, why))
 }
 
 /// Returns the reason for which a run failed, if it did.

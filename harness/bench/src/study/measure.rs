@@ -4,7 +4,7 @@ use crate::experiments::entry::{Audited, Network};
 use crate::experiments::group::Group;
 use crate::experiments::number::grouped;
 use crate::experiments::pop;
-use crate::statistics::median;
+use crate::statistics::median_of;
 use Input::{Against, Alone, Audit, Phases, Series};
 use serde::de::{Deserialize, Deserializer, Error};
 
@@ -17,7 +17,8 @@ pub struct Measure {
     pub(super) input: Input,
     /// A value with its unit.
     pub show: fn(f64) -> String,
-    value: Value,
+    /// The value, or in one sentence what the runs do not report.
+    pub(super) of: fn(&Sample) -> Result<f64, String>,
 }
 
 /// The input of a measure.
@@ -35,92 +36,84 @@ pub(super) enum Input {
     Audit,
 }
 
-#[derive(Debug)]
-enum Value {
-    /// Of runs.
-    Runs(fn(&Sample) -> Result<f64, String>),
-    /// Of one audit. The value of several is their median, or the least.
-    Audit(fn(&Audited) -> f64, fn(&[f64]) -> Option<f64>),
-}
-
 /// The input of a row's measure.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<'a> {
-    /// The runs: one, unless the measure is that of a series.
+    /// The runs: one, unless the measure is that of a series; none for audits.
     pub runs: &'a [&'a Group],
-    /// The run with which it is compared; the run itself if the measure has none.
-    pub against: &'a Group,
+    /// The run with which it is compared.
+    pub against: Option<&'a Group>,
     /// The requested phases, if any.
     pub phases: &'a [String],
     /// Latency and bandwidth of messages.
     pub network: &'a Network,
+    /// The audits of a mesh on disk: at least one, or none for runs.
+    pub audits: &'a [Audited],
 }
 
 impl<'a> Sample<'a> {
     fn run(&self) -> &'a Group {
         self.runs[0]
     }
+
+    fn against(&self) -> &'a Group {
+        self.against.unwrap_or(self.run())
+    }
+
+    fn of_audits(&self, of: fn(&Audited) -> f64) -> Vec<f64> {
+        self.audits.iter().map(of).collect()
+    }
 }
 
-type OfRuns = fn(&Sample) -> Result<f64, String>;
-
-const fn of_runs(name: &'static str, input: Input, show: fn(f64) -> String, of: OfRuns) -> Measure {
-    Measure { name, input, show, value: Value::Runs(of) }
-}
-
-const fn of_audits(
+const fn measure(
     name: &'static str,
+    input: Input,
     show: fn(f64) -> String,
-    of: fn(&Audited) -> f64,
-    all: fn(&[f64]) -> Option<f64>,
+    of: fn(&Sample) -> Result<f64, String>,
 ) -> Measure {
-    Measure { name, input: Audit, show, value: Value::Audit(of, all) }
+    Measure { name, input, show, of }
 }
 
 /// All measures.
 pub static MEASURES: [Measure; 17] = [
-    of_runs("cells_per_second_per_core", Alone, cells_rate, |s| Ok(s.run().rate())),
-    of_runs("facets_per_second_per_core", Alone, facets_rate, |s| {
+    measure("cells_per_second_per_core", Alone, cells_rate, |s| Ok(s.run().rate())),
+    measure("facets_per_second_per_core", Alone, facets_rate, |s| {
         let run = s.run();
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
     }),
-    of_runs("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
-    of_runs("speed_up", Against, plain, |s| Ok(s.against.time_s.value / s.run().time_s.value)),
-    of_runs("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against.rate())),
-    of_runs("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
-    of_runs("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),
-    of_runs("bytes_per_cell_beyond", Against, per_cell, |s| beyond(s.run(), s.against)),
-    of_runs("time_per_cell_growth", Series, plain, |s| Ok(growth(s.runs))),
-    of_runs("lambda_cells", Alone, plain, |s| {
+    measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
+    measure("speed_up", Against, plain, |s| Ok(s.against().time_s.value / s.run().time_s.value)),
+    measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against().rate())),
+    measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
+    measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),
+    measure("bytes_per_cell_beyond", Against, per_cell, |s| beyond(s.run(), s.against())),
+    measure("time_per_cell_growth", Series, plain, |s| Ok(growth(s.runs))),
+    measure("lambda_cells", Alone, plain, |s| {
         let leaves = s.run().typical.counters.get("leaves");
         let leaves = leaves.ok_or("the program does not count leaves by rank")?;
         Ok(leaves.lambda(s.run().setup.ranks))
     }),
-    of_runs("lambda_cpu", Alone, plain, |s| {
+    measure("lambda_cpu", Alone, plain, |s| {
         Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
     }),
-    of_runs("efficiency", Against, plain, |s| match s.against.setup.ranks {
-        1 => Ok(s.run().efficiency(s.against, s.network).global()),
+    measure("efficiency", Against, plain, |s| match s.against().setup.ranks {
+        1 => Ok(s.run().efficiency(s.against(), s.network).global()),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
-    of_runs("parallel_efficiency", Alone, plain, |s| {
+    measure("parallel_efficiency", Alone, plain, |s| {
         Ok(s.run().efficiency(s.run(), s.network).parallel())
     }),
-    of_runs("phase_share", Phases, |v| format!("{:.2} %", v * 100.0), share),
+    measure("phase_share", Phases, |v| format!("{:.2} %", v * 100.0), share),
     // A single failed audit is a failure.
-    of_audits(
-        "audit_holds",
-        holds,
-        |a| f64::from(u8::from(a.holds)),
-        |all| all.iter().copied().reduce(f64::min),
-    ),
-    of_audits(
-        "audit_cells_per_second_per_core",
-        cells_rate,
-        |a| a.cells as f64 / a.time_cpu_s,
-        middle,
-    ),
-    of_audits("audit_peak_bytes", gibibytes, |a| a.peak_rss_bytes as f64, middle),
+    measure("audit_holds", Audit, holds, |s| {
+        Ok(f64::from(u8::from(s.audits.iter().all(|a| a.holds))))
+    }),
+    measure("audit_cells_per_second_per_core", Audit, cells_rate, |s| {
+        Ok(median_of(&s.of_audits(|a| a.cells as f64 / a.time_cpu_s)))
+    }),
+    measure("audit_peak_bytes", Audit, gibibytes, |s| {
+        Ok(median_of(&s.of_audits(|a| a.peak_rss_bytes as f64)))
+    }),
 ];
 
 impl Measure {
@@ -133,50 +126,15 @@ impl Measure {
     pub(super) fn is_efficiency(&self) -> bool {
         self.name.ends_with("efficiency")
     }
-
-    /// Returns the value for runs.
-    ///
-    /// # Errors
-    /// One sentence, if the runs do not report it.
-    pub(super) fn of(&self, sample: &Sample) -> Result<f64, String> {
-        match self.value {
-            Value::Runs(of) => of(sample),
-            Value::Audit(..) => Err(format!("{} is measured of a mesh on disk", self.name)),
-        }
-    }
-
-    /// Returns the value for audits.
-    ///
-    /// # Errors
-    /// One sentence, if no audit is given.
-    pub(super) fn of_audits(&self, audits: &[Audited]) -> Result<f64, String> {
-        match self.value {
-            Value::Runs(_) => Err(format!("{} is not measured of a mesh on disk", self.name)),
-            Value::Audit(of, all) => {
-                let values: Vec<f64> = audits.iter().map(of).collect();
-                all(&values).ok_or_else(|| "no audit is given".to_owned())
-            }
-        }
-    }
 }
 
-impl PartialEq for Measure {
-    fn eq(&self, other: &Self) -> bool {
-        self.name == other.name
-    }
-}
-
-impl<'a> Deserialize<'a> for &'static Measure {
-    fn deserialize<D: Deserializer<'a>>(from: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(from)?;
-        Measure::named(&name).ok_or_else(|| {
-            let all: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
-            D::Error::custom(format!(
-                "unknown variant `{name}`, expected one of {}",
-                all.join(", ")
-            ))
-        })
-    }
+/// Reads the name of a measure.
+pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure, D::Error> {
+    let name = String::deserialize(from)?;
+    Measure::named(&name).ok_or_else(|| {
+        let all: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
+        D::Error::custom(format!("unknown variant `{name}`, expected one of {}", all.join(", ")))
+    })
 }
 
 fn plain(value: f64) -> String {
@@ -202,10 +160,6 @@ fn gibibytes(bytes: f64) -> String {
 
 fn holds(value: f64) -> String {
     (if value >= 1.0 { "all holds" } else { "findings" }).to_owned()
-}
-
-fn middle(values: &[f64]) -> Option<f64> {
-    median(values).map(|median| median.value)
 }
 
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
@@ -264,13 +218,13 @@ mod tests {
         Groups::of(&lines).all.remove(0)
     }
 
-    fn measure(name: &str) -> &'static Measure {
+    fn named(name: &str) -> &'static Measure {
         Measure::named(name).unwrap()
     }
 
     fn value(name: &str, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {
-        let against = against.unwrap_or(runs[0]);
-        measure(name).of(&Sample { runs, against, phases: &["b".into()], network: &FREE })
+        let phases = &["b".into()];
+        (named(name).of)(&Sample { runs, against, phases, network: &FREE, audits: &[] })
     }
 
     /// Returns a group with the given ranks, time and cells.
@@ -340,8 +294,9 @@ mod tests {
         assert!(value("efficiency", &[&weak], Some(&two)).is_err());
         let share = |phases: &[&str]| {
             let phases: Vec<String> = phases.iter().map(|p| (*p).to_owned()).collect();
-            let sample = Sample { runs: &[&two], against: &two, phases: &phases, network: &FREE };
-            measure("phase_share").of(&sample)
+            let (runs, audits): (&[&Group], &[Audited]) = (&[&two], &[]);
+            let sample = Sample { runs, against: None, phases: &phases, network: &FREE, audits };
+            (named("phase_share").of)(&sample)
         };
         assert_eq!(share(&["a", "b", "c"]), Ok(1.0));
         assert_eq!(share(&["c", "b"]), share(&["b"]));
@@ -361,21 +316,13 @@ mod tests {
             peak_rss_bytes,
         };
         let all = [audited(true, 3.0, 10), audited(false, 9.0, 30), audited(true, 2.0, 20)];
-        assert_eq!(measure("audit_holds").of_audits(&all), Ok(0.0));
-        assert_eq!(measure("audit_holds").of_audits(&all[..1]), Ok(1.0));
-        assert_eq!(measure("audit_cells_per_second_per_core").of_audits(&all), Ok(300.0));
-        assert_eq!(measure("audit_peak_bytes").of_audits(&all), Ok(20.0));
-        assert!(measure("audit_holds").of_audits(&[]).is_err());
-        assert!(measure("seconds").of_audits(&all).is_err());
-    }
-
-    #[test]
-    fn measures_have_the_same_names_as_in_a_targets_file() {
-        for measure in ["bytes_per_cell_beyond", "audit_holds", "lambda_cpu"] {
-            let text = format!("measure = \"{measure}\"");
-            let table: std::collections::BTreeMap<String, &Measure> =
-                toml::from_str(&text).unwrap();
-            assert_eq!(table["measure"].name, measure);
-        }
+        let of = |name: &str, audits: &[Audited]| {
+            let (runs, phases): (&[&Group], &[String]) = (&[], &[]);
+            (named(name).of)(&Sample { runs, against: None, phases, network: &FREE, audits })
+        };
+        assert_eq!(of("audit_holds", &all), Ok(0.0));
+        assert_eq!(of("audit_holds", &all[..1]), Ok(1.0));
+        assert_eq!(of("audit_cells_per_second_per_core", &all), Ok(300.0));
+        assert_eq!(of("audit_peak_bytes", &all), Ok(20.0));
     }
 }

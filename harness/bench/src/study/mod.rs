@@ -8,9 +8,11 @@
 pub mod file;
 pub mod judge;
 pub mod measure;
+mod plan;
 mod series;
 mod session;
 
 pub use file::Study;
 pub use judge::judged;
+pub use plan::SessionOptions;
 pub use session::{Outcome, measure};

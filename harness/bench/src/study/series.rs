@@ -1,6 +1,7 @@
 //! Series of runs, as a study file declares them.
 
 use crate::experiments::entry::Comm;
+use crate::refuse;
 use run::engine::description::{Description, is_own};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -129,11 +130,6 @@ impl Series {
 
 pub(super) fn are_ranks(all: &[usize]) -> bool {
     all.iter().all(|ranks| (1..=RANKS_MAX).contains(ranks))
-}
-
-/// Returns the first reason that applies.
-pub(super) fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
-    reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
 }
 
 pub(super) fn mesher() -> Vec<String> {

@@ -1,20 +1,24 @@
-//! Executes a study: its series, then the runs that its rows need, row by row.
+//! Executes a study: its series, then the runs that its rows need, row by row. Every result is appended to the record at once.
 //!
-//! Repetitions are the outer loop, so that a drift of the machine affects all setups equally.
+//! Repetitions are the outer loop, so that a drift of the machine affects all setups equally. Equal meshes have equal digests: the time of
+//! a wrong mesh is not a result.
 
-use super::file::{EXPERIMENT, Experiment, Mesh, Row, Series, Study};
+use super::file::{Row, Series, Study};
 use super::judge::{judge, unjudged};
-use crate::experiments::entry::{Comm, Entry, Judged, Line, Setup, Verdict};
-use crate::experiments::execute::has_message_matrix;
-use crate::experiments::feasible;
-use crate::experiments::session::{Bench, BenchError, Planned, SessionOptions};
-use crate::experiments::sizing::Sizes;
-use crate::experiments::variant::Base;
-use contract::case::Case;
+use super::plan::{Plan, Planned, SessionOptions};
+use crate::experiments::entry::{
+    Comm, Entry, Failure as Failed, Judged, LeftOut, Line, Run, Session as Opening, Setup, Verdict,
+};
+use crate::experiments::execute::{Runner, has_message_matrix};
+use crate::experiments::record::Record;
+use crate::experiments::{feasible, machine, network};
+use crate::failure::Failure;
+use check::promises::Independence;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The result of a session.
 #[derive(Debug)]
@@ -38,54 +42,50 @@ pub fn measure(
     record: &Path,
     study: &Study,
     programs: &Programs,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Outcome, BenchError> {
-    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir();
-    let place = place.map_err(|error| format!("no temporary directory: {error}"))?;
-    let bench = Bench::open(options, record, study.engines(), programs, place.path(), progress)?;
-    let (bases, made, warm) = Default::default();
-    let mut session = Session { bench, study, options, bases, made, warm };
-    let series = study.series.iter().try_for_each(|series| session.series(series));
-    let mut interrupted = match series {
-        Err(BenchError::Interrupted) => true,
-        other => other.map(|()| false)?,
+    progress: &dyn Fn(&str),
+) -> Result<Outcome, Failure> {
+    let place = tempfile::Builder::new().prefix("harness-bench-").tempdir()?;
+    let (launcher, limit) = (&options.launcher, Duration::from_secs(options.timeout));
+    let runner = Runner { programs, launcher, limit, place: place.path() };
+    let mut session = Session {
+        plan: Plan { study, options, runner, progress, bases: BTreeMap::new() },
+        lines: Vec::new(),
+        record: Record::new(record),
+        digests: HashMap::new(),
+        network: false,
+        made: BTreeSet::new(),
+        warm: BTreeSet::new(),
     };
     let mut rows = Vec::new();
-    for (i, row) in study.row.iter().enumerate() {
-        interrupted |= interrupt::requested();
-        let judged = if interrupted { Err(BenchError::Interrupted) } else { session.row(row) };
-        rows.push(match judged {
-            Err(BenchError::Interrupted) => {
-                interrupted = true;
-                // A row that was not measured before the interruption is not a result.
-                unjudged(row, Verdict::LeftOut, "interrupted".to_owned())
-            }
-            judged => {
-                let judged = judged?;
-                let [name, target, value, how, verdict] = judged.fields();
-                let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
-                (session.bench.progress)(&format!("row {} of {}: {line}", i + 1, study.row.len()));
-                session.bench.append(Entry::Target(judged.clone()))?;
-                judged
-            }
-        });
+    let done = session.all(&mut rows);
+    let interrupted = done.as_ref().is_err_and(Failure::is_interrupt);
+    if !interrupted {
+        done?;
     }
+    // A row that was not measured before the interruption is not a result.
+    let rest = study.row[rows.len()..].iter();
+    rows.extend(rest.map(|row| unjudged(row, Verdict::LeftOut, "interrupted".to_owned())));
     let needs_mpi =
         |row: &Row| study.runs_of(row).into_iter().any(|name| study.run[name].comm == Comm::Mpi);
     let is_missing = !options.no_mpi && !options.launcher.is_found();
     let program = options.launcher.program();
     let missing = (is_missing && study.row.iter().any(needs_mpi))
         .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
-    Ok(Outcome { rows, lines: session.bench.lines, interrupted, missing })
+    Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
+
+/// Everything that a mesh, and so its digest, depends on: engine, case, spacing, n, and the partition unless the engine
+/// promises independence of it.
+type Digested = [String; 5];
 
 /// A running session.
 struct Session<'a> {
-    bench: Bench<'a>,
-    study: &'a Study,
-    options: &'a SessionOptions,
-    /// Geometries read so far, by their source, with the known sizes of their meshes by n.
-    bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
+    plan: Plan<'a>,
+    lines: Vec<Line>,
+    record: Record,
+    digests: HashMap<Digested, String>,
+    /// Whether the cost of messages is known.
+    network: bool,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
@@ -93,112 +93,78 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
+    /// Executes the series and the rows, which are added as soon as they are judged.
+    fn all(&mut self, rows: &mut Vec<Judged>) -> Result<(), Failure> {
+        self.open()?;
+        let study = self.plan.study;
+        study.series.iter().try_for_each(|series| self.series(series))?;
+        for (row, number) in study.row.iter().zip(1..) {
+            if interrupt::requested() {
+                return Err(Failure::interrupted());
+            }
+            let judged = self.row(row)?;
+            let [name, target, value, how, verdict] = judged.fields();
+            let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
+            (self.plan.progress)(&format!("row {number} of {}: {line}", study.row.len()));
+            self.append(Entry::Target(judged.clone()))?;
+            rows.push(judged);
+        }
+        Ok(())
+    }
+
+    /// Records the circumstances.
+    fn open(&mut self) -> Result<(), Failure> {
+        let programs = self.plan.runner.programs;
+        let catalogue = programs.paths.catalogue.path();
+        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+        let lacks = |engine: String| {
+            let lacks = programs.labelled(&engine).description().lacks();
+            (engine, lacks)
+        };
+        let opening = Opening {
+            command: std::env::args().collect(),
+            machine: machine::describe(&self.plan.runner.launcher.program(), repository),
+            load_average: machine::load_average(),
+            lacks: self.plan.study.engines().into_iter().map(lacks).collect(),
+        };
+        self.append(Entry::Session(Box::new(opening)))
+    }
+
+    fn append(&mut self, entry: Entry) -> Result<(), Failure> {
+        let line = self.record.append(entry);
+        let line = line.map_err(|error| contract::files::named(self.record.path(), &error))?;
+        self.lines.push(line);
+        Ok(())
+    }
+
     /// Runs a series: every size by all programs in turn.
-    fn series(&mut self, series: &Series) -> Result<(), BenchError> {
+    fn series(&mut self, series: &Series) -> Result<(), Failure> {
         for cells in series.sizes() {
             let mut points = Vec::new();
             for engine in &series.engines {
-                points.extend(self.points(series, engine, cells)?);
+                points.extend(self.plan.series(series, engine, cells)?);
             }
             self.make(&mut points)?;
         }
         Ok(())
     }
 
-    /// Plans the runs of a series by one engine at one size; those of cases that it declines are left out.
-    fn points(
-        &mut self,
-        series: &Series,
-        engine: &str,
-        cells: Option<f64>,
-    ) -> Result<Vec<Planned>, BenchError> {
-        let description = self.bench.runner.programs.labelled(engine).description().clone();
-        let layouts = series.layouts(&description, self.mpi_left_out().is_some());
-        if layouts.is_empty() {
-            let experiment = series.experiment;
-            (self.bench.progress)(&format!("{engine} cannot run the series {experiment}"));
-        }
-        let mesh = Mesh { case: Some(series.case.clone()), ..Mesh::default() };
-        let key = self.base(&series.case, &mesh)?;
-        let of_case = [self.bases[&key].0.layer_cells_min];
-        let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
-        let mut points = Vec::new();
-        for &n in layers {
-            for &(comm, ranks) in &layouts {
-                for spacing in self.spacings(&key, series.experiment, cells, ranks)? {
-                    let base = &self.bases[&key].0;
-                    let path = base.variant(spacing, n)?;
-                    let setup = Setup {
-                        experiment: series.experiment.to_string(),
-                        engine: engine.to_owned(),
-                        ranks,
-                        comm,
-                        ..Setup::serial(&base.name, spacing, n)
-                    };
-                    let case = Case::read(&path).map_err(|error| error.to_string())?;
-                    if let Some(why) = description.declines(&case) {
-                        self.bench.leave_out(setup, why)?;
-                        continue;
-                    }
-                    points.extend(series.choices().iter().map(|&choice| {
-                        let (weights, partitioner, weight_exposed) = choice;
-                        let (weights, partitioner) = (weights.to_owned(), partitioner.to_owned());
-                        let setup = Setup { weights, partitioner, weight_exposed, ..setup.clone() };
-                        let repeats = self.options.repeats(series.repeats);
-                        let (case, audit, failed) = (path.clone(), false, false);
-                        Planned { setup, case, repeats, warm_up: true, audit, failed }
-                    }));
-                }
-            }
-        }
-        Ok(points)
-    }
-
-    /// Returns the spacings of the meshes of a series for a number of ranks.
-    fn spacings(
-        &mut self,
-        key: &str,
-        experiment: Experiment,
-        cells: Option<f64>,
-        ranks: usize,
-    ) -> Result<Vec<f64>, BenchError> {
-        let base = &self.bases[key].0;
-        let (Some(cells), n) = (cells, base.layer_cells_min) else {
-            return Ok(vec![base.spacing_min]);
-        };
-        let target = if experiment == Experiment::Weak { cells * ranks as f64 } else { cells };
-        let finest = self.spacing(key, n, target)?;
-        if experiment != Experiment::Spacing {
-            return Ok(vec![finest]);
-        }
-        // Coarser by factors of two, while there are enough cells to measure.
-        let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
-        Ok((0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect())
-    }
-
-    /// Returns the spacing that gives about this number of cells.
-    fn spacing(&mut self, key: &str, n: u32, cells: f64) -> Result<f64, BenchError> {
-        let (base, sizes) = self.bases.get_mut(key).expect("the geometry was read");
-        let runner = &self.bench.runner;
-        sizes.entry(n).or_default().spacing(cells, base.coarse(), |s| runner.count(base, s, n))
-    }
-
     /// Executes the runs of a row that are not complete, and judges it.
-    fn row(&mut self, row: &Row) -> Result<Judged, BenchError> {
-        let study = self.study;
+    fn row(&mut self, row: &Row) -> Result<Judged, Failure> {
+        let study = self.plan.study;
         let mut points = Vec::new();
         for name in study.runs_of(row) {
             let is_mpi = study.run[name].comm == Comm::Mpi;
-            if let Some(why) = self.mpi_left_out().filter(|_| is_mpi) {
+            if let Some(why) = self.plan.mpi_left_out().filter(|_| is_mpi) {
                 return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
             }
             if self.made.contains(name) {
                 continue;
             }
-            match self.point(name) {
+            match self.plan.run(name) {
                 Ok(point) => points.push(point),
-                Err(BenchError::Interrupted) => return Err(BenchError::Interrupted),
-                Err(BenchError::Input(why)) => {
+                Err(failure) if failure.is_interrupt() => return Err(failure),
+                Err(Failure { why, .. }) => {
                     let why = format!("mesh {}: {why}", study.run[name].mesh);
                     return Ok(unjudged(row, Verdict::Failed, why));
                 }
@@ -206,92 +172,134 @@ impl Session<'_> {
         }
         self.make(&mut points)?;
         self.made.extend(study.runs_of(row).into_iter().cloned());
-        Ok(judge(study, row, &self.bench.lines))
-    }
-
-    /// Plans the run of this name, and writes its case.
-    fn point(&mut self, name: &str) -> Result<Planned, BenchError> {
-        let spec = &self.study.run[name];
-        let mesh = &self.study.mesh[&spec.mesh];
-        let key = self.base(&spec.mesh, mesh)?;
-        let base = self.bases[&key].0.clone();
-        let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
-        let (case, spacing) = match mesh.cells {
-            None => {
-                let spacing = mesh.spacing_min.unwrap_or(base.spacing_min);
-                (base.in_own_root(spacing, n), spacing)
-            }
-            Some(cells) => {
-                (self.bench.progress)(&format!("{}: looking for the spacing", spec.mesh));
-                let spacing = self.spacing(&key, n, cells)?;
-                (base.variant(spacing, n), spacing)
-            }
-        };
-        let repeats = self.options.repeats(spec.repeats);
-        let setup = Setup {
-            experiment: EXPERIMENT.to_owned(),
-            ranks: spec.ranks,
-            comm: spec.comm,
-            partitioner: spec.partitioner.clone(),
-            weights: spec.weights.clone(),
-            ..Setup::serial(&spec.mesh, spacing, n)
-        };
-        let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);
-        let case = case?;
-        Ok(Planned { setup, case, repeats, warm_up, audit: spec.audit, failed: false })
-    }
-
-    /// Returns the reason why runs on MPI are skipped; `None` if they are not.
-    fn mpi_left_out(&self) -> Option<&'static str> {
-        match self.options.no_mpi {
-            true => Some("--no-mpi was given"),
-            false => (!self.options.launcher.is_found()).then_some("the launcher is missing"),
-        }
+        Ok(judge(study, row, &self.lines))
     }
 
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
     /// the time or the memory is not run on that mesh.
-    fn make(&mut self, points: &mut [Planned]) -> Result<(), BenchError> {
+    fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
+        for point in points.iter() {
+            if let Some(why) = &point.declined {
+                self.leave_out(point.setup.clone(), why.clone())?;
+            }
+        }
         if points.iter().any(|p| p.setup.comm == Comm::Sim) {
-            self.bench.measure_network()?;
+            self.measure_network()?;
         }
         for index in warmers(points) {
             let (mesh, setup) = (points[index].mesh(), points[index].setup.clone());
             if !self.warm.insert(mesh.clone()) {
                 continue;
             }
-            match feasible::excess(&self.bench.lines, &setup, self.bench.runner.limit) {
-                None => self.bench.run(&mut points[index], 0, true)?,
+            match feasible::excess(&self.lines, &setup, self.plan.runner.limit) {
+                None => self.run(&mut points[index], 0, true)?,
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
-                    self.bench.leave_out(setup, why)?;
+                    self.leave_out(setup, why)?;
                 }
             }
         }
         for repeat in 0..points.iter().map(|p| p.repeats).max().unwrap_or(0) {
             for point in points.iter_mut().filter(|p| repeat < p.repeats && !p.failed) {
-                self.bench.run(point, repeat, false)?;
+                self.run(point, repeat, false)?;
             }
         }
         Ok(())
     }
 
-    /// Writes the geometry of a mesh as a binary STL file, once; returns its key.
-    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, BenchError> {
-        let Mesh { case, geometry, generator, root_scale, .. } = mesh;
-        let key = format!("{case:?} {geometry:?} {generator:?} {root_scale:?}");
-        if self.bases.contains_key(&key) {
-            return Ok(key);
+    /// Records the cost of messages, once.
+    fn measure_network(&mut self) -> Result<(), Failure> {
+        if std::mem::replace(&mut self.network, true) {
+            return Ok(());
         }
-        (self.bench.progress)(&format!("{name}: reading the geometry"));
-        let (place, directory) = (self.bench.runner.place, &self.study.directory);
-        let path = match case {
-            Some(case) => self.bench.runner.programs.paths.catalogue.case_file(case, directory),
-            None => given_case(mesh, directory, place.join(format!("{name}-given.toml"))),
+        let measured = || self.plan.runner.ping_pong().and_then(|text| network::parse(&text));
+        let network = self.plan.options.network.map_or_else(measured, Ok).unwrap_or_else(|why| {
+            (self.plan.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
+            network::ASSUMED
+        });
+        self.append(Entry::Network(network))
+    }
+
+    /// Runs a point, or writes and audits its mesh, and records the result.
+    fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
+        let s = &point.setup;
+        let repetition = match (point.audit, warm_up) {
+            (true, _) => "audit on disk".to_owned(),
+            (false, true) => "warm-up".to_owned(),
+            (false, false) => format!("{}, repeat {}", s.division(), repeat + 1),
         };
-        let base = path.and_then(|path| Base::read(&path, place))?;
-        self.bases.insert(key.clone(), (base, BTreeMap::new()));
-        Ok(key)
+        (self.plan.progress)(&format!(
+            "{} {} by {}: {} ranks ({}), spacing {:.3e}, n {}, {repetition}",
+            s.experiment,
+            s.case,
+            s.engine,
+            s.ranks,
+            crate::name_of(&s.comm),
+            s.spacing_min,
+            s.layer_cells_min,
+        ));
+        let entry = match point.audit {
+            true => {
+                // The mesh is written to the record's file system.
+                let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
+                let disk = disk.unwrap_or(Path::new("."));
+                self.plan.runner.audit(s, &point.case, disk).map(Entry::Audit)
+            }
+            false => self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
+                self.check_mesh(point, &run)?;
+                Ok(Entry::Run(Box::new(run)))
+            }),
+        };
+        match entry {
+            Ok(entry) => self.append(entry),
+            Err(failure) if failure.is_interrupt() => Err(failure),
+            Err(Failure { why, .. }) => {
+                (self.plan.progress)(&format!("failed: {why}"));
+                point.failed = true;
+                let setup = point.setup.clone();
+                let command = format!("{} on {} ranks", setup.engine, setup.ranks);
+                self.append(Entry::Failure(Failed { setup, command, why }))
+            }
+        }
+    }
+
+    /// Leaves a run out, with the reason.
+    fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
+        (self.plan.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
+        self.append(Entry::LeftOut(LeftOut { setup, why }))
+    }
+
+    /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result. The mesh of an
+    /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
+    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), String> {
+        let engine = self.plan.runner.programs.labelled(&point.setup.engine);
+        let (promises, s) = (&engine.description().promises, &run.setup);
+        if run.warm_up && engine.name() != "mesher" && promises.definition {
+            let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
+            // Whether the mesher can be run is not a property of this engine.
+            let expected = self.plan.runner.run(&setup, &point.case, 0, true);
+            if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
+                return Err(format!(
+                    "the mesh has digest {}, but that of the definition has {}",
+                    run.digest, expected.digest
+                ));
+            }
+        }
+        let ranks = !promises.is_independent_of(Independence::Ranks);
+        let partitioner = !promises.is_independent_of(Independence::Partitioner);
+        let partition =
+            [ranks.then(|| s.ranks.to_string()), partitioner.then(|| s.partitioner.clone())];
+        let partition = partition.into_iter().flatten().collect();
+        let (spacing, n) = (format!("{:e}", s.spacing_min), s.layer_cells_min.to_string());
+        let mesh = [s.engine.clone(), s.case.clone(), spacing, n, partition];
+        let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
+        match *first == run.digest || !promises.is_deterministic() {
+            true => Ok(()),
+            false => Err(format!(
+                "the mesh has digest {}, but that of an earlier run has {first}",
+                run.digest
+            )),
+        }
     }
 }
 
@@ -303,7 +311,9 @@ fn warmers(points: &[Planned]) -> Vec<usize> {
         false => 0,
     };
     let mut best: Vec<usize> = Vec::new();
-    for (index, point) in points.iter().enumerate().filter(|(_, point)| point.warm_up) {
+    for (index, point) in
+        points.iter().enumerate().filter(|(_, point)| point.warm_up && !point.failed)
+    {
         match best.iter_mut().find(|b| points[**b].mesh() == point.mesh()) {
             Some(chosen) if worth(point) > worth(&points[*chosen]) => *chosen = index,
             Some(_) => {}
@@ -313,29 +323,14 @@ fn warmers(points: &[Planned]) -> Vec<usize> {
     best
 }
 
-/// Writes a case file for a geometry that was given without one; returns its path.
-fn given_case(mesh: &Mesh, directory: &Path, path: PathBuf) -> Result<PathBuf, String> {
-    let wrong = |error| format!("{}: {error}", path.display());
-    let mut table = toml::Table::new();
-    if let Some(file) = &mesh.geometry {
-        let file = std::path::absolute(directory.join(file)).map_err(wrong)?;
-        table.insert("geometry".into(), file.to_string_lossy().into_owned().into());
-    }
-    table.extend(mesh.generator.clone().map(|generator| ("generator".into(), generator.into())));
-    for (key, value) in [("root_scale", mesh.root_scale), ("spacing_min", mesh.spacing_min)] {
-        table.extend(value.map(|v| (key.to_owned(), v.into())));
-    }
-    std::fs::write(&path, table.to_string()).map_err(wrong)?;
-    Ok(path)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn point(comm: Comm, ranks: usize, case: &str) -> Planned {
         let setup = crate::testing::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
-        Planned { setup, case: case.into(), repeats: 1, warm_up: true, audit: false, failed: false }
+        let (audit, failed, declined) = (false, false, None);
+        Planned { setup, case: case.into(), repeats: 1, warm_up: true, audit, failed, declined }
     }
 
     #[test]

@@ -6,8 +6,7 @@ use crate::failure::Failure;
 use bench::experiments::entry::{Entry, Judged, Line, Verdict};
 use bench::experiments::group::Groups;
 use bench::experiments::record::{self, Content};
-use bench::experiments::session::{BenchError, SessionOptions};
-use bench::study::{self, Study};
+use bench::study::{self, SessionOptions, Study};
 use clap::Args;
 use contract::files::named;
 use report::benchmark::tables;
@@ -91,13 +90,12 @@ fn measure(arguments: &Arguments) -> Result<u8, Failure> {
     let programs = programs(arguments, &mut study)?;
     let record = record_path(arguments);
     let start = Instant::now();
-    let mut progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&arguments.session, &record, &study, &programs, &mut progress)
-        .map_err(Failure::input)?;
+    let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
+    let outcome = study::measure(&arguments.session, &record, &study, &programs, &progress)?;
     let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", record.display());
     if outcome.interrupted {
-        eprintln!("harness: {}", BenchError::Interrupted);
+        eprintln!("harness: interrupted: the record contains all results so far");
         return Ok(EXIT_INTERRUPTED);
     }
     match outcome.missing {
@@ -122,32 +120,29 @@ fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, Failur
     for name in foreign {
         programs.others.push(Engine::find(name, None, &programs.paths)?);
     }
-    let mut found: BTreeMap<&str, &Engine> = BTreeMap::new();
+    let mut labels: BTreeMap<&str, String> = BTreeMap::new();
+    // Our mesher chooses the spacings, also for other engines.
+    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
+    let mut required: Vec<&Engine> = also.into_iter().collect();
     for name in &names {
         let known = [&programs.mesher, &programs.reference, &programs.engine];
         let engine = known.into_iter().chain(&programs.others).find(|engine| engine.name() == name);
         let engine = engine.expect("every engine was found");
+        required.push(engine);
         let label = engine.label();
-        if found.values().any(|other| other.label() == label) {
+        if labels.values().any(|other| *other == label) {
             return Err(Failure::input(format!(
                 "two programs of one name, {label}: rename a file"
             )));
         }
-        found.insert(name, engine);
+        labels.insert(name, label);
     }
-    // Our mesher chooses the spacings, also for other engines.
-    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
-    for engine in found.values().copied().chain(also) {
-        let program = engine.program();
-        if !program.is_file() {
-            let program = program.display();
-            return Err(Failure::missing(format!(
-                "{program} is missing: build it or give its path"
-            )));
-        }
+    if let Some(missing) = required.iter().find(|engine| !engine.program().is_file()) {
+        let program = missing.program().display();
+        return Err(Failure::missing(format!("{program} is missing: build it or give its path")));
     }
     for engine in study.series.iter_mut().flat_map(|series| &mut series.engines) {
-        *engine = found[engine.as_str()].label();
+        engine.clone_from(&labels[engine.as_str()]);
     }
     Ok(programs)
 }

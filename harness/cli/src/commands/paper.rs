@@ -9,7 +9,7 @@ use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};
 use report::picture::scene::Scene;
 use report::picture::set::{Drawn, MEMBERS, Made, Member, Part, RANKS, page, request};
-use report::picture::{Picture, Request, svg, tikz};
+use report::picture::{DETAIL, Picture, Request, svg};
 use run::engine::layout::{Layout, Ranks};
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
@@ -105,10 +105,7 @@ fn draw_member(
             Err(other) => Err(other),
         };
     }
-    let collect = |format: Format| Picture::collect(&mesh, &request, &format.detail());
-    let tex = tikz(&collect(Format::Tikz)?);
-    put(&file("tex"), tex.as_bytes())?;
-    let picture = collect(Format::Svg)?;
+    let picture = Picture::collect(&mesh, &request, &DETAIL)?;
     write(&picture, Format::Svg, &file("svg"))?;
     Ok(Drawn::Slice(svg(&picture)))
 }

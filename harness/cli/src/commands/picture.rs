@@ -11,7 +11,7 @@ use export::mesh::Mesh;
 use report::picture::colour::Colour;
 use report::picture::format::{Format, write};
 use report::picture::scene::Scene;
-use report::picture::{Picture, Request};
+use report::picture::{DETAIL, Picture, Request};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use run::engine::paths::Paths;
 use run::verify::report::EXIT_HOLDS;
@@ -26,7 +26,7 @@ file is replaced.
 Examples:
   harness picture uav-small --out uav.svg                             mesh a case and draw its middle
   harness picture body.toml --out nose.png --slice y=0 --zoom 8       closer, in another plane
-  harness picture mesh --case body.toml --out mesh.tex --colour side  a mesh on disk; without --case, no geometry is drawn
+  harness picture mesh --case body.toml --out mesh.pdf --colour side  a mesh on disk; without --case, no geometry is drawn
   harness picture uav-small --out ranks.html --ranks 16 --colour rank the partition in three dimensions
   harness picture uav-medium --paper --out pictures                   every step of the algorithm, and a page of them
 
@@ -40,7 +40,7 @@ pub struct Arguments {
     /// The mesh.
     #[command(flatten)]
     source: MeshArguments,
-    /// The picture: .svg, .png, .pdf, .tex or .tikz for a slice, .html or .png for a view; with --paper a directory
+    /// The picture: .svg, .png or .pdf for a slice, .html or .png for a view; with --paper a directory
     #[arg(short, long, value_name = "FILE|DIR")]
     out: PathBuf,
     /// What colours show
@@ -100,7 +100,7 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
         let scene = Scene::collect(&mesh, &request)?;
         write_view(&scene, out, &Paths::find(), source)?;
     } else {
-        let picture = Picture::collect(&mesh, &request, &format.detail())?;
+        let picture = Picture::collect(&mesh, &request, &DETAIL)?;
         write(&picture, format, out)?;
         println!("{}", picture.title());
     }

@@ -2,9 +2,8 @@
 
 use super::programs::ProgramArguments;
 use crate::failure::Failure;
-use bench::shrink::bundle::{self, Repeat};
 use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{Budget, Verdict, shrink, verdict};
+use bench::shrink::{Budget, bundle, fault, shrink};
 use clap::Args;
 use contract::files::named;
 use contract::plain::PlainCase;
@@ -70,40 +69,28 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let catalogue = &programs.paths.catalogue;
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
     let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
-    let check = arguments.check.as_deref();
-    if arguments.test_only {
-        let case = PlainCase::read(&path)?;
-        return Ok(match verdict(&Trial { case, ranks }, &probe, check)? {
-            Verdict::Fails(failure) => {
-                println!("{failure}");
-                EXIT_FAILED
-            }
-            Verdict::Holds(count) => {
-                println!("{}", passed(check, count));
-                EXIT_HOLDS
-            }
-        });
-    }
-    let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
-    let shrunk = match shrink(&path, &probe, check, &budget)? {
-        Ok(shrunk) => shrunk,
-        Err(count) => {
-            println!("{}, and it was not shrunk", passed(check, count));
-            return Ok(EXIT_HOLDS);
+    let given = Trial { case: PlainCase::read(&path)?, ranks };
+    let judged = probe.judge(&given)?;
+    let Some(first) = fault(&judged, arguments.check.as_deref())? else {
+        match &arguments.check {
+            Some(name) => println!("the case does not fail {name}"),
+            None => println!("the case does not fail: {} checks hold", judged.len()),
         }
+        return Ok(EXIT_HOLDS);
     };
+    if arguments.test_only {
+        println!("{first}");
+        return Ok(EXIT_FAILED);
+    }
+    eprintln!("harness shrink: the case fails {first}");
+    let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
+    let shrunk = shrink(given, &first, &budget, |trial| probe.judge(trial))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    let repeat = Repeat { engine: arguments.engine.clone(), program };
+    let mut options = vec!["--engine", &arguments.engine];
+    options.extend(program.iter().flat_map(|program| ["--mesher", program]));
     let readme =
-        bundle::write(&shrunk, &probe, &repeat, &out).map_err(|error| named(&out, &error))?;
+        bundle::write(&shrunk, &probe, &options, &out).map_err(|error| named(&out, &error))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
-}
-
-fn passed(check: Option<&str>, count: usize) -> String {
-    match check {
-        Some(name) => format!("the case does not fail {name}"),
-        None => format!("the case does not fail: {count} checks hold"),
-    }
 }

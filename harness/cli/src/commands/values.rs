@@ -11,16 +11,17 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A file that the command writes. It is checked when the command line is parsed, before any work: it can be written, and the
-/// command does not read it.
+/// A file or a directory that the command writes or reads. It is checked when the command line is parsed, before any work: what is written
+/// can be written, and is nothing that the command reads. Files of a directory are inputs when they are opened.
 #[derive(Clone, Debug)]
-pub struct Output(PathBuf);
+pub struct Place<const WRITTEN: bool>(PathBuf);
 
-/// A file or a directory that the command reads. Files of a directory are inputs when they are opened.
-#[derive(Clone, Debug)]
-pub struct Input(PathBuf);
+/// A file that the command writes.
+pub type Output = Place<true>;
+/// A file or a directory that the command reads.
+pub type Input = Place<false>;
 
-impl Deref for Output {
+impl<const WRITTEN: bool> Deref for Place<WRITTEN> {
     type Target = Path;
 
     fn deref(&self) -> &Path {
@@ -28,29 +29,12 @@ impl Deref for Output {
     }
 }
 
-impl Deref for Input {
-    type Target = Path;
-
-    fn deref(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl ValueParserFactory for Output {
+impl<const WRITTEN: bool> ValueParserFactory for Place<WRITTEN> {
     type Parser = ValueParser;
 
     fn value_parser() -> ValueParser {
-        let parse = |path: PathBuf| files::check_writable(&path).map(|()| Self(path));
-        PathBufValueParser::new().try_map(parse).into()
-    }
-}
-
-impl ValueParserFactory for Input {
-    type Parser = ValueParser;
-
-    fn value_parser() -> ValueParser {
-        let parse = |path: PathBuf| files::register_input(&path).map(|()| Self(path));
-        PathBufValueParser::new().try_map(parse).into()
+        let check = if WRITTEN { files::check_writable } else { files::register_input };
+        PathBufValueParser::new().try_map(move |path| check(&path).map(|()| Self(path))).into()
     }
 }
 
@@ -63,7 +47,7 @@ pub fn with_extension(
             let endings = extensions.join(" or .");
             return Err(io::Error::other(format!("the file name must end in .{endings}")));
         }
-        files::check_writable(&path).map(|()| Output(path))
+        files::check_writable(&path).map(|()| Place(path))
     })
 }
 

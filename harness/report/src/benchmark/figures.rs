@@ -5,7 +5,6 @@ use super::paper::{self, cited};
 use super::{balance, matrix, scaling};
 use crate::figure::{Axis, Body, Figure, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::programs::Comparison;
 use bench::order::{by_key, distinct};
 use bench::statistics::Median;
 
@@ -18,7 +17,6 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all.extend(balance::figures(groups));
     all.extend(groups.matrices.iter().map(matrix::figure));
     all.extend(rate_and_memory(groups));
-    all.extend(groups.comparisons().iter().flat_map(programs));
     all
 }
 
@@ -32,9 +30,9 @@ fn at(group: &Group, value: Median) -> Point {
 }
 
 /// Million cells per second and core.
-fn rate(group: &Group, time_s: Median) -> Point {
+fn rate(group: &Group) -> Point {
     let (cells, ranks) = (group.cells() as f64, group.setup.ranks as f64);
-    at(group, time_s.falling(|time_s| cells / time_s / ranks / 1e6))
+    at(group, group.time_s.falling(|time_s| cells / time_s / ranks / 1e6))
 }
 
 /// A series per program, number and kind of ranks, and per case if there are several, by cells. Programs and cases stay in the order
@@ -121,8 +119,8 @@ fn rate_and_memory(groups: &Groups) -> Vec<Figure> {
             format!(
                 "Cells per second and core of {engines} {of} Rates are cells over median times."
             ),
-            RATE,
-            with(series(&all, |g| rate(g, g.time_s)), rates),
+            "million cells / (s core)",
+            with(series(&all, rate), rates),
         ),
         over_cells(
             "memory".to_owned(),
@@ -130,50 +128,8 @@ fn rate_and_memory(groups: &Groups) -> Vec<Figure> {
             format!(
                 "Peak resident memory of all ranks of {engines}, program and facets included, {of}"
             ),
-            MEMORY,
+            "bytes per cell",
             with(series(&all, |g| at(g, g.bytes_per_cell())), memory),
         ),
     ]
-}
-
-const RATE: &str = "million cells / (s core)";
-const MEMORY: &str = "bytes per cell";
-
-/// CPU time, rate and memory of several programs on the same cases, on one core, with a series per program.
-fn programs(comparison: &Comparison) -> [Figure; 3] {
-    let Comparison { case, layer_cells_min: n, programs, .. } = comparison;
-    let series = |what: &str, style: usize, value: &dyn Fn(&Group) -> Option<Point>| {
-        let of = |(i, (name, groups)): (usize, &(&str, Vec<&Group>))| {
-            let points = groups.iter().filter_map(|group| value(group)).collect();
-            Series::new(&format!("{name}{what}"), Provenance::Measured, style + i, points)
-        };
-        programs.iter().enumerate().map(of).collect::<Vec<_>>()
-    };
-    let mut times = series("", 0, &|g| Some(at(g, g.cpu_s()?)));
-    let mut search = series(": search", programs.len(), &|g| Some(at(g, g.search_s()?)));
-    search.retain(|series| !series.points.is_empty());
-    let note = match search.is_empty() {
-        true => "",
-        false => {
-            " The series \"search\" are the part of the time in which a program searches the geometry, where it reports that."
-        }
-    };
-    times.extend(search);
-    let rates = series("", 0, &|g| Some(rate(g, g.cpu_s()?)));
-    let memory = series("", 0, &|g| Some(at(g, g.bytes_per_cell())));
-    let groups: Vec<&Group> = programs.iter().flat_map(|p| p.1.clone()).collect();
-    [
-        ("time", "CPU time", "CPU time / s", note, times),
-        ("rate", "Cells per second and core", RATE, "", rates),
-        ("memory", "Peak memory per cell", MEMORY, "", memory),
-    ]
-    .map(|(id, what, y, note, series)| {
-        let caption = format!(
-            "{what} of several programs over the number of cells of {case} at n = {n}, on one core and at the same spacings. Times are CPU times of \
-             the whole process, its start and reading included.{note} {}. Lines join meshes of one program.",
-            repetitions(&groups)
-        );
-        let title = format!("{what} by program: {case}");
-        over_cells(format!("programs-{id}-{case}-{n}"), title, caption, y, series)
-    })
 }

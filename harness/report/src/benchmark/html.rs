@@ -2,10 +2,10 @@
 
 use super::groups::{Subject, is_summarised};
 use super::latex::{commands, machines};
-use super::rules::{Broken, RULES};
+use super::rules::Broken;
 use super::tables;
 use crate::figure::Figure;
-use crate::page::{figure as page_figure, page as whole_page, table, with_code};
+use crate::page::{figure as page_figure, page as whole_page, with_code};
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::number::grouped;
@@ -77,18 +77,10 @@ fn figure(drawn: &Drawn) -> Markup {
 }
 
 fn rules(broken: &[Broken]) -> Markup {
-    let mut rows = Vec::new();
-    for (number, (rule, kept)) in (1..).zip(RULES) {
-        let row = |verdict: Markup, why: &str| {
-            vec![html! { (number) ". " (rule) }, verdict, html! { (why) }]
-        };
-        let of_rule = broken.iter().filter(|b| b.0 == number);
-        rows.extend(of_rule.map(|(_, why)| row(html! { strong { "broken" } }, why)));
-        if broken.iter().all(|b| b.0 != number) {
-            rows.push(row(html! { "kept" }, kept));
-        }
+    html! {
+        @if broken.is_empty() { p { "The record breaks none of them." } }
+        ul { @for (rule, why) in broken { li { strong { "Rule " (rule) " is broken" } ": " (why) } } }
     }
-    table(Some("words"), &["rule", "verdict", "reason"], &rows)
 }
 
 fn machine(lines: &[Line]) -> Markup {

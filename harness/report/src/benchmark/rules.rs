@@ -1,57 +1,12 @@
 //! The twelve rules of Hoefler and Belli, "Scientific Benchmarking of Parallel Computing Systems" (SC15): which of them a record breaks.
 //!
-//! The figures keep those that concern figures alone: captions state the base case and which messages are counted, scaling has an
-//! ideal line, and only points of one family are joined.
+//! reports/README.md lists the rules, and how every report keeps those that no record can break.
 
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 
 /// A rule that the record breaks: its number, 1 to 12, and the reason in a sentence.
 pub type Broken = (usize, String);
-
-/// The rules in short, and how a report keeps them that does not break them.
-pub const RULES: [(&str, &str); 12] = [
-    (
-        "speedup: state the base case and its absolute performance",
-        "the captions state the base case and its absolute performance",
-    ),
-    (
-        "state the reason for using a part of a benchmark or of a system only",
-        "the record has every run that was started, on all cores; runs with more ranks than cores are marked",
-    ),
-    (
-        "summarise costs by the arithmetic and rates by the harmonic mean",
-        "costs are summarised by medians; rates are cells over a median time",
-    ),
-    ("do not average ratios", "ratios are ratios of medians; none is an average of ratios"),
-    (
-        "state whether values are deterministic; give confidence intervals if not",
-        "values repeat exactly, have intervals with 95 % coverage, or are of medians per rank or of the run of median time, whose interval \
-         is in the speedup figure",
-    ),
-    (
-        "do not assume normality without a test",
-        "intervals are order statistics of the median and assume no distribution",
-    ),
-    ("compare nondeterministic values by sound statistics", "the values compared repeat exactly"),
-    (
-        "choose mean, median or another quantile by the question",
-        "users of a batch program wait for its median run time; ranks are summarised by maximum and mean, because the slowest rank determines the time",
-    ),
-    (
-        "document all factors and the whole setup",
-        "the record has processor, memory, kernel, compiler and commit; captions state which messages are counted",
-    ),
-    (
-        "state how parallel time was measured and summarised",
-        "run time is that of the slowest rank from reading to the last leaf, without barriers between phases; useful time is CPU time outside communication",
-    ),
-    ("show upper bounds of performance", "an ideal line is drawn in figures of scaling"),
-    (
-        "plot what interpretation needs; join points only where interpolation is valid",
-        "lines join members of one family only; in a matrix zero has no colour, and larger values are darker",
-    ),
-];
 
 /// The rules that a record breaks, in the order of the rules.
 pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {

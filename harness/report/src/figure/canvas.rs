@@ -36,19 +36,6 @@ pub const DASHED: Dashes = Some((22, 15));
 /// A point on the page.
 pub type At = (f64, f64);
 
-/// Position of a text relative to its point.
-#[derive(Clone, Copy, Debug)]
-pub enum Anchor {
-    /// The text starts at the point.
-    Start,
-    /// The text is centred below the point.
-    Below,
-    /// The text ends at the point.
-    End,
-    /// The text is turned upwards and centred above the point.
-    Turned,
-}
-
 /// Why drawing cannot fail.
 const DRAWN: &str = "a string accepts every element";
 
@@ -93,7 +80,7 @@ fn pixel((x, y): At) -> (i32, i32) {
     (x.round() as i32, y.round() as i32)
 }
 
-/// The font of all text, turned upwards or not.
+/// The font of all text.
 pub fn font() -> TextStyle<'static> {
     // plotters divides the size by this factor in SVG.
     (FONT, SIZE * 1.24).into_font().color(&BLACK)
@@ -173,25 +160,24 @@ impl Canvas<'_> {
                 (x, y) = (left, y + LINE);
             }
             symbol(self, (x, y), i);
-            self.text(name, (x + SYMBOL, y), Anchor::Start);
+            self.text(name, (x + SYMBOL, y));
             x += entry;
         }
         y + 40.0
     }
 
-    /// Draws a text.
-    pub fn text(&self, text: &str, at: At, anchor: Anchor) {
-        let pos = match anchor {
-            Anchor::Start => Pos::new(HPos::Left, VPos::Center),
-            Anchor::Below => Pos::new(HPos::Center, VPos::Top),
-            Anchor::End => Pos::new(HPos::Right, VPos::Center),
-            Anchor::Turned => Pos::new(HPos::Center, VPos::Bottom),
-        };
-        let style = match anchor {
-            Anchor::Turned => font().transform(FontTransform::Rotate270),
-            _ => font(),
-        };
-        self.area.draw(&Text::new(text, pixel(at), style.pos(pos))).expect(DRAWN);
+    /// Draws a text that starts at a point.
+    pub fn text(&self, text: &str, at: At) {
+        self.write(text, at, Pos::new(HPos::Left, VPos::Center));
+    }
+
+    /// Draws a text that is centred below a point.
+    pub fn text_below(&self, text: &str, at: At) {
+        self.write(text, at, Pos::new(HPos::Center, VPos::Top));
+    }
+
+    fn write(&self, text: &str, at: At, pos: Pos) {
+        self.area.draw(&Text::new(text, pixel(at), font().pos(pos))).expect(DRAWN);
     }
 
     // Many shapes of one colour are one path, below all else. Coordinates are rounded to a tenth of a unit.

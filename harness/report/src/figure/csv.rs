@@ -1,66 +1,56 @@
 //! The values of a figure as CSV. Numbers come first and text has no commas, so that `pgfplots` can read it.
 
-use super::{Body, Figure, HeatMap};
-
-/// The number of the plot, numbers and texts.
-type Row = (usize, Vec<f64>, Vec<String>);
+use super::{Body, Figure, Point, Series};
 
 /// The values as CSV, one per line. Comments at the head, starting with `#`, name the title, the axes and the command of a run. Rows that belong
 /// together have the same number `plot`.
 pub fn csv(figure: &Figure) -> String {
     let mut head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
-    let (columns, rows): (&[&str], Vec<Row>) = match &figure.body {
+    let (columns, rows): (&[&str], Vec<Vec<String>>) = match &figure.body {
         Body::Points { series, .. } => {
-            let of = |(plot, s): (usize, &super::Series)| {
-                let text = vec![s.name.clone(), s.provenance.word().to_owned()];
-                let row = |p: &super::Point| {
-                    let coverage = (p.coverage * 1e4).round() / 1e4;
-                    (plot, vec![p.x, p.y, p.low, p.high, p.count as f64, coverage], text.clone())
-                };
-                s.points.iter().map(row).collect::<Vec<_>>()
+            let point = |plot: usize, s: &Series, p: &Point| {
+                let coverage = (p.coverage * 1e4).round() / 1e4;
+                let numbers = [p.x, p.y, p.low, p.high, p.count as f64, coverage];
+                row(plot, &numbers, &[&s.name, s.provenance.word()])
             };
+            let points = (0..).zip(series);
+            let points =
+                points.flat_map(|(plot, s)| s.points.iter().map(move |p| point(plot, s, p)));
             let columns = &["plot", "x", "y", "low", "high", "count", "coverage", "series", "how"];
-            (columns, series.iter().enumerate().flat_map(of).collect())
+            (columns, points.collect())
         }
         Body::Bars(bars) => {
-            let how = bars.provenance.word();
             let mut rows = Vec::new();
             for (plot, (part, values)) in bars.segments.iter().enumerate() {
-                let bar = |(i, name): (usize, &String)| {
-                    (
-                        plot,
-                        vec![i as f64, values[i]],
-                        vec![name.clone(), part.clone(), how.to_owned()],
-                    )
-                };
-                rows.extend(bars.categories.iter().enumerate().map(bar));
+                for (i, name) in bars.categories.iter().enumerate() {
+                    let text = [name, part, bars.provenance.word()];
+                    rows.push(row(plot, &[i as f64, values[i]], &text));
+                }
             }
             // A level is a line from the first bar to the last.
             let ends = [-0.5, bars.categories.len() as f64 - 0.5];
             for (plot, (name, level)) in (bars.segments.len()..).zip(&bars.references) {
-                let text = vec![String::new(), name.clone(), "bound".to_owned()];
-                rows.extend(ends.map(|x| (plot, vec![x, *level], text.clone())));
+                rows.extend(ends.map(|x| row(plot, &[x, *level], &["", name, "bound"])));
             }
             (&["plot", "x", "value", "bar", "part", "how"], rows)
         }
-        Body::HeatMap(HeatMap { layers, command, .. }) => {
-            head += &format!("# {command}\n");
-            let layers = layers.iter().enumerate();
+        Body::HeatMap(map) => {
+            head += &format!("# {}\n", map.command);
+            let layers = map.layers.iter().enumerate();
             let rows = layers.flat_map(|(plot, layer)| {
-                let row = move |&(row, column, value): &(usize, usize, f64)| {
-                    (plot, vec![row as f64, column as f64, value], vec![layer.label.clone()])
-                };
-                layer.entries.iter().map(row)
+                let entries = layer.entries.iter();
+                entries.map(move |e| row(plot, &[e.0 as f64, e.1 as f64, e.2], &[&layer.label]))
             });
             (&["plot", "row", "column", "value", "quantity"], rows.collect())
         }
     };
-    let row = |(plot, numbers, text): (usize, Vec<f64>, Vec<String>)| {
-        let numbers = numbers.iter().map(f64::to_string);
-        let text = text.iter().map(|text| plain(text));
-        std::iter::once(plot.to_string()).chain(numbers).chain(text).collect()
-    };
-    head + &table(columns, rows.into_iter().map(row))
+    head + &table(columns, rows)
+}
+
+fn row(plot: usize, numbers: &[f64], text: &[&str]) -> Vec<String> {
+    let numbers = numbers.iter().map(f64::to_string);
+    let text = text.iter().map(|text| plain(text));
+    std::iter::once(plot.to_string()).chain(numbers).chain(text).collect()
 }
 
 /// A name without what ends a field or means something to TeX.

@@ -21,45 +21,40 @@ pub fn svg(figure: &Figure) -> String {
     })
 }
 
-/// The symbol beside a name in the legend.
-enum Symbol<'a> {
-    Series(&'a Series),
-    Mark(usize),
-    Bar(usize),
-    /// Index of a reference line.
-    Reference(usize),
-}
+/// A name in the legend, and what draws the symbol beside it at its left end.
+type Entry<'a> = (&'a str, Box<dyn Fn(&Canvas, At) + 'a>);
 
+/// Length of a line in the legend.
+const LENGTH: f64 = SYMBOL - 18.0;
 /// Space at the right of the data.
 const RIGHT: f64 = 40.0;
+
 /// Draws the legend, and returns its lower end.
-fn legend(canvas: &mut Canvas, left: f64, entries: &[(&str, Symbol)]) -> f64 {
+fn legend(canvas: &mut Canvas, left: f64, entries: &[Entry]) -> f64 {
     let names: Vec<&str> = entries.iter().map(|entry| entry.0).collect();
-    canvas.legend([left; 2], &names, |canvas, at, i| draw_symbol(canvas, at, &entries[i].1))
+    canvas.legend([left; 2], &names, |canvas, at, i| entries[i].1(canvas, at))
 }
 
-fn draw_symbol(canvas: &Canvas, (x, y): At, symbol: &Symbol) {
-    let (ends, middle) = ([(x, y), (x + SYMBOL - 18.0, y)], (x + (SYMBOL - 18.0) / 2.0, y));
-    match symbol {
-        Symbol::Reference(index) => canvas.line(&ends, BLACK, 3, reference_dashes(*index)),
-        Symbol::Series(s) if s.provenance == Provenance::Bound => {
-            canvas.line(&ends, BLACK, 3, DOTTED)
+fn of_series(s: &Series) -> Entry<'_> {
+    let symbol = |canvas: &Canvas, (x, y): At| {
+        let (ends, solid) = ([(x, y), (x + LENGTH, y)], s.provenance.is_solid());
+        if s.provenance == Provenance::Bound {
+            return canvas.line(&ends, BLACK, 3, DOTTED);
         }
-        Symbol::Series(s) => {
-            let solid = s.provenance.is_solid();
-            if s.joined {
-                canvas.line(&ends, colour(s.style), 4, if solid { None } else { DASHED });
-            }
-            canvas.marker(middle, s.style, solid);
+        if s.joined {
+            canvas.line(&ends, colour(s.style), 4, if solid { None } else { DASHED });
         }
-        Symbol::Mark(style) => {
-            let ends = [(middle.0, y - 18.0), (middle.0, y + 18.0)];
-            canvas.line(&ends, colour(*style), 4, None);
-        }
-        Symbol::Bar(style) => {
-            canvas.bar((x + 12.0, y - 16.0), (x + SYMBOL - 22.0, y + 16.0), *style)
-        }
-    }
+        canvas.marker((x + LENGTH / 2.0, y), s.style, solid);
+    };
+    (&s.name, Box::new(symbol))
+}
+
+fn of_mark(mark: &Mark) -> Entry<'_> {
+    let symbol = |canvas: &Canvas, (x, y): At| {
+        let ends = [y - 18.0, y + 18.0].map(|y| (x + LENGTH / 2.0, y));
+        canvas.line(&ends, colour(mark.style), 4, None);
+    };
+    (&mark.name, Box::new(symbol))
 }
 
 /// Dashes of a reference line, which differ from those of the next.
@@ -68,11 +63,10 @@ fn reference_dashes(index: usize) -> Dashes {
 }
 
 fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark]) {
-    let mut entries: Vec<(&str, Symbol)> =
-        series.iter().map(|s| (s.name.as_str(), Symbol::Series(s))).collect();
+    let mut entries: Vec<Entry> = series.iter().map(of_series).collect();
     for mark in marks {
         if !entries.iter().any(|(name, _)| *name == mark.name) {
-            entries.push((&mark.name, Symbol::Mark(mark.style)));
+            entries.push(of_mark(mark));
         }
     }
     let all = || series.iter().flat_map(|s| s.points.iter());
@@ -119,12 +113,19 @@ fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
 }
 
 fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
-    let segments = bars.segments.iter().enumerate();
-    let references = bars.references.iter().enumerate();
-    let entries: Vec<(&str, Symbol)> = segments
-        .map(|(style, s)| (s.0.as_str(), Symbol::Bar(style)))
-        .chain(references.map(|(i, r)| (r.0.as_str(), Symbol::Reference(i))))
-        .collect();
+    let mut entries: Vec<Entry> = Vec::new();
+    for (style, (name, _)) in bars.segments.iter().enumerate() {
+        let bar = move |canvas: &Canvas, (x, y): At| {
+            canvas.bar((x + 12.0, y - 16.0), (x + SYMBOL - 22.0, y + 16.0), style)
+        };
+        entries.push((name, Box::new(bar)));
+    }
+    for (i, (name, _)) in bars.references.iter().enumerate() {
+        let line = move |canvas: &Canvas, (x, y): At| {
+            canvas.line(&[(x, y), (x + LENGTH, y)], BLACK, 3, reference_dashes(i))
+        };
+        entries.push((name, Box::new(line)));
+    }
     let total = |i: usize| bars.segments.iter().map(|s| s.1[i]).sum::<f64>();
     let (count, right) = (bars.categories.len(), f64::from(WIDTH) - RIGHT);
     let y = range(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
@@ -148,7 +149,7 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
         }
         let (x, _) = to_page(i as f64 + 0.5, 0.0);
         for (line, name) in names.iter().enumerate() {
-            canvas.text(name, (x, bottom + 22.0 + LINE * line as f64), Anchor::Below);
+            canvas.text_below(name, (x, bottom + 22.0 + LINE * line as f64));
         }
     }
     for (i, (_, level)) in bars.references.iter().enumerate() {
@@ -156,7 +157,7 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
         canvas.line(&ends, BLACK, 3, reference_dashes(i));
     }
     let below = (left.midpoint(right), bottom + 82.0 + lines * LINE);
-    canvas.text(&figure.x.label, below, Anchor::Below);
+    canvas.text_below(&figure.x.label, below);
 }
 
 /// The lines of the label below every bar. Labels too long for their bars are broken at spaces; where that does not

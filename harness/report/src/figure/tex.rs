@@ -1,8 +1,9 @@
-//! A figure for LaTeX, set in the fonts of the document: a `pgfplots` axis that reads the CSV file beside it.
+//! A figure for LaTeX, set in the fonts of the document: a `pgfplots` axis that reads the CSV file beside it. TeX reads the thousands of entries
+//! of a matrix too slowly: its figure is the PDF file.
 
-use super::palette::{COLOURS, MARKERS, SHADES, shade};
+use super::palette::{COLOURS, MARKERS};
 use super::scale::{SUPERSCRIPTS, range, tick_label, ticks};
-use super::{Axis, Bars, Body, Figure, HeatMap, Mark, Provenance, Series, heat};
+use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series};
 use std::fmt::Write;
 
 /// What a document needs before it can include figures.
@@ -18,8 +19,14 @@ const MARKS: [(&str, &str); MARKERS] = [
     ("pentagon*", "pentagon"),
 ];
 
-/// The figure as a `tikzpicture`. `\figures` is the directory of its CSV file.
+/// The figure as a `tikzpicture`, or as its PDF. `\figures` is the directory of its other files.
 pub fn tex(figure: &Figure) -> String {
+    if let Body::HeatMap(_) = figure.body {
+        let id = &figure.id;
+        return format!(
+            "\\providecommand{{\\figures}}{{figures}}\n\\includegraphics[width=\\linewidth]{{\\figures/{id}.pdf}}\n"
+        );
+    }
     let mut out = format!(
         "% Requires {PREAMBLE}\n\\providecommand{{\\figures}}{{figures}}\n\\begin{{tikzpicture}}\n"
     );
@@ -30,7 +37,7 @@ pub fn tex(figure: &Figure) -> String {
     match &figure.body {
         Body::Points { series, marks } => points(&mut out, figure, series, marks),
         Body::Bars(b) => bars(&mut out, figure, b),
-        Body::HeatMap(map) => heat_maps(&mut out, figure, map),
+        Body::HeatMap(_) => {}
     }
     out.push_str("\\end{tikzpicture}\n");
     out
@@ -144,45 +151,6 @@ fn bars(out: &mut String, figure: &Figure, b: &Bars) {
     out.push_str("\\end{axis}\n");
 }
 
-/// An axis per layer, each with its colour scale below it.
-fn heat_maps(out: &mut String, figure: &Figure, map: &HeatMap) {
-    let shades = (0..SHADES).map(|i| {
-        let [r, g, b] = shade(i);
-        format!("rgb255=({r},{g},{b})")
-    });
-    let _ = writeln!(
-        out,
-        "\\pgfplotsset{{colormap={{shades}}{{{}}}}}",
-        shades.collect::<Vec<_>>().join(" ")
-    );
-    for (plot, layer) in map.layers.iter().enumerate() {
-        let (low, high) = heat::range(layer);
-        let (low, high) = (low.log10().round() as i32, high.log10().round() as i32);
-        let powers: Vec<String> = (low..=high)
-            .step_by(((high - low) as usize).div_ceil(4).max(1))
-            .map(|p| p.to_string())
-            .collect();
-        let (edge, order) = (0.36, map.order as f64);
-        let _ = writeln!(
-            out,
-            "\\begin{{axis}}[\n  at={{({}\\linewidth,0)}}, scale only axis, width={edge}\\linewidth, height={edge}\\linewidth,\n  \
-             xmin=-0.5, xmax={last}, ymin=-0.5, ymax={last}, y dir=reverse, tick align=outside,\n  xlabel={{{}}}, ylabel={{{}}},\n  \
-             colorbar horizontal, colormap name=shades, point meta min={low}, point meta max={high},\n  \
-             colorbar style={{xlabel={{{}}}, xtick={{{}}}, xticklabel={{$10^{{\\pgfmathprintnumber{{\\tick}}}}$}}, at={{(0,-0.5)}}, anchor=north west}}\n]\n\
-             \\addplot[scatter, only marks, mark=square*, mark size={half}\\linewidth, point meta={{log10(\\thisrow{{value}})}}, scatter/use mapped color={{draw=mapped color,fill=mapped color,line width=0pt}}] {rows};\n\
-             \\end{{axis}}",
-            plot as f64 / map.layers.len() as f64,
-            escape(&figure.x.label),
-            if plot == 0 { escape(&figure.y.label) } else { String::new() },
-            escape(&layer.label),
-            powers.join(","),
-            last = order - 0.5,
-            half = edge / order / 2.0,
-            rows = table(figure, plot, "x=column, y=row")
-        );
-    }
-}
-
 /// The text with what is special to LaTeX escaped.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -236,11 +204,9 @@ mod tests {
     }
 
     #[test]
-    fn matrices_are_marks_of_their_size_in_an_axis_each() {
+    fn a_matrix_is_its_pdf() {
         let text = tex(&heat_map());
-        assert!(text.contains("mark size=0.06\\linewidth"), "{text}");
-        assert!(text.contains("xtick={1,3,5}"), "{text}");
-        assert!(text.lines().count() < 30);
+        assert!(text.contains("{\\figures/messages.pdf}") && !text.contains("axis"), "{text}");
         assert_closed(&text);
     }
 

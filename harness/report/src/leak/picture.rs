@@ -1,7 +1,7 @@
 //! A slice through the narrowest place of a leak as SVG: the plane that contains the direction of the path and a point
 //! of the rim. It shows the leaves, the section of the facets, the largest ball that passes and the path.
 
-use crate::figure::canvas::{Anchor, Canvas, LINE, WIDTH, document};
+use crate::figure::canvas::{Canvas, LINE, WIDTH, document};
 use crate::figure::palette::colour;
 use crate::section::{Planar, Window};
 use contract::case::Case;
@@ -131,7 +131,7 @@ fn describe(canvas: &Canvas, window: &Window, passage: &Passage) {
         format!("cell {cell}, centre ({centre})"),
         format!("to the right {along}, upwards {across}"),
     ]) {
-        canvas.text(&text, (left, bottom + f64::from(line) * LINE), Anchor::Start);
+        canvas.text(&text, (left, bottom + f64::from(line) * LINE));
     }
 }
 

@@ -1,10 +1,11 @@
 //! The layout of a picture: the squares, the section line, axes and a legend.
 
 use super::Picture;
+use super::colour::Entry;
 use super::squares::Square;
 use crate::figure::Axis;
 use crate::figure::axes;
-use crate::figure::canvas::{Anchor, Canvas, INK, SYMBOL, WIDTH, document, width};
+use crate::figure::canvas::{Canvas, INK, SYMBOL, WIDTH, document, width};
 use crate::figure::palette::hex;
 use crate::section::Planar;
 use std::collections::BTreeSet;
@@ -68,13 +69,19 @@ fn draw(picture: &Picture, canvas: &mut Canvas) -> u32 {
     let [low, high] = picture.window;
     let ((left, bottom), (right, top)) = (page.at(low), page.at(high));
     canvas.fill(&[[left, top, right - left, bottom - top]], "#FFFFFF");
-    for Layer { fill, outline, squares } in layers(picture) {
-        let rectangles: Vec<[f64; 4]> =
-            squares.into_iter().filter_map(|square| page.rectangle(square)).collect();
-        match outline {
-            _ if rectangles.is_empty() => {}
-            Some(outline) => canvas.outlined(&rectangles, &hex(fill), &hex(outline)),
-            None => canvas.fill(&rectangles, &hex(fill)),
+    // Outlined squares are last, so that no fill covers half of an outline.
+    for outlined in [false, true] {
+        for Entry { value, fill, .. } in &picture.key {
+            let shown = |s: &&Square| {
+                s.value == *value && (s.level <= picture.squares.level_outlined) == outlined
+            };
+            let squares = picture.squares.squares.iter().filter(shown);
+            let rectangles: Vec<_> = squares.filter_map(|square| page.rectangle(square)).collect();
+            match outlined {
+                _ if rectangles.is_empty() => {}
+                true => canvas.outlined(&rectangles, &hex(*fill), &hex(outline(*fill))),
+                false => canvas.fill(&rectangles, &hex(*fill)),
+            }
         }
     }
     section(&page, canvas);
@@ -89,7 +96,7 @@ fn draw(picture: &Picture, canvas: &mut Canvas) -> u32 {
 fn legend(picture: &Picture, canvas: &mut Canvas) -> f64 {
     let (entries, title) = picture.colour.legend(&picture.key);
     let left = left(&picture.window);
-    canvas.text(&title, (left, 36.0), Anchor::Start);
+    canvas.text(&title, (left, 36.0));
     let line = picture.section.as_ref().map(|_| "geometry");
     let names: Vec<&str> = entries.iter().map(|entry| entry.0).chain(line).collect();
     let start = left + width(&title) + 50.0;
@@ -103,35 +110,9 @@ fn legend(picture: &Picture, canvas: &mut Canvas) -> f64 {
 }
 
 /// The colour of outlines around a fill: the same hue, so that small cells look like those of the legend.
-pub fn outline(fill: [u8; 3]) -> [u8; 3] {
+fn outline(fill: [u8; 3]) -> [u8; 3] {
     let is_light = fill.iter().map(|&c| u32::from(c)).sum::<u32>() > 360;
     fill.map(|c| if is_light { c / 2 } else { c / 2 + 105 })
-}
-
-/// Squares of one colour, with outlines or without.
-pub struct Layer<'a> {
-    pub fill: [u8; 3],
-    pub outline: Option<[u8; 3]>,
-    pub squares: Vec<&'a Square>,
-}
-
-/// The squares by colour. Outlined ones are last, so that no fill covers half of an outline.
-pub fn layers(picture: &Picture) -> impl Iterator<Item = Layer<'_>> {
-    let Picture { squares, key, .. } = picture;
-    let both = [false, true].into_iter();
-    both.flat_map(|outlined| key.iter().map(move |entry| (outlined, entry))).map(
-        |(outlined, entry)| {
-            let shown = |s: &&Square| {
-                s.value == entry.value && (s.level <= squares.level_outlined) == outlined
-            };
-            let outline = outlined.then(|| outline(entry.fill));
-            Layer {
-                fill: entry.fill,
-                outline,
-                squares: squares.squares.iter().filter(shown).collect(),
-            }
-        },
-    )
 }
 
 fn section(page: &Page, canvas: &mut Canvas) {
@@ -157,5 +138,5 @@ fn below(page: &Page, canvas: &mut Canvas) {
     let picture = page.picture;
     let plane = super::plane_name(&picture.root, picture.slice);
     let at = (page.left, page.at(picture.window[0]).1 + 170.0);
-    canvas.text(&format!("{plane}; {}", picture.count()), at, Anchor::Start);
+    canvas.text(&format!("{plane}; {}", picture.count()), at);
 }

@@ -1,7 +1,6 @@
 //! The formats of pictures, by the name of the file.
 
-use super::squares::Detail;
-use super::{Picture, TEX, VECTOR, csv, svg, tikz};
+use super::{Picture, csv, svg};
 use clap::ValueEnum;
 use contract::files::{Content, named, write_atomically, write_together};
 use run::engine::interrupt;
@@ -17,9 +16,6 @@ pub enum Format {
     Png,
     /// A slice as PDF.
     Pdf,
-    /// A slice as PGF/TikZ.
-    #[value(name = "tex", alias = "tikz")]
-    Tikz,
     /// A view as HTML.
     Html,
 }
@@ -31,15 +27,10 @@ impl Format {
     /// One sentence, if it states none.
     pub fn of(path: &Path) -> Result<Self, String> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let endings = ".svg, .png, .pdf, .tex, .tikz or .html";
+        let endings = ".svg, .png, .pdf or .html";
         let file = path.display();
         Self::from_str(extension, true)
             .map_err(|_| format!("{file}: the file name of a picture must end in {endings}"))
-    }
-
-    /// How many squares the format can show.
-    pub fn detail(self) -> Detail {
-        if self == Self::Tikz { TEX } else { VECTOR }
     }
 
     /// The slice in this format.
@@ -49,7 +40,6 @@ impl Format {
     pub fn draw(self, picture: &Picture) -> Result<Vec<u8>, String> {
         match self {
             Self::Svg => Ok(svg(picture).into_bytes()),
-            Self::Tikz => Ok(tikz(picture).into_bytes()),
             #[cfg(feature = "figures")]
             Self::Png => crate::figure::raster::png(&svg(picture)),
             #[cfg(feature = "figures")]

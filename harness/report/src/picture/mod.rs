@@ -1,7 +1,7 @@
-//! Pictures of meshes: slices as SVG, PNG, PDF and PGF/TikZ, and views in three dimensions as HTML and PNG.
+//! Pictures of meshes: slices as SVG, PNG and PDF, and views in three dimensions as HTML and PNG.
 //!
 //! [`Picture`] is the data of a slice: the squares in which a plane cuts leaves, the segments in which it cuts facets, and the
-//! window. Reading takes time in proportion to the slice, and no picture has more squares than its format can show.
+//! window. Reading takes time in proportion to the slice, and no picture has more squares than can be shown.
 
 pub mod colour;
 mod csv;
@@ -13,7 +13,6 @@ pub mod squares;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod tikz;
 
 use crate::section::{Planar, Window};
 use colour::{Colour, Entry, short};
@@ -29,7 +28,6 @@ use squares::{Detail, Squares, plane_axes};
 
 pub use csv::csv;
 pub use draw::svg;
-pub use tikz::tikz;
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -100,11 +98,9 @@ pub struct Picture {
     pub command: String,
 }
 
-/// Squares of a vector graphic: about two megabytes.
-pub const VECTOR: Detail =
+/// Squares of a slice: about two megabytes of SVG.
+pub const DETAIL: Detail =
     Detail { squares_max: 60_000, outlined_max: 30_000, level_max: LEVEL_MAX };
-/// Squares of a TikZ picture, which TeX sets in a few seconds.
-pub const TEX: Detail = Detail { squares_max: 10_000, outlined_max: 6_000, level_max: LEVEL_MAX };
 
 /// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, through the
 /// root's centre and normal to z.

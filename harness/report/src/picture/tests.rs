@@ -59,7 +59,7 @@ fn cube() -> Vec<Facet> {
 fn squares_are_where_the_leaves_are() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let shown = Request { selection: at(2, 1.0), ..request(Colour::Level) };
-    let svg = svg(&Picture::collect(&mesh, &shown, &VECTOR).unwrap());
+    let svg = svg(&Picture::collect(&mesh, &shown, &DETAIL).unwrap());
     // The window is 1360 wide, from 200 to 1560, so a unit of the user is 170; the legend ends at 72.
     for path in [
         "M200 752h340v340h-340z",
@@ -74,7 +74,7 @@ fn squares_are_where_the_leaves_are() {
     assert!(svg.contains(">level<") && !svg.contains("geometry"), "{svg}");
     // Above the small leaves.
     let shown = Request { selection: at(2, 4.0), ..shown };
-    let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     assert_eq!((picture.squares.leaves, picture.key.len()), (4, 1));
 }
 
@@ -85,7 +85,7 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     let section = |axis: usize, coordinate: f64| {
         let selection = at(axis, coordinate);
         let shown = Request { selection, body: Some(&cube), ..request(Colour::Level) };
-        Picture::collect(&mesh, &shown, &VECTOR).unwrap().section.unwrap()
+        Picture::collect(&mesh, &shown, &DETAIL).unwrap().section.unwrap()
     };
     for (axis, coordinate) in [(0, 4.0), (1, 3.3), (2, 4.0), (2, 2.0)] {
         let segments = section(axis, coordinate);
@@ -99,7 +99,7 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     assert!(section(2, 6.0).is_empty());
     // Without a slice, the plane halves the cube.
     let shown = Request { body: Some(&cube), ..request(Colour::Side) };
-    let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     assert_eq!((picture.slice.axis, picture.slice.at), (2, UNITS_PER_EDGE / 2));
     assert!(svg(&picture).contains(">geometry<"));
 }
@@ -114,7 +114,7 @@ proptest! {
         let slice = selection.slice.unwrap();
         let cut: Vec<Octant> = leaves.iter().map(|&w| word::octant(w)).filter(|o| slice.cuts(o)).collect();
         let shown = Request { selection, ..request(Colour::Level) };
-        let picture = match Picture::collect(&mesh, &shown, &VECTOR) {
+        let picture = match Picture::collect(&mesh, &shown, &DETAIL) {
             Ok(picture) => picture,
             Err(error) => {
                 prop_assert!(cut.is_empty(), "{}", error);
@@ -148,13 +148,13 @@ fn small_leaves_are_merged_and_the_greatest_value_counts() {
     words.sort_unstable();
     let (_place, mesh) = on_disk(vec![words]);
     let shown = Request { selection: at(2, 0.0), ..request(Colour::Side) };
-    let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     let [square] = picture.squares.squares[..] else { panic!("{picture:?}") };
     assert_eq!((square.level, square.value, square.leaves), (10, Side::Crossing as u32, 3));
     assert!(svg(&picture).contains("3 cells in the plane, the smallest merged"));
     // The base mesh shows its own levels.
     let shown = Request { level_max: 6, colour: Colour::Level, ..shown };
-    let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     assert_eq!((picture.squares.squares.len(), picture.key[0].value), (1, 6));
     assert!(svg(&picture).contains("; 1 cell in the plane<"));
 }
@@ -165,7 +165,7 @@ fn a_clip_box_is_the_window() {
     let clip = [[0.0, 0.0, 7.0], [4.0, 2.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
     let selection = Selection { clip: Some(clip), ..at(2, 1.0) };
     let shown = Request { selection, ..request(Colour::Spacing) };
-    let picture = Picture::collect(&mesh, &shown, &VECTOR).unwrap();
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     assert_eq!(picture.window, [[0.0, 0.0], [4.0, 2.0]]);
     assert_eq!((picture.squares.leaves, picture.key[0].name.as_str()), (2, "2"));
 }
@@ -174,7 +174,7 @@ fn a_clip_box_is_the_window() {
 fn a_picture_without_cells_and_unknown_sides_are_errors() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
     let sentence = |mesh: &Mesh, shown: &Request| {
-        Picture::collect(mesh, shown, &VECTOR).unwrap_err().to_string()
+        Picture::collect(mesh, shown, &DETAIL).unwrap_err().to_string()
     };
     let selection = Selection { level_max: Some(0), ..Selection::default() };
     let empty = Request { selection, ..request(Colour::Level) };
@@ -186,16 +186,11 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 }
 
 #[test]
-fn tikz_has_every_square_and_csv_every_shape() {
+fn csv_has_every_shape() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let cube = cube();
     let shown = Request { selection: at(2, 3.0), body: Some(&cube), ..request(Colour::Level) };
-    let picture = Picture::collect(&mesh, &shown, &TEX).unwrap();
-    let tex = tikz(&picture);
-    assert_eq!(tex.matches(" rectangle ").count(), 7, "{tex}");
-    assert_eq!(tex.matches("area legend").count(), 2, "{tex}");
-    assert_eq!(tex.matches('{').count(), tex.matches('}').count());
-    assert!(tex.contains("(0,340) rectangle (340,680)"), "{tex}");
+    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
     let csv = csv(&picture);
     assert!(csv.starts_with(
         "# Slice z = 3 of a mesh, 7 cells by level\n# harness picture mesh --out a.svg\n"
@@ -208,8 +203,8 @@ fn tikz_has_every_square_and_csv_every_shape() {
 #[test]
 fn a_picture_and_its_data_are_written_beside_each_other() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
-    let picture = Picture::collect(&mesh, &request(Colour::Level), &VECTOR).unwrap();
-    let path = place.path().join("a.tikz");
+    let picture = Picture::collect(&mesh, &request(Colour::Level), &DETAIL).unwrap();
+    let path = place.path().join("a.svg");
     write(&picture, Format::of(&path).unwrap(), &path).unwrap();
     assert!(path.is_file() && place.path().join("a.csv").is_file());
     let error = write(&picture, Format::Svg, &place.path().join("no/a.svg")).unwrap_err();
@@ -265,11 +260,11 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
     let (_dir, mesh) = on_disk(vec![eight_and_seven()]);
     let facet = [[1.0f32, 1.0, -1.0], [7.0, 1.0, 9.0], [1.0, 7.0, 9.0]];
     let request = Request { body: Some(&[facet]), selection: at(2, 1.0), ..request(Colour::Level) };
-    let mut picture = Picture::collect(&mesh, &request, &VECTOR).unwrap();
+    let mut picture = Picture::collect(&mesh, &request, &DETAIL).unwrap();
     change(&mut picture);
     let check = std::panic::AssertUnwindSafe(|| {
         picture.check_invariants();
-        picture.squares.check_invariants(&VECTOR);
+        picture.squares.check_invariants(&DETAIL);
     });
     let caught = std::panic::catch_unwind(check).unwrap_err();
     let message = caught.downcast_ref::<String>().cloned();

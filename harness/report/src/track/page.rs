@@ -88,7 +88,7 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     };
     let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];
     let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
-    html! { h2 { "Change points" } (table(None, &columns, &rows)) }
+    html! { h2 { "Change points" } (table(&columns, &rows)) }
 }
 
 #[cfg(test)]

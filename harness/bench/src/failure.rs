@@ -1,7 +1,5 @@
-//! Why a command has no result: the exit code and the one sentence that `main` prints.
+//! Why a command has no result: the exit code and the one sentence that `harness` prints.
 
-use bench::gate::GateError;
-use bench::shrink::probe::Unknown;
 use contract::case::CaseError;
 use contract::leafset::ReadError;
 use export::error::ExportError;
@@ -35,6 +33,11 @@ impl Failure {
     /// The user interrupted the command.
     pub fn interrupted() -> Self {
         Self { code: EXIT_INTERRUPTED, why: "interrupted".to_owned() }
+    }
+
+    /// Whether the user interrupted the command.
+    pub fn is_interrupt(&self) -> bool {
+        self.code == EXIT_INTERRUPTED
     }
 }
 
@@ -94,24 +97,6 @@ impl From<VerifyError> for Failure {
         match error {
             VerifyError::Input(why) => Self::input(why),
             VerifyError::Missing(why) => Self::missing(why),
-        }
-    }
-}
-
-impl From<GateError> for Failure {
-    fn from(error: GateError) -> Self {
-        match error {
-            GateError::Input(why) => Self::input(why),
-            GateError::Missing(why) => Self::missing(why),
-        }
-    }
-}
-
-impl From<Unknown> for Failure {
-    fn from(error: Unknown) -> Self {
-        match error {
-            Unknown::LeftOut(_) => Self::missing(error),
-            Unknown::Error(_) => Self::input(error),
         }
     }
 }
