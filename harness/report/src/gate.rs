@@ -1,8 +1,10 @@
 //! The report of a gate as text, Markdown, JUnit XML and JSON.
 
-use crate::junit::{Ended, suite, test, to_text};
+use crate::junit::{skipped, suite, test, to_text, unsuccessful};
 use crate::markdown::escaped;
 use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
+use quick_junit::NonSuccessKind::{Error, Failure};
+use quick_junit::TestCaseStatus;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -36,17 +38,14 @@ pub fn junit(report: &GateReport) -> String {
     xml.set_time(Duration::from_secs_f64(report.time_s));
     for layer in &report.layers {
         let left_out = layer.left_out.iter();
-        let left_out =
-            left_out.map(|why| test("layer", Ended::Skipped(format!("left out: {why}")), ""));
+        let left_out = left_out.map(|why| test("layer", skipped(format!("left out: {why}")), ""));
         let of_finding = |finding: &GateFinding| {
             let GateFinding { case, metric, verdict, note, .. } = finding;
             let ended = match verdict {
-                Verdict::Regression => Ended::Failed(line(finding)),
-                Verdict::Missing => Ended::Error(format!("not compared: {note}")),
-                Verdict::Inconclusive | Verdict::LeftOut => {
-                    Ended::Skipped(format!("{verdict}: {note}"))
-                }
-                _ => Ended::Passed,
+                Verdict::Regression => unsuccessful(Failure, &line(finding)),
+                Verdict::Missing => unsuccessful(Error, &format!("not compared: {note}")),
+                Verdict::Inconclusive | Verdict::LeftOut => skipped(format!("{verdict}: {note}")),
+                _ => TestCaseStatus::success(),
             };
             test(format!("{case}: {metric}"), ended, &line(finding))
         };

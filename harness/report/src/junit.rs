@@ -3,30 +3,8 @@
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::time::Duration;
 
-/// How a test ended, with the reason.
-pub enum Ended {
-    /// It holds.
-    Passed,
-    /// It was not run.
-    Skipped(String),
-    /// It does not hold.
-    Failed(String),
-    /// It could not be run.
-    Error(String),
-}
-
-/// A test. The first line of the reason is its message, and `output` is shown with it unless it is empty.
-pub fn test(name: impl Into<String>, ended: Ended, output: &str) -> TestCase {
-    let status = match ended {
-        Ended::Passed => TestCaseStatus::success(),
-        Ended::Skipped(why) => {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(why);
-            status
-        }
-        Ended::Failed(why) => unsuccessful(NonSuccessKind::Failure, &why),
-        Ended::Error(why) => unsuccessful(NonSuccessKind::Error, &why),
-    };
+/// A test, with a text that is shown with it unless it is empty.
+pub fn test(name: impl Into<String>, status: TestCaseStatus, output: &str) -> TestCase {
     let mut test = TestCase::new(name.into(), status);
     if !output.is_empty() {
         test.set_system_out(output);
@@ -34,7 +12,15 @@ pub fn test(name: impl Into<String>, ended: Ended, output: &str) -> TestCase {
     test
 }
 
-fn unsuccessful(kind: NonSuccessKind, why: &str) -> TestCaseStatus {
+/// What was not run, with the reason.
+pub fn skipped(why: String) -> TestCaseStatus {
+    let mut status = TestCaseStatus::skipped();
+    status.set_message(why);
+    status
+}
+
+/// What does not hold, or could not be run. The first line of the reason is the message.
+pub fn unsuccessful(kind: NonSuccessKind, why: &str) -> TestCaseStatus {
     let mut status = TestCaseStatus::non_success(kind);
     status.set_message(why.lines().next().unwrap_or_default()).set_description(why);
     status

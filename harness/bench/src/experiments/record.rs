@@ -40,29 +40,23 @@ impl Record {
     }
 }
 
-/// The content of a record.
-#[derive(Clone, Debug, Default)]
-pub struct Content {
-    /// The lines in chronological order.
-    pub lines: Vec<Line>,
-    /// Numbers (from 1) of invalid lines, with the reason.
-    pub broken: Vec<(usize, String)>,
-}
+/// The lines of a record in chronological order, and the numbers (from 1) of invalid ones, with the reason.
+pub type Content = (Vec<Line>, Vec<(usize, String)>);
 
 /// Reads a record.
 ///
 /// # Errors
 /// If the file cannot be read.
 pub fn read(path: &Path) -> io::Result<Content> {
-    let mut content = Content::default();
+    let (mut lines, mut broken) = Content::default();
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
-            Ok(line) if line.schema == SCHEMA => content.lines.push(line),
-            Ok(line) => content.broken.push((number, format!("its schema is {}", line.schema))),
-            Err(why) => content.broken.push((number, why)),
+            Ok(line) if line.schema == SCHEMA => lines.push(line),
+            Ok(line) => broken.push((number, format!("its schema is {}", line.schema))),
+            Err(why) => broken.push((number, why)),
         }
     }
-    Ok(content)
+    Ok((lines, broken))
 }
 
 /// Returns the current time, as `2026-01-31T12:00:00Z`.
@@ -94,10 +88,10 @@ mod tests {
                 });
             }
         });
-        let content = read(&path).unwrap();
-        assert!(content.broken.is_empty(), "{:?}", content.broken);
+        let (lines, broken) = read(&path).unwrap();
+        assert!(broken.is_empty(), "{broken:?}");
         let mut seen: Vec<u64> = Vec::new();
-        for line in content.lines {
+        for line in lines {
             let Entry::Network(n) = line.entry else { panic!() };
             seen.push(n.latency_s as u64);
         }
@@ -113,12 +107,11 @@ mod tests {
         let mut text = std::fs::read_to_string(&path).unwrap();
         text.push_str(&text.clone()[..20]);
         std::fs::write(&path, &text).unwrap();
-        let content = read(&path).unwrap();
-        assert_eq!((content.lines.len(), content.broken.len()), (1, 1));
-        assert_eq!(content.broken[0].0, 2);
+        let (lines, broken) = read(&path).unwrap();
+        assert_eq!((lines.len(), broken.len(), broken[0].0), (1, 1, 2));
         Record::new(&path).append(network(2.0)).unwrap();
-        let content = read(&path).unwrap();
-        assert_eq!((content.lines.len(), content.broken.len()), (2, 0));
+        let (lines, broken) = read(&path).unwrap();
+        assert_eq!((lines.len(), broken.len()), (2, 0));
     }
 
     #[test]
@@ -128,7 +121,7 @@ mod tests {
         Record::new(&path).append(network(1.0)).unwrap();
         let text = std::fs::read_to_string(&path).unwrap().replace("bench/1", "bench/9");
         std::fs::write(&path, text).unwrap();
-        assert!(read(&path).unwrap().broken[0].1.contains("octree-bench/9"));
+        assert!(read(&path).unwrap().1[0].1.contains("octree-bench/9"));
     }
 
     #[test]

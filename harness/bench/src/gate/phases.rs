@@ -19,36 +19,28 @@ pub(super) const OUTSIDE: &str = "outside the phases";
 
 /// A time that the gate compares, over all rounds of a case on some ranks.
 #[derive(Debug)]
-pub(super) struct Quantity<'a> {
-    pub case: &'a str,
-    /// The beginning of the names of quantities on these ranks.
-    pub prefix: String,
-    /// [`CPU`], [`WALL`], [`OUTSIDE`], or the name of a phase.
-    pub name: String,
+pub(super) struct Quantity {
+    pub case: String,
+    /// Its name in the report.
+    pub metric: String,
     /// Logarithms of its times.
     pub rounds: Vec<Round>,
     /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
     pub found: Comparison,
 }
 
-impl Quantity<'_> {
+impl Quantity {
     /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
     /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
     fn times(&self) -> [f64; 2] {
-        let baseline: Vec<f64> = self.rounds.iter().map(|r| (r.a + r.a_again) / 2.0).collect();
+        let baseline: Vec<f64> = self.rounds.iter().map(|r| (r[0] + r[1]) / 2.0).collect();
         let baseline = trimmed_mean(&baseline).exp();
         [baseline, baseline * (1.0 + self.found.effect)]
     }
 
     /// The finding about this time.
     pub fn finding(&self, verdict: Verdict, note: String) -> GateFinding {
-        let metric = match self.name.as_str() {
-            CPU | WALL => self.name.clone(),
-            OUTSIDE => format!("CPU time {OUTSIDE}"),
-            phase => format!("CPU time in {phase}"),
-        };
-        let metric = format!("{}{metric}", self.prefix);
-        GateFinding::of_values(self.case, &metric, verdict, self.times(), note)
+        GateFinding::of_values(&self.case, &self.metric, verdict, self.times(), note)
     }
 
     /// The certainty of the effect, as text.
@@ -102,13 +94,13 @@ mod tests {
     use crate::statistics::comparison::compare;
     use proptest::prelude::*;
 
-    fn of(name: &str, rounds: Vec<Round>, found: Comparison) -> Quantity<'static> {
-        Quantity { case: "c", prefix: String::new(), name: name.into(), rounds, found }
+    fn of(name: &str, rounds: Vec<Round>, found: Comparison) -> Quantity {
+        Quantity { case: "c".into(), metric: name.into(), rounds, found }
     }
 
     /// A quantity with a certain change of its time.
-    fn quantity(name: &str, before: f64, after: f64) -> Quantity<'static> {
-        let round = Round { a: before.ln(), a_again: before.ln(), b: after.ln() };
+    fn quantity(name: &str, before: f64, after: f64) -> Quantity {
+        let round = [before.ln(), before.ln(), after.ln()];
         let effect = after / before - 1.0;
         let found =
             Comparison { effect, p: 1e-5, floor: 0.01, visible: 0.02, low: effect, high: effect };
@@ -124,21 +116,16 @@ mod tests {
     #[test]
     fn the_guilty_phase_is_named() {
         let phases = [quantity("read", 0.3, 0.3), quantity("grade", 0.1, 0.11)];
-        assert_eq!(verdicts(&phases), [("CPU time in grade".into(), Verdict::Regression)]);
+        assert_eq!(verdicts(&phases), [("grade".into(), Verdict::Regression)]);
         let after = [quantity(OUTSIDE, 0.01, 0.1)];
-        assert_eq!(
-            verdicts(&after),
-            [("CPU time outside the phases".to_owned(), Verdict::Regression)]
-        );
+        assert_eq!(verdicts(&after), [(OUTSIDE.to_owned(), Verdict::Regression)]);
     }
 
     #[test]
     fn work_that_moves_between_phases_is_no_regression() {
         let phases = [quantity("read", 0.3, 0.2), quantity("grade", 0.1, 0.2)];
-        let expected = [
-            ("CPU time in read".to_owned(), Verdict::Improvement),
-            ("CPU time in grade".to_owned(), Verdict::Changed),
-        ];
+        let expected =
+            [("read".to_owned(), Verdict::Improvement), ("grade".to_owned(), Verdict::Changed)];
         assert_eq!(verdicts(&phases), expected);
     }
 
@@ -152,10 +139,9 @@ mod tests {
         /// Of rounds of which half are disturbed, the means of both programs may have the other order than the effect.
         #[test]
         fn the_times_have_the_ratio_of_the_effect(drawn in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
-            let rounds: Vec<Round> = drawn.iter().map(|&[a, a_again, b]| Round { a, a_again, b }).collect();
-            let found = compare(&rounds, 0.01, 1);
+            let found = compare(&drawn, 0.01, 1);
             let effect = found.effect;
-            let times = of(CPU, rounds, found).times();
+            let times = of(CPU, drawn, found).times();
             prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);
         }
     }

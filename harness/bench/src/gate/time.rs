@@ -24,52 +24,43 @@ use std::path::Path;
 
 /// Compares the times of candidate and baseline.
 pub fn layer(bench: &Bench, layer: &mut Layer) {
-    let why = match &bench.baseline {
+    let left_out = match &bench.baseline {
         Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
         Baseline::Record(..) => {
             "a record cannot be run, and times of different sessions are not comparable"
         }
         Baseline::None => "no baseline was given",
     };
-    layer.left_out = Some(why.to_owned());
+    layer.left_out = Some(left_out.to_owned());
 }
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
-    let (rules, seed) = (&bench.rules.time, bench.options.seed);
-    let mut measured = Vec::new();
+    let rules = &bench.rules.time;
+    let mut measured: Vec<Vec<Quantity>> = Vec::new();
     'all: for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
-            let (case_name, prefix) = (&case.rule.name, prefix(ranks));
             match rounds(bench, baseline, case, ranks) {
-                Ok(times) => measured.extend(times.into_iter().map(|(name, rounds)| {
-                    let found = compare(&rounds, rules.alpha, seed);
-                    Quantity { case: case_name, prefix: prefix.clone(), name, rounds, found }
-                })),
+                Ok(times) => measured.push(times),
                 Err(failure) if failure.is_interrupt() => break 'all,
                 Err(why) => {
-                    let (metric, why) = (format!("{prefix}time"), why.to_string());
-                    let finding = GateFinding::noted(case_name, &metric, Verdict::Missing, why);
-                    layer.findings.push(finding);
+                    let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
+                    let why = why.to_string();
+                    layer.findings.push(GateFinding::noted(name, &metric, Verdict::Missing, why));
                 }
             }
         }
     }
     // All quantities of all cases are tested together.
-    let p_values: Vec<f64> = measured.iter().map(|quantity| quantity.found.p).collect();
-    for (quantity, p) in measured.iter_mut().zip(adjusted(&p_values)) {
+    let p_values: Vec<f64> = measured.iter().flatten().map(|quantity| quantity.found.p).collect();
+    for (quantity, p) in measured.iter_mut().flatten().zip(adjusted(&p_values)) {
         quantity.found.p = p;
     }
-    for times in measured.chunk_by(|a, b| (a.case, &a.prefix) == (b.case, &b.prefix)) {
+    for times in &measured {
         let (whole, phases) = times.split_at(2);
         layer.findings.extend(whole.iter().map(|quantity| whole_finding(quantity, rules)));
         layer.findings.extend(phases::findings(&whole[0], phases, rules));
     }
 }
-
-/// The three runs of a round.
-const BASELINE: usize = 0;
-const AGAIN: usize = 1;
-const CANDIDATE: usize = 2;
 
 /// Runs all rounds of a case: the two times of the process, then the phases that both programs report, by name.
 fn rounds(
@@ -77,7 +68,7 @@ fn rounds(
     baseline: &Engine,
     case: &Selected,
     ranks: Ranks,
-) -> Result<Vec<(String, Vec<Round>)>, Failure> {
+) -> Result<Vec<Quantity>, Failure> {
     let path = bench.prepare(baseline, case, "time")?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run reads program and geometry from disk and is not counted.
@@ -98,20 +89,29 @@ fn rounds(
     let mut times: Vec<(String, Vec<Round>)> =
         names.into_iter().map(|name| (name.to_owned(), Vec::new())).collect();
     for _ in 0..count {
-        let mut order = [BASELINE, AGAIN, CANDIDATE];
+        let mut order = [0, 1, 2];
         random.shuffle(&mut order);
         let mut runs = [const { None }; 3];
         for index in order {
             runs[index] = Some(run(bench, engines[index], &path, ranks)?);
         }
-        let [Some(a), Some(a_again), Some(b)] = runs else { unreachable!("each was run") };
+        let runs = runs.map(|run| run.expect("each was run"));
         for (name, rounds) in &mut times {
             // A microsecond is the resolution of the clocks.
-            let of = |run: &Completed| seconds(run, name).max(1e-6).ln();
-            rounds.push(Round { a: of(&a), a_again: of(&a_again), b: of(&b) });
+            rounds.push(runs.each_ref().map(|run| seconds(run, name).max(1e-6).ln()));
         }
     }
-    Ok(times)
+    let quantity = |(name, rounds): (String, Vec<Round>)| {
+        let metric = match name.as_str() {
+            CPU | WALL => name.clone(),
+            OUTSIDE => format!("CPU time {OUTSIDE}"),
+            phase => format!("CPU time in {phase}"),
+        };
+        let (case, metric) = (case.rule.name.clone(), format!("{}{metric}", prefix(ranks)));
+        let found = compare(&rounds, rules.alpha, bench.options.seed);
+        Quantity { case, metric, rounds, found }
+    };
+    Ok(times.into_iter().map(quantity).collect())
 }
 
 fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
@@ -179,8 +179,8 @@ mod tests {
             high: 0.1,
         };
         let of = |found: Comparison| {
-            let (prefix, name) = (String::new(), CPU.to_owned());
-            verdict(&Quantity { case: "c", prefix, name, rounds: Vec::new(), found }, &rules)
+            let (case, metric) = ("c".to_owned(), CPU.to_owned());
+            verdict(&Quantity { case, metric, rounds: Vec::new(), found }, &rules)
         };
         assert_eq!(of(found), Verdict::Regression);
         assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);

@@ -30,37 +30,21 @@ impl Default for Rules {
     }
 }
 
-/// A step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// Index of the first value after it.
-    pub at: usize,
-    /// The p-value.
-    pub p: f64,
-}
-
-/// A linear change of the mean between two steps or ends of the series.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drift {
-    /// First index.
+/// A step, or a drift: a linear change of the mean between two steps or ends of the series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// Whether it is a drift.
+    pub is_drift: bool,
+    /// Index of the last value before a step, or of the first of a drift.
     pub from: usize,
-    /// Index after the last one.
-    pub until: usize,
-    /// Mean at the first index.
+    /// Index of the first value after a step, or of the last of a drift.
+    pub at: usize,
+    /// Median of the values since the previous step, or mean at the first index of a drift.
     pub before: f64,
-    /// Mean at the last index.
+    /// Median of the values up to the next step, or mean at the last index of a drift.
     pub after: f64,
     /// The p-value.
     pub p: f64,
-}
-
-/// The changes of a series, in ascending order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Changes {
-    /// Steps.
-    pub steps: Vec<Step>,
-    /// Drifts.
-    pub drifts: Vec<Drift>,
 }
 
 /// Minimum number of values: two on either side of a step.
@@ -93,11 +77,11 @@ const STEP_MIN: f64 = 1.5;
 /// No p-value is smaller: noise is normal only near its middle.
 const P_MIN: f64 = 1e-9;
 
-/// Returns the steps and drifts of a series.
-pub fn change_points(values: &[f64], rules: &Rules) -> Changes {
+/// Returns the steps of a series, then its drifts, each in ascending order.
+pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     let size = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
     if values.len() < VALUES_MIN || size == 0.0 || !size.is_finite() {
-        return Changes::default();
+        return Vec::new();
     }
     let middle = median_of(values);
     let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / size).collect();
@@ -106,13 +90,19 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Changes {
     // The variance below which noise is not distinguished from none.
     let floor = (least / 4.0).max(1e-9).powi(2);
     let mut model = Model::select(&clean, floor);
-    let steps = model.steps(least, rules.alpha);
-    let drifts = model.drifts(least, rules.alpha).into_iter().map(|drift| Drift {
+    let p_values = model.steps(least, rules.alpha);
+    let edges = model.edges();
+    let step = |(w, p): (&[usize], f64)| {
+        let at = w[1];
+        let (before, after) = (median_of(&values[w[0]..at]), median_of(&values[at..w[2]]));
+        Change { is_drift: false, from: at - 1, at, before, after, p }
+    };
+    let drifts = model.drifts(least, rules.alpha).into_iter().map(|drift| Change {
         before: drift.before * size + middle,
         after: drift.after * size + middle,
         ..drift
     });
-    Changes { steps, drifts: drifts.collect() }
+    edges.windows(3).zip(p_values).map(step).chain(drifts).collect()
 }
 
 /// A model of values without outliers.
@@ -215,8 +205,8 @@ impl<'a> Model<'a> {
         (MODELS_TRIED * ratio.powf(-self.freedom() / 2.0)).clamp(P_MIN, 1.0)
     }
 
-    /// Removes the boundaries that are no steps, and returns the others.
-    fn steps(&mut self, least: f64, alpha: f64) -> Vec<Step> {
+    /// Removes the boundaries that are no steps, and returns the p-values of the others.
+    fn steps(&mut self, least: f64, alpha: f64) -> Vec<f64> {
         let series = Series::new(self.values, self.phi);
         loop {
             let (edges, fits) = (self.edges(), self.fits(&series));
@@ -224,36 +214,35 @@ impl<'a> Model<'a> {
                 Mean::Constant => least,
                 Mean::Linear => least.max(STEP_MIN * self.variance(&series).sqrt()),
             };
-            let step = |i: usize| {
+            let p_value = |i: usize| {
                 let middle = edges[i + 1] as f64 - 0.5;
                 let is_small = (fits[i + 1].at(middle) - fits[i].at(middle)).abs() <= least;
                 let one = series.fit(edges[i], edges[i + 2], self.mean).cost;
                 let p = self.p_without(&series, one - fits[i].cost - fits[i + 1].cost);
-                let p = if is_small { 1.0 } else { (p * self.values.len() as f64).min(1.0) };
-                Step { at: edges[i + 1], p }
+                if is_small { 1.0 } else { (p * self.values.len() as f64).min(1.0) }
             };
-            let steps: Vec<Step> = (0..self.boundaries.len()).map(step).collect();
-            match steps.iter().max_by(|a, b| a.p.total_cmp(&b.p)) {
-                Some(worst) if worst.p > alpha => self.boundaries.retain(|at| *at != worst.at),
-                _ => return steps,
+            let p_values: Vec<f64> = (0..self.boundaries.len()).map(p_value).collect();
+            match (0..p_values.len()).max_by(|&a, &b| p_values[a].total_cmp(&p_values[b])) {
+                Some(worst) if p_values[worst] > alpha => _ = self.boundaries.remove(worst),
+                _ => return p_values,
             }
         }
     }
 
     /// Returns the drifts between the boundaries.
-    fn drifts(&self, least: f64, alpha: f64) -> Vec<Drift> {
+    fn drifts(&self, least: f64, alpha: f64) -> Vec<Change> {
         if self.mean == Mean::Constant {
             return Vec::new();
         }
         let series = Series::new(self.values, self.phi);
         let drift = |w: &[usize]| {
-            let (from, until) = (w[0], w[1]);
-            let line = series.fit(from, until, Mean::Linear);
-            let (before, after) = (line.at(from as f64), line.at((until - 1) as f64));
-            let level = series.fit(from, until, Mean::Constant);
+            let (from, at) = (w[0], w[1] - 1);
+            let line = series.fit(from, w[1], Mean::Linear);
+            let (before, after) = (line.at(from as f64), line.at(at as f64));
+            let level = series.fit(from, w[1], Mean::Constant);
             let p = self.p_without(&series, level.cost - line.cost);
             let counts = p <= alpha && (after - before).abs() > least;
-            counts.then_some(Drift { from, until, before, after, p })
+            counts.then_some(Change { is_drift: true, from, at, before, after, p })
         };
         self.edges().windows(2).filter_map(drift).collect()
     }

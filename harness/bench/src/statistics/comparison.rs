@@ -37,16 +37,8 @@ const SCALE_BASELINE_DIFFERENCE: f64 = 0.866_025_403_784_438_6;
 /// The 90 % quantile of the standard normal distribution.
 const NORMAL_QUANTILE_90: f64 = 1.2816;
 
-/// Natural logarithms of the times of one round.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Round {
-    /// Baseline.
-    pub a: f64,
-    /// Baseline, second run.
-    pub a_again: f64,
-    /// Candidate.
-    pub b: f64,
-}
+/// Natural logarithms of the times of one round: baseline, baseline again, candidate.
+pub type Round = [f64; 3];
 
 /// The result of a comparison. Effects are ratios of times minus one: 0.05 is five percent slower.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,15 +60,11 @@ pub struct Comparison {
 /// Compares the candidate with the baseline at significance level `alpha`; reproducible for a given seed.
 pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let mut random = Random(seed);
-    let difference = |b: f64, a: f64, c: f64| b - (a + c) / 2.0;
-    let differences: Vec<f64> = rounds.iter().map(|r| difference(r.b, r.a, r.a_again)).collect();
+    let difference = |of: usize, r: &Round| r[of] - (r[(of + 1) % 3] + r[(of + 2) % 3]) / 2.0;
+    let differences: Vec<f64> = rounds.iter().map(|r| difference(2, r)).collect();
     let effect = trimmed_mean(&differences);
     let permuted_effect = |random: &mut Random| {
-        let relabelled = rounds.iter().map(|r| match random.below(3) {
-            0 => difference(r.b, r.a, r.a_again),
-            1 => difference(r.a, r.b, r.a_again),
-            _ => difference(r.a_again, r.a, r.b),
-        });
+        let relabelled = rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r));
         trimmed_mean(&relabelled.collect::<Vec<_>>()).abs()
     };
     let (mut as_large, mut drawn) = (0, 0);
@@ -85,7 +73,7 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         drawn += 1;
     }
     let baseline_differences: Vec<f64> =
-        rounds.iter().map(|r| (r.a_again - r.a) * SCALE_BASELINE_DIFFERENCE).collect();
+        rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE).collect();
     let mut null_effects = collect_draws(SAMPLES, || {
         let flipped =
             baseline_differences.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
@@ -141,9 +129,7 @@ mod tests {
             let burst = if random.below(25) == 0 { 2.0 } else { 1.0 };
             (factor * burst * (1.0 + 0.035 * noise + 0.01 * round as f64)).ln()
         };
-        (0..count)
-            .map(|i| Round { a: time(i, 1.0), a_again: time(i, 1.0), b: time(i, slower) })
-            .collect()
+        (0..count).map(|i| [time(i, 1.0), time(i, 1.0), time(i, slower)]).collect()
     }
 
     #[test]

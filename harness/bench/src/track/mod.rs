@@ -14,9 +14,8 @@ mod summary;
 
 pub use summary::summary;
 
-use crate::statistics::change_points::{Changes, Rules, Step, change_points};
+use crate::statistics::change_points::{Change as Found, Rules, change_points};
 use crate::statistics::false_discovery::adjusted;
-use crate::statistics::median_of;
 use history::Record;
 use serde::Serialize;
 
@@ -141,32 +140,26 @@ pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
     names.dedup();
     let all: Vec<Vec<(usize, f64)>> = names.iter().map(|name| points(name, records)).collect();
     let values = |points: &[(usize, f64)]| points.iter().map(|p| p.1).collect::<Vec<f64>>();
-    let mut found: Vec<Changes> =
+    let mut found: Vec<Vec<Found>> =
         all.iter().map(|points| change_points(&values(points), rules)).collect();
     control(&mut found, rules.alpha);
     let both = names.into_iter().zip(all).zip(found);
     let all: Vec<Series> =
-        both.map(|((name, points), found)| series(name, points, &found, records)).collect();
+        both.map(|((name, points), found)| series(name, points, found, records)).collect();
     all.iter().for_each(|series| series.check_invariants(records));
     all
 }
 
 /// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test for steps and one
 /// for drifts: its smallest p-value counts, and 1 if nothing was found.
-fn control(found: &mut [Changes], alpha: f64) {
-    let least = |p_values: &mut dyn Iterator<Item = f64>| p_values.fold(1.0, f64::min);
-    let steps: Vec<f64> =
-        found.iter().map(|changes| least(&mut changes.steps.iter().map(|step| step.p))).collect();
-    let drifts: Vec<f64> = found
-        .iter()
-        .map(|changes| least(&mut changes.drifts.iter().map(|drift| drift.p)))
-        .collect();
-    for (i, (steps, drifts)) in adjusted(&steps).into_iter().zip(adjusted(&drifts)).enumerate() {
-        if steps > alpha {
-            found[i].steps.clear();
-        }
-        if drifts > alpha {
-            found[i].drifts.clear();
+fn control(found: &mut [Vec<Found>], alpha: f64) {
+    for is_drift in [false, true] {
+        let least = |changes: &Vec<Found>| {
+            changes.iter().filter(|c| c.is_drift == is_drift).map(|c| c.p).fold(1.0, f64::min)
+        };
+        let p_values: Vec<f64> = found.iter().map(least).collect();
+        for (changes, p) in found.iter_mut().zip(adjusted(&p_values)) {
+            changes.retain(|change| change.is_drift != is_drift || p <= alpha);
         }
     }
 }
@@ -176,10 +169,9 @@ fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
     records.iter().enumerate().filter_map(|(i, record)| Some((i, value(record)?))).collect()
 }
 
-fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Record]) -> Series {
-    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
+fn series(name: &str, points: Vec<(usize, f64)>, found: Vec<Found>, records: &[Record]) -> Series {
     let commit = |at: usize| records[points[at].0].commit.clone();
-    let change = |is_drift, [from, at]: [usize; 2], [before, after]: [f64; 2], p| Change {
+    let change = |Found { is_drift, from, at, before, after, p }| Change {
         is_drift,
         from,
         at,
@@ -191,16 +183,7 @@ fn series(name: &str, points: Vec<(usize, f64)>, found: &Changes, records: &[Rec
         p,
         accepted: !is_drift && is_accepted(at, &points, records),
     };
-    let mut changes = Vec::new();
-    for (i, &Step { at, p }) in found.steps.iter().enumerate() {
-        let from = if i == 0 { 0 } else { found.steps[i - 1].at };
-        let until = found.steps.get(i + 1).map_or(values.len(), |next| next.at);
-        let medians = [&values[from..at], &values[at..until]].map(median_of);
-        changes.push(change(false, [at - 1, at], medians, p));
-    }
-    changes.extend(found.drifts.iter().map(|drift| {
-        change(true, [drift.from, drift.until - 1], [drift.before, drift.after], drift.p)
-    }));
+    let changes = found.into_iter().map(change).collect();
     Series { name: name.to_owned(), unit: unit(name), changes, points }
 }
 

@@ -5,7 +5,7 @@ use super::programs::ProgramArguments;
 use crate::failure::Failure;
 use bench::experiments::entry::{Entry, Judged, Line, Verdict};
 use bench::experiments::group::Groups;
-use bench::experiments::record::{self, Content};
+use bench::experiments::record;
 use bench::study::{self, SessionOptions, Study};
 use clap::Args;
 use contract::files::named;
@@ -157,7 +157,7 @@ fn record_path(arguments: &Arguments) -> PathBuf {
 fn show(arguments: &Arguments) -> Result<u8, Failure> {
     let study = read(arguments)?;
     let path = record_path(arguments);
-    let Content { lines, broken } = record::read(&path).map_err(|error| named(&path, &error))?;
+    let (lines, broken) = record::read(&path).map_err(|error| named(&path, &error))?;
     for (line, why) in &broken {
         eprintln!("harness: line {line} is skipped: {why}");
     }

@@ -35,11 +35,12 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let mut lines = Vec::new();
     for path in &records {
-        let content = record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        for (line, why) in &content.broken {
+        let (read, broken) =
+            record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        for (line, why) in broken {
             eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
         }
-        lines.extend(content.lines);
+        lines.extend(read);
     }
     if lines.is_empty() {
         let shown = directory.display();

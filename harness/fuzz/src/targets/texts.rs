@@ -43,7 +43,7 @@ pub(super) fn catalogue(scratch: &mut Scratch, bytes: &[u8]) -> bool {
 /// A record of `harness bench`.
 pub(super) fn record(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let content = record::read(scratch.file("record.jsonl", bytes));
-    content.is_ok_and(|content| !content.lines.is_empty())
+    content.is_ok_and(|(lines, _)| !lines.is_empty())
 }
 
 /// A history of `harness track`.

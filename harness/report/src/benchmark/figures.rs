@@ -59,7 +59,7 @@ fn series(all: &[&Group], value: impl Fn(&Group) -> Point) -> Vec<Series> {
 /// The counterpart of the paper's Figure 17.
 fn time_by_spacing(case: &str, all: &[&Group]) -> Figure {
     let mut series = series(all, |group| at(group, group.time_s));
-    let runs = paper::RUNS.iter().map(|r| (r.cells, r.time_s));
+    let runs = paper::RUNS.map(|(cells, _, time_s)| (cells, time_s));
     series.push(cited("the paper: 1, 32 and 64 ranks", runs));
     let caption = format!(
         "Run time of {} over the number of cells of {case} at n = {} (the paper's Figure 17). The spacing is halved from \
@@ -105,7 +105,7 @@ fn rate_and_memory(groups: &Groups) -> Vec<Figure> {
     let cases = distinct(all.iter().map(|group| group.setup.case.as_str())).join(", ");
     let of = format!("over the number of cells: {cases}. {}.", repetitions(&all));
     let engines = engines(&all);
-    let rates = paper::RUNS.iter().map(|r| (r.cells, r.cells / r.time_s / r.ranks as f64 / 1e6));
+    let rates = paper::RUNS.map(|(cells, ranks, time_s)| (cells, cells / time_s / ranks / 1e6));
     let rates = cited("the paper: 1, 32 and 64 ranks", rates);
     let memory = cited("the paper: 84 bytes per voxel", [(50e6, 84.0)]);
     let with = |mut series: Vec<Series>, cited| {

@@ -243,16 +243,16 @@ impl Figure {
     /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
     /// how many there are.
     pub fn without_zeros(mut self) -> Self {
+        let (x, y) = (self.x.log, self.y.log);
         let Body::Points { series, .. } = &mut self.body else { return self };
-        let (x_min, y_min) = (self.x.log.then_some(0.0), self.y.log.then_some(0.0));
-        let before: usize = series.iter().map(|s| s.points.len()).sum();
-        for s in series.iter_mut() {
-            s.points
-                .retain(|p| x_min.is_none_or(|min| p.x > min) && y_min.is_none_or(|min| p.y > min));
+        let mut zeros = 0;
+        for Series { points, .. } in series {
+            let before = points.len();
+            points.retain(|p| (!x || p.x > 0.0) && (!y || p.y > 0.0));
+            zeros += before - points.len();
         }
-        match before - series.iter().map(|s| s.points.len()).sum::<usize>() {
-            0 => {}
-            n => self.caption += &format!(" The axes cannot show {n} values of 0."),
+        if zeros > 0 {
+            self.caption += &format!(" The axes cannot show {zeros} values of 0.");
         }
         self
     }

@@ -2,9 +2,11 @@
 
 use crate::figure::csv::table;
 use crate::json::pretty;
-use crate::junit::{Ended, suite, test, to_text};
+use crate::junit::{suite, test, to_text, unsuccessful};
 use bench::track::history::Record;
 use bench::track::{Series, summary, unit};
+use quick_junit::NonSuccessKind::Failure;
+use quick_junit::TestCaseStatus;
 use serde_json::{Map, Value, json};
 
 /// The last record in Bencher Metric Format: `{case: {metric: {"value": x}}}`.
@@ -42,8 +44,8 @@ pub fn junit(all: &[Series], recent: usize) -> String {
     let of_series = |series: &Series| {
         let text = summary(std::slice::from_ref(series));
         let ended = match series.worse_recently(recent) {
-            Some(_) => Ended::Failed(text.trim_end().to_owned()),
-            None => Ended::Passed,
+            Some(_) => unsuccessful(Failure, text.trim_end()),
+            None => TestCaseStatus::success(),
         };
         test(&series.name, ended, if series.changes.is_empty() { "" } else { &text })
     };

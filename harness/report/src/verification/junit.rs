@@ -1,8 +1,9 @@
 //! A verification as JUnit XML: a suite per case, a test per check. Checks that were left out are skipped tests with a
 //! reason.
 
-use crate::junit::{Ended, suite, test, to_text};
-use quick_junit::TestCase;
+use crate::junit::{skipped, suite, test, to_text, unsuccessful};
+use quick_junit::NonSuccessKind::{Error, Failure};
+use quick_junit::{TestCase, TestCaseStatus};
 use run::verify::report::{CaseReport, Check, Outcome, Report, Tally};
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ pub fn junit(report: &Report) -> String {
     // A missing program that `--require` names fails the build, so it is an error here too.
     let required = report.missing.iter().filter(|missing| missing.required);
     let required: Vec<TestCase> =
-        required.map(|one| test(&one.what, Ended::Error(one.why.clone()), "")).collect();
+        required.map(|one| test(&one.what, unsuccessful(Error, &one.why), "")).collect();
     if !required.is_empty() {
         xml.add_test_suite(suite("required", 0.0, required));
     }
@@ -36,12 +37,12 @@ fn check_invariants(xml: &quick_junit::Report, report: &Report) {
 fn tests(case: &CaseReport) -> impl Iterator<Item = TestCase> {
     let refused = case.input_error.iter();
     let refused =
-        refused.map(|error| test("the programs take the case", Ended::Error(error.clone()), ""));
+        refused.map(|error| test("the programs take the case", unsuccessful(Error, error), ""));
     let of_check = |check: &Check| {
         let ended = match &check.outcome {
-            Outcome::Pass { .. } => Ended::Passed,
-            Outcome::Fail { why } => Ended::Failed(why.clone()),
-            Outcome::LeftOut { why } => Ended::Skipped(format!("left out: {why}")),
+            Outcome::Pass { .. } => TestCaseStatus::success(),
+            Outcome::Fail { why } => unsuccessful(Failure, why),
+            Outcome::LeftOut { why } => skipped(format!("left out: {why}")),
         };
         let name = format!("{}: {}", check.subject, check.name);
         let mut test = test(name, ended, &check.notes.join("\n"));
