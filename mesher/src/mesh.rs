@@ -46,8 +46,7 @@ impl Mesh {
             crossing: &self.crossing,
             sides: &self.sides,
             ownership: &self.ownership,
-            all_leaves: self.is_base,
-            rules: &self.rules,
+            drops_crossing: !self.is_base && !self.rules.keep_crossing,
         }
     }
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 /// One phase on one rank.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Phase {
     /// Name of the phase.
     pub name: &'static str,
@@ -56,12 +56,7 @@ impl Recorder {
         let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
         let after = comm.traffic();
         let index = self.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
-            self.phases.push(Phase {
-                name,
-                time_wall_s: 0.0,
-                time_cpu_s: 0.0,
-                traffic: Traffic::default(),
-            });
+            self.phases.push(Phase { name, ..Phase::default() });
             self.phases.len() - 1
         });
         let p = &mut self.phases[index];

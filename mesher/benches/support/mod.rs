@@ -94,8 +94,7 @@ impl Phases {
             crossing: &self.tree.crossing,
             sides: &self.sides,
             ownership: &self.ownership,
-            all_leaves: false,
-            rules: &self.rules,
+            drops_crossing: !self.rules.keep_crossing,
         }
     }
 

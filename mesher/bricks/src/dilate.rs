@@ -47,39 +47,34 @@ impl<'t> Reach<'t> {
     /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
     pub fn dilate(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         // A radius greater than the root's width reaches no more than the root.
-        let mut left = radius.min(1 << self.level) as usize;
-        if left <= MARGIN {
-            return dilate_tiles(sources, left, false, self.tile, &mut self.out, &mut self.words);
+        let radius = radius.min(1 << self.level);
+        if radius <= MARGIN as u32 {
+            return dilate_tiles(sources, radius, false, self.tile, &mut self.out, &mut self.words);
         }
-        let mut near = Gathered::new(self.level);
-        dilate_tiles(sources, MARGIN, false, self.tile, &mut near, &mut self.words);
-        let mut set = near.into_set();
-        left -= MARGIN;
-        while left > MARGIN {
-            let mut near = Gathered::new(self.level);
-            dilate_tiles(set.bricks(), MARGIN, false, self.tile, &mut near, &mut self.words);
-            set = near.into_set();
-            left -= MARGIN;
-        }
-        dilate_tiles(set.bricks(), left, false, self.tile, &mut self.out, &mut self.words);
+        let near = self.near(sources, MARGIN as u32, false);
+        self.dilate(near.bricks(), radius - MARGIN as u32);
     }
 
     /// Adds the parents of all octants within `radius` of a source, with sources and radius one level deeper than
     /// the union. Sources come in Morton order.
     pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         if radius < 2 {
-            return dilate_tiles(
-                sources,
-                radius as usize,
-                true,
-                self.tile,
-                &mut self.out,
-                &mut self.words,
-            );
+            return dilate_tiles(sources, radius, true, self.tile, &mut self.out, &mut self.words);
         }
-        let mut odd = Gathered::new(self.level);
-        dilate_tiles(sources, (radius & 1) as usize, true, self.tile, &mut odd, &mut self.words);
-        self.dilate(odd.into_set().bricks(), radius / 2);
+        let odd = self.near(sources, radius & 1, true);
+        self.dilate(odd.bricks(), radius / 2);
+    }
+
+    /// The octants that one pass reaches.
+    fn near(
+        &mut self,
+        sources: impl Iterator<Item = Brick>,
+        radius: u32,
+        to_parents: bool,
+    ) -> BrickSet {
+        let mut near = Gathered::new(self.level);
+        dilate_tiles(sources, radius, to_parents, self.tile, &mut near, &mut self.words);
+        near.into_set()
     }
 
     /// The octants reached, and the work done.
@@ -91,13 +86,13 @@ impl<'t> Reach<'t> {
 /// One pass over the tiles. Adds to `out` the octants reached, or their parents if `to_parents`.
 fn dilate_tiles(
     sources: impl Iterator<Item = Brick>,
-    radius: usize,
+    radius: u32,
     to_parents: bool,
     tile: &mut Tile,
     out: &mut Gathered,
     words: &mut Words,
 ) {
-    tile.set_radius(radius);
+    tile.set_radius(radius as usize);
     let mut now = None;
     for b in sources {
         let key = b.key >> (3 * TILE_BRICKS_LOG2);

@@ -43,7 +43,7 @@ use mesher::partition::cost::Counts;
 use mesher::partition::ownership::Ownership;
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
-use pilot::{Amounts, Collector, Pilots};
+use pilot::{Amounts, Pilots};
 use ranks::{Comm, gather, uncounted};
 use serde::Serialize;
 use shared::Ranks;
@@ -239,15 +239,15 @@ fn pilot(
     let run = |rules: Rules| {
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, comm, &mut record);
-        let mut collector = Collector::default();
+        let mut base = Amounts::default();
         let count = |tree: &Tree, ownership: &Ownership| {
-            collector.base_tree(tree, &Counts::of_rank(tree, ownership));
+            base = pilot::of_base_tree(tree, &Counts::of_rank(tree, ownership));
         };
         let facets = &quantised.facets[..];
         let &Quantised { bounds, counts, .. } = quantised;
         let mesh = grow(Quantised { rules, bounds, facets, counts }, job, count)?;
         let (_, written, _) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
-        Ok(collector.finish(&mesh, written.leaves, job, volumes))
+        Ok(pilot::of_mesh(base, &mesh, written.leaves, job, volumes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     match run(rules.clone()) {

@@ -90,48 +90,44 @@ pub fn coarser(rules: &Rules, shift: Level) -> Rules {
     }
 }
 
-/// Collects the amounts of a pilot run on this rank.
-#[derive(Debug, Default)]
-pub struct Collector {
-    amounts: Amounts,
-}
-
-impl Collector {
-    /// Counts the base tree, before its sides are decided.
-    pub fn base_tree(&mut self, mesh: &Tree, counts: &Counts) {
-        let bricks = |sets: &PerLevel| sets.iter().map(|s| s.len() as f64).sum::<f64>();
-        let depth = mesh.depth();
-        let linked: usize = (0..depth).map(|l| Tree::exists(&mesh.split, l).count()).sum();
-        self.amounts.components = (counts.bricks + counts.components) as f64;
-        self.amounts.bytes_sides = BRICK * (bricks(&mesh.split) + bricks(&mesh.crossing))
+/// What this rank needs for the base tree, before its sides are decided.
+pub fn of_base_tree(tree: &Tree, counts: &Counts) -> Amounts {
+    let linked: usize = (0..tree.depth()).map(|l| Tree::exists(&tree.split, l).count()).sum();
+    Amounts {
+        components: (counts.bricks + counts.components) as f64,
+        bytes_sides: BRICK * (bricks(&tree.split) + bricks(&tree.crossing))
             + NODE[0] * counts.bricks as f64
             + NODE[1] * linked as f64
-            + COMPONENT * counts.components as f64;
+            + COMPONENT * counts.components as f64,
+        ..Amounts::default()
     }
+}
 
-    /// The amounts of a finished pilot.
-    pub fn finish(self, mesh: &Mesh, cells: u64, job: &Job, volumes: &Volumes) -> Amounts {
-        let bricks = |sets: &PerLevel| sets.iter().map(|s| s.len() as f64).sum::<f64>();
-        let stored = bricks(&mesh.crossing) + bricks(&mesh.sides.stored);
-        let time = |of: &[&str]| -> f64 {
-            let phases = job.record.phases().iter();
-            phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
-        };
-        let all: f64 = job.record.phases().iter().map(|p| p.time_cpu_s).sum();
-        let [refine, sides] = [time(&["refine"]), time(&["sides", "leaks"])];
-        let leaves = time(&["grade", "rebalance", "share top", "leaves"]);
-        Amounts {
-            cells: cells as f64,
-            cells_boxed_deleted: deleted_in(volumes, mesh),
-            tests: job.counters.facet_brick_tests as f64
-                + job.counters.bricks_voxelised as f64 / VISITS_PER_TEST,
-            bytes_graded: BRICK * (stored + COPIES_GRADED * bricks(&mesh.split)),
-            time_refine_s: refine,
-            time_sides_s: sides,
-            time_leaves_s: leaves,
-            time_fixed_s: all - refine - sides - leaves,
-            ..self.amounts
-        }
+fn bricks(sets: &PerLevel) -> f64 {
+    sets.iter().map(|s| s.len() as f64).sum()
+}
+
+/// What this rank needs for a pilot run: the `base` tree's amounts, and those of the mesh.
+pub fn of_mesh(base: Amounts, mesh: &Mesh, cells: u64, job: &Job, volumes: &Volumes) -> Amounts {
+    let stored = bricks(&mesh.crossing) + bricks(&mesh.sides.stored);
+    let time = |of: &[&str]| -> f64 {
+        let phases = job.record.phases().iter();
+        phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
+    };
+    let all: f64 = job.record.phases().iter().map(|p| p.time_cpu_s).sum();
+    let [refine, sides] = [time(&["refine"]), time(&["sides", "leaks"])];
+    let leaves = time(&["grade", "rebalance", "share top", "leaves"]);
+    Amounts {
+        cells: cells as f64,
+        cells_boxed_deleted: deleted_in(volumes, mesh),
+        tests: job.counters.facet_brick_tests as f64
+            + job.counters.bricks_voxelised as f64 / VISITS_PER_TEST,
+        bytes_graded: BRICK * (stored + COPIES_GRADED * bricks(&mesh.split)),
+        time_refine_s: refine,
+        time_sides_s: sides,
+        time_leaves_s: leaves,
+        time_fixed_s: all - refine - sides - leaves,
+        ..base
     }
 }
 

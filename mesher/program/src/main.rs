@@ -12,15 +12,12 @@ use mesher::Options;
 use mesher::error::Error;
 use mesher::input::agreement;
 use mesher::input::ingest::Source;
-use mesher::output::report::Report;
 use mesher::output::write::write_json;
 use mesher::partition::Division;
 use mesher::record::Recorder;
-use planner::Plan;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
-use serde::Serialize;
 use std::fmt::Display;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
+use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
@@ -148,31 +145,18 @@ fn complain(line: &dyn Display) -> bool {
     stderr().write_all(format!("{}\n", message(line)).as_bytes()).is_ok()
 }
 
-/// The result of a run.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Outcome {
-    Meshed(Box<Report>),
-    Planned(Plan),
-}
-
-impl Display for Outcome {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Meshed(report) => report.fmt(f),
-            Self::Planned(plan) => plan.fmt(f),
-        }
-    }
+/// What a run prints.
+struct Done {
+    text: String,
+    warnings: Vec<String>,
+    /// Why the planned mesh would not be made.
+    refusal: Option<Error>,
 }
 
 /// Prints warnings and the outcome; returns the exit code. A closed pipe is no reason to fail.
-fn print(outcome: &Outcome) -> i32 {
-    let warns = |w| complain(&format_args!("mesher: warning: {w}"));
-    let is_warned = match outcome {
-        Outcome::Meshed(report) => report.warnings.iter().all(warns),
-        Outcome::Planned(_) => true,
-    };
-    match writeln!(stdout(), "{outcome}").and_then(|()| stdout().flush()) {
+fn print(done: &Done) -> i32 {
+    let is_warned = done.warnings.iter().all(|w| complain(&format_args!("mesher: warning: {w}")));
+    match writeln!(stdout(), "{}", done.text).and_then(|()| stdout().flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => {
             fail(&Error::output(format!("standard output: {e}: free disk space")), true)
         }
@@ -282,12 +266,12 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
-    let outcome = match result {
-        Ok(outcome) => outcome,
+    let done = match result {
+        Ok(done) => done,
         Err(e) => return fail(&e, first),
     };
-    match (if first && !args.quiet { print(&outcome) } else { 0 }, outcome) {
-        (0, Outcome::Planned(plan)) if !plan.fits && !args.force => fail(&plan.refusal(), first),
+    match (if first && !args.quiet { print(&done) } else { 0 }, done.refusal) {
+        (0, Some(refusal)) => fail(&refusal, first),
         (code, _) => code,
     }
 }
@@ -312,7 +296,7 @@ fn registered(source: &Source) -> Result<(), Error> {
     files::register_input(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
 }
 
-fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, Error> {
+fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Error> {
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
     let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
@@ -348,20 +332,23 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Outcome, 
         strict: args.strict,
         case_name: cli::case_name(args),
     };
-    let outcome = if args.plan {
-        Outcome::Planned(planner::plan(&case, &options, comm, record)?)
-    } else {
-        let report = planner::mesh(&case, &options, args.force, comm, record)?;
-        let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
-        Outcome::Meshed(Box::new(report))
+    let finish = |done: Done, advice: &str, json: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
+        interrupt::stop_at(format_args!("report:{}", comm.rank()));
+        on_json(advice, &|path| write_atomically(path, json)).map(|()| done)
     };
-    interrupt::stop_at(format_args!("report:{}", comm.rank()));
+    let advice = "free disk space";
+    if args.plan {
+        let plan = planner::plan(&case, &options, comm, record)?;
+        let refusal = (!plan.fits && !args.force).then(|| plan.refusal());
+        let done = Done { text: plan.to_string(), warnings: Vec::new(), refusal };
+        return finish(done, advice, &|to| write_json(to, &plan));
+    }
+    let report = planner::mesh(&case, &options, args.force, comm, record)?;
+    let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
     let advice = match options.out {
-        Some(_) if !args.plan => {
-            "the mesh is complete, only its report is missing; free disk space"
-        }
-        _ => "free disk space",
+        Some(_) => "the mesh is complete, only its report is missing; free disk space",
+        None => advice,
     };
-    on_json(advice, &|path| write_atomically(path, |to| write_json(to, &outcome)))?;
-    Ok(outcome)
+    let done = Done { text: report.to_string(), warnings: report.warnings.clone(), refusal: None };
+    finish(done, advice, &|to| write_json(to, &report))
 }

@@ -45,7 +45,7 @@ pub fn agree_over_faces(sides: &Sides, tree: &Tree, ownership: &Ownership, comm:
 /// The first leaf of each component is stored as its verdict asks; without seeds, the verdict is that of its rays if all six agree.
 /// Collective.
 pub fn components(
-    Decided { sides, components, verdict, reach, .. }: &Decided,
+    Decided { sides, components, verdict, .. }: &Decided,
     (rules, facets): (&Rules, &[Facet]),
     ownership: &Ownership,
     comm: &dyn Comm,
@@ -54,7 +54,7 @@ pub fn components(
         let (l, code) = first.leaf();
         let is_inside = verdict.inside.contains(&label);
         let is_stored = match sides.keep {
-            Keep::Outside => is_inside || reach.enclosed.contains(&label),
+            Keep::Outside => is_inside || verdict.enclosed.contains(&label),
             Keep::Inside => !is_inside,
             Keep::All => is_inside,
         };

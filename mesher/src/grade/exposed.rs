@@ -45,9 +45,8 @@ pub fn faces(mesh: &Mesh, comm: &dyn Comm) -> Vec<InBrick> {
         // All leaves that touch a crossing leaf of the surface level are in its layer, if that has two cells. Deeper ones may have been split
         // after their level was swept.
         if l > rules.level_surface || rules.layer_cells_min < 2 {
-            let quarters = search.quarters(l, &arrived);
-            let (quarters, _) = mesh.ownership.redistribute(l - 1, quarters, comm);
-            quarters.iter().for_each(|set| search.coarser(l - 1, set));
+            let quarters = MessageBuffer::of_entries(search.quarters(l, &arrived));
+            search.coarser(l - 1, comm.sparse_all_to_all(quarters).words());
         }
     }
     search.found
@@ -153,29 +152,33 @@ impl Search<'_> {
         }
     }
 
-    /// The parents, of level `l - 1`, of octants that do not exist and at which crossing leaves arrived, in bricks that this rank owns. For
-    /// every direction three sets: those that count for at least one, two and three faces.
-    fn quarters(&self, l: Level, arrived: &[BrickSet; 6]) -> [BrickSet; 18] {
-        let mut quarters = [const { BrickSet::EMPTY }; 18];
-        for (set, counts) in arrived.iter().zip(quarters.as_chunks_mut::<3>().0) {
-            for b in set.bricks().filter(|b| self.mesh.ownership.owns(l, b.key)) {
-                let missing = b.bits & !self.existing(l, b.key);
-                for j in ones(u64::from(brick::parents(missing))) {
-                    let parent = 1 << (8 * (b.key & 7) + u64::from(j));
-                    // Four quarters are one face.
-                    let faces = match brick::byte(missing, u64::from(j)).count_ones() {
-                        4 => 1,
-                        few => few as usize,
-                    };
-                    counts[..faces].iter_mut().for_each(|set| set.push(b.key >> 3, parent));
-                }
+    /// The parents, of level `l - 1`, of octants that do not exist and at which crossing leaves arrived, in bricks that this rank owns: to
+    /// their owners, each code with the number of faces that one direction exposes.
+    fn quarters(&self, l: Level, arrived: &[BrickSet; 6]) -> Vec<(usize, [u64; 2])> {
+        let ownership = &self.mesh.ownership;
+        let mut quarters = Vec::new();
+        for b in arrived.iter().flat_map(BrickSet::bricks).filter(|b| ownership.owns(l, b.key)) {
+            let missing = b.bits & !self.existing(l, b.key);
+            for j in ones(u64::from(brick::parents(missing))).map(u64::from) {
+                // Four quarters are one face.
+                let faces = match brick::byte(missing, j).count_ones() {
+                    4 => 1,
+                    few => few,
+                };
+                let owner = ownership.owner(l - 1, b.key >> 3);
+                quarters.push((owner, [b.key << 3 | j, u64::from(faces)]));
             }
         }
         quarters
     }
 
-    /// Counts the leaves of level `l` among some octants, which need not exist.
-    fn coarser(&mut self, l: Level, set: &BrickSet) {
-        set.bricks().for_each(|b| self.count(l, b.key, b.bits));
+    /// Counts the faces of octants of a level, given by code, that are leaves on a side.
+    fn coarser(&mut self, level: Level, quarters: &[u64]) {
+        for &[code, faces] in quarters.as_chunks().0 {
+            let key = code >> 6;
+            if (self.existing(level, key) & self.on_a_side(level, key)) >> (code & 63) & 1 == 1 {
+                self.found.push(InBrick { level, key, faces: faces as u32 });
+            }
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! - it is *complete*: the leaves emitted and the leaves left out (deleted, or
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::input::lattice::{Keep, Rules};
+use crate::input::lattice::Keep;
 use crate::partition::ownership::{Ownership, Placement};
 use crate::sides::Sides;
 use bricks::brick;
@@ -51,10 +51,8 @@ pub struct Leaves<'a> {
     pub sides: &'a Sides,
     /// Ownership of the bricks.
     pub ownership: &'a Ownership,
-    /// Whether all leaves are emitted, including those that the rules delete.
-    pub all_leaves: bool,
-    /// The mesh's rules.
-    pub rules: &'a Rules,
+    /// Whether crossing leaves are left out.
+    pub drops_crossing: bool,
 }
 
 impl Leaves<'_> {
@@ -81,6 +79,7 @@ impl Leaves<'_> {
 /// Cursors over the sets of one level.
 pub struct LevelCursors<'a> {
     keep: Keep,
+    drops_crossing: bool,
     split: Cursor<'a>,
     crossing: Cursor<'a>,
     stored: Cursor<'a>,
@@ -93,9 +92,9 @@ pub struct Octants {
     pub split: u64,
     /// Those in crossing leaves.
     pub crossing: u64,
-    /// Those that are inside, crossing ones among them. Deleted leaves have no side.
+    /// Those that are inside. Deleted leaves have no side.
     pub inside: u64,
-    /// Leaves that are deleted.
+    /// Leaves that are left out.
     pub deleted: u64,
 }
 
@@ -104,6 +103,7 @@ impl<'a> LevelCursors<'a> {
     pub fn new(of: &Leaves<'a>, l: usize) -> Self {
         Self {
             keep: of.sides.keep,
+            drops_crossing: of.drops_crossing,
             split: of.split[l].cursor(),
             crossing: of.crossing[l].cursor(),
             stored: of.sides.stored[l].cursor(),
@@ -120,7 +120,8 @@ impl<'a> LevelCursors<'a> {
             Keep::All => (stored | inside, 0),
         };
         let crossing = self.crossing.get(key) | crossing;
-        Octants { split: self.split.get(key), crossing, inside, deleted }
+        let deleted = if self.drops_crossing { deleted | crossing } else { deleted };
+        Octants { split: self.split.get(key), crossing, inside: inside & !crossing, deleted }
     }
 }
 
@@ -156,17 +157,8 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         };
         let Octants { split, crossing, inside, deleted } = cursors.read(key, crossing, inside);
         let split = split & exists;
-        let mut leaves = exists & !split;
-        if !of.all_leaves {
-            leaves &= !deleted;
-            if !of.rules.keep_crossing {
-                leaves &= !crossing;
-            }
-        }
-        if placement != Placement::Local {
-            leaves = 0;
-        }
-        let inside = inside & !crossing;
+        let is_local = placement == Placement::Local;
+        let leaves = if is_local { exists & !split & !deleted } else { 0 };
         let counts = &mut self.counts.by_level[l as usize];
         let count = |side: u64| u64::from((leaves & side).count_ones());
         counts[Side::Crossing as usize] += count(crossing);

@@ -11,60 +11,46 @@ use crate::input::lattice::{Enclosed, Keep, Rules};
 use ranks::{Comm, all_gather_reduced};
 use std::collections::HashSet;
 
-/// What the kept region owes to the root's boundary. The same on all ranks.
-#[derive(Default)]
-pub struct Region {
-    /// Components that are deleted although they are outside.
-    pub enclosed: HashSet<Label>,
-    /// Whether the inside is kept and reaches the root's boundary.
-    pub inside_reaches_boundary: bool,
-    /// Whether the outside is kept and seeds decide it, and none of it reaches the root's boundary.
-    pub flow_misses_boundary: bool,
-}
-
-impl Region {
+impl Verdict {
     /// Compares the components with those at the root's boundary, of which `at_boundary` are this rank's, some more
-    /// than once.
-    /// Collective.
-    pub fn new(
+    /// than once. Collective.
+    pub fn compare_with_boundary(
+        &mut self,
         rules: &Rules,
         components: &[FirstLeaf],
-        verdict: &Verdict,
         at_boundary: impl Iterator<Item = Label>,
         comm: &dyn Comm,
-    ) -> Self {
-        let of_all_ranks = || -> HashSet<Label> {
-            let mine = at_boundary.map(|label| [label, 0]).collect();
-            all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label).collect()
-        };
-        let outside =
-            || components.iter().map(|c| c.0).filter(|label| !verdict.inside.contains(label));
-        let deletes = rules.seeds.is_empty() && rules.enclosed == Enclosed::Delete;
-        match rules.keep {
+    ) {
+        let outside = components.iter().map(|c| c.0).filter(|label| !self.inside.contains(label));
+        let outside: HashSet<Label> = outside.collect();
+        let by_rays = rules.seeds.is_empty();
+        let matters = match rules.keep {
             // A single outside component either reaches the boundary or is the only one and kept.
-            Keep::Outside if deletes && outside().nth(1).is_some() => {
-                let far_field = of_all_ranks();
-                let (reached, enclosed): (HashSet<_>, HashSet<_>) =
-                    outside().partition(|label| far_field.contains(label));
-                let enclosed = if reached.is_empty() { HashSet::new() } else { enclosed };
-                Self { enclosed, ..Self::default() }
+            Keep::Outside if by_rays => rules.enclosed == Enclosed::Delete && outside.len() > 1,
+            Keep::Outside => true,
+            Keep::Inside => !self.inside.is_empty(),
+            Keep::All => false,
+        };
+        if !matters {
+            return;
+        }
+        let mine = at_boundary.map(|label| [label, 0]).collect();
+        let far_field =
+            all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label);
+        let far_field: HashSet<Label> = far_field.collect();
+        match rules.keep {
+            Keep::Inside => {
+                self.summary.inside_reaches_boundary = !self.inside.is_disjoint(&far_field);
             }
-            Keep::Outside if !rules.seeds.is_empty() => {
-                let far_field = of_all_ranks();
-                let flow_misses_boundary = !outside().any(|label| far_field.contains(&label));
-                Self { flow_misses_boundary, ..Self::default() }
-            }
-            Keep::Inside if !verdict.inside.is_empty() => Self {
-                inside_reaches_boundary: !verdict.inside.is_disjoint(&of_all_ranks()),
-                ..Self::default()
-            },
-            _ => Self::default(),
+            _ if !by_rays => self.summary.flow_misses_boundary = outside.is_disjoint(&far_field),
+            _ if outside.is_disjoint(&far_field) => {}
+            _ => self.enclosed = outside.difference(&far_field).copied().collect(),
         }
     }
 
     /// The enclosed components in numbers, of whose leaves this rank owns `leaves`; none if there are none.
     /// Collective.
-    pub fn summary(
+    pub fn enclosed_components(
         &self,
         components: &[FirstLeaf],
         leaves: u64,

@@ -31,7 +31,6 @@ use bricks::brick::Brick;
 use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
-use enclosed::Region;
 use global::Label;
 use nodes::{Component, Nodes};
 use ranks::Comm;
@@ -94,8 +93,10 @@ pub struct Ambiguous {
 pub struct Verdict {
     /// The components that are inside.
     pub inside: HashSet<Label>,
-    /// The components that were decided by majority.
-    pub ambiguous: Option<Ambiguous>,
+    /// Outside components that are deleted, as the far field does not reach them.
+    pub enclosed: HashSet<Label>,
+    /// The components in numbers.
+    pub summary: Summary,
     /// Number of rays cast.
     pub rays: u64,
 }
@@ -154,8 +155,6 @@ pub struct Decided {
     pub components: Vec<FirstLeaf>,
     /// Their sides.
     pub verdict: Verdict,
-    /// Which of them the far field reaches.
-    pub reach: Region,
 }
 
 /// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
@@ -176,7 +175,7 @@ pub fn decide(
     if options.checks() {
         components.nodes.check_invariants();
     }
-    let verdict = if rules.seeds.is_empty() {
+    let mut verdict = if rules.seeds.is_empty() {
         vote::decide(&components.all, &components.candidates, facets, comm)
     } else {
         let label = |c| components.label(c);
@@ -187,10 +186,10 @@ pub fn decide(
     components.nodes.drop_links();
 
     let at_boundary = components.at_boundary.iter().map(|&c| components.label(c));
-    let region = Region::new(rules, &components.all, &verdict, at_boundary, comm);
+    verdict.compare_with_boundary(rules, &components.all, at_boundary, comm);
     let class = |label| match () {
         () if verdict.inside.contains(label) => Class::Inside,
-        () if region.enclosed.contains(label) => Class::Enclosed,
+        () if verdict.enclosed.contains(label) => Class::Enclosed,
         () => Class::Outside,
     };
     let Components { nodes, merged, labels, all, .. } = components;
@@ -198,23 +197,15 @@ pub fn decide(
     let mut of_local = Vec::with_capacity(merged.len());
     of_local.extend(merged.iter().map(|&c| classes[c as usize]));
     drop(merged);
-    let mut sides = Sides {
-        keep: if options.ungraded { Keep::All } else { rules.keep },
-        stored: per_level(),
-        summary: Summary {
-            outside: (all.len() - verdict.inside.len()) as u64,
-            inside: verdict.inside.len() as u64,
-            enclosed: None,
-            ambiguous: verdict.ambiguous,
-            inside_reaches_boundary: region.inside_reaches_boundary,
-            flow_misses_boundary: region.flow_misses_boundary,
-        },
-        rays: verdict.rays,
-    };
+    let keep = if options.ungraded { Keep::All } else { rules.keep };
+    let mut sides =
+        Sides { keep, stored: per_level(), summary: verdict.summary, rays: verdict.rays };
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
     let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership, &mut regions);
-    sides.summary.enclosed = region.summary(&all, leaves_enclosed, comm);
-    Ok(Decided { sides, regions, components: all, verdict, reach: region })
+    let inside = verdict.inside.len() as u64;
+    (sides.summary.inside, sides.summary.outside) = (inside, all.len() as u64 - inside);
+    sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, comm);
+    Ok(Decided { sides, regions, components: all, verdict })
 }
 
 impl Sides {

@@ -142,7 +142,7 @@ pub fn decide(
     }
     exhausted.extend(open);
     let first = exhausted.iter().map(|(label, _)| lists[label][0]).min();
-    verdict.ambiguous =
+    verdict.summary.ambiguous =
         first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
     let is_inside = |&(label, votes): &(Label, usize)| votes > 3 * lists[&label].len();
     verdict.inside.extend(exhausted.into_iter().filter(is_inside).map(|c| c.0));

@@ -3,7 +3,7 @@
 use crate::brick;
 use crate::brickset::BrickSet;
 use crate::octant::{Level, morton};
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// log2 of the bricks in a block, in which results are gathered: 2 x 2 x 2, most of which a layer fills.
 const BLOCK_LOG2: u32 = 3;
@@ -25,7 +25,7 @@ pub struct Gathered {
     extent: i64,
     /// Bits that octants of this level can have, by brick of a block.
     valid: [u64; BLOCK],
-    numbers: HashMap<u64, u32, Spread>,
+    numbers: FxHashMap<u64, u32>,
     /// Blocks of each page, or [`NONE`].
     pages: Vec<[u32; PAGE]>,
     words: Vec<[u64; BLOCK]>,
@@ -41,7 +41,7 @@ impl Gathered {
         Self {
             extent: if l < 3 { 1 } else { 1 << (l - 3) },
             valid: std::array::from_fn(valid),
-            numbers: HashMap::default(),
+            numbers: FxHashMap::default(),
             pages: Vec::new(),
             words: Vec::new(),
             latest: [(u64::MAX, 0); PAGE],
@@ -93,30 +93,5 @@ impl Gathered {
             }
         }
         set
-    }
-}
-
-/// Hash function for Morton codes: one multiplication spreads them well enough.
-#[derive(Clone, Copy, Default)]
-struct Spread(u64);
-
-impl std::hash::BuildHasher for Spread {
-    type Hasher = Self;
-    fn build_hasher(&self) -> Self {
-        Self(0)
-    }
-}
-
-impl std::hash::Hasher for Spread {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-    fn write(&mut self, bytes: &[u8]) {
-        for &b in bytes {
-            self.write_u64(u64::from(b));
-        }
-    }
-    fn write_u64(&mut self, v: u64) {
-        self.0 = (self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }

@@ -24,9 +24,8 @@ impl Numbering {
         for l in 0..LEVELS as Level {
             let mut counts = vec![0; intervals.len()];
             if l > 0 {
-                let mut at = Interval::default();
                 for b in Tree::exists(&mesh.split, l).filter(|b| mesh.ownership.owns(l, b.key)) {
-                    counts[at.of(&intervals, l, b.key)] += u64::from(b.bits.count_ones() / 8);
+                    counts[interval_of(&intervals, l, b.key)] += u64::from(b.bits.count_ones() / 8);
                 }
             }
             mine.extend(counts);
@@ -62,24 +61,15 @@ impl Numbering {
         Self { nodes, first, intervals }
     }
 
-    /// The first number in this rank's interval with the brick, which this rank owns, and the interval.
-    pub(super) fn first(&self, at: &mut Interval, l: Level, key: u64) -> (usize, u64) {
-        let interval = at.of(&self.intervals, l, key);
+    /// The interval with the brick, which this rank owns, and the first number in it.
+    pub(super) fn first(&self, l: Level, key: u64) -> (usize, u64) {
+        let interval = interval_of(&self.intervals, l, key);
         (interval, self.first[l as usize][interval])
     }
 }
 
-/// A position in a rank's intervals, found for ascending bricks of a level.
-#[derive(Default)]
-pub(super) struct Interval(usize);
-
-impl Interval {
-    /// The interval with the minimum corner of a brick.
-    fn of(&mut self, intervals: &[Range<u64>], l: Level, key: u64) -> usize {
-        let start = brick_start(l, key);
-        while intervals[self.0].end <= start {
-            self.0 += 1;
-        }
-        self.0
-    }
+/// The interval with the minimum corner of a brick.
+fn interval_of(intervals: &[Range<u64>], l: Level, key: u64) -> usize {
+    let start = brick_start(l, key);
+    intervals.partition_point(|interval| interval.end <= start)
 }

@@ -1,6 +1,6 @@
 //! The nodes that a rank owns, eight siblings at a time, in the order of the file.
 
-use super::numbering::{Interval, Numbering};
+use super::numbering::Numbering;
 use crate::mesh::Mesh;
 use crate::output::stream::{LevelCursors, Octants};
 use bricks::brick::{byte, children, parents};
@@ -15,18 +15,18 @@ pub(super) fn own_siblings<'a>(
     numbering: &'a Numbering,
 ) -> impl Iterator<Item = (u64, Siblings)> + 'a {
     let of_level = move |l: Level| {
-        let (mut path, mut at) = (Path::new(mesh, l), Interval::default());
+        let mut path = Path::new(mesh, l);
         // The interval of the last brick, and the number of the next siblings.
         let (mut interval, mut next) = (None, 0);
         let bricks = mesh.split[l as usize - 1].child_bricks();
         bricks.filter(move |b| mesh.ownership.owns(l, b.key)).flat_map(move |b| {
-            let (found, first) = numbering.first(&mut at, l, b.key);
+            let (found, first) = numbering.first(l, b.key);
             if interval.replace(found) != Some(found) {
                 next = first;
             }
             let (brick, groups, first) = (path.load(l, b.key), parents(b.bits), next);
             next += u64::from(groups.count_ones());
-            let of_group = move |j| siblings(brick, mesh, u64::from(j));
+            let of_group = move |j| siblings(brick, u64::from(j));
             (first..).zip(ones(u64::from(groups)).map(of_group))
         })
     };
@@ -35,7 +35,7 @@ pub(super) fn own_siblings<'a>(
 
 /// The root.
 pub(super) fn root(mesh: &Mesh) -> Siblings {
-    let root = siblings(Path::new(mesh, 0).load(0, 0), mesh, 0);
+    let root = siblings(Path::new(mesh, 0).load(0, 0), 0);
     // The seven other octants of the brick do not exist.
     let [split, deleted, crossing, inside] =
         [root.split, root.deleted, root.crossing, root.inside].map(|bits| bits & 1);
@@ -44,21 +44,13 @@ pub(super) fn root(mesh: &Mesh) -> Siblings {
 
 /// Siblings that exist: byte `j` of a brick.
 #[inline]
-fn siblings(brick: Octants, mesh: &Mesh, j: u64) -> Siblings {
-    let Octants { split, crossing, inside, deleted } = brick;
-    let mut gone = 0;
-    if !mesh.is_base {
-        gone = deleted;
-        if !mesh.rules.keep_crossing {
-            gone |= crossing;
-        }
-    }
-    let kept = !split & !gone;
+fn siblings(Octants { split, crossing, inside, deleted }: Octants, j: u64) -> Siblings {
+    let kept = !split & !deleted;
     Siblings {
         split: byte(split, j),
-        deleted: byte(gone & !split, j),
+        deleted: byte(deleted & !split, j),
         crossing: byte(crossing & kept, j),
-        inside: byte(inside & kept & !crossing, j),
+        inside: byte(inside & kept, j),
     }
 }
 
