@@ -3,7 +3,7 @@
 use super::Shrunk;
 use super::probe::Probe;
 use super::reduce::size;
-use check::diff::{self, Trust};
+use check::diff;
 use contract::case::Case;
 use contract::plain::StlForm;
 use run::engine::layout::Ranks;
@@ -71,7 +71,7 @@ fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
     };
     let compared = probe.meshes(&shrunk.trial).and_then(|[engine, truth]| {
         let case = Case::read(case).ok();
-        diff::diff(&engine, &truth, case.as_ref(), Trust::Leaves).map_err(|error| error.to_string())
+        diff::diff(&engine, &truth, case.as_ref()).map_err(|error| error.to_string())
     });
     match compared {
         Ok(report) => {
