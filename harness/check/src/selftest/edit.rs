@@ -2,7 +2,7 @@
 
 use super::SelftestCase;
 use contract::leafset::LeafSet;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::CELLS_PER_EDGE;
 use contract::tree::{Neighbourhood, Tree};
 use contract::word::{self, Leaf, Side};
 

@@ -68,10 +68,10 @@ pub(super) const MUTANTS: &[Mutant] = &[
             word::level(w) < s.case.level_surface
                 && around.handles.iter().all(|&h| tree.kinds(h) & near_surface == 0)
         };
-        changed(s, away, |words, i| drop(words.remove(i)))
+        changed(s, away, |words, i| _ = words.remove(i))
     }),
     words("crossing leaf removed", "complete", INFORMED, |s| {
-        changed(s, |w| has_side(w, Side::Crossing), |words, i| drop(words.remove(i)))
+        changed(s, |w| has_side(w, Side::Crossing), |words, i| _ = words.remove(i))
     }),
     words("octant emptied", "complete", AUDITED, |s| {
         // The corner of the root is far from the body, so the leaves around the hole are coarse.

@@ -82,10 +82,7 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::stream`].
-    pub fn stream_ranked(
-        &self,
-        run: &mut dyn FnMut(usize, &[u64], &[u32]) -> bool,
-    ) -> Result<(), ReadError> {
+    pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), ReadError> {
         match &self.parts[..] {
             [Part::Tree(tree)] => tree
                 .words_and_ranks(&mut |words, ranks| run(0, words, ranks))
@@ -146,6 +143,9 @@ impl Mesh {
         ReadError::NotLinear { path: self.dir.clone(), why }
     }
 }
+
+/// What is given the words of a part, with its number, and their ranks.
+pub type RankedRun<'r> = dyn FnMut(usize, &[u64], &[u32]) -> bool + 'r;
 
 /// The end of the leaves so far, as a Morton code.
 #[derive(Clone, Copy, Debug, Default)]

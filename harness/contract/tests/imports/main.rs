@@ -3,7 +3,6 @@
 mod damage;
 mod trees;
 
-use contract::htg::TreeFile;
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, ImportError, Request, leaf_set};
