@@ -330,48 +330,21 @@ fn positive(what: &str, value: f64) -> Result<(), String> {
     }
 }
 
-/// A TOML error in one line, with the most similar known key if a key is unknown.
+/// A TOML error in one line, with the line of the file, counted from 1, and the key or table on it.
 fn explain(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message().replace("expected f64", "expected a number");
+    let message = error.message().replace("expected f64", "expected a number").replace('\n', " ");
     let at = error.span().map_or(0, |span| span.start);
-    let (line, key) = place(text, at);
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    match (message.starts_with("unknown field"), quoted.next()) {
-        (true, Some(wrong)) => {
-            match quoted.max_by(|a, b| similarity(wrong, a).total_cmp(&similarity(wrong, b))) {
-                Some(near) => format!("{line}: unknown key `{wrong}`; did you mean `{near}`?"),
-                None => format!("{line}: unknown key `{wrong}`"),
-            }
-        }
-        // Of the file as a whole.
-        (false, _) if at == 0 && message.starts_with("missing") => message.clone(),
-        _ => format!("{line}{key}: {}{}", message.replace('\n', " "), advice(text, at)),
+    // Of the file as a whole.
+    if at == 0 && message.starts_with("missing") {
+        return message;
     }
-}
-
-/// How to write a path, if a key whose value is one has another value: a backslash in double quotes, or no quotes at all.
-fn advice(text: &str, at: usize) -> &'static str {
     let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
+    let number = text[..begin].matches('\n').count() + 1;
     let line = text[begin..].lines().next().unwrap_or_default();
-    match line.split_once('=') {
-        Some((key, value)) if key.trim() == "geometry" && !value.trim().starts_with('\'') => {
-            "; put the path in single quotes: geometry = 'DIRECTORY/FILE.stl'"
-        }
+    let key = line.split('=').next().unwrap_or_default().trim();
+    let path = match key {
+        "geometry" => "; put the path in single quotes: geometry = 'DIRECTORY/FILE.stl'",
         _ => "",
-    }
-}
-
-/// The line of a byte of a case file, counted from 1, and the key or table on it, as the beginning of a message.
-fn place(text: &str, byte: usize) -> (String, String) {
-    let begin = text[..byte].rfind('\n').map_or(0, |at| at + 1);
-    let (number, line) = (text[..begin].matches('\n').count() + 1, text[begin..].lines().next());
-    let key = line.unwrap_or_default().split('=').next().unwrap_or_default().trim();
-    let is_key = |c: char| c.is_alphanumeric() || "_-.[]\"".contains(c);
-    let is_key = !key.is_empty() && key.chars().all(is_key);
-    (format!("line {number}"), if is_key { format!(", {key}") } else { String::new() })
-}
-
-/// Similarity of two keys, from 0 to 1, by the metric that the mesher uses too.
-fn similarity(a: &str, b: &str) -> f64 {
-    strsim::jaro_winkler(a, b)
+    };
+    format!("line {number}, {key}: {message}{path}")
 }

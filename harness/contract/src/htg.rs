@@ -10,7 +10,6 @@
 
 mod bits;
 mod bytes;
-mod cursor;
 #[cfg(test)]
 mod tests;
 
@@ -31,7 +30,6 @@ const RUN: usize = 4096;
 /// The least number that is no rank, so that counting leaves by rank takes little memory whatever a file contains.
 const RANKS_MAX: u32 = 1 << 24;
 
-pub use cursor::Cursor;
 /// The cell data with the sides.
 pub use vtkhdf::tree::SIDE;
 
@@ -104,19 +102,19 @@ impl TreeFile {
         let split = Bits::read(&file, &file.split, described)?;
         let masked = file.masked.as_ref().map(|array| Bits::read(&file, array, end)).transpose()?;
         let masked = masked.unwrap_or_default();
-        for (level, counts) in levels.windows(2).enumerate() {
-            let parents = split.ones_before(counts[0].end) - split.ones_before(counts[0].start);
-            let children = counts[1].end - counts[1].start;
+        if !split.are_disjoint(&masked) {
+            return nodes("a node is masked and split");
+        }
+        let mut leaves = end - masked.ones(0..end);
+        for (level, pair) in levels.windows(2).enumerate() {
+            let (parents, children) = (split.ones(pair[0].clone()), pair[1].end - pair[1].start);
+            leaves -= parents;
             if 8 * parents != children {
                 return nodes(format!(
                     "{parents} nodes of level {level} are split, and {children} are on the next"
                 ));
             }
         }
-        if !split.are_disjoint(&masked) {
-            return nodes("a node is masked and split");
-        }
-        let leaves = end - split.ones_before(end) - masked.ones_before(end);
         let (path, root) = (path.to_owned(), Root { origin, edge });
         Ok(Self { path, file, root, leaves, with_sides, levels, split, masked })
     }
@@ -136,8 +134,19 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        let run = &mut |words: &[u64], _: &[u32]| run(words);
-        let mut walk = Walk::new(self, None);
+        self.walk(None, &mut |words, _| run(words))
+    }
+
+    /// The same with the ranks of the leaves, if the file has them.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn words_and_ranks(&self, run: &mut Run) -> Result<()> {
+        self.walk(self.file.ranks.as_ref(), run)
+    }
+
+    fn walk(&self, ranks: Option<&Chunked>, run: &mut Run) -> Result<()> {
+        let mut walk = Walk::new(self, ranks);
         if walk.siblings(0, 0, 1, run)? {
             walk.flush(run);
         }
@@ -174,11 +183,6 @@ impl<'a> Walk<'a> {
         };
         let levels = tree.levels.iter().map(level).collect();
         Self { tree, levels, words: Vec::with_capacity(RUN + 8), ranks: Vec::new() }
-    }
-
-    /// Continues with these nodes.
-    fn seek(&mut self, next: &[u64]) {
-        self.levels.iter_mut().zip(next).for_each(|(level, next)| level.next = *next);
     }
 
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.

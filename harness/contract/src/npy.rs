@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
-use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -109,25 +108,6 @@ impl PartFile {
         self.read_at(0, &mut words)?;
         Ok(words)
     }
-
-    /// Index of the first word in a range of a sorted file that is not less than `word`; the range's end if there is none.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn lower_bound(&self, range: Range<u64>, word: u64) -> std::io::Result<u64> {
-        let (mut low, mut high) = (range.start, range.end);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            let mut at = [0];
-            self.read_at(middle, &mut at)?;
-            if at[0] < word {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        Ok(low)
-    }
 }
 
 /// What an npy header states of an array.
@@ -220,18 +200,12 @@ mod tests {
     }
 
     #[test]
-    fn written_words_are_read_back_and_found_by_bisection() {
+    fn written_words_are_read_back() {
         let file = file_of(b"");
         let words: Vec<u64> = (0..100).map(|i| i * i).collect();
         write(file.path(), &words).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!(part.read_all().unwrap(), words);
-        for probe in [0, 1, 2, 5000, 9801, 9802] {
-            let expected = words.partition_point(|&w| w < probe) as u64;
-            assert_eq!(part.lower_bound(0..part.len(), probe).unwrap(), expected);
-            let bound = part.lower_bound(3..5, probe).unwrap();
-            assert_eq!(bound, expected.clamp(3, 5));
-        }
         assert!(!part.is_empty() && part.path() == file.path());
     }
 

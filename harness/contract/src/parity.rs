@@ -6,6 +6,7 @@
 //! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
 use crate::lattice::FacetLattice;
+use rustc_hash::FxHashMap;
 
 /// Facets, binned into one grid per axis.
 #[derive(Debug)]
@@ -14,19 +15,12 @@ pub struct Parity {
     grids: [Grid; 3],
 }
 
-/// Facets binned by their projection along one axis: cell (i, j) lists every facet whose projected bounding box
-/// meets it.
+/// Facets binned by their projection along one axis: a cell lists every facet whose projected bounding box meets it.
 #[derive(Debug)]
 struct Grid {
-    /// Number of cells along each of the two axes.
-    cells: i64,
-    /// Minimum of the projected facets.
-    low: [i64; 2],
     /// Width of a cell, at least 1.
     width: [i64; 2],
-    /// Cell `c` lists `facets[starts[c]..starts[c + 1]]`.
-    starts: Vec<u32>,
-    facets: Vec<u32>,
+    lists: FxHashMap<[i64; 2], Vec<u32>>,
 }
 
 impl Parity {
@@ -95,8 +89,8 @@ fn is_positive(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<boo
     Some(sign != i128::from(normal[axis].signum()))
 }
 
-/// The facet's normal, not normalised. Lattice coordinates are small enough for i64.
-fn normal(facet: &FacetLattice) -> [i64; 3] {
+/// The facet's normal, with twice the area as its length; at most 2^59 in size on the lattice.
+pub fn normal(facet: &FacetLattice) -> [i64; 3] {
     let edge = |v: usize| -> [i64; 3] { std::array::from_fn(|a| facet[v][a] - facet[0][a]) };
     let (u, v) = (edge(1), edge(2));
     std::array::from_fn(|a| {
@@ -107,65 +101,29 @@ fn normal(facet: &FacetLattice) -> [i64; 3] {
 
 impl Grid {
     fn new(facets: &[FacetLattice], axis: usize) -> Self {
-        let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
-        for facet in facets {
-            let (from, to) = bounds(facet, axis);
-            for a in 0..2 {
-                low[a] = low[a].min(from[a]);
-                high[a] = high[a].max(to[a]);
+        let boxes: Vec<_> = facets.iter().map(|facet| bounds(facet, axis)).collect();
+        let cells = (facets.len() as f64).sqrt().clamp(1.0, 1024.0) as i64;
+        let width = std::array::from_fn(|a| {
+            let low = boxes.iter().map(|(from, _)| from[a]).min().unwrap_or(0);
+            let high = boxes.iter().map(|(_, to)| to[a]).max().unwrap_or(0);
+            (high - low) / cells + 1
+        });
+        let mut grid = Self { width, lists: FxHashMap::default() };
+        for (index, (from, to)) in (0..).zip(boxes) {
+            let ([left, low], [right, high]) = (grid.cell(from), grid.cell(to));
+            for cell in (low..=high).flat_map(|j| (left..=right).map(move |i| [i, j])) {
+                grid.lists.entry(cell).or_default().push(index);
             }
         }
-        if facets.is_empty() {
-            (low, high) = ([0; 2], [0; 2]);
-        }
-        let cells = (facets.len() as f64).sqrt().clamp(1.0, 1024.0) as i64;
-        let width = std::array::from_fn(|a| (high[a] - low[a]) / cells + 1);
-        let mut grid = Self { cells, low, width, starts: Vec::new(), facets: Vec::new() };
-        grid.fill(facets, axis);
         grid
     }
 
-    /// Counting sort of the facets into cells.
-    fn fill(&mut self, facets: &[FacetLattice], axis: usize) {
-        let mut starts = vec![0u32; (self.cells * self.cells) as usize + 1];
-        for facet in facets {
-            self.cells_of(facet, axis, |c| starts[c + 1] += 1);
-        }
-        for c in 1..starts.len() {
-            starts[c] = starts[c].checked_add(starts[c - 1]).expect("fewer than 2^32 entries");
-        }
-        let mut next = starts.clone();
-        self.facets = vec![0; *starts.last().expect("at least one") as usize];
-        let mut list = std::mem::take(&mut self.facets);
-        for (i, facet) in facets.iter().enumerate() {
-            self.cells_of(facet, axis, |c| {
-                list[next[c] as usize] = i as u32;
-                next[c] += 1;
-            });
-        }
-        (self.starts, self.facets) = (starts, list);
+    fn cell(&self, point: [i64; 2]) -> [i64; 2] {
+        [0, 1].map(|a| point[a].div_euclid(self.width[a]))
     }
 
-    /// Visits the cells that the projected bounding box of a facet meets.
-    fn cells_of(&self, facet: &FacetLattice, axis: usize, mut visit: impl FnMut(usize)) {
-        let (from, to) = bounds(facet, axis);
-        let cell = |coordinate: i64, a: usize| (coordinate - self.low[a]) / self.width[a];
-        for j in cell(from[1], 1)..=cell(to[1], 1) {
-            for i in cell(from[0], 0)..=cell(to[0], 0) {
-                visit((j * self.cells + i) as usize);
-            }
-        }
-    }
-
-    /// Facets whose projection may contain this point.
     fn candidates(&self, point: [i64; 2]) -> &[u32] {
-        let cell: [i64; 2] =
-            std::array::from_fn(|a| (point[a] - self.low[a]).div_euclid(self.width[a]));
-        if cell.iter().any(|c| !(0..self.cells).contains(c)) {
-            return &[];
-        }
-        let c = (cell[1] * self.cells + cell[0]) as usize;
-        &self.facets[self.starts[c] as usize..self.starts[c + 1] as usize]
+        self.lists.get(&self.cell(point)).map_or(&[], Vec::as_slice)
     }
 }
 

@@ -1,12 +1,11 @@
 //! Meshes as files of other programs. A [`mesh::Mesh`] on disk is read leaf by leaf, so memory does not grow with the mesh,
-//! and only those parts of the files are read that a [`selection::Selection`] needs.
+//! also of one of which a [`selection::Selection`] needs a part.
 //!
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
 //! - [`foam`]: meshes for OpenFOAM;
 //! - [`brick`]: lattice points in groups of neighbours;
-//! - [`pieces`]: leaves in pieces of limited size; [`ordered`]: computed on threads, written in order.
 
 #![deny(missing_docs)]
 
@@ -19,9 +18,7 @@ pub mod leaf;
 pub mod mesh;
 pub mod near_body;
 pub mod options;
-pub mod ordered;
 pub mod p8est;
-pub mod pieces;
 pub mod selection;
 #[cfg(test)]
 mod testing;

@@ -21,8 +21,7 @@ use crate::error::ExportError;
 use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::pieces::nothing_selected;
-use crate::selection::Selection;
+use crate::selection::{Selection, nothing_selected};
 use crate::written::Written;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
@@ -61,9 +60,8 @@ pub fn write(
         pad(&mut start);
         out.write_all(&start).map_err(named)?;
         let (mut done, mut written) = (0, Written::default());
-        quadrants(mesh, selection, &mut |quadrant| {
+        quadrants(mesh, selection, options, &mut |quadrant| {
             if done % STEP == 0 {
-                options.check()?;
                 options.watch.progress(done, total);
             }
             done += 1;
@@ -101,10 +99,11 @@ impl Quadrant {
 fn quadrants(
     mesh: &Mesh,
     selection: &Selection,
+    options: &Options<'_>,
     visit: &mut impl FnMut(Quadrant) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let (mut next, mut part_last) = (0, 0);
-    mesh.visit(Mesh::ALL, selection, &mut |Leaf { octant, side, rank: part, .. }| {
+    mesh.visit(selection, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(ExportError::Request(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
@@ -143,12 +142,8 @@ fn counted(
     options: &Options<'_>,
 ) -> Result<(u64, Vec<u64>), ExportError> {
     let mut ends = vec![0; mesh.leaves_by_rank()?.len().max(1)];
-    let (mut leaves, mut done) = (0, 0u64);
-    quadrants(mesh, selection, &mut |quadrant| {
-        if done.is_multiple_of(STEP) {
-            options.check()?;
-        }
-        done += 1;
+    let mut leaves = 0;
+    quadrants(mesh, selection, options, &mut |quadrant| {
         leaves += u64::from(quadrant.data != FILLER);
         ends[quadrant.part as usize] += 1;
         Ok(())

@@ -4,6 +4,7 @@ use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use contract::lattice::FacetLattice;
+use contract::parity::normal;
 
 /// A facet is a sliver if its height is below this part of its longest edge.
 const SLIVER: f64 = 1e-3;
@@ -47,16 +48,6 @@ pub fn shapes(input: &Input, first: usize) -> [Finding; 2] {
 /// Whether a facet is a segment or a point.
 pub fn is_degenerate(facet: &FacetLattice) -> bool {
     normal(facet) == [0; 3]
-}
-
-/// The facet's normal, with twice the area as its length; at most 2^59 in size on the lattice.
-pub fn normal(facet: &FacetLattice) -> [i64; 3] {
-    let edge = |v: usize| -> [i64; 3] { std::array::from_fn(|a| facet[v][a] - facet[0][a]) };
-    let (u, v) = (edge(1), edge(2));
-    std::array::from_fn(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        u[b] * v[c] - u[c] * v[b]
-    })
 }
 
 fn is_sliver(facet: &[[f32; 3]; 3]) -> bool {

@@ -5,8 +5,9 @@
 //! normal to an edge of either.
 
 use contract::lattice::FacetLattice;
+use contract::parity::normal;
 
-use super::facets::{is_degenerate, normal};
+use super::facets::is_degenerate;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::FacetTree;

@@ -4,7 +4,7 @@
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
 //! - [`facets`]: defects of single facets, and duplicates; [`extent`]: the body's position in the root;
 //! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
-//! - [`finding`] and [`report`]: the result as data; [`meaning`]: a sentence per finding; [`text`]: the result for a terminal.
+//! - [`finding`] and [`report`]: the result as data; [`meaning`](mod@meaning): a table of their kinds; [`text`]: the result for a terminal.
 //!
 //! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that
 //! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
@@ -17,7 +17,7 @@ pub mod input;
 mod intersections;
 mod junctions;
 pub mod leak;
-pub mod meaning;
+mod meaning;
 mod openings;
 pub mod report;
 mod sheets;

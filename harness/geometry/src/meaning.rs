@@ -1,4 +1,4 @@
-//! The effect of each finding on the mesh at the given spacing.
+//! The kinds of findings as one table: heading, effect on the mesh, and whether it changes the region.
 
 use contract::manifest::Keep;
 use contract::octant::CELLS_PER_EDGE;
@@ -7,139 +7,104 @@ use super::finding::{Finding, Kind};
 use super::input::Input;
 use contract::number::number;
 
-/// Whether every occurrence of a kind can change the mesh's region. Openings and intersections are judged one
-/// by one.
-pub fn changes_region(kind: Kind, keep: Keep) -> bool {
-    match kind {
-        Kind::NonManifoldOdd | Kind::Duplicates | Kind::OutsideRoot => true,
-        Kind::ThinWalls => keep != Keep::Outside,
-        Kind::ThinGaps => keep != Keep::Inside,
-        _ => false,
+impl Kind {
+    /// The heading of the kind's row.
+    pub fn title(self) -> &'static str {
+        self.row().0
+    }
+
+    /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
+    pub fn changes_region(self, keep: Keep) -> bool {
+        match self {
+            Self::NonManifoldOdd | Self::Duplicates | Self::OutsideRoot => true,
+            Self::ThinWalls => keep != Keep::Outside,
+            Self::ThinGaps => keep != Keep::Inside,
+            _ => false,
+        }
+    }
+
+    /// Heading and effect on the mesh.
+    #[rustfmt::skip]
+    fn row(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Openings => ("openings",
+                "Inside and outside become one component where a cell fits through."),
+            Self::Junctions => ("edges at T-junctions",
+                "No effect: a vertex lies on the edge of another facet, and the crack is far narrower than the finest cell."),
+            Self::NonManifoldOdd => ("edges with 3, 5, ... facets",
+                "Rays on either side of such an edge disagree about the inside, so a component's side may be wrong or ambiguous."),
+            Self::NonManifoldEven => ("edges with 4, 6, ... facets",
+                "No effect: neither crossing leaves nor rays depend on how facets are connected."),
+            Self::Winding => ("neighbours, opposite winding",
+                "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
+            Self::InsideOut => ("closed shells inside out",
+                "No effect, but normals point inward: thin walls and thin gaps are confused, and other programs may exchange inside and outside."),
+            Self::Cavities => ("closed shells, likely cavities",
+                "Rays count both surfaces, so the interior of a cavity is outside. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it."),
+            Self::Duplicates => ("duplicate facets",
+                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
+            Self::Degenerate => ("facets without area",
+                "No effect: a facet without area crosses the octants that it touches, and no ray counts it."),
+            Self::Slivers => ("slivers",
+                "No effect: every decision about a facet is exact, however thin it is."),
+            Self::Intersections => ("intersecting pairs of facets",
+                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
+            Self::Contacts => ("touching pairs of facets",
+                "No effect: facets that touch without a common vertex cross the same leaves."),
+            Self::ThinWalls => ("facets of thin walls",
+                "No cell fits into the wall: it consists of crossing leaves, without an inside."),
+            Self::ThinGaps => ("facets at thin gaps",
+                "No cell fits into the gap, so no flow passes. The wedge along the line where two shells intersect is a gap, too."),
+            Self::OutsideRoot => ("facets beyond the root",
+                "The root cuts the body, whose facets beyond it rays still count. Enlarge the root if the body is to be meshed whole."),
+            Self::TouchingRoot => ("facets on the root's boundary",
+                "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there."),
+        }
     }
 }
 
 /// The effect of a finding that occurs at least once.
 pub fn meaning(finding: &Finding, input: &Input) -> String {
+    let (_, meaning) = finding.kind.row();
+    let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
+    let finest = input.root.edge / f64::from(CELLS_PER_EDGE);
     match finding.kind {
-        Kind::Openings => openings(finding, input),
-        Kind::Junctions => "No effect: a vertex lies on the edge of another facet, so the edges do not match, but the \
-                            crack is far narrower than the finest cell."
-            .into(),
-        Kind::NonManifoldOdd => "Rays that pass on either side of such an edge disagree about the inside, so a \
-                                 component's side may be wrong or ambiguous."
-            .into(),
-        Kind::NonManifoldEven => {
-            "No effect: neither crossing leaves nor rays depend on how facets are connected.".into()
-        }
-        Kind::Winding => "No effect on the mesh: no decision uses a facet's orientation. Thin walls and thin gaps \
-                          may be confused with each other or missed at these facets."
-            .into(),
-        Kind::InsideOut => "No effect on the mesh: no decision uses a facet's orientation. The facets of such a closed shell \
-                            are wound so that their normals point inward: thin walls and thin gaps are confused with each \
-                            other there, and other programs may exchange inside and outside. Reverse all its facets. The \
-                            first facet of each is listed."
-            .into(),
-        Kind::Cavities => "A closed shell whose normals point inward, within the bounding box of another \
-                           closed shell, is a cavity if it lies in that solid. Rays count both surfaces, so its interior is \
-                           outside. If the outside is kept, it is deleted, unless enclosed = keep. If seeds are given, it is \
-                           flow only if a seed lies in it. The first facet of each is listed."
-            .into(),
-        Kind::Duplicates => "A ray counts every copy: an even number of copies is passed as if the surface were \
-                             open there, so a component's side may be wrong. Remove the copies."
-            .into(),
-        Kind::Degenerate => "No effect: a facet without area crosses the octants that it touches, and no ray \
-                             counts it."
-            .into(),
-        Kind::Slivers => "No effect: every decision about a facet is exact, however thin it is.".into(),
-        Kind::Intersections if finding.count_changing == 0 => "No effect: the facets overlap within one plane, or a \
-                                                               shift of 2 lattice units separates them, less than a \
-                                                               hundredth of the finest cell. No volumes overlap."
-            .into(),
-        Kind::Intersections => "Where two closed shells overlap by more than a cell, rays count both surfaces, and \
-                                the overlap is outside rather than inside. If the outside is kept, an overlap that \
-                                the far field does not reach is deleted, unless enclosed = keep. If seeds are given, \
-                                the overlap is flow only if a seed lies in it. Unite the shells if that is not meant."
-            .into(),
-        Kind::Contacts => {
-            "No effect: facets that touch without a common vertex cross the same leaves.".into()
-        }
-        Kind::ThinWalls => format!(
-            "No cell fits into the wall: it consists of crossing leaves, without an inside. {}",
-            resolved(finding, input)
-        ),
-        Kind::ThinGaps => format!(
-            "No cell fits into the gap: crossing leaves fill it, and no flow passes. The wedge along the line where two \
-             shells intersect is a gap, too. {}",
-            resolved(finding, input)
-        ),
-        Kind::OutsideRoot => "The root cuts the body: no leaf exists beyond its boundary. Rays still count these \
-                              facets. Enlarge the root if the body is to be meshed whole."
-            .into(),
-        Kind::TouchingRoot => "No leaf exists on the far side of these facets, and no flow passes between the \
-                               body and the root's boundary there."
-            .into(),
-    }
-}
-
-fn openings(finding: &Finding, input: &Input) -> String {
-    let widest = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
-    let leak = "inside and outside become one component";
-    match input.cell {
-        _ if widest == 0.0 => {
-            "All have no width (facets meet without common vertices), so crossing leaves close them \
-             at every spacing."
+        Kind::Openings => openings(finding, input, (width, finest)),
+        Kind::Intersections if finding.count_changing == 0 => {
+            "No effect: the facets overlap within one plane or by the rounding of their \
+                                                               vertices, so no volumes overlap."
                 .into()
         }
-        _ if widest < input.root.edge / f64::from(CELLS_PER_EDGE) => {
-            "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into()
+        // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice.
+        Kind::ThinWalls | Kind::ThinGaps if width / 2.0 < finest => {
+            format!("{meaning} A twentieth is too narrow for the finest cell of the root.")
         }
-        None => format!(
-            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {} or less the widest \
-             may leak: {leak}.",
-            number(widest)
+        Kind::ThinWalls | Kind::ThinGaps => format!(
+            "{meaning} A spacing below {} would resolve all but the narrowest twentieth.",
+            number(width / 2.0)
         ),
-        Some(_) if finding.count_changing == 0 => format!(
-            "All are narrower than a cell, so crossing leaves close them; at a spacing of {} or less the widest may \
-             leak.",
-            number(widest)
-        ),
-        Some(cell) if widest < LEAK_CELLS * cell => format!(
-            "{} at least one cell wide and may leak, depending on the position in the lattice: {leak}. Crossing \
-             leaves close an opening only if it is narrower than a cell; close it or mesh with a spacing above {}.",
-            of(finding),
-            number(widest)
-        ),
-        Some(_) => format!(
-            "{} at least one cell wide, and the widest leaks unless other facets cover it: {leak}. The rim of a \
-             sheet counts too; a sheet has no inside.",
-            of(finding)
-        ),
+        _ => meaning.into(),
     }
 }
 
-/// A straight chain of cells, each connected to the next by a face, fits into a round opening wider than
-/// 2 sqrt(3) = 3.46 cells, wherever it lies in the lattice.
-const LEAK_CELLS: f64 = 3.5;
-
-fn of(finding: &Finding) -> String {
-    match (finding.count, finding.count_changing) {
-        (1, _) => "It is".into(),
-        (_, 1) => "One is".into(),
-        (all, changing) if all == changing => "All are".into(),
-        (_, changing) => format!("{changing} of them are"),
+/// The effect of openings, of which the widest is given.
+fn openings(finding: &Finding, input: &Input, (widest, finest): (f64, f64)) -> String {
+    let (_, meaning) = finding.kind.row();
+    if widest < finest {
+        return "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into();
     }
-}
-
-/// The spacing at which cells fit in all but the narrowest twentieth. A gap of two cells holds one of them wherever it
-/// lies in the lattice, if it is parallel to a face of the lattice.
-fn resolved(finding: &Finding, input: &Input) -> String {
-    let narrowest = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
-    if narrowest / 2.0 < input.root.edge / f64::from(CELLS_PER_EDGE) {
-        return "A twentieth is too narrow for the finest cell of the root.".into();
+    let widest = number(widest);
+    if input.cell.is_none() || finding.count_changing == 0 {
+        return format!(
+            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {widest} or less the widest may leak. \
+             {meaning}"
+        );
     }
+    // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
     format!(
-        "A spacing below {} would resolve all but the narrowest twentieth.",
-        number(narrowest / 2.0)
+        "At least one cell wide: {} of {}, the widest {widest}. {meaning} Below 3.5 cells that depends on the position in the \
+         lattice. Close it or mesh with a greater spacing. The rim of a sheet counts, too; a sheet has no inside.",
+        finding.count_changing, finding.count
     )
 }
 
@@ -172,15 +137,14 @@ mod tests {
 
     #[test]
     fn an_opening_is_judged_by_its_width_in_cells() {
-        let of = |width, changing, with_cell| of_width(Kind::Openings, width, changing, with_cell);
         for (width, changing, with_cell, beginning) in [
-            (0.0, 0, true, "All have no width"),
+            (0.0, 0, true, "All are narrower than the finest cell"),
             (0.99, 0, true, "All are narrower than the finest cell"),
             (
                 1.0,
                 0,
                 true,
-                "All are narrower than a cell, so crossing leaves close them; at a spacing of 1.00 or less",
+                "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
             ),
             (
                 1.0,
@@ -188,16 +152,11 @@ mod tests {
                 false,
                 "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
             ),
-            (13.9, 3, true, "All are at least one cell wide and may leak"),
-            (14.0, 3, true, "All are at least one cell wide, and the widest leaks unless"),
-            (14.0, 1, true, "One is at least one cell wide, and"),
-            (14.0, 2, true, "2 of them are at least one cell wide, and"),
+            (14.0, 2, true, "At least one cell wide: 2 of 3, the widest 14.0"),
         ] {
-            let text = of(width, changing, with_cell);
+            let text = of_width(Kind::Openings, width, changing, with_cell);
             assert!(text.starts_with(beginning), "{width}, {changing}, {with_cell}: {text}");
         }
-        let one = Finding { count: 1, count_changing: 1, ..Finding::new(Kind::Openings) };
-        assert_eq!(super::of(&one), "It is");
     }
 
     #[test]
@@ -246,7 +205,7 @@ mod tests {
         let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.title()).collect();
         assert_eq!(titles.len(), kinds.len());
         let changing = |keep| {
-            kinds.into_iter().filter(move |&kind| changes_region(kind, keep)).collect::<Vec<_>>()
+            kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
         };
         let always = [Kind::NonManifoldOdd, Kind::Duplicates];
         let all = [always[0], always[1], Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot];

@@ -72,7 +72,7 @@ impl Diagnosis {
         first: usize,
     ) -> Self {
         for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
-            if meaning::changes_region(finding.kind, input.keep) {
+            if finding.kind.changes_region(input.keep) {
                 finding.count_changing = finding.count;
             }
             finding.meaning = meaning::meaning(finding, input);

@@ -6,30 +6,6 @@ use super::finding::{Finding, Kind, Place};
 use super::report::Diagnosis;
 use contract::number::number;
 
-impl Kind {
-    /// The heading of the kind's row.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Openings => "openings",
-            Self::Junctions => "edges at T-junctions",
-            Self::NonManifoldOdd => "edges with 3, 5, ... facets",
-            Self::NonManifoldEven => "edges with 4, 6, ... facets",
-            Self::Winding => "neighbours, opposite winding",
-            Self::InsideOut => "closed shells inside out",
-            Self::Cavities => "closed shells, likely cavities",
-            Self::Duplicates => "duplicate facets",
-            Self::Degenerate => "facets without area",
-            Self::Slivers => "slivers",
-            Self::Intersections => "intersecting pairs of facets",
-            Self::Contacts => "touching pairs of facets",
-            Self::ThinWalls => "facets of thin walls",
-            Self::ThinGaps => "facets at thin gaps",
-            Self::OutsideRoot => "facets beyond the root",
-            Self::TouchingRoot => "facets on the root's boundary",
-        }
-    }
-}
-
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.header(f)?;

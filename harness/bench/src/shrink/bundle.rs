@@ -3,7 +3,7 @@
 use super::Shrunk;
 use super::probe::Probe;
 use super::reduce::size;
-use check::diff::{self, Trust};
+use check::diff;
 use contract::case::Case;
 use contract::plain::StlForm;
 use run::engine::layout::Ranks;
@@ -61,7 +61,7 @@ fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
     let compared = probe.meshes(&shrunk.trial).map_err(|failure| failure.why).and_then(|meshes| {
         let Some(([engine, truth], name)) = meshes else { return Ok(None) };
         let case = Case::read(case).ok();
-        let report = diff::diff(&engine, &truth, case.as_ref(), Trust::Leaves);
+        let report = diff::diff(&engine, &truth, case.as_ref());
         report.map(|report| Some((report, name))).map_err(|error| error.to_string())
     });
     match compared {

@@ -1,7 +1,7 @@
 use super::*;
 use contract::import::htg::ImportedTree;
 use contract::leafset;
-use contract::manifest::octant_index;
+use contract::manifest::{Manifest, octant_index};
 use contract::testing::{leaf_set, random_words, words_of};
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ fn without_the_sides_of_one_mesh_the_cells_are_compared() {
     let words = words_of(|o| o.level < 2);
     let with_sides = words.iter().map(|word| word | 1).collect();
     let (a, b) = (written(with_sides), written(words.clone()));
-    let compare = || diff(a.path(), b.path(), None, Trust::Manifests).unwrap();
+    let compare = || diff(a.path(), b.path(), None).unwrap();
     assert!(!compare().same_leaves());
     let unknown = |mut set: contract::leafset::LeafSet| {
         set.manifest.sides = Sides::Unknown;
@@ -46,16 +46,10 @@ fn the_octants_that_differ_are_listed_up_to_eight() {
     );
     assert_eq!(report.to_string(), expected);
     report.octants.push(level_3(511));
-    report.leaf = None;
-    let contradiction = "but the leaves in them are the same: a manifest contradicts its files";
     let expected = format!(
-        "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\n{contradiction}"
+        "a field\nthe leaves differ in 9 of 512 level-3 octants: {eight}, ...\na leaf\n  rule: one"
     );
     assert_eq!(report.to_string(), expected);
-    let manifest = leaf_set(vec![]).manifest;
-    assert_eq!(manifests(&manifest, &manifest).compared, Trust::Manifests);
-    let same = DiffReport { compared: Trust::Manifests, leaves: 5, ..DiffReport::default() };
-    assert_eq!(same.to_string(), "the leaves are the same (5, by the digests in the manifests)");
 }
 
 #[test]
@@ -69,25 +63,22 @@ fn the_first_difference_is_found_in_any_octant_and_part() {
         changed.iter().enumerate().for_each(|(i, &word)| parts[i % 3].push(word));
         let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
         leaf_set(parts).write(b.path()).unwrap();
-        for trust in [Trust::Leaves, Trust::Manifests] {
-            let found = diff(a.path(), b.path(), None, trust).unwrap();
-            assert_eq!((found.octants, found.leaves), (vec![level_3(index)], 512));
-            let octant = word::octant(words[index]);
-            let leaf = leaf_set(vec![]).manifest.root.describe(&octant);
-            let text = format!(
-                "first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}"
-            );
-            assert_eq!(found.leaf, Some(text));
-            assert_eq!(
-                found.rule.unwrap(),
-                "section 4 (side): give the case file (--case) to decide it"
-            );
-            assert_eq!(found.contradictions, [""; 0]);
-        }
+        let found = diff(a.path(), b.path(), None).unwrap();
+        assert_eq!((found.octants, found.leaves), (vec![level_3(index as u64)], 512));
+        let octant = word::octant(words[index]);
+        let leaf = leaf_set(vec![]).manifest.root.describe(&octant);
+        let text =
+            format!("first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}");
+        assert_eq!(found.leaf, Some(text));
+        assert_eq!(
+            found.rule.unwrap(),
+            "section 4 (side): give the case file (--case) to decide it"
+        );
+        assert_eq!(found.contradictions, [""; 0]);
     }
     // A mesh that ends early.
     let (a, b) = (written(words.clone()), written(words[..511].to_vec()));
-    let found = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+    let found = diff(a.path(), b.path(), None).unwrap();
     assert!(found.leaf.unwrap().ends_with("\n  B has no more leaves"));
 }
 
@@ -99,7 +90,7 @@ fn meshes_of_other_inputs_or_trees_are_not_judged() {
         let mut set = leaf_set(vec![words.iter().map(|word| word | 1).collect()]);
         change(&mut set.manifest);
         set.write(b.path()).unwrap();
-        diff(a.path(), b.path(), None, Trust::Leaves).unwrap().rule.unwrap()
+        diff(a.path(), b.path(), None).unwrap().rule.unwrap()
     };
     assert!(rules(|_| ()).starts_with("section 4"));
     assert!(
@@ -109,20 +100,19 @@ fn meshes_of_other_inputs_or_trees_are_not_judged() {
 }
 
 #[test]
-fn a_leaf_that_its_manifest_does_not_show_is_found_unless_manifests_are_trusted() {
+fn a_leaf_that_its_manifest_does_not_show_is_found() {
     let words = words_of(|o| o.level < 2);
     let (a, b) = (written(words.clone()), written(words.clone()));
-    let compare = |trust| diff(a.path(), b.path(), None, trust).unwrap();
-    assert!(compare(Trust::Leaves).contradictions.is_empty());
-    assert_eq!(compare(Trust::Leaves).to_string(), "the leaves are the same (64 compared)");
+    let compare = || diff(a.path(), b.path(), None).unwrap();
+    assert!(compare().contradictions.is_empty());
+    assert_eq!(compare().to_string(), "the leaves are the same (64 compared)");
 
     let manifest = std::fs::read(b.path().join("mesh.json")).unwrap();
     let mut changed = words;
     changed[9] |= 1;
     leaf_set(vec![changed]).write(b.path()).unwrap();
     std::fs::write(b.path().join("mesh.json"), manifest).unwrap();
-    assert!(compare(Trust::Manifests).same_leaves());
-    let found = compare(Trust::Leaves);
+    let found = compare();
     assert!(!found.same_leaves() && found.leaf.is_some());
     assert!(found.to_string().contains("manifest of B contradicts"), "{found}");
 }
@@ -137,7 +127,7 @@ fn a_tree_is_compared_with_parts_like_other_parts() {
     std::fs::create_dir(&tree).unwrap();
     imported.link(&tree).unwrap();
     imported.create(&parts).unwrap();
-    let compared = |a: &Path, b: &Path| diff(a, b, None, Trust::Leaves).unwrap();
+    let compared = |a: &Path, b: &Path| diff(a, b, None).unwrap();
     let same = compared(&tree, &parts);
     assert!(same.same_leaves() && same.leaves == 9056, "{same}");
     let set = leafset::read(&parts).unwrap();
@@ -148,7 +138,7 @@ fn a_tree_is_compared_with_parts_like_other_parts() {
         set.with_parts(vec![words]).write(changed.path()).unwrap();
         for [a, b] in [[tree.as_path(), changed.path()], [changed.path(), &tree]] {
             let found = compared(a, b);
-            assert_eq!(found.octants, [level_3(octant_index(set.words[at]))], "{found}");
+            assert_eq!(found.octants, [level_3(octant_index(set.words[at]) as u64)], "{found}");
             let leaf = set.manifest.root.describe(&word::octant(set.words[at]));
             let text = found.leaf.as_ref().expect("the first difference");
             assert_eq!(text.matches(&leaf).count(), 2, "{text}");
@@ -164,7 +154,7 @@ fn a_part_larger_than_the_buffer_is_read_to_its_end() {
     let mut changed = words.clone();
     *changed.last_mut().unwrap() |= 1;
     let (a, b) = (written(words.clone()), written(changed));
-    let compared = |b: &Path| diff(a.path(), b, None, Trust::Leaves).unwrap();
+    let compared = |b: &Path| diff(a.path(), b, None).unwrap();
     let same = compared(a.path());
     assert_eq!((same.same_leaves(), same.leaves), (true, words.len() as u64));
     let found = compared(b.path());
@@ -183,7 +173,7 @@ proptest! {
             _ => {}
         }
         let (a, b) = (written(words.clone()), written(changed.clone()));
-        let report = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
+        let report = diff(a.path(), b.path(), None).unwrap();
         prop_assert_eq!(report.same_leaves(), changed == words);
         prop_assert_eq!(report.same_mesh(), changed == words);
         if changed != words {
@@ -201,14 +191,9 @@ fn meshes_in_different_roots_differ() {
     let mut moved = leaf_set(vec![words]);
     moved.manifest.root.edge = moved.manifest.root.edge.next_up();
     moved.write(b.path()).unwrap();
-    for trust in [Trust::Leaves, Trust::Manifests] {
-        let report = diff(a.path(), b.path(), None, trust).unwrap();
-        assert!(report.same_leaves() && !report.same_mesh(), "{report}");
-        assert!(
-            report.to_string().ends_with("but in other roots, so the cells differ"),
-            "{report}"
-        );
-    }
+    let report = diff(a.path(), b.path(), None).unwrap();
+    assert!(report.same_leaves() && !report.same_mesh(), "{report}");
+    assert!(report.to_string().ends_with("but in other roots, so the cells differ"), "{report}");
 }
 
 #[test]
@@ -220,7 +205,7 @@ fn words_that_are_no_linear_tree_are_refused() {
     for bad in [[&words[1..], &words[..1]].concat(), overlapping] {
         let bad = written(bad);
         for (a, b) in [(&good, &bad), (&bad, &good), (&bad, &bad)] {
-            let error = diff(a.path(), b.path(), None, Trust::Leaves).unwrap_err();
+            let error = diff(a.path(), b.path(), None).unwrap_err();
             assert!(matches!(error, ReadError::NotLinear { .. }), "{error}");
         }
     }
@@ -230,13 +215,12 @@ fn words_that_are_no_linear_tree_are_refused() {
 fn a_report_that_contradicts_itself_is_a_bug() {
     let words = words_of(|o| o.level < 2);
     let (a, b) = (written(words.clone()), written(words[..60].to_vec()));
-    let correct = diff(a.path(), b.path(), None, Trust::Leaves).unwrap();
-    let faults: [fn(&mut DiffReport); 5] = [
+    let correct = diff(a.path(), b.path(), None).unwrap();
+    let faults: [fn(&mut DiffReport); 4] = [
         |r| r.octants.clear(),
         |r| r.octants.reverse(),
         |r| r.octants[0].level = 2,
         |r| r.leaf = None,
-        |r| r.roots_differ = true,
     ];
     for (i, fault) in faults.iter().enumerate() {
         let mut wrong = correct.clone();

@@ -2,7 +2,7 @@
 
 use super::SelftestCase;
 use contract::leafset::LeafSet;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::CELLS_PER_EDGE;
 use contract::tree::{Neighbourhood, Tree};
 use contract::word::{self, Leaf, Side};
 
@@ -22,6 +22,24 @@ pub(super) fn with_words(set: &LeafSet, mut words: Vec<u64>) -> LeafSet {
     // By level-2 octant, so that neighbours in Morton order are often in different parts.
     words.iter().for_each(|&w| parts[(w >> 58) as usize % PARTS].push(w));
     set.with_parts(parts)
+}
+
+/// Index of the middle one of the leaves that satisfy a predicate.
+pub(super) fn middle(words: &[u64], predicate: impl Fn(u64) -> bool) -> Option<usize> {
+    let fit: Vec<usize> = (0..words.len()).filter(|&i| predicate(words[i])).collect();
+    fit.get(fit.len() / 2).copied()
+}
+
+/// The leaves of the mesh after a change at the middle one of those that satisfy a predicate.
+pub(super) fn changed(
+    s: &SelftestCase,
+    predicate: impl Fn(u64) -> bool,
+    change: impl FnOnce(&mut Vec<u64>, usize),
+) -> Option<Vec<u64>> {
+    let mut words = s.mesh.words.clone();
+    let i = middle(&words, predicate)?;
+    change(&mut words, i);
+    Some(words)
 }
 
 /// The leaf with this side.
@@ -111,11 +129,6 @@ pub(super) fn mirrored(words: &[u64]) -> Vec<u64> {
 /// The neighbourhood of a leaf in a mesh.
 pub(super) fn neighbourhood(tree: &Tree, word: u64) -> Neighbourhood {
     Neighbourhood::of(tree, word::octant(word))
-}
-
-/// Level of the T0 leaf that contains the minimum corner of an octant.
-pub(super) fn base_level(base: &Tree, octant: &Octant) -> u8 {
-    base.locate(octant.corner).map_or(0, |(o, _)| o.level)
 }
 
 #[cfg(test)]

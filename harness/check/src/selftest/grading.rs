@@ -5,24 +5,37 @@
 //! property in the corruption's name.
 
 use super::SelftestCase;
-use super::edit::{self, base_level, has_side, merge, sibling_groups, split};
-use super::mutant::{Mutant, Mutation, audited, informed};
+use super::edit::{self, has_side, merge, sibling_groups, split};
+use super::mutant::{AUDITED, INFORMED, Mutant, words};
 use contract::manifest::Keep;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::{Neighbourhood, OFFSETS, Tree};
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
-    audited("two levels apart over a face", "balance", over_face),
-    audited("two levels apart over an edge only", "balance", over_edge_only),
-    audited("two levels apart over a corner only", "balance", over_corner_only),
-    audited("leaf split twice", "balance", split_twice),
-    audited("octant that balance requires merged", "balance", balance_merged),
-    audited("layer too thin at one place of one level", "layer", layer_merged),
-    audited("layer too thin along one whole level", "layer", layer_missing),
-    audited("layer around the surface too thin", "layer", surface_layer_merged),
-    audited("refinement missing along a plane, as for a lost halo", "layer", halo_missing),
-    informed("extra layer around deleted leaves missing", "layer", extra_layer_missing),
+    words("two levels apart over a face", "balance", AUDITED, |s| {
+        split_where(s, |coarser| coarser[1] > 0)
+    }),
+    words("two levels apart over an edge only", "balance", AUDITED, |s| {
+        split_where(s, |coarser| coarser[1] == 0 && coarser[2] > 0)
+    }),
+    words("two levels apart over a corner only", "balance", AUDITED, |s| {
+        split_where(s, |coarser| coarser[1] == 0 && coarser[2] == 0 && coarser[3] > 0)
+            .or_else(|| merged_at_finer_corner(s))
+    }),
+    words("leaf split twice", "balance", AUDITED, split_twice),
+    words("octant that balance requires merged", "balance", AUDITED, |s| {
+        merge_where(s, |level, near| near.touching > level)
+    }),
+    words("layer too thin at one place of one level", "layer", AUDITED, |s| {
+        merge_where(s, |level, near| thins_layer(s, level, near))
+    }),
+    words("layer too thin along one whole level", "layer", AUDITED, layer_missing),
+    words("layer around the surface too thin", "layer", AUDITED, |s| {
+        merge_where(s, |level, near| level == s.case.level_surface && near.in_surface_layer)
+    }),
+    words("refinement missing along a plane, as for a lost halo", "layer", AUDITED, halo_missing),
+    words("extra layer around deleted leaves missing", "layer", INFORMED, extra_layer_missing),
 ];
 
 /// Number of coarser neighbours across faces (index 1), edges (2) and corners (3).
@@ -36,40 +49,30 @@ fn coarser_neighbours(neighbourhood: &Neighbourhood) -> [usize; 4] {
 }
 
 /// Splits the first leaf whose numbers of coarser neighbours satisfy a predicate. They are then two levels coarser.
-fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Option<Mutation> {
+fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Option<Vec<u64>> {
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
         word::level(w) < LEVEL_MAX && predicate(coarser_neighbours(&edit::neighbourhood(&tree, w)))
     };
-    let i = s.mesh.words.iter().position(fit)?;
-    Some(Mutation::with_words(s, split(&s.mesh.words, i)))
+    Some(split(&s.mesh.words, s.mesh.words.iter().position(fit)?))
 }
 
-fn over_face(s: &SelftestCase) -> Option<Mutation> {
-    split_where(s, |coarser| coarser[1] > 0)
-}
-
-fn over_edge_only(s: &SelftestCase) -> Option<Mutation> {
-    split_where(s, |coarser| coarser[1] == 0 && coarser[2] > 0)
-}
-
-fn over_corner_only(s: &SelftestCase) -> Option<Mutation> {
-    split_where(s, |coarser| coarser[1] == 0 && coarser[2] == 0 && coarser[3] > 0)
-        .or_else(|| merged_at_finer_corner(s))
+/// Merges the first graded siblings that satisfy a predicate of their index.
+fn merged_where(s: &SelftestCase, fit: impl Fn(usize) -> bool) -> Option<Vec<u64>> {
+    let i = graded_siblings(s).into_iter().find(|&i| fit(i))?;
+    Some(merge(&s.mesh.words, &[i]))
 }
 
 /// Merges siblings that touch finer leaves at corners only.
-fn merged_at_finer_corner(s: &SelftestCase) -> Option<Mutation> {
+fn merged_at_finer_corner(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
-    let fit = |&i: &usize| {
+    merged_where(s, |i| {
         let merged = word::octant(edit::parent(words[i]));
         let finer = |w: &&u64| word::level(**w) > merged.level + 1;
         let touching = |w: &&u64| merged.distance(&word::octant(**w)) == 0;
         let mut near = words.iter().filter(|w| finer(w) && touching(w)).peekable();
         near.peek().is_some() && near.all(|&w| meet_in_corner(&merged, &word::octant(w)))
-    };
-    let i = graded_siblings(s).into_iter().find(fit)?;
-    Some(Mutation::with_words(s, merge(words, &[i])))
+    })
 }
 
 /// Whether two octants have exactly one common point.
@@ -79,7 +82,7 @@ fn meet_in_corner(a: &Octant, b: &Octant) -> bool {
     (0..3).all(adjacent)
 }
 
-fn split_twice(s: &SelftestCase) -> Option<Mutation> {
+fn split_twice(s: &SelftestCase) -> Option<Vec<u64>> {
     // A neighbour of the leaf's level is two levels coarser than the leaf's grandchildren. The first child is
     // split, so the neighbour must be across a low face.
     let tree = Tree::of_words(&s.mesh.words);
@@ -88,8 +91,7 @@ fn split_twice(s: &SelftestCase) -> Option<Mutation> {
         word::level(w) + 1 < LEVEL_MAX && neighbourhood.at_offset([-1, 0, 0]).as_leaf().is_some()
     };
     let i = s.mesh.words.iter().position(fit)?;
-    let once = split(&s.mesh.words, i);
-    Some(Mutation::with_words(s, split(&once, i)))
+    Some(split(&split(&s.mesh.words, i), i))
 }
 
 /// Groups of siblings that gradation made, because T0 is coarser there.
@@ -97,7 +99,7 @@ fn graded_siblings(s: &SelftestCase) -> Vec<usize> {
     let base = Tree::of_words(&s.base.words);
     let graded = |&i: &usize| {
         let octant = word::octant(s.mesh.words[i]);
-        base_level(&base, &octant) < octant.level
+        base.locate(octant.corner).map_or(0, |(leaf, _)| leaf.level) < octant.level
     };
     sibling_groups(&s.mesh.words).into_iter().filter(graded).collect()
 }
@@ -145,15 +147,8 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
 fn merge_where(
     s: &SelftestCase,
     predicate: impl Fn(u8, &Surroundings) -> bool,
-) -> Option<Mutation> {
-    let words = &s.mesh.words;
-    let fit = |&i: &usize| predicate(word::level(words[i]), &surroundings(s, i));
-    let i = graded_siblings(s).into_iter().find(fit)?;
-    Some(Mutation::with_words(s, merge(words, &[i])))
-}
-
-fn balance_merged(s: &SelftestCase) -> Option<Mutation> {
-    merge_where(s, |level, near| near.touching > level)
+) -> Option<Vec<u64>> {
+    merged_where(s, |i| predicate(word::level(s.mesh.words[i]), &surroundings(s, i)))
 }
 
 /// Whether the definition requires a layer of cells of this level that is not implied by the balance.
@@ -161,34 +156,25 @@ fn has_layer(s: &SelftestCase, level: u8) -> bool {
     s.case.layer_cells_min > 1 && (s.case.keep == Keep::All || level < s.case.level_surface)
 }
 
-fn layer_merged(s: &SelftestCase) -> Option<Mutation> {
-    merge_where(s, |level, near| thins_layer(s, level, near))
-}
-
 /// Whether merging siblings of this level makes a layer too thin, but keeps the mesh balanced.
 fn thins_layer(s: &SelftestCase, level: u8, near: &Surroundings) -> bool {
     has_layer(s, level) && near.touching <= level && near.within_layer > level
 }
 
-fn surface_layer_merged(s: &SelftestCase) -> Option<Mutation> {
-    merge_where(s, |level, near| level == s.case.level_surface && near.in_surface_layer)
-}
-
 /// Merges all graded siblings of one level that touch nothing finer. The level is the first on which that makes
 /// a layer too thin.
-fn layer_missing(s: &SelftestCase) -> Option<Mutation> {
+fn layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
     let graded = graded_siblings(s);
     let thins = |&&i: &&usize| thins_layer(s, word::level(words[i]), &surroundings(s, i));
     let level = word::level(words[*graded.iter().find(thins)?]);
     let of_level =
         |&i: &usize| word::level(words[i]) == level && surroundings(s, i).touching <= level;
-    let all: Vec<usize> = graded.into_iter().filter(of_level).collect();
-    Some(Mutation::with_words(s, merge(words, &all)))
+    Some(merge(words, &graded.into_iter().filter(of_level).collect::<Vec<_>>()))
 }
 
 /// Merges all graded siblings above the middle plane across z, as if a rank had not received its neighbour's layer.
-fn halo_missing(s: &SelftestCase) -> Option<Mutation> {
+fn halo_missing(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
     let at_plane = |&i: &usize| word::octant(words[i]).corner[2] == CELLS_PER_EDGE / 2;
     let halo: Vec<usize> = graded_siblings(s).into_iter().filter(at_plane).collect();
@@ -196,23 +182,19 @@ fn halo_missing(s: &SelftestCase) -> Option<Mutation> {
         let level = word::level(words[i]);
         has_layer(s, level) && surroundings(s, i).within_layer > level
     };
-    halo.iter().any(thins).then(|| Mutation::with_words(s, merge(words, &halo)))
+    halo.iter().any(thins).then(|| merge(words, &halo))
 }
 
 /// Merges siblings on the surface's level that touch a deleted crossing leaf.
-fn extra_layer_missing(s: &SelftestCase) -> Option<Mutation> {
-    if s.case.keep_crossing {
-        return None;
-    }
+fn extra_layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
-    let touches = |&i: &usize| {
+    let touches = |i: usize| {
         let merged = word::octant(edit::parent(words[i]));
         let mut crossing = s.base.words.iter().filter(|&&w| has_side(w, Side::Crossing));
         word::level(words[i]) == s.case.level_surface
             && crossing.any(|&w| merged.distance(&word::octant(w)) == 0)
     };
-    let i = graded_siblings(s).into_iter().find(touches)?;
-    Some(Mutation::with_words(s, merge(words, &[i])))
+    if s.case.keep_crossing { None } else { merged_where(s, touches) }
 }
 
 #[cfg(test)]
@@ -254,8 +236,8 @@ mod tests {
             )
         };
         let (mesh, base) = (leaf_set(vec![words(&["0", "5", "7"])]), leaf_set(vec![words(&["7"])]));
-        let mutation = extra_layer_missing(&SelftestCase { case, mesh, base }).unwrap();
-        assert_eq!(mutation.mesh.words, words(&["0", "7"]));
+        let merged = extra_layer_missing(&SelftestCase { case, mesh, base }).unwrap();
+        assert_eq!(merged, words(&["0", "7"]));
     }
 
     /// Octant 0.0 is two cells of level 3 away from a crossing leaf of that level, the surface's, and touches leaves of level 2.

@@ -164,7 +164,7 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
     for mutant in catalogue() {
         let kills = report.kills.len();
         for correct in &cases {
-            if let Some(mutation) = (mutant.make)(correct) {
+            if let Some(mutation) = mutant.make(correct) {
                 let examined = examine(correct, &mutation, &scratch.join("mutant"))?;
                 report.kills.push(kill(&mutant, correct, &mutation, &examined));
             }

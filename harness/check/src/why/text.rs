@@ -106,7 +106,8 @@ fn sentence(Link { rule, octant, leaf, distance_cells }: &Link) -> String {
     match (rule, distance_cells) {
         (Rule::Layer, 0) => format!("by section 6, step 2 (layer): it touches the leaf {leaf}"),
         (Rule::Layer, cells) => format!(
-            "by section 6, step 2 (layer): only {cells} cells of level {} away is the leaf {leaf}",
+            "by section 6, step 2 (layer): only {cells} {} of level {} away is the leaf {leaf}",
+            if *cells == 1 { "cell" } else { "cells" },
             leaf.level
         ),
         (Rule::Balance, _) => format!(

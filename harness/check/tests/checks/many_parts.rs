@@ -39,7 +39,7 @@ fn every_corruption_of_leaves_is_found_in_many_parts() {
     assert_eq!(found(&correct.mesh, Some(&correct.case)), [""; 0]);
     let mut planted = 0;
     for mutant in selftest::catalogue() {
-        let Some(mutation) = (mutant.make)(&correct) else { continue };
+        let Some(mutation) = mutant.make(&correct) else { continue };
         if mutation.mesh.words == correct.mesh.words {
             continue;
         }

@@ -83,7 +83,7 @@ fn every_corruption_changes_the_leaves_and_files_that_are_listed() {
     for mutant in selftest::catalogue() {
         let before = lines.len();
         for case in &cases {
-            if let Some(mutation) = (mutant.make)(case) {
+            if let Some(mutation) = mutant.make(case) {
                 lines.push(format!(
                     "{}, {}: {}",
                     mutant.name,

@@ -2,7 +2,7 @@
 
 use super::values::Input;
 use crate::failure::Failure;
-use check::diff::{self, Trust};
+use check::diff;
 use clap::Args;
 use contract::case::Case;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
@@ -22,9 +22,6 @@ pub struct Arguments {
     /// The case of both meshes: its facets help to find the deciding rule
     #[arg(long)]
     case: Option<Input>,
-    /// Compare the counts and digests in the manifests instead of reading all leaves
-    #[arg(long)]
-    trust_manifests: bool,
     /// Compare the leaves as octants, whatever the roots are
     #[arg(long)]
     ignore_root: bool,
@@ -34,12 +31,9 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If a mesh or the case cannot be read.
-pub fn run(
-    Arguments { a, b, case, trust_manifests, ignore_root }: &Arguments,
-) -> Result<u8, Failure> {
-    let trust = if *trust_manifests { Trust::Manifests } else { Trust::Leaves };
+pub fn run(Arguments { a, b, case, ignore_root }: &Arguments) -> Result<u8, Failure> {
     let case = case.as_deref().map(Case::read).transpose()?;
-    let report = diff::diff(a, b, case.as_ref(), trust).map_err(Failure::input)?;
+    let report = diff::diff(a, b, case.as_ref()).map_err(Failure::input)?;
     println!("A {}\nB {}\n{report}", a.display(), b.display());
     let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
     Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED })

@@ -1,11 +1,9 @@
 //! The bits of an array, all in memory: an eighth of a byte for each node in a chunk that is stored.
 
 use super::Result;
+use std::ops::Range;
 use vtkhdf::format::Chunked;
 use vtkhdf::read::TreeReader;
-
-/// Bytes between two counts: a divisor of the length of chunks, if there are several.
-const STEP: u64 = 512;
 
 /// Bits that the file has from the most significant one of each byte.
 #[derive(Debug, Default)]
@@ -14,23 +12,12 @@ pub(super) struct Bits {
     chunks: Vec<Vec<u8>>,
     /// Bytes of a chunk.
     chunk_bytes: u64,
-    /// Number of bits that are set before each step, and at the end.
-    before: Vec<u64>,
-}
-
-/// Number of set bits.
-fn ones(bytes: &[u8]) -> u64 {
-    let (words, rest) = bytes.as_chunks::<8>();
-    let words: u32 = words.iter().map(|word| u64::from_le_bytes(*word).count_ones()).sum();
-    let rest: u32 = rest.iter().map(|byte| byte.count_ones()).sum();
-    u64::from(words + rest)
 }
 
 impl Bits {
     /// The first `count` bits of an array. Those after them have no meaning, and are zero here.
     pub(super) fn read(file: &TreeReader, array: &Chunked, count: u64) -> Result<Self> {
-        let mut bits = Self { chunk_bytes: u64::from(array.chunk_len), ..Self::default() };
-        let mut sum = 0;
+        let mut bits = Self { chunks: Vec::new(), chunk_bytes: u64::from(array.chunk_len) };
         for (index, begin) in (0..array.chunks.len()).zip((0..).step_by(array.chunk_len as usize)) {
             let mut chunk = Vec::new();
             if array.chunks[index].is_some() {
@@ -43,14 +30,8 @@ impl Bits {
                     *last &= !(0xff >> (left % 8));
                 }
             }
-            for step in (0..array.chunk_len as usize).step_by(STEP as usize) {
-                bits.before.push(sum);
-                let step = chunk.get(step..).unwrap_or_default();
-                sum += ones(&step[..step.len().min(STEP as usize)]);
-            }
             bits.chunks.push(chunk);
         }
-        bits.before.push(sum);
         Ok(bits)
     }
 
@@ -68,19 +49,10 @@ impl Bits {
         byte.copied().unwrap_or(0)
     }
 
-    /// Number of bits that are set before a position.
-    pub(super) fn ones_before(&self, bit: u64) -> u64 {
-        let (step, end) = (bit / 8 / STEP, bit / 8);
-        let Some(&before) = self.before.get(step as usize) else {
-            return self.before.last().copied().unwrap_or(0);
-        };
-        let begin = step * STEP - step * STEP % self.chunk_bytes;
-        let Some(chunk) = self.chunks.get((begin / self.chunk_bytes) as usize) else {
-            return before;
-        };
-        let within = |byte: u64| chunk.len().min((byte - begin) as usize);
-        let partial = (u16::from(self.byte(end)) << (bit % 8) >> 8).count_ones();
-        before + ones(&chunk[within(step * STEP)..within(end)]) + u64::from(partial)
+    /// Number of bits that are set in a range.
+    pub(super) fn ones(&self, Range { start, end }: Range<u64>) -> u64 {
+        let bits = |first: u64| self.get(first, (end - first).min(8) as u32).count_ones();
+        (start..end).step_by(8).map(|first| u64::from(bits(first))).sum()
     }
 
     /// Whether no bit is set in both.

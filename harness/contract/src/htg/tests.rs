@@ -96,7 +96,7 @@ fn words_in(tree: &TreeFile) -> Result<Vec<u64>> {
 }
 
 #[test]
-fn a_tree_in_several_chunks_is_read_as_a_whole_and_octant_by_octant() {
+fn a_tree_in_several_chunks_is_read_as_a_whole() {
     let words = words(7);
     let nodes = nodes_of(&words);
     assert!(nodes.split.len() as u64 > 2 * WINDOW && nodes.by_level.len() == 8);
@@ -105,18 +105,6 @@ fn a_tree_in_several_chunks_is_read_as_a_whole_and_octant_by_octant() {
     assert_eq!((tree.root, tree.path()), (ROOT, file.path()));
     assert_eq!(words_in(&tree).unwrap(), words);
     assert_eq!(tree.leaves, words.len() as u64);
-    let mut cursor = Cursor::new(&tree);
-    for level in 0..=7u8 {
-        for octant in (0..1u64 << (3 * level)).step_by(1 + (1 << level) * 25) {
-            let (begin, end) = (octant * span(level), (octant + 1) * span(level));
-            let first = words.partition_point(|&w| key(w) < begin);
-            let last = words.partition_point(|&w| key(w) < end);
-            let mut found = Vec::new();
-            cursor.words(begin, level, &mut found, &mut Vec::new()).unwrap();
-            assert_eq!(found, words[first..last], "octant {octant} of level {level}");
-            assert_eq!(cursor.leaves_before(begin), first as u64);
-        }
-    }
     let without_sides = TreeFile::open(file.path(), false).unwrap();
     let expected: Vec<u64> = words.iter().map(|w| w & !word::SIDE_BITS).collect();
     assert_eq!(words_in(&without_sides).unwrap(), expected);
@@ -150,7 +138,11 @@ fn ranks_are_read_with_the_words_if_there_is_one_for_each_node() {
     };
     let read = |tree: &TreeFile| {
         let (mut found, mut ranks) = (Vec::new(), Vec::new());
-        let read = Cursor::new(tree).words(0, 0, &mut found, &mut ranks);
+        let read = tree.words_and_ranks(&mut |words, of_words| {
+            found.extend_from_slice(words);
+            ranks.extend_from_slice(of_words);
+            true
+        });
         read.map(|()| (found, ranks))
     };
     let (tree, nodes, _file) = ranked(true, |node| node as i32 % 77);

@@ -1,14 +1,14 @@
 //! Meshes on disk, of any size: the part files of a leaf-set directory or, if it has none, its tree.
 //!
 //! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`] and [`Mesh::tree`] refuse words that are
-//! not a linear oct-tree, for all who rely on one. [`Readers`] find the leaves of an octant without reading those before it.
+//! not a linear oct-tree, for all who rely on one.
 
 mod merge;
 mod part;
 
 use std::path::{Path, PathBuf};
 
-pub use part::{Interval, Part, Readers};
+pub use part::Part;
 
 pub use crate::directory::NODES_MAX;
 use crate::directory::{self, ReadError};
@@ -78,6 +78,19 @@ impl Mesh {
         }
     }
 
+    /// The same with the ranks of the words, if a tree has them. Those of a part have its index as their rank.
+    ///
+    /// # Errors
+    /// As [`Mesh::stream`].
+    pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), ReadError> {
+        match &self.parts[..] {
+            [Part::Tree(tree)] => tree
+                .words_and_ranks(&mut |words, ranks| run(0, words, ranks))
+                .map_err(|error| ReadError::tree(tree, error)),
+            parts => merge::merge(parts, &mut |part, words| run(part, words, &[])),
+        }
+    }
+
     /// Visits all leaf words in ascending order.
     ///
     /// # Errors
@@ -112,19 +125,17 @@ impl Mesh {
         }
     }
 
-    /// The sorted words of the leaves in an octant.
+    /// The sorted words of the leaves in an octant, found among all.
     ///
     /// # Errors
-    /// As [`Mesh::visit`], as far as the words of the octant show it.
+    /// As [`Mesh::visit`].
     pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, ReadError> {
-        let (start, mut readers) = (word::key_of(octant.corner), Readers::new(&self.parts));
-        let intervals = readers.intervals(start..start + word::span(octant.level))?;
-        let (leaves, mut order) = (readers.leaves(octant, &intervals)?, Order::default());
-        let words: Vec<u64> = leaves.into_iter().map(|(word, _)| word).collect();
-        match words.iter().find_map(|&word| order.fault(word)) {
-            None => Ok(words),
-            Some(why) => Err(self.not_linear(why)),
-        }
+        let start = word::key_of(octant.corner);
+        let keys = start..start + word::span(octant.level);
+        let mut found = Vec::new();
+        let within = |word: &&u64| keys.contains(&word::key(**word));
+        self.visit(&mut |words| found.extend(words.iter().filter(within)))?;
+        Ok(found)
     }
 
     /// The error of words that are not a linear oct-tree.
@@ -132,6 +143,9 @@ impl Mesh {
         ReadError::NotLinear { path: self.dir.clone(), why }
     }
 }
+
+/// What is given the words of a part, with its number, and their ranks.
+pub type RankedRun<'r> = dyn FnMut(usize, &[u64], &[u32]) -> bool + 'r;
 
 /// The end of the leaves so far, as a Morton code.
 #[derive(Clone, Copy, Debug, Default)]

@@ -3,14 +3,12 @@
 mod damage;
 mod trees;
 
-use contract::htg::{Cursor, TreeFile};
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, ImportError, Request, leaf_set};
 use contract::lattice::Root;
 use contract::leafset::{self, LeafSet};
 use contract::npy;
-use contract::word::{key, span};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -58,31 +58,6 @@ fn a_tree_is_opened_as_such_only_with_its_own_root() {
 }
 
 #[test]
-fn the_leaves_of_an_octant_are_read_without_those_before_it() {
-    let tree = TreeFile::open(&sample("sphere.vtkhdf"), true).unwrap();
-    let mut all = Vec::new();
-    tree.words(&mut |run| {
-        all.extend_from_slice(run);
-        true
-    })
-    .unwrap();
-    let mut cursor = Cursor::new(&tree);
-    for level in [0, 1, 3, 4, 5] {
-        for octant in (0..1u64 << (3 * level)).step_by(1 + (1 << level)) {
-            let (begin, end) = (octant * span(level), (octant + 1) * span(level));
-            let within = |word: &&u64| (begin..end).contains(&key(**word));
-            let expected: Vec<u64> = all.iter().filter(within).copied().collect();
-            let before = all.iter().filter(|word| key(**word) < begin).count() as u64;
-            let mut found = Vec::new();
-            cursor.words(begin, level, &mut found, &mut Vec::new()).unwrap();
-            assert_eq!(found, expected, "octant {octant} of level {level}");
-            assert_eq!(cursor.leaves_before(begin), before, "{octant}, {level}");
-        }
-    }
-    assert_eq!(cursor.leaves_before(span(0)), 9056);
-}
-
-#[test]
 fn a_truncated_tree_is_refused() {
     let bytes = fs::read(sample("sphere.vtkhdf")).unwrap();
     let place = tempfile::tempdir().unwrap();

@@ -24,6 +24,7 @@ mod tests;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use contract::files::{Staging, nearest_directory};
 use contract::lattice::Root;
@@ -32,13 +33,10 @@ use contract::octant::Octant;
 use contract::word;
 
 use crate::error::ExportError;
-use crate::leaf::Leaf;
 use crate::mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
-use crate::ordered::in_order;
-use crate::pieces::nothing_selected;
-use crate::selection::Selection;
+use crate::selection::{Selection, nothing_selected};
 use directory::{Directory, directories};
 use faces::Faces;
 use leaves::{CELLS_MAX, CUT, Leaves};
@@ -97,12 +95,17 @@ pub fn write(
         })
     };
     let cells = u64::from(of_mesh.leaves.count());
-    let mut done = 0;
-    in_order(targets.len(), options.jobs, make, |part, ()| {
-        done += parts[part].cells.len() as u64;
+    let (mut done, all) = (0, (0..targets.len()).collect::<Vec<_>>());
+    for some in all.chunks(options.jobs.get()) {
+        thread::scope(|scope| {
+            let make = &make;
+            let threads: Vec<_> =
+                some.iter().map(|&part| scope.spawn(move || make(part))).collect();
+            threads.into_iter().try_for_each(|thread| thread.join().expect("it does not panic"))
+        })?;
+        done += some.iter().map(|&part| parts[part].cells.len() as u64).sum::<u64>();
         options.watch.progress(done, cells);
-        Ok(())
-    })?;
+    }
     let (files, bytes) = sizes(staging.path()).map_err(named)?;
     options.check()?;
     staging.publish(|staged| {
@@ -146,8 +149,7 @@ fn read<'a>(
     }
     let mut ranks = (mesh.leaves_by_rank()?.len() > 1).then(Vec::new);
     let (mut words, mut cells) = (Vec::new(), 0);
-    mesh.visit(mesh::Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
-        options.check_at(words.len() as u64)?;
+    mesh.visit(&Selection::default(), &|| options.check(), &mut |leaf| {
         let is_exported = selection.has(&leaf);
         cells += u64::from(is_exported);
         if cells > CELLS_MAX {

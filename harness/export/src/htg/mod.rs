@@ -17,11 +17,9 @@ use contract::manifest::Sides;
 use vtkhdf::tree::{Shape, TreeWriter};
 
 use crate::error::ExportError;
-use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::pieces::nothing_selected;
-use crate::selection::Selection;
+use crate::selection::{Selection, nothing_selected};
 use crate::written::Written;
 use siblings::{Family, Open};
 use windows::Windows;
@@ -83,9 +81,8 @@ fn families(
 ) -> Result<Written, ExportError> {
     let with_sides = mesh.manifest.sides == Sides::Known;
     let (mut open, mut written) = (Open::default(), Written::default());
-    mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+    mesh.visit(selection, &|| options.check(), &mut |leaf| {
         if written.cells.is_multiple_of(REPORT) {
-            options.check()?;
             options.watch.progress(written.cells.min(total), total.max(1));
         }
         written.add(&leaf.octant, true);

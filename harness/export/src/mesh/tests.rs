@@ -1,14 +1,15 @@
 use super::*;
 use crate::testing::on_disk;
+use contract::octant::Octant;
 use contract::testing::random_words;
 use contract::word::Side;
 use proptest::prelude::*;
 
-fn words(mesh: &Mesh, keys: Range<u64>, selection: &Selection) -> Result<Vec<u64>, ExportError> {
+fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>, ExportError> {
     let mut words = Vec::new();
-    mesh.visit(keys, selection, &mut |leaf: Leaf| {
+    mesh.visit(selection, &|| Ok(()), &mut |leaf| {
         words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
-        Ok::<(), ExportError>(())
+        Ok(())
     })?;
     Ok(words)
 }
@@ -19,24 +20,7 @@ proptest! {
         leaves in random_words(5), parts in 1usize..4, run in 1usize..40
     ) {
         let (_dir, mesh) = on_disk(&leaves, parts, |i| i / run);
-        prop_assert_eq!(&words(&mesh, Mesh::ALL, &Selection::default()).unwrap(), &leaves);
-    }
-
-    #[test]
-    fn blocks_are_disjoint_and_contain_all_leaves(
-        leaves in random_words(5), parts in 1usize..4, leaves_max in 1u64..100
-    ) {
-        let (_dir, mesh) = on_disk(&leaves, parts, |i| i / 7);
-        let blocks = mesh.blocks(&Selection::default(), leaves_max).unwrap();
-        prop_assert!(blocks.windows(2).all(|w| w[0].keys.end <= w[1].keys.start));
-        let mut visited = Vec::new();
-        for Block { keys, leaves } in blocks {
-            let block = words(&mesh, keys, &Selection::default()).unwrap();
-            prop_assert!(!block.is_empty() && leaves <= leaves_max);
-            prop_assert_eq!(block.len() as u64, leaves);
-            visited.extend(block);
-        }
-        prop_assert_eq!(visited, leaves);
+        prop_assert_eq!(&words(&mesh, &Selection::default()).unwrap(), &leaves);
     }
 
     #[test]
@@ -48,18 +32,15 @@ proptest! {
         let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
         let mut expected = Vec::new();
         let mut index = 0;
-        mesh.visit(Mesh::ALL, &Selection::default(), &mut |leaf: Leaf| {
+        mesh.visit(&Selection::default(), &|| Ok(()), &mut |leaf| {
             assert_eq!(leaf.index, index);
             index += 1;
             expected.extend(selection.has(&leaf).then(|| {
                 word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
             }));
-            Ok::<(), ExportError>(())
+            Ok(())
         }).unwrap();
-        prop_assert_eq!(&words(&mesh, Mesh::ALL, &selection).unwrap(), &expected);
-        let blocks = mesh.blocks(&selection, 20).unwrap();
-        let of_block = |b: &Block| words(&mesh, b.keys.clone(), &selection).unwrap();
-        prop_assert_eq!(blocks.iter().flat_map(of_block).collect::<Vec<_>>(), expected);
+        prop_assert_eq!(words(&mesh, &selection).unwrap(), expected);
     }
 }
 
@@ -77,7 +58,7 @@ fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
         (invalid, "is not a leaf"),
     ] {
         let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
-        let error = words(&mesh, Mesh::ALL, &Selection::default()).unwrap_err().to_string();
+        let error = words(&mesh, &Selection::default()).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
 }

@@ -13,7 +13,6 @@ use contract::tree::{HOLES, Handle, Kinds, Neighbourhood, Tree};
 use contract::word::{self, Side};
 
 use crate::error::ExportError;
-use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::selection::Selection;
 
@@ -75,12 +74,12 @@ pub fn front(
     search(&tree, &Neighbourhood::root(&tree), &mut found, check)?;
     // The tree has neither ranks nor what else may be selected.
     let (mut found, mut faces) = (found.into_iter().peekable(), Vec::new());
-    mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+    mesh.visit(selection, check, &mut |leaf| {
         let key = word::key_of(leaf.octant.corner);
         while let Some((owner, face)) = found.next_if(|(owner, _)| *owner <= key) {
             faces.extend((owner == key).then_some(Face { rank: leaf.rank, ..face }));
         }
-        Ok::<(), ExportError>(())
+        Ok(())
     })?;
     Ok(faces)
 }

@@ -16,6 +16,7 @@ pub struct VtuFile {
     file: File,
     content: Content,
     places: Vec<Place>,
+    pieces: usize,
     header_bytes: usize,
     data_bytes: u64,
 }
@@ -28,7 +29,7 @@ impl VtuFile {
     pub fn begin(mut file: File, content: Content, pieces: usize) -> io::Result<Self> {
         let header_bytes = content.vtu(&vec![Place::longest(); pieces], 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64))?;
-        Ok(Self { file, content, places: Vec::new(), header_bytes, data_bytes: 0 })
+        Ok(Self { file, content, places: Vec::new(), pieces, header_bytes, data_bytes: 0 })
     }
 
     /// Appends a piece.
@@ -43,6 +44,11 @@ impl VtuFile {
         self.data_bytes += piece.bytes.len() as u64;
         self.content.digest.merge(piece.digest);
         Ok(())
+    }
+
+    /// Whether it has all its pieces.
+    pub fn is_full(&self) -> bool {
+        self.places.len() == self.pieces
     }
 
     /// Writes the XML and flushes the file to disk; returns its size in bytes.

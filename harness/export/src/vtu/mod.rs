@@ -14,8 +14,8 @@ mod piece;
 mod points;
 mod zlib;
 
-use std::cell::RefCell;
 use std::path::Path;
+use std::thread;
 
 use contract::digest::Digest;
 use contract::files;
@@ -24,8 +24,6 @@ use contract::manifest::Sides;
 use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::ordered::in_order;
-use crate::pieces::{Piece, pieces};
 use crate::selection::Selection;
 use crate::written::Written;
 use file::VtuFile;
@@ -47,58 +45,64 @@ pub fn write_file(
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
-    let pieces = pieces(mesh, selection, PIECE, options)?;
+    let leaves = selection.count(mesh, &|| options.check())?;
     let named = |error| ExportError::write(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
         let file = file.try_clone().map_err(named)?;
-        let mut file = VtuFile::begin(file, content(mesh), pieces.len()).map_err(named)?;
-        let written = encode(mesh, selection, &pieces, options, |_, piece| {
-            file.append(&piece).map_err(named)
-        })?;
-        written.check_invariants(mesh, selection, leaves(&pieces));
+        let mut file =
+            VtuFile::begin(file, content(mesh), leaves.div_ceil(PIECE) as usize).map_err(named)?;
+        encode(mesh, selection, leaves, options, &mut |piece| file.append(&piece).map_err(named))?;
         let bytes = file.finish().map_err(named)?;
         options.check()?;
         Ok(bytes)
     })?;
-    Ok(Summary { leaves: leaves(&pieces), files: 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
 
-thread_local! {
-    static ENCODER: RefCell<Encoder> = RefCell::default();
-}
-
-/// Encodes pieces on threads and hands them to `take` in order; returns all that was taken.
+/// Encodes the selected leaves, of which the number is known, and hands their pieces to `take` in order. As many pieces as there are threads are
+/// read one after the other and encoded together.
 fn encode(
     mesh: &Mesh,
     selection: &Selection,
-    pieces: &[Piece],
+    leaves: u64,
     options: &Options<'_>,
-    mut take: impl FnMut(usize, Encoded) -> Result<(), ExportError> + Send,
-) -> Result<Written, ExportError> {
-    let content = content(mesh);
-    let visitor = mesh.visitor();
-    let make = |index: usize| {
-        options.check()?;
-        let keys = &pieces[index].keys;
-        ENCODER.with_borrow_mut(|encoder| {
-            encoder.leaves.clear();
-            visitor.visit(keys.clone(), selection, &mut |leaf| {
-                encoder.leaves.push(leaf);
-                Ok::<(), ExportError>(())
-            })?;
-            options.check()?;
-            Ok::<Encoded, ExportError>(encoder.encode(&content))
-        })
+    take: &mut dyn FnMut(Encoded) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    let content = &content(mesh);
+    let (mut written, check) = (Written::default(), || options.check());
+    let mut flush = |encoders: &mut [Encoder]| {
+        check()?;
+        let pieces: Vec<Encoded> = thread::scope(|scope| {
+            let encode = |encoder| scope.spawn(move || Encoder::encode(encoder, content));
+            let threads: Vec<_> = encoders.iter_mut().map(encode).collect();
+            threads.into_iter().map(|thread| thread.join().expect("it does not panic")).collect()
+        });
+        for piece in pieces {
+            check()?;
+            written.append(&piece.written);
+            take(piece)?;
+            options.watch.progress(written.cells, leaves);
+        }
+        Ok::<(), ExportError>(())
     };
-    let total = leaves(pieces);
-    let mut written = Written::default();
-    in_order(pieces.len(), options.jobs, make, |index, piece| {
-        written.append(&piece.written);
-        take(index, piece)?;
-        options.watch.progress(written.cells, total);
+    let jobs = options.jobs.get().min(leaves.div_ceil(PIECE) as usize);
+    let mut encoders: Vec<Encoder> = (0..jobs).map(|_| Encoder::default()).collect();
+    let mut filling = 0;
+    mesh.visit(selection, &check, &mut |leaf| {
+        if encoders[filling].leaves.len() as u64 == PIECE {
+            filling += 1;
+            if filling == jobs {
+                flush(&mut encoders)?;
+                encoders.iter_mut().for_each(|encoder| encoder.leaves.clear());
+                filling = 0;
+            }
+        }
+        encoders[filling].leaves.push(leaf);
         Ok(())
     })?;
-    Ok(written)
+    flush(&mut encoders[..=filling])?;
+    written.check_invariants(mesh, selection, leaves);
+    Ok(())
 }
 
 /// What files of this mesh state about themselves before they have leaves.
@@ -109,8 +113,4 @@ fn content(mesh: &Mesh) -> Content {
         with_sides: mesh.manifest.sides == Sides::Known,
         digest: Digest::default(),
     }
-}
-
-fn leaves(pieces: &[Piece]) -> u64 {
-    pieces.iter().map(|piece| piece.leaves).sum()
 }

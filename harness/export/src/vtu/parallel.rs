@@ -12,11 +12,10 @@ use contract::files::{self, Staging};
 
 use super::file::VtuFile;
 use super::header::MARK;
-use super::{PIECE, content, encode, leaves};
+use super::{PIECE, content, encode};
 use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::pieces::pieces;
 use crate::selection::Selection;
 
 /// Pieces in one file.
@@ -40,36 +39,36 @@ pub fn write_files(
     let folder = format!("{stem}_pieces");
     let directory = path.with_file_name(&folder);
     refuse_other_files(&directory)?;
-    let pieces = pieces(mesh, selection, PIECE, options)?;
+    let leaves = selection.count(mesh, &|| options.check())?;
+    let mut left = leaves.div_ceil(PIECE) as usize;
     let named = |error| ExportError::write(&directory, error);
     let place = Staging::beside(&directory).map_err(named)?;
     let (mut whole, mut bytes, mut files) = (content(mesh), 0, Vec::new());
     let mut begun: Option<VtuFile> = None;
-    let cells = encode(mesh, selection, &pieces, options, |index, piece| {
+    encode(mesh, selection, leaves, options, &mut |piece| {
         let mut file = match begun.take() {
             Some(file) => file,
             None => {
                 let name = format!("{stem}_{:04}.vtu", files.len());
                 let file = File::create_new(place.path().join(&name)).map_err(named)?;
                 files.push(format!("{folder}/{name}"));
-                let count = PIECES.min(pieces.len() - index);
-                VtuFile::begin(file, content(mesh), count).map_err(named)?
+                VtuFile::begin(file, content(mesh), PIECES.min(left)).map_err(named)?
             }
         };
         file.append(&piece).map_err(named)?;
         whole.digest.merge(piece.digest);
-        match index % PIECES == PIECES - 1 || index == pieces.len() - 1 {
+        left -= 1;
+        match file.is_full() {
             true => bytes += file.finish().map_err(named)?,
             false => begun = Some(file),
         }
         Ok(())
     })?;
-    cells.check_invariants(mesh, selection, leaves(&pieces));
     options.check()?;
     let xml = whole.pvtu(&files);
     place.publish(|staged| publish(path, &directory, staged, &xml))?;
     bytes += xml.len() as u64;
-    Ok(Summary { leaves: leaves(&pieces), files: files.len() as u64 + 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, files: files.len() as u64 + 1, bytes, notes: Vec::new() })
 }
 
 /// An error if the directory exists and has a file that an earlier export did not write.

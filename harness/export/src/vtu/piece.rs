@@ -9,7 +9,7 @@ use contract::word;
 
 use super::header::{Content, Place};
 use super::points::{Points, unpacked};
-use super::zlib::{Known, Zlib};
+use super::zlib::Zlib;
 use crate::leaf::Leaf;
 use crate::written::Written;
 
@@ -38,15 +38,13 @@ pub struct Encoder {
     pub leaves: Vec<Leaf>,
     points: Points,
     zlib: Zlib,
-    offsets: Known,
-    types: Known,
 }
 
 impl Encoder {
     /// Encodes the leaves with the arrays that the content has.
     pub fn encode(&mut self, content: &Content) -> Encoded {
         let Content { root, with_ranks, with_sides, .. } = content;
-        let Self { leaves, points, zlib, offsets, types } = self;
+        let Self { leaves, points, zlib } = self;
         points.set(leaves);
         points.check_invariants(leaves);
         let cells = leaves.len();
@@ -59,11 +57,8 @@ impl Encoder {
         let connectivity = points.connectivity.iter();
         to.push(zlib, points.packed.len(), points.packed.iter().map(|&p| point(p, root)));
         to.push(zlib, 8 * cells, connectivity.map(|&i| u64::from(i).to_le_bytes()));
-        to.begin_array();
-        let end = |cell: usize| (8 * cell as u64 + 8).to_le_bytes();
-        zlib.append_known(cells, end, offsets, &mut to.bytes);
-        to.begin_array();
-        zlib.append_known(cells, |_| [HEXAHEDRON], types, &mut to.bytes);
+        to.push(zlib, cells, (1..=cells as u64).map(|cell| (8 * cell).to_le_bytes()));
+        to.push(zlib, cells, (0..cells).map(|_| [HEXAHEDRON]));
         to.push(zlib, cells, leaves.iter().map(|leaf| [leaf.octant.level]));
         if *with_ranks {
             to.push(zlib, cells, leaves.iter().map(|leaf| leaf.rank.to_le_bytes()));
@@ -90,12 +85,8 @@ impl Encoded {
         count: usize,
         values: impl Iterator<Item = [u8; N]>,
     ) {
-        self.begin_array();
-        zlib.append(count, values, &mut self.bytes);
-    }
-
-    fn begin_array(&mut self) {
         self.offsets.push(self.bytes.len() as u64);
+        zlib.append(count, values, &mut self.bytes);
     }
 }
 

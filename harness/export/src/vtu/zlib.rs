@@ -9,9 +9,6 @@ use libdeflater::{CompressionLvl, Compressor};
 /// zlib looks back 32 KiB.
 const BLOCK: usize = 24 << 12;
 
-/// The compressed blocks of an array that has the same content in every piece, up to its length.
-pub type Known = Vec<Vec<u8>>;
-
 /// A compressor and its memory.
 pub struct Zlib {
     compressor: Compressor,
@@ -35,64 +32,23 @@ impl Zlib {
         out: &mut Vec<u8>,
     ) {
         const { assert!(BLOCK.is_multiple_of(N)) };
-        self.append_blocks(count * N, out, |zlib, _, length, out| {
-            let slots = zlib.block[..length].chunks_exact_mut(N);
-            slots.zip(&mut values).for_each(|(slot, value)| slot.copy_from_slice(&value));
-            zlib.deflate(length, out)
-        });
-    }
-
-    /// The same for an array whose value with index i is `value(i)` in every piece. Its whole blocks are compressed once.
-    pub fn append_known<const N: usize>(
-        &mut self,
-        count: usize,
-        value: impl Fn(usize) -> [u8; N],
-        known: &mut Known,
-        out: &mut Vec<u8>,
-    ) {
-        const { assert!(BLOCK.is_multiple_of(N)) };
-        self.append_blocks(count * N, out, |zlib, block, length, out| {
-            if let Some(bytes) = known.get(block).filter(|_| length == BLOCK) {
-                out.extend_from_slice(bytes);
-                return bytes.len();
-            }
-            let slots = zlib.block[..length].chunks_exact_mut(N);
-            let first = block * (BLOCK / N);
-            slots.zip(first..).for_each(|(slot, index)| slot.copy_from_slice(&value(index)));
-            let written = zlib.deflate(length, out);
-            if length == BLOCK && known.len() == block {
-                known.push(out[out.len() - written..].to_vec());
-            }
-            written
-        });
-    }
-
-    /// Appends an array of this many bytes. `append` appends the block with an index and a length, and returns its compressed length.
-    fn append_blocks(
-        &mut self,
-        bytes: usize,
-        out: &mut Vec<u8>,
-        mut append: impl FnMut(&mut Self, usize, usize, &mut Vec<u8>) -> usize,
-    ) {
+        let bytes = count * N;
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
         let header = out.len();
         out.resize(header + 8 * (numbers.len() + numbers[0]), 0);
-        for (block, start) in (0..bytes).step_by(BLOCK).enumerate() {
-            numbers.push(append(self, block, BLOCK.min(bytes - start), out));
+        for begin in (0..bytes).step_by(BLOCK) {
+            let block = &mut self.block[..BLOCK.min(bytes - begin)];
+            let slots = block.chunks_exact_mut(N).zip(&mut values);
+            slots.for_each(|(slot, value)| slot.copy_from_slice(&value));
+            let start = out.len();
+            out.resize(start + self.compressor.zlib_compress_bound(block.len()), 0);
+            let written = self.compressor.zlib_compress(block, &mut out[start..]);
+            numbers.push(written.expect("the bound suffices"));
+            out.truncate(start + numbers[numbers.len() - 1]);
         }
         for (slot, number) in out[header..].chunks_exact_mut(8).zip(numbers) {
             slot.copy_from_slice(&(number as u64).to_le_bytes());
         }
-    }
-
-    /// Appends the first bytes of the block as one zlib stream; returns its length.
-    fn deflate(&mut self, length: usize, out: &mut Vec<u8>) -> usize {
-        let start = out.len();
-        out.resize(start + self.compressor.zlib_compress_bound(length), 0);
-        let written = self.compressor.zlib_compress(&self.block[..length], &mut out[start..]);
-        let written = written.expect("the bound suffices");
-        out.truncate(start + written);
-        written
     }
 }
 
@@ -103,14 +59,11 @@ mod tests {
 
     #[test]
     fn an_array_is_the_content_of_its_blocks() {
-        let (mut zlib, mut known) = (Zlib::default(), Known::new());
+        let mut zlib = Zlib::default();
         for count in [0, 1, 5, BLOCK / 8 - 1, BLOCK / 8, BLOCK / 8 + 1, BLOCK / 4] {
             let values = |i: usize| ((i * i) as u64).to_le_bytes();
             let mut out = b"before".to_vec();
             zlib.append(count, (0..count).map(values), &mut out);
-            let mut again = b"before".to_vec();
-            zlib.append_known(count, values, &mut known, &mut again);
-            assert!(again == out);
             let mut number = out[6..].chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
             let mut next = || number.next().unwrap() as usize;
             let (blocks, size, last) = (next(), next(), next());

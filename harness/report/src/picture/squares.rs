@@ -18,9 +18,6 @@ const EDGE_MIN: f64 = 1.0;
 /// Edge of the smallest square with an outline, in units of the page.
 const EDGE_OUTLINED: f64 = 3.5;
 
-/// Leaves between two checks for an interrupt.
-const LEAVES_PER_CHECK: u64 = 1 << 16;
-
 /// A square in a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Square {
@@ -106,15 +103,13 @@ impl Squares {
         let mut found =
             Self { squares: Vec::new(), level_outlined, level_drawn, is_merged: false, leaves: 0 };
         let mut last = None;
-        mesh.visit(Mesh::ALL, selection, &mut |leaf: Leaf| {
+        let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+        mesh.visit(selection, &check, &mut |leaf| {
             let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
             // Leaves merged to the deepest level are one cell of the mesh that is shown.
             let leaves = u64::from(last.replace(octant) != Some(octant));
             found.add(Square { leaves, ..square(&Leaf { octant, ..leaf }, axes, colour) });
-            match found.leaves.is_multiple_of(LEAVES_PER_CHECK) && interrupt::requested() {
-                true => Err(ExportError::Interrupted),
-                false => Ok(()),
-            }
+            Ok(())
         })?;
         found.outline(detail.outlined_max);
         found.merge_siblings();

@@ -5,8 +5,7 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word;
 use export::error::ExportError;
-use export::leaf::Leaf;
-use export::mesh::{Block, Mesh};
+use export::mesh::Mesh;
 use export::selection::Selection;
 use run::engine::interrupt;
 use std::collections::HashMap;
@@ -15,8 +14,6 @@ use std::collections::HashMap;
 const TRIANGLES_MAX: usize = 100_000;
 /// Cells of the finest grid in which vertices are merged, along the longest extent.
 const GRID: u32 = 1 << 13;
-/// Leaves that are read at a time.
-const LEAVES_PER_BLOCK: u64 = 1 << 20;
 
 /// Triangles with common vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,24 +101,16 @@ pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, Ex
     order.sort_unstable();
     let mut ranks = vec![None; points.len()];
     let mut next = order.as_slice();
-    for Block { keys, .. } in mesh.blocks(&Selection::default(), LEAVES_PER_BLOCK)? {
-        if interrupt::requested() {
-            return Err(ExportError::Interrupted);
+    let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+    mesh.visit(&Selection::default(), &check, &mut |leaf| {
+        let start = word::key_of(leaf.octant.corner);
+        let end = start + word::span(leaf.octant.level);
+        while let Some((&(key, point), rest)) = next.split_first().filter(|(n, _)| n.0 < end) {
+            ranks[point] = (key >= start).then_some(leaf.rank);
+            next = rest;
         }
-        next = &next[next.partition_point(|&(key, _)| key < keys.start)..];
-        if next.first().is_none_or(|&(key, _)| key >= keys.end) {
-            continue;
-        }
-        mesh.visit(keys, &Selection::default(), &mut |leaf: Leaf| {
-            let start = word::key_of(leaf.octant.corner);
-            let end = start + word::span(leaf.octant.level);
-            while let Some((&(key, point), rest)) = next.split_first().filter(|(n, _)| n.0 < end) {
-                ranks[point] = (key >= start).then_some(leaf.rank);
-                next = rest;
-            }
-            Ok::<(), ExportError>(())
-        })?;
-    }
+        Ok(())
+    })?;
     Ok(ranks)
 }
 

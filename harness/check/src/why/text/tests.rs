@@ -40,7 +40,7 @@ fn a_chain_is_printed_link_by_link() {
     );
     let first = link(Rule::Layer, &[0], &[1, 0, 0], 1);
     let second = link(Rule::Balance, &[1, 0], &[1, 0, 0, 0], 0);
-    let expected = "by section 6, step 2 (layer): only 1 cells of level 3 away is the leaf octant 1.0.0 (level 3), (8, 0, 0) to (10, 2, 2)\n\
+    let expected = "by section 6, step 2 (layer): only 1 cell of level 3 away is the leaf octant 1.0.0 (level 3), (8, 0, 0) to (10, 2, 2)\n\
             its parent is split by section 6, step 3 (balance): it touches the leaf octant 1.0.0.0 (level 4), (8, 0, 0) to (9, 1, 1), 2 levels finer\n\
             its parent is split by section 3: facet 7 crosses it";
     let chain = clauses(&[0], vec![first, second], cause(&[1, 0, 0], &[7], 1, &[]));
