@@ -1,0 +1,473 @@
+(** The program: files become trees, and every promise is a walk over trees.
+
+    Arithmetic is that of OCaml's integers of 63 bits: [add], [sub] and [mul] wrap, and the proofs show where they are used that they
+    do not. What is only compared, halved or copied needs no such argument. *)
+From Coq Require Import ZArith List Bool.
+Import ListNotations.
+From Proof Require Import Statement.
+Open Scope Z_scope.
+
+Definition wrap (a : Z) : Z := (a + 4611686018427387904) mod 9223372036854775808 - 4611686018427387904.
+Definition add (a b : Z) : Z := wrap (a + b).
+Definition sub (a b : Z) : Z := wrap (a - b).
+Definition mul (a b : Z) : Z := wrap (a * b).
+
+(** * Trees *)
+
+(** What fills a cube: nothing, or a leaf. [Reached] is a leaf of the side that is flooded, see [flood]. *)
+Inductive kind := Empty | Outer | Inner | Cross | Reached.
+
+(** Children are in Morton order. A node keeps the greatest and the least edge of its leaves, and whether a leaf of the kind that
+    is looked for is among them. *)
+Inductive tree :=
+  | Cube (k : kind)
+  | Node (most least : Z) (has : bool) (a b c d e f g h : tree).
+
+Definition same (k k' : kind) : bool :=
+  match k, k' with
+  | Empty, Empty | Outer, Outer | Inner, Inner | Cross, Cross | Reached, Reached => true
+  | _, _ => false
+  end.
+Definition none : Z := 4194304.
+Definition most (t : tree) (e : Z) : Z := match t with Cube Empty => 0 | Cube _ => e | Node m _ _ _ _ _ _ _ _ _ _ => m end.
+Definition least (t : tree) (e : Z) : Z := match t with Cube Empty => none | Cube _ => e | Node _ m _ _ _ _ _ _ _ _ _ => m end.
+Definition has (k : kind) (t : tree) : bool := match t with Cube k' => same k k' | Node _ _ b _ _ _ _ _ _ _ _ => b end.
+
+(** The child at the far end (true) or the near end of each axis; a cube is its own child. *)
+Definition kid (i j k : bool) (t : tree) : tree :=
+  match t with
+  | Cube _ => t
+  | Node _ _ _ a b c d e f g h => if k then if j then if i then h else g else if i then f else e
+                                  else if j then if i then d else c else if i then b else a
+  end.
+
+Definition max8 a b c d e f g h := Z.max (Z.max (Z.max a b) (Z.max c d)) (Z.max (Z.max e f) (Z.max g h)).
+Definition min8 a b c d e f g h := Z.min (Z.min (Z.min a b) (Z.min c d)) (Z.min (Z.min e f) (Z.min g h)).
+Definition all8 (a b c d e f g h : bool) : bool := a && b && c && d && e && f && g && h.
+
+(** The parent of eight trees with edge z. *)
+Definition join (k : kind) (z : Z) (a b c d e f g h : tree) : tree :=
+  Node (max8 (most a z) (most b z) (most c z) (most d z) (most e z) (most f z) (most g z) (most h z))
+       (min8 (least a z) (least b z) (least c z) (least d z) (least e z) (least f z) (least g z) (least h z))
+       (has k a || has k b || has k c || has k d || has k e || has k f || has k g || has k h) a b c d e f g h.
+
+(** * Reading *)
+
+Inductive parsed := Bad | Good (t : tree) (next : Z).
+Section Read.
+Variable looked_for : kind.
+
+(** The octant with key k, level l, edge z, volume v; i is the next leaf. *)
+Fixpoint parse (p : part) (fuel : nat) (l z v k i : Z) : parsed :=
+  if i <? count p then
+    let q := key p i in
+    if add k v <=? q then Good (Cube Empty) i
+    else if (q =? k) && (Z.shiftr (code p i) 2 =? l) then
+      let s := Z.land (code p i) 3 in
+      if s =? 0 then Good (Cube Outer) (add i 1) else if s =? 1 then Good (Cube Inner) (add i 1)
+      else if s =? 2 then Good (Cube Cross) (add i 1) else Bad
+    else match fuel with
+    | O => Bad
+    | S n =>
+      let l := add l 1 in let z := Z.shiftr z 1 in let v := Z.shiftr v 3 in
+      match parse p n l z v k i with Bad => Bad | Good a i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good b i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good c i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good d i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good e i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good f i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good g i =>
+      let k := add k v in match parse p n l z v k i with Bad => Bad | Good h i =>
+      Good (join looked_for z a b c d e f g h) i
+      end end end end end end end end
+    end
+  else Good (Cube Empty) i.
+
+(** Both trees in one, if no leaves of theirs overlap; z is the edge. *)
+Fixpoint merge (t u : tree) (z : Z) : option tree :=
+  match t, u with
+  | Cube Empty, _ => Some u
+  | _, Cube Empty => Some t
+  | Node _ _ _ a b c d e f g h, Node _ _ _ a' b' c' d' e' f' g' h' =>
+    let z := Z.shiftr z 1 in
+    match merge a a' z with None => None | Some a => match merge b b' z with None => None | Some b =>
+    match merge c c' z with None => None | Some c => match merge d d' z with None => None | Some d =>
+    match merge e e' z with None => None | Some e => match merge f f' z with None => None | Some f =>
+    match merge g g' z with None => None | Some g => match merge h h' z with None => None | Some h =>
+    Some (join looked_for z a b c d e f g h)
+    end end end end end end end end
+  | _, _ => None
+  end.
+
+Definition read (p : part) : option tree :=
+  if (0 <=? count p) && (count p <=? 144115188075855872) then
+    match parse p 19 0 524288 144115188075855872 0 0 with
+    | Good t i => if i =? count p then Some t else None
+    | Bad => None
+    end
+  else None.
+Fixpoint build (parts : list part) : option tree :=
+  match parts with
+  | [] => Some (Cube Empty)
+  | p :: rest => match read p with None => None | Some t =>
+                 match build rest with None => None | Some u => merge t u 524288 end end
+  end.
+End Read.
+
+(** * Counts *)
+
+(** Leaves of edge w in a tree of edge z. *)
+Fixpoint count_edge (w : Z) (t : tree) (z : Z) : Z :=
+  if (most t z <? w) || (w <? least t z) then 0 else
+  match t with
+  | Cube _ => 1
+  | Node _ _ _ a b c d e f g h =>
+    let z := Z.shiftr z 1 in
+    add (count_edge w a z) (add (count_edge w b z) (add (count_edge w c z) (add (count_edge w d z)
+   (add (count_edge w e z) (add (count_edge w f z) (add (count_edge w g z) (count_edge w h z)))))))
+  end.
+Fixpoint count_kind (k : kind) (t : tree) : Z :=
+  match t with
+  | Cube k' => if same k k' then 1 else 0
+  | Node _ _ _ a b c d e f g h =>
+    add (count_kind k a) (add (count_kind k b) (add (count_kind k c) (add (count_kind k d)
+   (add (count_kind k e) (add (count_kind k f) (add (count_kind k g) (count_kind k h)))))))
+  end.
+Fixpoint all_equal (a b : list Z) : bool :=
+  match a, b with [], [] => true | x :: a, y :: b => (x =? y) && all_equal a b | _, _ => false end.
+Definition edges : list Z := [524288; 262144; 131072; 65536; 32768; 16384; 8192; 4096; 2048; 1024; 512; 256; 128; 64; 32; 16; 8; 4; 2; 1].
+Definition sum3 (s : list Z) : Z := match s with [a; b; c] => add a (add b c) | _ => -1 end.
+Definition check_counts (f : manifest) (parts : list part) (t : tree) : bool :=
+  let sides := map (fun k => count_kind k t) [Outer; Inner; Cross] in
+  all_equal (by_part f) (map count parts) && all_equal (by_level f) (map (fun w => count_edge w t 524288) edges) &&
+  all_equal (by_side f) sides && (total f =? sum3 sides).
+
+(** * Pairs of leaves *)
+
+(** The distance along one axis of intervals of lengths p and q, of which the second is displaced by d; negative if they overlap. *)
+Definition apart (p q d : Z) : Z := Z.max (sub d p) (sub (sub 0 d) q).
+
+Section Walk.
+(** Whether no pair of leaves in two cubes with edges p and q, at distance d, can violate the rule. *)
+Variable stop : tree -> Z -> tree -> Z -> Z -> bool.
+
+(** No leaf of t (edge p) and leaf of u (edge q), displaced by (x, y, z), violate the rule. *)
+Fixpoint walk (fuel : nat) (t u : tree) (p q x y z : Z) : bool :=
+  if stop t p u q (Z.max (apart p q x) (Z.max (apart p q y) (apart p q z))) then true else
+  match fuel with
+  | O => false
+  | S n =>
+    match t, u with
+    | Node _ _ _ a b c d e f g h, Cube _ =>
+      let p := Z.shiftr p 1 in
+      walk n a u p q x y z && walk n b u p q (sub x p) y z && walk n c u p q x (sub y p) z && walk n d u p q (sub x p) (sub y p) z &&
+      walk n e u p q x y (sub z p) && walk n f u p q (sub x p) y (sub z p) && walk n g u p q x (sub y p) (sub z p) &&
+      walk n h u p q (sub x p) (sub y p) (sub z p)
+    | Node _ _ _ a b c d e f g h, Node _ _ _ a' b' c' d' e' f' g' h' =>
+      if q <=? p then
+        let p := Z.shiftr p 1 in
+        walk n a u p q x y z && walk n b u p q (sub x p) y z && walk n c u p q x (sub y p) z && walk n d u p q (sub x p) (sub y p) z &&
+        walk n e u p q x y (sub z p) && walk n f u p q (sub x p) y (sub z p) && walk n g u p q x (sub y p) (sub z p) &&
+        walk n h u p q (sub x p) (sub y p) (sub z p)
+      else
+        let q := Z.shiftr q 1 in
+        walk n t a' p q x y z && walk n t b' p q (add x q) y z && walk n t c' p q x (add y q) z && walk n t d' p q (add x q) (add y q) z &&
+        walk n t e' p q x y (add z q) && walk n t f' p q (add x q) y (add z q) && walk n t g' p q x (add y q) (add z q) &&
+        walk n t h' p q (add x q) (add y q) (add z q)
+    | _, Node _ _ _ a' b' c' d' e' f' g' h' =>
+      let q := Z.shiftr q 1 in
+      walk n t a' p q x y z && walk n t b' p q (add x q) y z && walk n t c' p q x (add y q) z && walk n t d' p q (add x q) (add y q) z &&
+      walk n t e' p q x y (add z q) && walk n t f' p q (add x q) y (add z q) && walk n t g' p q x (add y q) (add z q) &&
+      walk n t h' p q (add x q) (add y q) (add z q)
+    | _, _ => false
+    end
+  end.
+End Walk.
+
+(** Balance and layers are one rule: a leaf of edge e keeps away from leaves of edge at most e / 4, by n e / 2 where layers are
+    asked for ([wide] <= e), and else by more than nothing. *)
+Definition graded_stop (n wide : Z) (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
+  let w := most t p in
+  if w <? mul 4 (least u q) then true else if wide <=? w then mul n w <=? mul 2 d else 0 <? d.
+
+(** Leaves that are coarser than s, the edge at the surface, keep the distance r from crossing leaves of edge s, and do not touch
+    any crossing leaf unless they may. *)
+Definition surface_stop (s r : Z) (touching : bool) (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
+  (most t p <=? s) || negb (has Cross u) || ((touching || (0 <? d)) && ((r <=? d) || (most u q <? s))).
+
+(** * Base tree *)
+
+Fixpoint every (f : kind -> bool) (t : tree) : bool :=
+  match t with
+  | Cube k => f k
+  | Node _ _ _ a b c d e f' g h =>
+    every f a && every f b && every f c && every f d && every f e && every f f' && every f g && every f h
+  end.
+
+(** Crossing leaves have at most the edge s. *)
+Fixpoint fine_tree (s : Z) (t : tree) (z : Z) : bool :=
+  if most t z <=? s then true else
+  match t with
+  | Cube k => negb (same Cross k)
+  | Node _ _ _ a b c d e f g h =>
+    let z := Z.shiftr z 1 in
+    fine_tree s a z && fine_tree s b z && fine_tree s c z && fine_tree s d z &&
+    fine_tree s e z && fine_tree s f z && fine_tree s g z && fine_tree s h z
+  end.
+
+Inductive axis := X | Y | Z_.
+Definition kid_on (a : axis) (s i j : bool) (t : tree) : tree :=
+  match a with X => kid s i j t | Y => kid i s j t | Z_ => kid i j s t end.
+
+(** Components meet only crossing leaves. [Empty] stands for what is outside of the root: leaves of kind k do not reach it. *)
+Definition may_share (k a b : kind) : bool :=
+  match a, b with Cross, _ | _, Cross => true | Empty, _ => negb (same k b) | _, Empty => negb (same k a) | _, _ => same a b end.
+
+(** Leaves that share part of a face of t and u, where u follows t along the axis. *)
+Fixpoint face (k : kind) (fuel : nat) (a : axis) (t u : tree) : bool :=
+  match t, u with
+  | Cube k1, Cube k2 => may_share k k1 k2
+  | _, _ =>
+    match fuel with
+    | O => false
+    | S n =>
+      face k n a (kid_on a true false false t) (kid_on a false false false u) && face k n a (kid_on a true true false t) (kid_on a false true false u) &&
+      face k n a (kid_on a true false true t) (kid_on a false false true u) && face k n a (kid_on a true true true t) (kid_on a false true true u)
+    end
+  end.
+Fixpoint faces (k : kind) (fuel : nat) (t : tree) : bool :=
+  match t with
+  | Cube _ => true
+  | Node _ _ _ a b c d e f g h =>
+    match fuel with
+    | O => false
+    | S n =>
+      face k n X a b && face k n X c d && face k n X e f && face k n X g h &&
+      face k n Y a c && face k n Y b d && face k n Y e g && face k n Y f h &&
+      face k n Z_ a e && face k n Z_ b f && face k n Z_ c g && face k n Z_ d h &&
+      faces k n a && faces k n b && faces k n c && faces k n d && faces k n e && faces k n f && faces k n g && faces k n h
+    end
+  end.
+Definition rim (k : kind) (t : tree) : bool :=
+  face k 20 X (Cube Empty) t && face k 20 X t (Cube Empty) && face k 20 Y (Cube Empty) t && face k 20 Y t (Cube Empty) &&
+  face k 20 Z_ (Cube Empty) t && face k 20 Z_ t (Cube Empty).
+
+(** * Flood: leaves of kind k become [Reached] from neighbours that are *)
+
+(** Whether a face of a tree, at the near (false) or far end of an axis, has a [Reached] leaf. *)
+Fixpoint wet (fuel : nat) (a : axis) (s : bool) (t : tree) : bool :=
+  match t with
+  | Cube k => same Reached k
+  | Node _ _ _ _ _ _ _ _ _ _ _ =>
+    match fuel with
+    | O => false
+    | S n => wet n a s (kid_on a s false false t) || wet n a s (kid_on a s true false t) ||
+             wet n a s (kid_on a s false true t) || wet n a s (kid_on a s true true t)
+    end
+  end.
+
+Section Flood.
+Variable k : kind.
+(** The order of a sweep: along each axis from the near end to the far one (false), or back. *)
+Variables i j l : bool.
+
+Definition T (x y z : bool) (t : tree) : tree := kid (xorb i x) (xorb j y) (xorb l z) t.
+
+(** One sweep through t, whose neighbours before it and after it along x, y, z, in the order of the sweep, are a, b, c and d, e, f.
+    [has] of a node is whether leaves of kind k are left in it. *)
+Fixpoint flood (fuel : nat) (t a b c d e f : tree) : tree :=
+  match t with
+  | Cube k' =>
+    if same k k' then
+      if wet 20 X (negb i) a || wet 20 Y (negb j) b || wet 20 Z_ (negb l) c || wet 20 X i d || wet 20 Y j e || wet 20 Z_ l f
+      then Cube Reached else t
+    else t
+  | Node p q some _ _ _ _ _ _ _ _ =>
+    if some then
+      match fuel with
+      | O => t
+      | S n =>
+        let r0 := flood n (T false false false t) (T true false false a) (T false true false b) (T false false true c)
+                  (T true false false t) (T false true false t) (T false false true t) in
+        let r1 := flood n (T true false false t) r0 (T true true false b) (T true false true c)
+                  (T false false false d) (T true true false t) (T true false true t) in
+        let r2 := flood n (T false true false t) (T true true false a) r0 (T false true true c)
+                  (T true true false t) (T false false false e) (T false true true t) in
+        let r3 := flood n (T true true false t) r2 r1 (T true true true c)
+                  (T false true false d) (T true false false e) (T true true true t) in
+        let r4 := flood n (T false false true t) (T true false true a) (T false true true b) r0
+                  (T true false true t) (T false true true t) (T false false false f) in
+        let r5 := flood n (T true false true t) r4 (T true true true b) r1
+                  (T false false true d) (T true true true t) (T true false false f) in
+        let r6 := flood n (T false true true t) (T true true true a) r4 r2
+                  (T true true true t) (T false false true e) (T false true false f) in
+        let r7 := flood n (T true true true t) r6 r5 r3 (T false true true d) (T true false true e) (T true true false f) in
+        let r := Node 0 0 false r0 r1 r2 r3 r4 r5 r6 r7 in
+        Node p q (has k r0 || has k r1 || has k r2 || has k r3 || has k r4 || has k r5 || has k r6 || has k r7)
+          (T false false false r) (T true false false r) (T false true false r) (T true true false r)
+          (T false false true r) (T true false true r) (T false true true r) (T true true true r)
+      end
+    else t
+  end.
+End Flood.
+
+(** Leaves that are still to be reached. *)
+Fixpoint rest (k : kind) (t : tree) : Z :=
+  match t with
+  | Cube k' => if same k k' then 1 else 0
+  | Node _ _ some a b c d e f g h =>
+    if some then add (rest k a) (add (rest k b) (add (rest k c) (add (rest k d)
+                (add (rest k e) (add (rest k f) (add (rest k g) (rest k h)))))))
+    else 0
+  end.
+
+(** Sweeps in all eight orders, until nothing is left or nothing changes. [out] is what is outside of the root. *)
+Definition sweeps (k : kind) (out t : tree) : tree :=
+  let once := fun i j l t => flood k i j l 20 t out out out out out out in
+  once true true true (once true true false (once true false true (once true false false
+ (once false true true (once false true false (once false false true (once false false false t))))))).
+Fixpoint rounds (k : kind) (out : tree) (fuel : nat) (t : tree) (before : Z) : tree :=
+  match fuel with
+  | O => t
+  | S n => let now := rest k t in if (now =? 0) || (now =? before) then t else rounds k out n (sweeps k out t) now
+  end.
+
+(** The leaf of kind k with the unit cell (u, v, w) becomes [Reached]; no other kind is changed. x, y, z, e are corner and edge. *)
+Fixpoint mark (k : kind) (fuel : nat) (u v w x y z e : Z) (t : tree) : tree :=
+  match t with
+  | Cube k' => if same k k' then Cube Reached else t
+  | Node p q r a b c d e' f g h =>
+    match fuel with
+    | O => t
+    | S n =>
+      let s := Z.shiftr e 1 in let x' := add x s in let y' := add y s in let z' := add z s in
+      if w <? z' then
+        if v <? y' then
+          if u <? x' then Node p q r (mark k n u v w x y z s a) b c d e' f g h
+          else Node p q r a (mark k n u v w x' y z s b) c d e' f g h
+        else if u <? x' then Node p q r a b (mark k n u v w x y' z s c) d e' f g h
+        else Node p q r a b c (mark k n u v w x' y' z s d) e' f g h
+      else if v <? y' then
+          if u <? x' then Node p q r a b c d (mark k n u v w x y z' s e') f g h
+          else Node p q r a b c d e' (mark k n u v w x' y z' s f) g h
+        else if u <? x' then Node p q r a b c d e' f (mark k n u v w x y' z' s g) h
+        else Node p q r a b c d e' f g (mark k n u v w x' y' z' s h)
+    end
+  end.
+(** The kind of the leaf with the unit cell (u, v, w). *)
+Fixpoint spot (fuel : nat) (u v w x y z e : Z) (t : tree) : kind :=
+  match t with
+  | Cube k => k
+  | Node _ _ _ a b c d e' f g h =>
+    match fuel with
+    | O => Empty
+    | S n =>
+      let s := Z.shiftr e 1 in let x' := add x s in let y' := add y s in let z' := add z s in
+      if w <? z' then
+        if v <? y' then if u <? x' then spot n u v w x y z s a else spot n u v w x' y z s b
+        else if u <? x' then spot n u v w x y' z s c else spot n u v w x' y' z s d
+      else
+        if v <? y' then if u <? x' then spot n u v w x y z' s e' else spot n u v w x' y z' s f
+        else if u <? x' then spot n u v w x y' z' s g else spot n u v w x' y' z' s h
+    end
+  end.
+
+(** * Kept region *)
+
+(** A cube is filled by leaves of kind k, or empty. *)
+Fixpoint filled (k : kind) (t : tree) : bool :=
+  match t with
+  | Cube k' => same k k'
+  | Node _ _ _ a b c d e f g h => filled k a && filled k b && filled k c && filled k d && filled k e && filled k f && filled k g && filled k h
+  end.
+
+(** Every leaf of t is filled with leaves of u of the kind [fate], or has none if that is [Empty]. *)
+Section Overlay.
+Variable fate : kind -> kind.
+Fixpoint overlay (t u : tree) : bool :=
+  match t with
+  | Cube k => filled (fate k) u
+  | Node _ _ _ a b c d e f g h =>
+    match u with
+    | Cube Empty | Node _ _ _ _ _ _ _ _ _ _ _ =>
+      overlay a (kid false false false u) && overlay b (kid true false false u) && overlay c (kid false true false u) &&
+      overlay d (kid true true false u) && overlay e (kid false false true u) && overlay f (kid true false true u) &&
+      overlay g (kid false true true u) && overlay h (kid true true true u)
+    | _ => false
+    end
+  end.
+End Overlay.
+
+(** * The whole *)
+
+Section Check.
+Variable c : inputs.
+
+Definition kind_of_flow : kind := match keep c with Keep_inside => Inner | _ => Outer end.
+Definition has_seeds : bool := match seeds c with [] => false | _ => true end.
+Definition may_enclose : bool := match keep c with Keep_outside => negb has_seeds && delete_enclosed c | _ => false end.
+
+Definition mark_seeds (t : tree) : tree :=
+  fold_left (fun t '(p, q, r) => mark kind_of_flow 19 (Z.shiftr p 8) (Z.shiftr q 8) (Z.shiftr r 8) 0 0 0 524288 t) (seeds c) t.
+Definition unit (p : Z) : bool := (0 <=? Z.shiftr p 8) && (Z.shiftr p 8 <? 524288).
+Definition seeds_reached (t : tree) : bool :=
+  forallb (fun '(p, q, r) => unit p && unit q && unit r &&
+                             same Reached (spot 19 (Z.shiftr p 8) (Z.shiftr q 8) (Z.shiftr r 8) 0 0 0 524288 t)) (seeds c).
+
+(** T0 in which the leaves that seeds reach, or the far field, are [Reached]. *)
+Definition flooded (t : tree) : tree :=
+  if has_seeds then rounds kind_of_flow (Cube Cross) 100 (mark_seeds t) (-1)
+  else if may_enclose then rounds Outer (Cube Reached) 100 t (-1)
+  else t.
+
+(** T0 before the flood: full, and fine at crossing leaves. *)
+Definition check_full (t : tree) : bool :=
+  every (fun k => negb (same Empty k) && negb (same Reached k)) t && fine_tree (Z.shiftr 524288 (surface c)) t 524288.
+
+(** T0 after the flood: components are of one kind, and none is left that should have been reached. *)
+Definition check_base (t : tree) : bool :=
+  faces kind_of_flow 20 t && (if has_seeds then seeds_reached t && every (fun k => negb (same kind_of_flow k)) t else true) &&
+  (if may_enclose then rim Outer t else true).
+
+(** What gradation leaves of a leaf of T0; [far] is whether there is a far field. *)
+Definition fate (far : bool) (k : kind) : kind :=
+  match k with
+  | Empty => Empty
+  | Cross => Cross
+  | Reached => kind_of_flow
+  | Outer => match keep c with Keep_outside => if may_enclose && far then Empty else Outer | Keep_inside => Empty | Keep_all => Outer end
+  | Inner => match keep c with Keep_outside => Empty | _ => Inner end
+  end.
+
+Definition below : Z := match keep c with Keep_all => 20 | _ => surface c end.
+Definition check_graded (g : tree) : bool :=
+  let n := layer_cells c in let s := Z.shiftr 524288 (surface c) in
+  walk (graded_stop n (Z.shiftr 2097152 below)) 40 g g 524288 524288 0 0 0 &&
+  walk (surface_stop s (mul (sub n 1) s) (keep_crossing c)) 40 g g 524288 524288 0 0 0.
+
+Definition check_crossing (dropped : list part) (m d : tree) : bool :=
+  if keep_crossing c then match dropped with [] => true | _ => false end
+  else every (fun k => negb (same Cross k)) m && every (fun k => same Cross k || same Empty k) d.
+
+Definition check_inputs : bool :=
+  (0 <=? surface c) && (surface c <=? 19) && (1 <=? layer_cells c) && (layer_cells c <=? 4096).
+
+Definition check (base mesh dropped : list part) (of_base of_mesh : manifest) : bool :=
+  if check_inputs then
+    match build kind_of_flow base with None => false | Some t =>
+    if check_counts of_base base t && check_full t then
+      let t := flooded t in
+      if check_base t then
+        match build Cross mesh with None => false | Some m =>
+        if check_counts of_mesh mesh m then
+          match build Cross dropped with None => false | Some d =>
+          if check_crossing dropped m d then
+            match merge Cross m d 524288 with None => false | Some g =>
+            if overlay (fate (negb (every (fun k => negb (same Reached k)) t))) t g then check_graded g else false
+            end
+          else false end
+        else false end
+      else false
+    else false end
+  else false.
+End Check.

@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Changes the program in ways that make it accept too much, and shows that the proof then fails.
+
+    mutants.py SOURCE OUT FILE...
+
+SOURCE is reference/proof, OUT a directory for copies, FILE... the names of the proof's files in order. Prints one line per mutant with the
+file whose proof fails. Exit codes: 0 every mutant breaks the proof, 1 one does not, or takes too long.
+"""
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+MUTANTS = {
+    "side 3 is crossing": ("else if s =? 2 then Good (Cube Cross) (add i 1) else Bad", "else Good (Cube Cross) (add i 1)"),
+    "leaves after the last octant": ("if i =? count p then Some t else None", "Some t"),
+    "overlapping parts": ("  | _, _ => None\n  end.\n\nDefinition read", "  | _, _ => Some t\n  end.\n\nDefinition read"),
+    "counts of different lengths": ("(x =? y) && all_equal a b | _, _ => false end", "(x =? y) && all_equal a b | _, _ => true end"),
+    "a child is not walked": ("walk n b u p q (sub x p) y z && ", ""),
+    "balance of 4:1": ("if w <? mul 4 (least u q)", "if w <? mul 8 (least u q)"),
+    "layers of n - 1": ("mul n w <=? mul 2 d else 0 <? d", "mul (sub n 1) w <=? mul 2 d else 0 <? d"),
+    "far from finer crossing leaves only": ("(r <=? d) || (most u q <? s)", "(r <=? d) || (most u q <=? s)"),
+    "a face is not checked": ("face k n Y b d && ", ""),
+    "components of two sides": ("| _, _ => same a b end", "| _, _ => true end"),
+    "the flood looks at the wrong face": ("wet 20 X (negb i) a", "wet 20 X i a"),
+    "leaves that the flood missed": ("seeds_reached t && every (fun k => negb (same kind_of_flow k)) t", "seeds_reached t"),
+    "seeds in walls": ("same Reached (spot 19", "negb (same kind_of_flow (spot 19"),
+    "enclosed without a far field": ("if may_enclose && far then Empty", "if may_enclose then Empty"),
+    "the far field is not flooded": ("if may_enclose then rim Outer t else true", "true"),
+    "holes in kept leaves": ("  | Cube k' => same k k'\n  | Node _ _ _ a b c d e f g h => filled k a", "  | Cube k' => same k k' || same Empty k'\n  | Node _ _ _ a b c d e f g h => filled k a"),
+    "crossing leaves in the mesh": ("every (fun k => negb (same Cross k)) m && ", ""),
+    "coarse crossing leaves": ("  | Cube k => negb (same Cross k)\n", "  | Cube _ => true\n"),
+    "sums that wrap": ("(count p <=? 144115188075855872)", "true"),
+    "layers without bound": ("(1 <=? layer_cells c) && (layer_cells c <=? 4096)", "(1 <=? layer_cells c)"),
+}
+
+
+def main(source, out, files):
+    program = (source / "Checker.v").read_text()
+    survived = 0
+    for name, (old, new) in MUTANTS.items():
+        if old not in program:
+            print(f"{name}: the program has no {old!r}")
+            survived += 1
+            continue
+        mutant = program.replace(old, new)
+        if name == "seeds in walls":  # one more parenthesis
+            mutant = mutant.replace("0 0 0 524288 t)) (seeds c).", "0 0 0 524288 t))) (seeds c).")
+        shutil.rmtree(out, ignore_errors=True)
+        out.mkdir(parents=True)
+        verdict = "NOT NOTICED"
+        for file in files:
+            text = mutant if file == "Checker" else (source / f"{file}.v").read_text()
+            (out / f"{file}.v").write_text(text)
+            try:
+                run = subprocess.run(["coqc", "-q", "-Q", ".", "Proof", f"{file}.v"], cwd=out, capture_output=True, timeout=300)
+            except subprocess.TimeoutExpired:
+                verdict = f"NOT DECIDED: {file}.v takes too long"
+                break
+            if run.returncode:
+                verdict = f"the proof fails in {file}.v" if file != "Checker" else "NOT A PROGRAM"
+                break
+        print(f"{name:36} {verdict}", flush=True)
+        survived += "NOT" in verdict
+    shutil.rmtree(out, ignore_errors=True)
+    return 1 if survived else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4:
+        sys.exit(__doc__)
+    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]))
