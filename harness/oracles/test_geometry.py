@@ -45,7 +45,7 @@ def diagnose(path):
     """The diagnosis, and the counts of its findings by kind."""
     with tempfile.TemporaryDirectory() as directory:
         out = pathlib.Path(directory) / "geometry.json"
-        command = [HARNESS, "geometry", path, "--no-intersections", "--json", out]
+        command = [HARNESS, "geometry", path, "--json", out]
         run = subprocess.run(command, capture_output=True, text=True)
         if run.returncode not in (0, 1):
             raise AssertionError(f"{path}: exit code {run.returncode}: {run.stderr}")

@@ -12,7 +12,7 @@ use crate::digest::Digest;
 pub use crate::directory::{ReadError, open_tree, read_manifest};
 use crate::files::named;
 use crate::manifest::{self, Manifest, Part, Tally};
-use crate::mesh::{self, Mesh};
+use crate::mesh::Mesh;
 use crate::npy::{self, PartFile};
 use ::files::Claim;
 
@@ -35,14 +35,12 @@ pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
     let mesh = Mesh::open(dir)?;
     let mut parts = Vec::new();
     for part in &mesh.parts {
-        parts.push(match part {
-            mesh::Part::Words(file) => file.read_all().map_err(|e| ReadError::part(file, e))?,
-            mesh::Part::Tree(_) => {
-                let mut words = Vec::new();
-                mesh.visit(&mut |run| words.extend_from_slice(run))?;
-                words
-            }
-        });
+        parts.push(part.read_all().map_err(|error| ReadError::part(part, error))?);
+    }
+    if mesh.tree_file.is_some() {
+        let mut words = Vec::new();
+        mesh.visit(&mut |run| words.extend_from_slice(run))?;
+        parts.push(words);
     }
     Ok(LeafSet::new(mesh.manifest, parts))
 }

@@ -5,11 +5,9 @@
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
 //! - [`foam`]: meshes for OpenFOAM;
-//! - [`brick`]: lattice points in groups of neighbours;
 
 #![deny(missing_docs)]
 
-pub mod brick;
 pub mod error;
 pub mod foam;
 pub mod format;

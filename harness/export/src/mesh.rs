@@ -5,8 +5,10 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use contract::case::Case;
+use contract::htg::TreeFile;
 use contract::lattice::Root;
-use contract::mesh::{self, Order, Part};
+use contract::mesh::{self, Order};
+use contract::npy::PartFile;
 use contract::word;
 
 use crate::error::ExportError;
@@ -62,7 +64,7 @@ impl Mesh {
 
     /// Whether the rank of each leaf is known: a tree may have been written without ranks.
     pub fn has_ranks(&self) -> bool {
-        self.parts.iter().all(Part::has_ranks)
+        self.tree_file.as_ref().is_none_or(TreeFile::has_ranks)
     }
 
     /// The error of a request that needs them.
@@ -82,15 +84,15 @@ impl Mesh {
             return Ok(known);
         }
         let mut leaves = Vec::new();
-        match &self.parts[..] {
-            _ if !self.has_ranks() => {}
-            [Part::Tree(_)] => self.visit(&Selection::default(), &|| Ok(()), &mut |leaf| {
+        match &self.tree_file {
+            None => leaves.extend(self.parts.iter().map(PartFile::len)),
+            Some(tree) if !tree.has_ranks() => {}
+            Some(_) => self.visit(&Selection::default(), &|| Ok(()), &mut |leaf| {
                 let rank = leaf.rank as usize;
                 leaves.resize(leaves.len().max(rank + 1), 0);
                 leaves[rank] += 1;
                 Ok(())
             })?,
-            parts => leaves.extend(parts.iter().map(Part::leaves)),
         }
         Ok(self.leaves_by_rank.get_or_init(|| leaves))
     }

@@ -3,6 +3,7 @@
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use super::tree::Point;
 use contract::lattice::FacetLattice;
 use contract::parity::normal;
 
@@ -51,14 +52,9 @@ pub fn is_degenerate(facet: &FacetLattice) -> bool {
 }
 
 fn is_sliver(facet: &[[f32; 3]; 3]) -> bool {
-    let edge = |v: usize, w: usize| -> [f64; 3] {
-        std::array::from_fn(|a| f64::from(facet[w][a]) - f64::from(facet[v][a]))
-    };
-    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    let (u, v, w) = (edge(0, 1), edge(0, 2), edge(1, 2));
-    let longest = dot(u, u).max(dot(v, v)).max(dot(w, w));
-    let cross: [f64; 3] =
-        std::array::from_fn(|a| u[(a + 1) % 3] * v[(a + 2) % 3] - u[(a + 2) % 3] * v[(a + 1) % 3]);
+    let [a, b, c] = facet.map(|vertex| Point::from(vertex.map(f64::from)));
+    let (u, v, w) = (b - a, c - a, c - b);
+    let longest = [u, v, w].map(Point::length_squared).into_iter().fold(0.0, f64::max);
     // |cross| = height * longest edge.
-    dot(cross, cross) < (SLIVER * longest).powi(2)
+    u.cross(v).length_squared() < (SLIVER * longest).powi(2)
 }

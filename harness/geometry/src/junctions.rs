@@ -4,6 +4,8 @@
 //! hole. Two open edges that leave a vertex in the same direction cancel along the shorter one, until no such
 //! pair is left; what remains bounds openings.
 
+use super::tree::Point;
+
 /// A segment between two vertices, given by their indices, at the boundary of a facet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
@@ -51,18 +53,15 @@ fn overlap(
     if at.len() > SEGMENTS_MAX {
         return None;
     }
-    let along = |i: u32| {
-        let end = other(segments[i as usize].expect("retained"), v);
-        std::array::from_fn(|a| points[end as usize][a] - points[v as usize][a])
-    };
+    let point = |v: u32| Point::from(points[v as usize]);
+    let along = |i: u32| point(other(segments[i as usize].expect("retained"), v)) - point(v);
     for (n, &i) in at.iter().enumerate() {
         for &j in &at[n + 1..] {
             let (p, q) = (along(i), along(j));
-            let is_longer = dot(p, p) >= dot(q, q);
+            let is_longer = p.length_squared() >= q.length_squared();
             let (long, short) = if is_longer { (p, q) } else { (q, p) };
-            let t = dot(short, long) / dot(long, long);
-            let offset: [f64; 3] = std::array::from_fn(|a| short[a] - t * long[a]);
-            if t > 0.0 && dot(offset, offset) <= tolerance * tolerance {
+            let t = short.dot(long) / long.length_squared();
+            if t > 0.0 && (short - t * long).length() <= tolerance {
                 return Some(if is_longer { (i, j) } else { (j, i) });
             }
         }
@@ -72,10 +71,6 @@ fn overlap(
 
 fn other(segment: Segment, v: u32) -> u32 {
     segment.ends[usize::from(segment.ends[0] == v)]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -33,38 +33,21 @@ use report::Diagnosis;
 use shells::Shells;
 use tree::FacetTree;
 
-/// Options of a diagnosis.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Whether to search for self-intersections.
-    pub intersections: bool,
-    /// Maximum number of places listed per finding.
-    pub first: usize,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { intersections: true, first: 5 }
-    }
-}
-
-/// Diagnoses a geometry. The counts do not depend on the order of the facets or of a facet's vertices.
-pub fn diagnose(input: &Input, options: &Options) -> Diagnosis {
+/// Diagnoses a geometry and lists the first places of each finding. The counts do not depend on the order of the facets or of a facet's vertices.
+pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let edges = Edges::new(&input.facets);
     let shells = Shells::new(&edges, &input.lattice);
     let mut findings: Vec<Finding> = Vec::new();
-    findings.extend(openings::openings(input, &edges, options.first));
-    findings.extend(edges::findings(input, &edges, options.first));
-    findings.extend(shells.findings(input, options.first));
-    findings.push(facets::duplicates(input, &edges, options.first));
-    findings.extend(facets::shapes(input, options.first));
+    findings.extend(openings::openings(input, &edges, first));
+    findings.extend(edges::findings(input, &edges, first));
+    findings.extend(shells.findings(input, first));
+    findings.push(facets::duplicates(input, &edges, first));
+    findings.extend(facets::shapes(input, first));
     let tree = FacetTree::new(&input.lattice);
-    if options.intersections {
-        findings.extend(intersections::intersections(input, &tree, options.first));
-    }
+    findings.extend(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
     }
-    findings.extend(extent::findings(input, options.first));
-    Diagnosis::new(input, &edges, &shells.all, findings, options.first)
+    findings.extend(extent::findings(input, first));
+    Diagnosis::new(input, &edges, &shells.all, findings, first)
 }

@@ -199,8 +199,8 @@ impl Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose;
     use crate::input::Requested;
-    use crate::{Options, diagnose};
     use geometries::{Generator, Shape};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -213,7 +213,7 @@ mod tests {
         facets[200].swap(0, 1);
         let root = Root { origin: [0.0; 3], edge: 8.0 };
         let requested = Requested { spacing_min: Some(4.0), root: Some(root), root_scale: None };
-        let right = diagnose(&Input::new(facets, &requested).unwrap(), &Options::default());
+        let right = diagnose(&Input::new(facets, &requested).unwrap(), 5);
         let index = |kind| right.findings.iter().position(|f| f.kind == kind).unwrap();
         let [openings, walls, winding] =
             [Kind::Openings, Kind::ThinWalls, Kind::Winding].map(index);

@@ -1,5 +1,7 @@
 //! The size of an opening: its widest diameter and its free width.
 
+use super::tree::Point;
+
 /// Diameter and width of a set of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
@@ -13,47 +15,38 @@ pub struct Size {
 /// Of more vertices of a hull, only some are used, evenly spread.
 const VERTICES_MAX: usize = 1024;
 
-type Point = [f64; 3];
-
 /// The size of a set of at least one point.
-pub fn size(points: &[Point]) -> Size {
-    let (from, to) = farthest(points);
-    let along = sub(to, from);
-    let diameter = norm(along);
+pub fn size(points: &[[f64; 3]]) -> Size {
+    let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
+    let (from, to) = farthest(&points);
+    let diameter = from.distance(to);
     if diameter == 0.0 {
         return Size { diameter, width: 0.0 };
     }
-    let u = along.map(|x| x / diameter);
-    let across = |p: &Point| {
-        let offset = sub(*p, from);
-        let t = dot(offset, u);
-        std::array::from_fn(|a| offset[a] - t * u[a])
-    };
-    let far = points.iter().map(across).max_by(|a, b| norm(*a).total_cmp(&norm(*b)));
+    let u = (to - from) / diameter;
+    let across = |p: &Point| (*p - from) - (*p - from).dot(u) * u;
+    let far = points.iter().map(across).max_by(|a, b| a.length().total_cmp(&b.length()));
     let far = far.expect("at least one point");
-    let height = norm(far);
+    let height = far.length();
     // Rounding leaves points of one line at a distance from it.
     if height <= 1e-12 * diameter {
         return Size { diameter, width: 0.0 };
     }
-    let v = far.map(|x| x / height);
-    let flat = points.iter().map(|p| [dot(sub(*p, from), u), dot(sub(*p, from), v)]).collect();
+    let v = far / height;
+    let flat = points.iter().map(|p| [(*p - from).dot(u), (*p - from).dot(v)]).collect();
     size_of_hull(&hull(flat), diameter)
 }
 
 /// Two points neither of which has a farther one than the other.
 fn farthest(points: &[Point]) -> (Point, Point) {
     let from = |p: Point| {
-        let distance = |q: &Point| norm(sub(*q, p));
-        *points
-            .iter()
-            .max_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .expect("at least one point")
+        let farthest = points.iter().max_by(|a, b| p.distance(**a).total_cmp(&p.distance(**b)));
+        *farthest.expect("at least one point")
     };
     let (mut p, mut q) = (points[0], from(points[0]));
     loop {
         let next = from(q);
-        if norm(sub(next, q)) <= norm(sub(p, q)) {
+        if next.distance(q) <= p.distance(q) {
             return (p, q);
         }
         (p, q) = (q, next);
@@ -107,24 +100,12 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-fn sub(a: Point, b: Point) -> Point {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: Point) -> f64 {
-    dot(a, a).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn circle(n: usize, radius: f64) -> Vec<Point> {
+    fn circle(n: usize, radius: f64) -> Vec<[f64; 3]> {
         let point = |i: usize| {
             let (sin, cos) = (i as f64 * std::f64::consts::TAU / n as f64).sin_cos();
             [radius * cos, radius * sin * 0.6, radius * sin * 0.8]
@@ -169,7 +150,7 @@ mod tests {
                     }
                 }
             }
-            let points: Vec<Point> = flat.iter().map(|&[x, y]| {
+            let points: Vec<[f64; 3]> = flat.iter().map(|&[x, y]| {
                 let mut at = [x, y, 3.0];
                 at.rotate_left(turn);
                 at

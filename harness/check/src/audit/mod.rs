@@ -22,7 +22,7 @@ use contract::case::Case;
 use contract::digest::Digest;
 use contract::leafset::{self, ReadError};
 use contract::manifest::Manifest;
-use contract::mesh::{Mesh, NODES_MAX, Part};
+use contract::mesh::{Mesh, NODES_MAX};
 use contract::octant::LEVEL_MAX;
 use contract::tree::Tree;
 
@@ -149,7 +149,7 @@ pub fn audit_against(
             files.examined = manifest.parts.len() as u64 + u64::from(tree);
             let subject = Subject::of(manifest, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
-            if tree && mesh.parts.iter().all(|part| matches!(part, Part::Words(_))) {
+            if tree && mesh.tree_file.is_none() {
                 report.checks.push(tree_file(dir, manifest));
             }
         }

@@ -7,8 +7,8 @@ use super::values::{self, Output, root};
 use crate::failure::Failure;
 use clap::Args;
 use contract::lattice::Root;
+use geometry::diagnose;
 use geometry::input::{Input, Requested};
-use geometry::{Options, diagnose};
 use report::json::pretty;
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 
@@ -33,9 +33,6 @@ pub struct Arguments {
     /// Write the result as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
-    /// Do not search for self-intersections, which takes about half of the time
-    #[arg(long)]
-    no_intersections: bool,
     /// Places to list for each kind of finding
     #[arg(long, value_name = "N", default_value = "5")]
     limit: NonZero<usize>,
@@ -48,9 +45,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
     let input = Input::read(&arguments.file, &Requested { spacing_min, root, root_scale })?;
-    let options =
-        Options { intersections: !arguments.no_intersections, first: arguments.limit.get() };
-    let diagnosis = diagnose(&input, &options);
+    let diagnosis = diagnose(&input, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {
         put(path, &pretty(&diagnosis))?;

@@ -3,12 +3,11 @@
 use super::cells::Cells;
 use super::{ImportError, Request};
 use crate::lattice::Root;
+use crate::leafset::read_parts;
 use crate::manifest;
 use crate::npy::PartFile;
-use crate::octant::Octant;
-use crate::word::{self, Side, WordError};
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::word::{self, Side};
+use std::path::Path;
 
 /// The name under which the sides in the words can be requested. Without the request they are ignored, because a program
 /// that does not know the sides writes some code too.
@@ -22,70 +21,45 @@ const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 /// # Errors
 /// If a part cannot be read, or a word is not a leaf.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
-    let with_sides = match request.sides.as_deref() {
-        None => false,
-        Some(SIDES) => true,
-        Some(name) => {
-            return Err(ImportError::content(format!(
-                "leaf words have no array {name}: request their sides with --sides {SIDES}"
+    let content = |why: String| ImportError::content(why);
+    if let Some(name) = request.sides.as_deref().filter(|name| *name != SIDES) {
+        return Err(content(format!(
+            "leaf words have no array {name}: request their sides with --sides {SIDES}"
+        )));
+    }
+    let parts = match path.is_dir() {
+        true if path.join(manifest::FILE).exists() => {
+            return Err(content(format!(
+                "has a manifest ({}), so it is a leaf set already: use it as it is",
+                manifest::FILE
             )));
         }
+        true => read_parts(path).map_err(|error| content(error.to_string()))?,
+        false => {
+            let file =
+                PartFile::open(path).map_err(|error| content(format!("the part {error}")))?;
+            vec![(String::new(), file.read_all()?)]
+        }
     };
-    let root = request.root.unwrap_or(UNIT);
+    let (with_sides, root) = (request.sides.is_some(), request.root.unwrap_or(UNIT));
     let mut cells =
         Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
-    for part in parts(path)? {
-        let of_part = |why: String| ImportError::content(why).of_file(&part);
-        let file = PartFile::open(&part).map_err(|error| of_part(format!("the part {error}")))?;
-        let words = file.read_all()?;
-        let is_leaf = |word: u64| octant(word, with_sides).is_ok();
-        let swapped = !words.iter().all(|&word| is_leaf(word))
-            && words.iter().all(|&word| is_leaf(word.swap_bytes()));
-        if swapped {
-            let why = "the bytes of its words are swapped: a big-endian machine wrote them";
-            return Err(of_part(why.to_owned()));
-        }
+    for (part, words) in parts {
         for word in words {
-            let cell = cells.len();
-            let octant = octant(word, with_sides).map_err(|why| {
-                of_part(format!("cell {cell} is the word {word:#018x}, in which {why}"))
-            })?;
-            cells
-                .push(root.to_user(octant.bounds().0), root.edge / f64::from(1u32 << octant.level));
+            // Side bits must be valid only if they are used.
+            if let Some(why) = word::fault(if with_sides { word } else { word & !3 }) {
+                let cell = cells.len();
+                return Err(content(format!(
+                    "{part} cell {cell} is the word {word:#018x}, in which {why}"
+                )));
+            }
+            let octant = word::octant(word);
+            let edge = root.edge / f64::from(1u32 << octant.level);
+            cells.push(root.to_user(octant.bounds().0), edge);
             cells.sides.iter_mut().for_each(|sides| sides.push(Side::ALL[(word & 3) as usize]));
         }
     }
     Ok(cells)
-}
-
-/// The octant of a word, whose side bits must be valid only if they are used.
-fn octant(word: u64, with_sides: bool) -> Result<Octant, WordError> {
-    match word::fault(if with_sides { word } else { word & !3 }) {
-        Some(why) => Err(why),
-        None => Ok(word::octant(word)),
-    }
-}
-
-/// The part files, in the order of their names.
-fn parts(path: &Path) -> Result<Vec<PathBuf>, ImportError> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
-    }
-    if path.join(manifest::FILE).exists() {
-        return Err(ImportError::content(format!(
-            "has a manifest ({}), so it is a leaf set already: use it as it is",
-            manifest::FILE
-        )));
-    }
-    let mut parts = Vec::new();
-    for entry in fs::read_dir(path)? {
-        let name = entry?.file_name();
-        if name.to_str().is_some_and(|name| name.starts_with("leaves-") && name.ends_with(".npy")) {
-            parts.push(path.join(name));
-        }
-    }
-    parts.sort();
-    Ok(parts)
 }
 
 #[cfg(test)]
@@ -93,6 +67,7 @@ mod tests {
     use super::*;
     use crate::npy;
     use crate::testing::words_with_sides;
+    use std::fs;
 
     fn words() -> Vec<u64> {
         words_with_sides(|o| o.level < 2, |o| Some(Side::ALL[o.digit() as usize % 3]))

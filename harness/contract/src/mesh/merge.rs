@@ -3,7 +3,6 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::Part;
 use crate::directory::ReadError;
 use crate::npy::PartFile;
 
@@ -41,14 +40,11 @@ impl Reader<'_> {
 /// # Errors
 /// If a part cannot be read.
 pub(super) fn merge(
-    parts: &[Part],
+    parts: &[PartFile],
     run: &mut dyn FnMut(usize, &[u64]) -> bool,
 ) -> Result<(), ReadError> {
-    let mut readers = Vec::new();
-    for part in parts {
-        let Part::Words(file) = part else { unreachable!("a tree is the only part of its mesh") };
-        readers.push(Reader { file, next: 0, words: Vec::new(), position: 0 });
-    }
+    let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
+    let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
     let mut heads = BinaryHeap::new();
     for (part, reader) in readers.iter_mut().enumerate() {
         if reader.fill()? {
@@ -78,12 +74,12 @@ mod tests {
     use crate::digest::mix;
     use crate::npy;
 
-    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<Part>) {
+    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<PartFile>) {
         let dir = tempfile::tempdir().unwrap();
         let open = |(i, words): (usize, &Vec<u64>)| {
             let path = dir.path().join(format!("{i}.npy"));
             npy::write(&path, words).unwrap();
-            Part::Words(PartFile::open(&path).unwrap())
+            PartFile::open(&path).unwrap()
         };
         let files = words.iter().enumerate().map(open).collect();
         (dir, files)

@@ -4,14 +4,12 @@
 //! not a linear oct-tree, for all who rely on one.
 
 mod merge;
-mod part;
 
 use std::path::{Path, PathBuf};
 
-pub use part::Part;
-
 pub use crate::directory::NODES_MAX;
 use crate::directory::{self, ReadError};
+use crate::htg::TreeFile;
 use crate::manifest::Manifest;
 use crate::npy::PartFile;
 use crate::octant::Octant;
@@ -24,8 +22,10 @@ pub struct Mesh {
     dir: PathBuf,
     /// The manifest.
     pub manifest: Manifest,
-    /// The files of words in the manifest's order, or the tree alone.
-    pub parts: Vec<Part>,
+    /// The files of words, in the manifest's order.
+    pub parts: Vec<PartFile>,
+    /// The tree, if there are no files of words.
+    pub tree_file: Option<TreeFile>,
 }
 
 impl Mesh {
@@ -35,28 +35,27 @@ impl Mesh {
     /// If the directory is not a leaf set.
     pub fn open(dir: &Path) -> Result<Self, ReadError> {
         let manifest = directory::read_manifest(dir)?;
-        let tree = match manifest.parts.is_empty() {
+        let tree_file = match manifest.parts.is_empty() {
             true => directory::open_tree(dir, &manifest)?,
             false => None,
         };
         let mut parts = Vec::new();
-        match tree {
-            Some(tree) => parts.push(Part::Tree(Box::new(tree))),
-            None => {
-                for part in &manifest.parts {
-                    let path = dir.join(&part.file);
-                    let file = PartFile::open(&path);
-                    parts.push(Part::Words(file.map_err(|e| ReadError::Part { path, source: e })?));
-                }
-                directory::refuse_extra_parts(dir, &manifest)?;
-            }
+        for part in &manifest.parts {
+            let path = dir.join(&part.file);
+            parts.push(PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?);
         }
-        Ok(Self { dir: dir.to_owned(), manifest, parts })
+        if tree_file.is_none() {
+            directory::refuse_extra_parts(dir, &manifest)?;
+        }
+        Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file })
     }
 
     /// Number of leaves in the files, whatever the manifest states.
     pub fn len(&self) -> u64 {
-        self.parts.iter().map(Part::leaves).sum()
+        match &self.tree_file {
+            Some(tree) => tree.leaves,
+            None => self.parts.iter().map(PartFile::len).sum(),
+        }
     }
 
     /// Whether there are no leaves.
@@ -70,11 +69,11 @@ impl Mesh {
     /// # Errors
     /// If a file cannot be read, or if the tree is damaged.
     pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), ReadError> {
-        match &self.parts[..] {
-            [Part::Tree(tree)] => {
+        match &self.tree_file {
+            Some(tree) => {
                 tree.words(&mut |words| run(0, words)).map_err(|error| ReadError::tree(tree, error))
             }
-            parts => merge::merge(parts, run),
+            None => merge::merge(&self.parts, run),
         }
     }
 
@@ -83,11 +82,11 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::stream`].
     pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), ReadError> {
-        match &self.parts[..] {
-            [Part::Tree(tree)] => tree
+        match &self.tree_file {
+            Some(tree) => tree
                 .words_and_ranks(&mut |words, ranks| run(0, words, ranks))
                 .map_err(|error| ReadError::tree(tree, error)),
-            parts => merge::merge(parts, &mut |part, words| run(part, words, &[])),
+            None => merge::merge(&self.parts, &mut |part, words| run(part, words, &[])),
         }
     }
 

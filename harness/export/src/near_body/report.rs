@@ -91,7 +91,12 @@ impl Report {
             edges_open: edges_open(polygons),
             faces_by_level,
             gap: gaps.and_then(|gaps| spreads(root, faces, gaps)),
-            ranks: mesh.has_ranks().then(|| Ranks::of(cells.to_vec(), faces)),
+            ranks: mesh.has_ranks().then(|| {
+                let mut by_rank = vec![0; cells.len()];
+                faces.iter().for_each(|face| by_rank[face.rank as usize] += 1);
+                let (lambda_cells, lambda_faces) = (lambda(cells), lambda(&by_rank));
+                Ranks { cells: cells.to_vec(), faces: by_rank, lambda_cells, lambda_faces }
+            }),
         };
         report.check_invariants(mesh.len(), root);
         check_surface(faces, polygons, is_whole && report.edges_open == 0);
@@ -103,31 +108,26 @@ impl Report {
         let Self { faces, area, .. } = *self;
         assert_eq!(self.faces_by_level.iter().sum::<u64>(), faces, "faces of all levels");
         let smallest = faces as f64 * edge_of_level(root, LEVEL_MAX).powi(2);
-        assert!(
-            area.is_finite() && area >= smallest * (1.0 - 1e-9),
-            "{faces} faces of area {area}"
-        );
+        let is_possible = area.is_finite() && area >= smallest * (1.0 - 1e-9);
+        assert!(is_possible, "{faces} faces of area {area}");
         if let Some(ranks) = &self.ranks {
             assert_eq!(ranks.faces.iter().sum::<u64>(), faces, "faces of all ranks");
             assert_eq!(ranks.cells.iter().sum::<u64>(), cells, "cells of all ranks");
-            let most = ranks.cells.len() as f64 + 1e-9;
-            let lambdas = [ranks.lambda_cells, ranks.lambda_faces];
-            assert!(
-                lambdas.iter().all(|l| (1.0 - 1e-9..=most).contains(l)),
-                "lambda {lambdas:?} on {} ranks",
-                ranks.cells.len()
-            );
+            let (lambdas, most) = ([ranks.lambda_cells, ranks.lambda_faces], ranks.cells.len());
+            let are_possible =
+                lambdas.iter().all(|l| (1.0 - 1e-9..=most as f64 + 1e-9).contains(l));
+            assert!(are_possible, "lambda {lambdas:?} on {most} ranks");
         }
         let Some(gap) = &self.gap else { return };
         for Spread { min, median, p95, max } in gap.values() {
             assert!(
-                0.0 <= *min && min <= median && median <= p95 && p95 <= max,
+                [0.0, *min, *median, *p95, *max].is_sorted(),
                 "gaps {min} {median} {p95} {max}"
             );
         }
-        let (least, centre) = (gap["least"], gap["centre"]);
-        let is_less =
-            least.min <= centre.min && least.median <= centre.median && least.max <= centre.max;
+        let [least, centre] =
+            ["least", "centre"].map(|of| [gap[of].min, gap[of].median, gap[of].max]);
+        let is_less = least.iter().zip(centre).all(|(least, centre)| *least <= centre);
         assert!(is_less, "the least distances {least:?} exceed those of the centres {centre:?}");
     }
 }
@@ -160,15 +160,6 @@ fn area(corners: impl Iterator<Item = [u32; 3]>) -> [i64; 3] {
         }
     }
     area
-}
-
-impl Ranks {
-    fn of(cells: Vec<u64>, faces: &[Face]) -> Self {
-        let mut by_rank = vec![0; cells.len()];
-        faces.iter().for_each(|face| by_rank[face.rank as usize] += 1);
-        let (lambda_cells, lambda_faces) = (lambda(&cells), lambda(&by_rank));
-        Self { cells, faces: by_rank, lambda_cells, lambda_faces }
-    }
 }
 
 /// Edge of the cells of a level, in the user's units.
@@ -223,35 +214,26 @@ impl fmt::Display for Report {
             open => format!("open at {open} edges"),
         };
         writeln!(f, "{} faces of area {:.6}, {closed}", self.faces, self.area)?;
-        let levels = (0..).zip(self.faces_by_level).filter(|&(_, count)| count > 0);
-        for (level, count) in levels {
-            let level: u8 = level;
+        for (level, count) in self.faces_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
             writeln!(f, "  level {level}: {count}")?;
         }
         if let Some(gap) = &self.gap {
-            writeln!(
-                f,
-                "gap to the wall      {:>12} {:>12} {:>12} {:>12}",
-                "min", "median", "95 %", "max"
-            )?;
-            for (name, key) in [
-                ("face", "least"),
-                ("face, in cells", "least_cells"),
-                ("centre", "centre"),
-                ("centre, in cells", "centre_cells"),
-            ] {
-                let Spread { min, median, p95, max } = gap[key];
+            let [a, b, c, d] = ["min", "median", "95 %", "max"];
+            writeln!(f, "{:<20} {a:>12} {b:>12} {c:>12} {d:>12}", "gap to the wall")?;
+            let keys = ["least", "least_cells", "centre", "centre_cells"];
+            let names = ["face", "face, in cells", "centre", "centre, in cells"];
+            for (name, Spread { min, median, p95, max }) in names.iter().zip(keys.map(|k| gap[k])) {
                 writeln!(f, "  {name:<18} {min:>12.6} {median:>12.6} {p95:>12.6} {max:>12.6}")?;
             }
         }
-        let Some(Ranks { cells, lambda_cells, lambda_faces, .. }) = &self.ranks else {
-            return writeln!(f, "the ranks of the cells are unknown");
-        };
-        match cells.len() {
-            1 => writeln!(f, "one rank, which has all cells and exposed faces"),
-            ranks => writeln!(
+        match &self.ranks {
+            None => writeln!(f, "the ranks of the cells are unknown"),
+            Some(ranks) => writeln!(
                 f,
-                "{ranks} ranks: lambda {lambda_cells:.3} by cells, {lambda_faces:.3} by exposed faces"
+                "ranks: {}; lambda {:.3} by cells, {:.3} by exposed faces",
+                ranks.cells.len(),
+                ranks.lambda_cells,
+                ranks.lambda_faces
             ),
         }
     }

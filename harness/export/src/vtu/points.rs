@@ -1,15 +1,16 @@
 //! The points of a piece: the corners of its leaves without duplicates.
 
+use contract::octant::LEVEL_MAX;
 use rustc_hash::FxHashMap;
 
-use crate::brick::{Point, place};
 use crate::leaf::Leaf;
 
+/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
+type Point = [u32; 3];
+
 /// Corners of a hexahedron in VTK's order, in cell edges.
-const CORNERS: [[usize; 3]; 8] =
+const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
-/// Greatest depth of the blocks that are numbered as a whole.
-const DEPTH_MAX: u32 = 3;
 
 /// Points and cells of a piece.
 #[derive(Debug, Default)]
@@ -18,7 +19,7 @@ pub struct Points {
     pub packed: Vec<u64>,
     /// Eight numbers for each leaf, in VTK's order.
     pub connectivity: Vec<u32>,
-    /// Index of each brick by its key.
+    /// Index of each brick by its key: four by four by four points of the coarsest grid that has them.
     index: FxHashMap<u64, usize>,
     /// One more than the number of each point of a brick, or 0. Points that are searched one after the other are near each other in memory.
     bricks: Vec<[u32; 64]>,
@@ -28,18 +29,18 @@ pub struct Points {
 
 impl Points {
     /// Replaces the content by that of these leaves, which are in Morton order.
-    pub fn set(&mut self, mut leaves: &[Leaf]) {
+    pub fn set(&mut self, leaves: &[Leaf]) {
         self.packed.clear();
         self.connectivity.clear();
         self.index.clear();
         self.bricks.clear();
         self.last = (u64::MAX, 0);
-        while !leaves.is_empty() {
-            let depth = (1..=DEPTH_MAX).take_while(|&depth| is_block(leaves, depth)).last();
-            let depth = depth.unwrap_or(0);
-            let (block, others) = leaves.split_at(1 << (3 * depth));
-            self.add(block, depth);
-            leaves = others;
+        for Leaf { octant, .. } in leaves {
+            for corner in CORNERS {
+                let at = [0, 1, 2].map(|a| octant.corner[a] + octant.edge() * corner[a]);
+                let number = self.number(at);
+                self.connectivity.push(number);
+            }
         }
     }
 
@@ -59,28 +60,6 @@ impl Points {
         assert_eq!(last, self.packed.len(), "points of cells and all points");
     }
 
-    /// Adds all leaves of an octant, `depth` levels below it. Most points are corners of several leaves of a block, and
-    /// are then searched once.
-    fn add(&mut self, block: &[Leaf], depth: u32) {
-        let first = &block[0].octant;
-        let along = (1 << depth) + 1;
-        let mut numbers = [0; ((1 << DEPTH_MAX) + 1usize).pow(3)];
-        for (index, number) in numbers[..along * along * along].iter_mut().enumerate() {
-            let steps = [index % along, index / along % along, index / along / along];
-            let at = [0, 1, 2].map(|a| first.corner[a] + first.edge() * steps[a] as u32);
-            let is_inner = steps.iter().all(|&step| 0 < step && step < along - 1);
-            *number = if is_inner { self.push(at) } else { self.number(at) };
-        }
-        let shift = first.edge().trailing_zeros();
-        for Leaf { octant, .. } in block {
-            let [x, y, z] =
-                [0, 1, 2].map(|a| (octant.corner[a] - first.corner[a]) as usize >> shift);
-            let corners =
-                CORNERS.map(|c| numbers[((z + c[2]) * along + y + c[1]) * along + x + c[0]]);
-            self.connectivity.extend(corners);
-        }
-    }
-
     /// The number of a point, which is a new one if the point is new.
     fn number(&mut self, point: Point) -> u32 {
         let (key, at) = place(point);
@@ -91,30 +70,21 @@ impl Points {
             }
             self.last = (key, brick);
         }
-        let (brick, at) = (self.last.1, at as usize);
+        let brick = self.last.1;
         if self.bricks[brick][at] == 0 {
-            self.bricks[brick][at] = self.push(point) + 1;
+            self.packed.push(packed(point));
+            self.bricks[brick][at] = self.packed.len() as u32;
         }
         self.bricks[brick][at] - 1
     }
-
-    /// The number of a point that is not searched again.
-    fn push(&mut self, point: Point) -> u32 {
-        self.packed.push(packed(point));
-        self.packed.len() as u32 - 1
-    }
 }
 
-/// Whether the first leaves are all leaves of one octant, `depth` levels below it.
-fn is_block(leaves: &[Leaf], depth: u32) -> bool {
-    let (first, count) = (&leaves[0].octant, 1 << (3 * depth));
-    let edge = first.edge() << depth;
-    let is_equal = |leaf: &Leaf| leaf.octant.level == first.level;
-    u32::from(first.level) >= depth
-        && first.corner.iter().all(|c| c & (edge - 1) == 0)
-        && leaves.len() >= count
-        && leaves[count - 1].octant.corner == first.corner.map(|c| c + edge - first.edge())
-        && leaves[..count].iter().all(is_equal)
+/// The key of a point's brick, and the point's index there, below 64.
+fn place(point: Point) -> (u64, usize) {
+    let zeros = (point[0] | point[1] | point[2]).trailing_zeros().min(u32::from(LEVEL_MAX));
+    let [x, y, z] = point.map(|c| (u64::from(c >> zeros >> 2), (c >> zeros & 3) as usize));
+    let key = x.0 | y.0 << 18 | z.0 << 36 | u64::from(zeros) << 54;
+    (key, x.1 | y.1 << 2 | z.1 << 4)
 }
 
 /// A corner as one number.
@@ -146,7 +116,7 @@ mod tests {
         assert_eq!(points.connectivity.len(), 8 * leaves.len());
         for (vertices, Leaf { octant, .. }) in points.connectivity.chunks(8).zip(&leaves) {
             for (&vertex, c) in vertices.iter().zip(CORNERS) {
-                let corner = [0, 1, 2].map(|a| octant.corner[a] + octant.edge() * c[a] as u32);
+                let corner = [0, 1, 2].map(|a| octant.corner[a] + octant.edge() * c[a]);
                 assert_eq!(unpacked(points.packed[vertex as usize]), corner);
             }
         }

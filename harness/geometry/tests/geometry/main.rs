@@ -4,10 +4,10 @@ use contract::case::Facet;
 use contract::lattice::Root;
 use contract::testing::assert_text;
 use geometries::{Generator, Shape};
+use geometry::diagnose;
 use geometry::finding::{Kind, Place};
 use geometry::input::{Input, Requested};
 use geometry::report::Diagnosis;
-use geometry::{Options, diagnose};
 use proptest::prelude::*;
 
 /// Lattice units are powers of two, so that vertices with integer coordinates are exact.
@@ -15,7 +15,7 @@ const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
 
 fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
     let requested = Requested { spacing_min, root: Some(ROOT), root_scale: None };
-    diagnose(&Input::new(facets, &requested).unwrap(), &Options::default())
+    diagnose(&Input::new(facets, &requested).unwrap(), 5)
 }
 
 fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
@@ -207,7 +207,7 @@ fn a_vertex_farther_from_an_edge_than_two_lattice_units_leaves_an_opening() {
             });
             let requested = Requested { spacing_min: None, root, root_scale: None };
             let input = Input::new(facets, &requested).unwrap();
-            let found = diagnose(&input, &Options::default());
+            let found = diagnose(&input, 5);
             assert_eq!(
                 counts(&found).first().map(|found| found.0),
                 Some(kind),
@@ -333,7 +333,7 @@ fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
     for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no-cells")] {
         let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
         let input = Input::new(facets.clone(), &requested).unwrap();
-        let text = diagnose(&input, &Options { first, ..Options::default() }).to_string();
+        let text = diagnose(&input, first).to_string();
         assert_text(&text, &format!("tests/geometry/expected/{name}.txt"));
     }
 }
