@@ -8,13 +8,20 @@ use check::audit::{AuditOptions, audit_against};
 use check::promises::Promises;
 use clap::Args;
 use contract::case::Case;
-use contract::files::named;
+use contract::files::{named, read_text};
 use contract::manifest;
 use run::engine::description::Description;
+use run::engine::failure::End;
 use run::engine::paths::Paths;
+use run::engine::process::{self, Watch};
 use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
 use tempfile::TempDir;
+
+/// Longest time of the proven checker, which takes a second for ten million leaves.
+const LIMIT: Duration = Duration::from_secs(86_400);
 
 /// `harness audit`.
 #[derive(Args, Debug)]
@@ -22,6 +29,7 @@ use tempfile::TempDir;
 Examples:
   harness audit mesh                                   what the leaves alone show
   harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, needless splits
+  harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
   harness audit mesh --case body.toml --promises p4est a mesh that need not keep the whole definition
 
@@ -34,6 +42,9 @@ pub struct Arguments {
     /// with a table of promises
     #[arg(long, value_name = "ENGINE")]
     promises: Option<String>,
+    /// Also prove the mesh right by the checker of reference/proof, given the directory of T0 (mesher --ungraded --out BASE)
+    #[arg(long, value_name = "BASE")]
+    proved: Option<Input>,
     /// Exit code 3 if a check had nothing to check
     #[arg(long)]
     require_checks: bool,
@@ -53,7 +64,7 @@ pub struct Arguments {
 /// # Errors
 /// If the mesh cannot be read, or the engine does not support the case.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { mesh, promises, require_checks, nodes_max, json, source } = arguments;
+    let Arguments { mesh, promises, proved, require_checks, nodes_max, json, source } = arguments;
     let find = |name: &String| Description::find(name, &Paths::find());
     let engine = promises.as_ref().map(find).transpose()?;
     let case = source.read_case()?;
@@ -82,13 +93,40 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let written = AuditRecord::of(&report).write(path);
         written.map_err(|error| named(path, &error))?;
     }
+    let is_proven = proved.as_ref().map_or(Ok(true), |base| prove(directory, base))?;
     let not_run = || report.not_run().next().is_some();
-    Ok(match report.holds() {
+    Ok(match report.holds() && is_proven {
         false => EXIT_FAILED,
         true if !report.checked_anything() || report.exceeds_memory() => EXIT_MISSING,
         true if *require_checks && not_run() => EXIT_MISSING,
         true => EXIT_HOLDS,
     })
+}
+
+/// Whether the proven checker accepts a mesh; prints its answer.
+fn prove(mesh: &Path, base: &Path) -> Result<bool, Failure> {
+    let checker = Paths::find().proven_checker;
+    if !checker.is_file() {
+        let why = "is missing: ci/prove proves and builds it";
+        return Err(Failure::missing(format!("{} {why}", checker.display())));
+    }
+    let place = tempfile::tempdir()?;
+    let mut command = Command::new(checker);
+    command.arg(mesh).arg(base);
+    let answer = match process::run(&mut command, &Watch::new("check", LIMIT, place.path())) {
+        Ok(finished) => read_text(&finished.stdout)?,
+        Err(failure) if matches!(failure.end, End::Exited { code: 1, .. }) => {
+            println!("proof    REJECTED by the checker of reference/proof");
+            return Ok(false);
+        }
+        Err(failure) => return Err(failure.into()),
+    };
+    println!("proof    {}", answer.trim_end());
+    println!(
+        "         proven, given T0: octants, completeness, sides by component, balance, layers (reference/proof/Statement.v); only tested: which \
+         leaves facets cross, and the rays"
+    );
+    Ok(true)
 }
 
 /// The leaf set of a mesh without a manifest, in a temporary directory.

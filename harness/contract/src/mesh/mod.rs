@@ -156,11 +156,11 @@ impl Order {
         if let Some(why) = word::fault(word) {
             return Some(format!("the word {word:#018x} is not a leaf: {why}"));
         }
-        let (begin, octant) = (word::key(word), word::octant(word));
+        let begin = word::key(word);
         if begin < self.0 {
-            return Some(format!("{octant} overlaps or precedes the leaf before it"));
+            return Some(format!("{} overlaps or precedes the leaf before it", word::octant(word)));
         }
-        self.0 = begin + word::span(octant.level);
+        self.0 = begin + word::span(word::level(word));
         None
     }
 }

@@ -16,6 +16,8 @@ pub struct Paths {
     /// The p4est program: `HARNESS_P4EST`, or `engines/p4est-balance` in the target directory of the harness or of the
     /// repository.
     pub p4est: PathBuf,
+    /// The checker of `reference/proof`, in the target directory of the harness or of the repository.
+    pub proven_checker: PathBuf,
     /// The catalogue of cases.
     pub catalogue: Catalogue,
     /// Directory of the engine files.
@@ -39,7 +41,9 @@ impl Paths {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
             oracles: root.join("harness/oracles"),
-            p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| p4est_below(&target, &root)),
+            p4est: from_env("HARNESS_P4EST")
+                .unwrap_or_else(|| built(&target, &root, "engines/p4est-balance")),
+            proven_checker: built(&target, &root, "proof/check"),
             catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
             engines: root.join("harness/engines"),
             root,
@@ -48,11 +52,9 @@ impl Paths {
     }
 }
 
-/// The p4est program in the target directory of the harness or, for a harness that was copied elsewhere, in that of
-/// the repository.
-fn p4est_below(target: &Path, root: &Path) -> PathBuf {
-    let [first, second] =
-        [target.to_owned(), root.join("target")].map(|place| place.join("engines/p4est-balance"));
+/// A program in the target directory of the harness or, for a harness that was copied elsewhere, in that of the repository.
+fn built(target: &Path, root: &Path, name: &str) -> PathBuf {
+    let [first, second] = [target.to_owned(), root.join("target")].map(|place| place.join(name));
     if !first.is_file() && second.is_file() { second } else { first }
 }
 
