@@ -117,21 +117,21 @@ pub fn quantised(case: &Case, job: &mut Job) -> Result<Quantised, Error> {
 /// Phases 9 and 10. Collective.
 fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Error> {
     // 9. Leaves: streamed in Morton order into the digest, and to disk on request; and the tree, level by level.
-    let (counts, written, heaviest) = job.phase("leaves", |comm| leaves::emit(mesh, out, comm))?;
-    job.check(|comm| check::leaves(mesh, &counts, &written, comm));
+    let (counts, digests, heaviest) = job.phase("leaves", |comm| leaves::emit(mesh, out, comm))?;
+    job.check(|comm| check::leaves(mesh, &counts, comm));
     if let Some(out) = out.filter(|out| out.output.tree) {
         job.phase("tree file", |comm| htg::write(mesh, out, out.output.cell_ranks, comm))?;
     }
 
     // 10. Finish: sums over the ranks, and the manifest.
     let (report, parts) =
-        job.phase("finish", |comm| leaves::finish(mesh, &counts, &written, out, comm))?;
-    job.counters.leaves = written.leaves;
+        job.phase("finish", |comm| leaves::finish(mesh, &counts, &digests, out, comm))?;
+    job.counters.leaves = counts.total();
     job.counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };
     job.counters.add_traffic(job.comm.traffic());
-    job.check(|comm| check::totals(&report, &parts, &written, comm));
+    job.check(|comm| check::totals(&report, &parts, counts.total(), comm));
     Ok(report.with_ranks(job))
 }
 

@@ -246,8 +246,8 @@ fn pilot(
         let facets = &quantised.facets[..];
         let &Quantised { bounds, counts, .. } = quantised;
         let mesh = grow(Quantised { rules, bounds, facets, counts }, job, count)?;
-        let (_, written, _) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
-        Ok(pilot::of_mesh(base, &mesh, written.leaves, job, volumes))
+        let (counts, ..) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
+        Ok(pilot::of_mesh(base, &mesh, counts.total(), job, volumes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     match run(rules.clone()) {

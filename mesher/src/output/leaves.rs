@@ -5,7 +5,8 @@ use crate::mesh::Mesh;
 use crate::output::manifest::{self, Manifest, PartWords};
 use crate::output::report::Report;
 use crate::output::stream::Counts;
-use crate::output::write::{OutDir, Part, Written, part_name};
+use crate::output::write::{OutDir, Part, part_name};
+use bricks::digest::Digests;
 use bricks::octant::{LEVEL_MAX, Level};
 use files::interrupt::stop_at;
 use ranks::{Comm, agree};
@@ -17,7 +18,7 @@ pub fn emit(
     mesh: &Mesh,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<(Counts, Written, u64), Error> {
+) -> Result<(Counts, Digests, u64), Error> {
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
     let mut heaviest = Heaviest::new(level);
@@ -25,18 +26,18 @@ pub fn emit(
     let mut work = || {
         let begin = |out: &OutDir| Part::new(out.file(&name)?);
         let mut part = out.filter(|out| out.output.words).map(begin).transpose()?;
-        let mut written = Written::default();
+        let mut digests = Digests::default();
         let counts = mesh.leaves().emit(|words| {
             heaviest.add(words);
-            written.add(words);
+            digests.add(words);
             part.as_mut().map_or(Ok(()), |part| part.add(words))
         })?;
-        part.map_or(Ok(()), |part| part.finish(written.leaves))?;
-        Ok((counts, written))
+        part.map_or(Ok(()), |part| part.finish(counts.total()))?;
+        Ok((counts, digests))
     };
     let failed = |e: io::Error| out.expect("only files can fail").failed(&name)(e);
-    let (counts, written) = agree(comm, work().map_err(failed))?;
-    Ok((counts, written, heaviest.max))
+    let (counts, digests) = agree(comm, work().map_err(failed))?;
+    Ok((counts, digests, heaviest.max))
 }
 
 /// Sums over the ranks, and writes the manifest if a directory is given. Returns the report without times and counters, and the parts
@@ -44,12 +45,12 @@ pub fn emit(
 pub fn finish(
     mesh: &Mesh,
     counts: &Counts,
-    written: &Written,
+    digests: &Digests,
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<(Report, Vec<PartWords>), Error> {
+    let (digests, parts) = manifest::gather(counts.total(), digests, comm);
     let counts = counts.gather(comm);
-    let (digests, parts) = manifest::gather(written, comm);
     let report = Report::new(mesh, &counts, &digests, comm.size());
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {

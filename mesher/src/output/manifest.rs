@@ -4,7 +4,7 @@ use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
 use crate::input::quantise::FacetCounts;
 use crate::mesh::Mesh;
 use crate::output::report::Report;
-use crate::output::write::{Output, TREE, Written, part_name};
+use crate::output::write::{Output, TREE, part_name};
 use crate::sides::leaks::Leak;
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
@@ -88,12 +88,12 @@ impl LeakEntry {
 pub type PartWords = [u64; 3];
 
 /// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
-pub fn gather(mine: &Written, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
+pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
     let split = |d: u128| [(d >> 64) as u64, d as u64];
-    let whole = split(mine.digests.whole());
-    let mut words = vec![mine.leaves, whole[0], whole[1]];
+    let whole = split(mine.whole());
+    let mut words = vec![leaves, whole[0], whole[1]];
     // The leaves of a rank lie in few of the octants.
-    let octants = (0..).zip(&mine.digests.octants).filter(|(_, d)| **d != 0);
+    let octants = (0..).zip(&mine.octants).filter(|(_, d)| **d != 0);
     words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
     let mut digests = Digests::default();
     let mut parts = Vec::new();

@@ -7,7 +7,6 @@
 //! - after an error or an interrupt, none of the mesh's files remains.
 
 use crate::error::Error;
-use bricks::digest::Digests;
 use files::{Claim, ClaimError, Draft};
 use ranks::{Comm, agree};
 use serde::Serialize;
@@ -124,23 +123,6 @@ impl OutDir {
 pub fn write_json(mut to: &mut dyn Write, value: &impl Serialize) -> io::Result<()> {
     serde_json::to_writer_pretty(&mut to, value)?;
     to.write_all(b"\n")
-}
-
-/// The leaves of a rank.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Written {
-    /// Number of leaves.
-    pub leaves: u64,
-    /// Their digests.
-    pub digests: Digests,
-}
-
-impl Written {
-    /// Counts words.
-    pub fn add(&mut self, words: &[u64]) {
-        self.digests.add(words);
-        self.leaves += words.len() as u64;
-    }
 }
 
 /// A rank's leaf words while they are being written.
