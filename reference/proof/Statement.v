@@ -62,7 +62,7 @@ Definition share_face (a b : leaf) : Prop := exists u v w u' v' w',
 Definition at_boundary (a : leaf) : Prop := cx a = 0 \/ cy a = 0 \/ cz a = 0 \/
   cx a + edge a = cells 0 \/ cy a + edge a = cells 0 \/ cz a + edge a = cells 0.
 
-(** * Inputs [1]: D is the level of the surface, a seed is three lattice coordinates (256 in a unit cell) *)
+(** * Inputs [1]: D is the level of the surface, n the cells of a layer, a seed three lattice coordinates (256 in a unit cell) *)
 Inductive choice := Keep_outside | Keep_inside | Keep_all.
 Record inputs := Inputs { surface : Z; layer_cells : Z; keep : choice; keep_crossing : bool; seeds : list (Z * Z * Z);
                           delete_enclosed : bool }.

@@ -147,7 +147,7 @@ def leaf_set(c, leaves, tree):
         key = sum(((x, y, z)[a] >> bit & 1) << 3 * (bit + 19 - DEEPEST) + a for bit in range(DEEPEST) for a in range(3))
         words.append(word(key, l, side))
     s.parts = [sorted(words)]
-    s.manifest = dict(c, schema="octree-leaf-set/1", tree=tree, root={}, boxes=[], seeds=[[q << 27 - DEEPEST for q in p] for p in c["seeds"]])
+    s.manifest = dict(c, schema="octree-leaf-set/1", tree=tree, root={}, boxes=[], geometry={}, seeds=[[q << 27 - DEEPEST for q in p] for p in c["seeds"]])
     s.count()
     return s
 

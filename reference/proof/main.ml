@@ -87,6 +87,7 @@ let open_set directory tree =
   if get file "tree" m <> Text tree then unusable "%s: the tree is not %S" file tree;
   if field file "sides" m = Some (Text "unknown") then unusable "%s: its leaves have no sides" file;
   let parts = list file (get file "parts" m) in
+  if parts = [] && get file "leaves" m <> Number "0" then unusable "%s: its leaves are in no part: write leaf words" file;
   let words = List.map (fun p -> match get file "file" p with
     | Text name -> map (Filename.concat directory name) | _ -> unusable "%s: a part has no name" file) parts in
   let sides = get file "leaves_by_side" m in
@@ -109,8 +110,8 @@ let inputs (file, m) =
 
 (* Both directories are of one case. *)
 let same_case (f, m) (g, b) =
-  List.iter (fun key -> if field f key m <> field g key b then unusable "%s and %s differ in %s" f g key)
-    ["root"; "level_surface"; "layer_cells_min"; "keep"; "keep_crossing"; "boxes"; "seeds"; "enclosed"; "geometry"]
+  List.iter (fun key -> if get f key m <> get g key b then unusable "%s and %s differ in %s" f g key) ["root"; "boxes"; "geometry"];
+  if inputs (f, m) <> inputs (g, b) then unusable "%s and %s differ in the surface level, layers, keep, seeds or enclosed" f g
 
 (* The crossing leaves of T0, which are those that were deleted after gradation unless gradation has split some (Offer). *)
 let crossing (base : words list) : words list =

@@ -1,6 +1,7 @@
 //! `harness import` and `harness audit` on meshes of other programs, as commands.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -128,4 +129,36 @@ fn options_that_contradict_a_manifest_are_refused() {
     assert_eq!(result(&["audit", mesh.to_str().unwrap()]).0, 0);
     let (code, _, error) = result(&["audit", mesh.to_str().unwrap(), "--root", "0,0,0,1"]);
     assert!(code == 2 && error.contains("has a manifest"), "{error}");
+}
+
+/// What the proven checker says is a check like any other: printed, recorded and part of the exit code.
+#[test]
+fn a_proof_is_part_of_an_audit() {
+    let place = tempfile::tempdir().unwrap();
+    let path = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
+    let [mesh, checker, json] = ["mesh", "checker", "audit.json"].map(path);
+    assert_eq!(result(&["import", &sample("unitcube.p8est"), "--out", &mesh]).0, 0);
+    let audit = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(["audit", &mesh, "--proved", &mesh, "--json", &json]);
+        let output = command.env("HARNESS_PROVEN", &checker).output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout) + &text(output.stderr))
+    };
+    let (code, printed) = audit();
+    assert!(code == 3 && printed.contains("ci/prove"), "{printed}");
+    for (ends, expected, says) in [
+        ("exit 0", 0, "proven, given T0"),
+        ("exit 1", 1, "rejects the mesh"),
+        ("echo 'no base' >&2; exit 2", 2, "no base"),
+        ("kill -9 $$", 2, "signal 9"),
+    ] {
+        fs::write(&checker, format!("#!/bin/sh\n{ends}\n")).unwrap();
+        fs::set_permissions(&checker, fs::Permissions::from_mode(0o755)).unwrap();
+        let (code, printed) = audit();
+        assert!(code == expected && printed.contains(says), "{ends}: {code} {printed}");
+        let record: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+        assert_eq!(record["holds"], code != 1, "{ends}");
+    }
 }

@@ -1,6 +1,7 @@
 //! The end of a program on a signal: at once, in whatever it does, and without unfinished files.
 
 use crate::unfinished::{abandon_all, complete};
+use crate::uses::forget;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
@@ -85,8 +86,9 @@ pub fn decided() {
     complete(true);
 }
 
-/// Notes that another run begins, whose outcome is open: for a program that stays for several runs.
+/// Notes that another run begins, whose outcome is open and whose files are others: for a program that stays for several runs.
 pub fn begin() {
+    forget();
     complete(false);
 }
 

@@ -92,6 +92,11 @@ pub fn register_output(path: &Path) -> io::Result<()> {
     fs::metadata(path).map_or(Ok(()), |found| register(path, &found, Use::Output))
 }
 
+/// Forgets all files: another run begins.
+pub fn forget() {
+    USES.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clear();
+}
+
 fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
     // A device is not replaced.
     if !file.is_file() {

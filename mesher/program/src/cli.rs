@@ -152,6 +152,17 @@ pub enum CommChoice {
     },
 }
 
+impl CommChoice {
+    /// Whether it is the communication of a job with so many ranks.
+    pub fn is_of(self, ranks: usize) -> bool {
+        match self {
+            Self::Auto | Self::Mpi => true,
+            Self::Solo => ranks == 1,
+            Self::Sim { .. } => false,
+        }
+    }
+}
+
 fn level_base(s: &str) -> Result<LevelBase, String> {
     if s == "auto" {
         return Ok(LevelBase(None));

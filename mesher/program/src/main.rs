@@ -1,4 +1,4 @@
-//! The program: chooses the communication between ranks, meshes, reports. Only this file prints.
+//! The program: chooses the communication between ranks, meshes, reports.
 
 #![deny(missing_docs)]
 
@@ -208,19 +208,18 @@ fn obey(asked: &Result<Asked, Error>, comm: &dyn Comm) -> i32 {
 fn serve(comm: &dyn Comm) -> i32 {
     let mut lines = stdin().lines();
     loop {
-        let line = match comm.rank() {
-            0 => lines.next().and_then(Result::ok).unwrap_or_default(),
-            _ => String::new(),
+        interrupt::begin();
+        // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end.
+        let line = match (comm.rank() == 0).then(|| lines.next()).flatten() {
+            Some(line) => line.unwrap_or_default() + "\n",
+            None => String::new(),
         };
         comm.next_run();
         let line = uncounted(comm, || text_of_first(comm, &line));
-        if line.is_empty() {
-            return 0;
-        }
-        interrupt::begin();
+        let Some(line) = line.strip_suffix('\n') else { return 0 };
         // The peak of this run alone; where that is impossible, it includes those before it.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
-        let code = match served(&line) {
+        let code = match served(line, comm) {
             Ok(args) => run(&args, comm),
             Err(e) => fail(&e, comm.rank() == 0),
         };
@@ -232,15 +231,21 @@ fn serve(comm: &dyn Comm) -> i32 {
 }
 
 /// The run that a line of a service asks for.
-fn served(line: &str) -> Result<Args, Error> {
+fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
     let words: Vec<String> = serde_json::from_str(line)
         .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
+    // These would end the service.
+    let prints = |w: &String| ["-h", "--help", "-V", "--version", "--man"].contains(&w.as_str());
+    let of_job = "a run of a service has no --help, --version, --man, --completions, --serve, --stall-limit, and no --comm but that of the job";
+    if words.iter().any(|w| prints(w) || w.starts_with("--completions")) {
+        return Err(Error::input(of_job));
+    }
     match parse(std::iter::once("mesher".to_owned()).chain(words))? {
-        Asked::Run(mut args) if args.stall_limit.is_none() => {
+        Asked::Run(mut args) if args.stall_limit.is_none() && args.comm.is_of(comm.size()) => {
             args.quiet = true;
             Ok(*args)
         }
-        _ => Err(Error::input("--serve and --stall-limit belong to a job, not to one of its runs")),
+        _ => Err(Error::input(of_job)),
     }
 }
 

@@ -16,7 +16,7 @@ pub struct Paths {
     /// The p4est program: `HARNESS_P4EST`, or `engines/p4est-balance` in the target directory of the harness or of the
     /// repository.
     pub p4est: PathBuf,
-    /// The checker of `reference/proof`, in the target directory of the harness or of the repository.
+    /// The checker of `reference/proof`: `HARNESS_PROVEN`, or in the target directory of the harness or of the repository.
     pub proven_checker: PathBuf,
     /// The catalogue of cases.
     pub catalogue: Catalogue,
@@ -43,7 +43,8 @@ impl Paths {
             oracles: root.join("harness/oracles"),
             p4est: from_env("HARNESS_P4EST")
                 .unwrap_or_else(|| built(&target, &root, "engines/p4est-balance")),
-            proven_checker: built(&target, &root, "proof/check"),
+            proven_checker: from_env("HARNESS_PROVEN")
+                .unwrap_or_else(|| built(&target, &root, "proof/check")),
             catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
             engines: root.join("harness/engines"),
             root,

@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 const ANSWER_MAX: usize = 100;
 /// Time for a program to end after its last request.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest time from an answer to its error.
+const LATE: Duration = Duration::from_millis(500);
 /// Longest time between two looks at the clock and at signals.
 const PAUSE: Timespec = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
 
@@ -51,9 +53,17 @@ impl Services {
     /// Starts the service, unless it runs.
     ///
     /// # Errors
-    /// [`End::Missing`] if it cannot be started.
+    /// [`End::Missing`] if it cannot be started; another end if it has failed since the last answer.
     pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), Failure> {
         let mut services = self.0.borrow_mut();
+        if let Some(service) = services.get(name)
+            && let Ok(Some((status, _))) = try_reap(&service.child)
+        {
+            let end = process::judge(status, || service.error());
+            services.remove(name);
+            // A program that has ended well between two requests is started again.
+            end.map_or(Ok(()), |end| Err(Failure::new(name, end)))?;
+        }
         if !services.contains_key(name) {
             let (mut command, shared) = start();
             let service = Service::start(&mut command, shared).map_err(|error| {
@@ -81,6 +91,11 @@ impl Services {
         let service = services.get_mut(name).expect("the service was started");
         let answer = service.wait(watch);
         let time_s = service.sent.elapsed().as_secs_f64();
+        // A launcher may pass on the error after the answer.
+        let late = Instant::now() + LATE;
+        while answer != Ok(0) && !service.error().ends_with('\n') && Instant::now() < late {
+            sleep(Duration::from_millis(5));
+        }
         let error = service.error();
         service.errors_before = service.errors.length();
         if answer == Ok(0) {

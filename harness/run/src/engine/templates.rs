@@ -127,6 +127,11 @@ impl Templates {
                     "`{key}` has the unknown placeholder {{{name}}}; known there are {known}"
                 ));
             }
+            let is_named =
+                || template.is_some_and(|words| words.iter().any(|word| word == "{program}"));
+            if key == "parallel" && self.serve.is_some() && !is_named() {
+                return Err("`serve` needs the word {program} in `parallel`".to_owned());
+            }
             let starts = ["serial", "parallel", "simulated"].contains(&key);
             let writes = |words: &Vec<String>| words.iter().any(|word| word.contains("{out}"));
             if starts && self.out.is_none() && template.is_some_and(|words| !writes(words)) {

@@ -81,8 +81,14 @@ fn a_run_of_a_service_is_a_run_of_its_own() {
         r#"["case.toml", "--json", "metis.json", "--partitioner", "metis", "--out", "first"]"#,
         r#"["case.toml", "--stall-limit", "9"]"#,
         "case.toml",
-        r#"["case.toml", "--json", "last.json", "--out", "last"]"#,
+        "",
+        r#"["--version"]"#,
+        r#"["case.toml", "--comm", "sim:4"]"#,
+        // What an earlier run has read.
+        r#"["torus.toml", "--json", "case.toml"]"#,
+        r#"["torus.toml", "--json", "last.json", "--out", "last"]"#,
     ];
+    workspace.write("torus.toml", CASE);
     workspace.write("lines", lines.join("\n"));
     for ranks in [1, 3] {
         let mpirun = workspace.mpirun(ranks, &["--serve"]);
@@ -93,13 +99,16 @@ fn a_run_of_a_service_is_a_run_of_its_own() {
         let served = run(workspace.as_mpi(command));
         assert_eq!(
             (served.code, served.stdout.as_str()),
-            (Some(0), "0\n2\n2\n2\n2\n0\n"),
+            (Some(0), "0\n2\n2\n2\n2\n2\n2\n2\n0\n0\n"),
             "{served:?}"
         );
-        for word in ["absent.toml", "first", "--stall-limit", "`case.toml` is no JSON"] {
+        for (word, count) in
+            [("absent.toml", 1), ("first", 1), ("--stall-limit", 3), ("is no JSON", 2)]
+        {
             let ours = |line: &&str| line.starts_with("mesher: ") && line.contains(word);
-            assert_eq!(served.stderr.lines().filter(ours).count(), 1, "{word}: {served:?}");
+            assert_eq!(served.stderr.lines().filter(ours).count(), count, "{word}: {served:?}");
         }
+        workspace.write("case.toml", CASE);
         let args = ["case.toml", "--quiet", "--json", "own.json", "--out", "own"];
         run(workspace.mpirun(ranks, &args)).succeeds();
         let own = workspace.json("own.json");
