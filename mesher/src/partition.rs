@@ -63,7 +63,7 @@ impl Division {
     pub fn is_of_curve(&self) -> bool {
         self.level_base.is_none()
             && self.partitioner == Partitioner::Morton
-            && self.weights != Weights::Unit
+            && matches!(self.weights, Weights::Area | Weights::Rebalance)
     }
 
     /// Whether octants are repartitioned after refinement and after gradation.
