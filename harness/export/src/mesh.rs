@@ -97,6 +97,35 @@ impl Mesh {
         Ok(self.leaves_by_rank.get_or_init(|| leaves))
     }
 
+    /// Number of selected leaves, which is not 0.
+    ///
+    /// # Errors
+    /// If no leaf is selected, if the mesh cannot be read, and those of `check`.
+    pub(crate) fn count(
+        &self,
+        selection: &Selection,
+        check: Check<'_>,
+    ) -> Result<u64, ExportError> {
+        let mut leaves = 0;
+        match *selection == Selection::default() {
+            true => leaves = self.len(),
+            false => self.visit(selection, check, &mut |_| {
+                leaves += 1;
+                Ok(())
+            })?,
+        }
+        if leaves == 0 { Err(self.nothing_selected()) } else { Ok(leaves) }
+    }
+
+    /// The error of an export without leaves.
+    pub(crate) fn nothing_selected(&self) -> ExportError {
+        let why = match self.is_empty() {
+            true => "the mesh has no leaves",
+            false => "no leaf satisfies all conditions of the selection: remove one of them",
+        };
+        ExportError::Request(why.to_owned())
+    }
+
     /// Visits the selected leaves in Morton order. All leaves are read once, and `check` is called from time to time.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use crate::error::ExportError;
 use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::selection::{Selection, nothing_selected};
+use crate::selection::Selection;
 use crate::written::Written;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
@@ -49,7 +49,7 @@ pub fn write(
 ) -> Result<Summary, ExportError> {
     let (leaves, ends) = counted(mesh, selection, options)?;
     if leaves == 0 {
-        return Err(nothing_selected(mesh));
+        return Err(mesh.nothing_selected());
     }
     let total = ends[ends.len() - 1];
     let named = |error| ExportError::write(path, error);

@@ -4,9 +4,7 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word::Side;
 
-use crate::error::ExportError;
 use crate::leaf::Leaf;
-use crate::mesh::{Check, Mesh};
 
 /// The leaves that satisfy every condition; without conditions, all leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,22 +53,6 @@ impl Slice {
 }
 
 impl Selection {
-    /// Number of selected leaves of a mesh, which is not 0.
-    ///
-    /// # Errors
-    /// If no leaf is selected, if the mesh cannot be read, and those of `check`.
-    pub(crate) fn count(&self, mesh: &Mesh, check: Check<'_>) -> Result<u64, ExportError> {
-        let mut leaves = 0;
-        match *self == Self::default() {
-            true => leaves = mesh.len(),
-            false => mesh.visit(self, check, &mut |_| {
-                leaves += 1;
-                Ok(())
-            })?,
-        }
-        if leaves == 0 { Err(nothing_selected(mesh)) } else { Ok(leaves) }
-    }
-
     /// Whether the leaf is selected.
     pub fn has(&self, leaf: &Leaf) -> bool {
         self.meets(&leaf.octant)
@@ -87,15 +69,6 @@ impl Selection {
                 .clip
                 .is_none_or(|[from, to]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]))
     }
-}
-
-/// The error of an export without leaves.
-pub(crate) fn nothing_selected(mesh: &Mesh) -> ExportError {
-    let why = match mesh.is_empty() {
-        true => "the mesh has no leaves",
-        false => "no leaf satisfies all conditions of the selection: remove one of them",
-    };
-    ExportError::Request(why.to_owned())
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
 //! The manifest of a mesh, `mesh.json`: its inputs, counts, digests and files.
 
 use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
-use crate::input::quantise::FacetCounts;
 use crate::mesh::Mesh;
-use crate::output::report::Report;
+use crate::output::report::leaks::LeakEntry;
+use crate::output::report::{Geometry, Report};
 use crate::output::write::{Output, TREE, part_name};
-use crate::sides::leaks::Leak;
 use bricks::digest::{Digests, hex};
-use bricks::octant::{LEVEL_MAX, Level};
 use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -38,50 +36,6 @@ pub struct Manifest<'a> {
     parts: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     hyper_tree_grid: Option<&'static str>,
-}
-
-/// The facets as read, in manifest and report.
-#[derive(Clone, Debug, Serialize)]
-pub struct Geometry {
-    /// Their number.
-    pub facets: u64,
-    /// Their digest on the lattice.
-    pub digest: String,
-}
-
-impl Geometry {
-    /// The facets of all ranks.
-    pub fn of(facets: &FacetCounts) -> Self {
-        Self { facets: facets.total, digest: hex(facets.digest) }
-    }
-}
-
-/// A leak, in manifest and report, in the unit of the geometry.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LeakEntry {
-    /// The spacing at which the region is closed.
-    pub spacing_coarse: f64,
-    /// The spacing of the mesh.
-    pub spacing_fine: f64,
-    /// The region's volume at the coarser spacing.
-    pub volume: f64,
-    /// A point in it.
-    pub point: [f64; 3],
-}
-
-impl LeakEntry {
-    /// The leaks of a mesh.
-    pub fn of(mesh: &Mesh) -> Vec<Self> {
-        let Root { edge, .. } = mesh.rules.root;
-        let edge_of = |l: Level| edge / f64::from(1u32 << l);
-        let entry = |leak: &Leak| Self {
-            spacing_coarse: edge_of(leak.level),
-            spacing_fine: edge_of(mesh.rules.level_surface),
-            volume: leak.volume as f64 * edge_of(LEVEL_MAX).powi(3),
-            point: mesh.rules.root.locate(leak.first.centroid()),
-        };
-        mesh.leaks.0.iter().map(entry).collect()
-    }
 }
 
 /// A part: its number of leaves, and the upper and the lower half of its digest.

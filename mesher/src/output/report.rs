@@ -6,23 +6,41 @@
 //! - every quantity by rank has an entry for each rank; times are finite and not negative;
 //! - the wall time is that of the slowest rank.
 
+pub mod leaks;
 mod text;
 pub(crate) mod warnings;
 
 pub use text::grouped;
 
+use crate::input::quantise::FacetCounts;
 use crate::job::Job;
 use crate::mesh::Mesh;
-use crate::output::manifest::{Geometry, LeakEntry};
 use crate::output::stream::Counts;
 use crate::partition::Partitioner;
 use crate::record::peak_rss_bytes;
 use crate::sides::Summary;
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
+use leaks::LeakEntry;
 use ranks::{Comm, matrix};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// The facets as read, in manifest and report.
+#[derive(Clone, Debug, Serialize)]
+pub struct Geometry {
+    /// Their number.
+    pub facets: u64,
+    /// Their digest on the lattice.
+    pub digest: String,
+}
+
+impl Geometry {
+    /// The facets of all ranks.
+    pub fn of(facets: &FacetCounts) -> Self {
+        Self { facets: facets.total, digest: hex(facets.digest) }
+    }
+}
 
 /// One phase over all ranks.
 #[derive(Clone, Debug, Serialize)]

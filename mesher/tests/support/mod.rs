@@ -6,7 +6,7 @@ use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
-use mesher::output::manifest::LeakEntry;
+use mesher::output::report::leaks::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};

@@ -6,7 +6,7 @@ use super::fibres::Fibres;
 use super::{Outcome, Run, Small, options, small};
 use mesher::error::Error;
 use mesher::input::case::Case;
-use mesher::output::manifest::LeakEntry;
+use mesher::output::report::leaks::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
 use mesher::{Options, mesh, words};

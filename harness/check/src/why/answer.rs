@@ -10,8 +10,8 @@
 //! in a deleted part.
 
 use super::Mesh;
+pub use super::gradation::Rule;
 use super::gradation::parent;
-use super::text::facets_that_cross;
 use crate::checks::components::{Component, Decision};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
@@ -82,18 +82,6 @@ pub struct Split {
     pub links: Vec<Link>,
     /// The cause in the inputs; none if no rule requires the split.
     pub cause: Option<Cause>,
-}
-
-/// The rule by which a leaf forces an octant to split (section 6 of reference/DEFINITION.md).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Rule {
-    /// The leaf is a deleted crossing leaf of T0, and the octant touches it.
-    ExtraLayer,
-    /// The layer of the leaf reaches the octant.
-    Layer,
-    /// The octant touches the leaf, which is at least two levels finer.
-    Balance,
 }
 
 /// A leaf that forces the previous octant of a chain to split.
@@ -358,5 +346,15 @@ impl Mesh<'_> {
         };
         let of_base = self.is_base.then_some("gradation: the mesh is a base tree");
         of_case.into_iter().chain(of_base).map(str::to_owned).collect()
+    }
+}
+
+/// The first of all facets as subject and verb.
+pub(super) fn facets_that_cross(facets: &[u32], count: u64) -> String {
+    let numbers: Vec<String> = facets.iter().map(ToString::to_string).collect();
+    match (count, count - facets.len() as u64) {
+        (1, _) => format!("facet {} crosses", numbers[0]),
+        (_, 0) => format!("facets {} cross", numbers.join(", ")),
+        (_, more) => format!("facets {} and {more} more cross", numbers.join(", ")),
     }
 }

@@ -20,10 +20,22 @@
 use std::ops::RangeInclusive;
 
 use super::Mesh;
-use super::answer::Rule;
 use contract::octant::{CELLS_PER_EDGE, Octant};
 use contract::tree::{Handle, OFFSETS};
 use contract::word;
+use serde::Serialize;
+
+/// The rule by which a leaf forces an octant to split (section 6 of reference/DEFINITION.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// The leaf is a deleted crossing leaf of T0, and the octant touches it.
+    ExtraLayer,
+    /// The layer of the leaf reaches the octant.
+    Layer,
+    /// The octant touches the leaf, which is at least two levels finer.
+    Balance,
+}
 
 /// Edge of a cell of a level, in level-19 cells.
 fn edge(level: u8) -> i64 {

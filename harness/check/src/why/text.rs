@@ -5,7 +5,8 @@ mod tests;
 
 use std::fmt;
 
-use super::answer::{Answer, Cause, Link, Place, Rule, Split};
+use super::answer::{Answer, Cause, Link, Place, Split, facets_that_cross};
+use super::gradation::Rule;
 use contract::number::number;
 
 const TERMS: &str = "\nterms
@@ -129,14 +130,4 @@ fn what(cause: &Cause) -> String {
     let surface = cause.is_crossed.then_some(surface).into_iter();
     let boxes = cause.boxes.iter().map(|index| format!("box {index} meets it"));
     surface.chain(boxes).collect::<Vec<_>>().join("; ")
-}
-
-/// The first of all facets as subject and verb.
-pub(super) fn facets_that_cross(facets: &[u32], count: u64) -> String {
-    let numbers: Vec<String> = facets.iter().map(ToString::to_string).collect();
-    match (count, count - facets.len() as u64) {
-        (1, _) => format!("facet {} crosses", numbers[0]),
-        (_, 0) => format!("facets {} cross", numbers.join(", ")),
-        (_, more) => format!("facets {} and {more} more cross", numbers.join(", ")),
-    }
 }

@@ -36,7 +36,7 @@ use crate::error::ExportError;
 use crate::mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
-use crate::selection::{Selection, nothing_selected};
+use crate::selection::Selection;
 use directory::{Directory, directories};
 use faces::Faces;
 use leaves::{CELLS_MAX, CUT, Leaves};
@@ -166,7 +166,7 @@ fn read<'a>(
         Ok(())
     })?;
     if cells == 0 {
-        return Err(nothing_selected(mesh));
+        return Err(mesh.nothing_selected());
     }
     let patches = Patches::new(options.foam.case, *selection != Selection::default());
     let (leaves, patches) = (Leaves::new(words), patches.map_err(ExportError::Request)?);

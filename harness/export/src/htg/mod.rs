@@ -19,7 +19,7 @@ use vtkhdf::tree::{Shape, TreeWriter};
 use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
-use crate::selection::{Selection, nothing_selected};
+use crate::selection::Selection;
 use crate::written::Written;
 use siblings::{Family, Open};
 use windows::Windows;
@@ -46,7 +46,7 @@ pub fn write(
     })?;
     let leaves = counted.cells;
     if leaves == 0 {
-        return Err(nothing_selected(mesh));
+        return Err(mesh.nothing_selected());
     }
     let root = mesh.manifest.root;
     let shape = Shape { origin: root.origin, edge: root.edge, nodes };

@@ -45,7 +45,7 @@ pub fn write_file(
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, ExportError> {
-    let leaves = selection.count(mesh, &|| options.check())?;
+    let leaves = mesh.count(selection, &|| options.check())?;
     let named = |error| ExportError::write(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
         let file = file.try_clone().map_err(named)?;

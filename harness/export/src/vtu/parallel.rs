@@ -39,7 +39,7 @@ pub fn write_files(
     let folder = format!("{stem}_pieces");
     let directory = path.with_file_name(&folder);
     refuse_other_files(&directory)?;
-    let leaves = selection.count(mesh, &|| options.check())?;
+    let leaves = mesh.count(selection, &|| options.check())?;
     let mut left = leaves.div_ceil(PIECE) as usize;
     let named = |error| ExportError::write(&directory, error);
     let place = Staging::beside(&directory).map_err(named)?;

@@ -3,7 +3,7 @@
 //!
 //! A request is a line on the program's standard input, a JSON array of words. The answer is a line on its standard output: the exit
 //! code that these words would have given a process of their own. Errors are on the standard error. A program that ends or hangs
-//! instead costs that request, and the next one starts it anew.
+//! instead costs that request, and the next one starts it again.
 
 use super::failure::{End, Failure};
 use super::interrupt;

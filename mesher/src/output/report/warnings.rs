@@ -2,7 +2,7 @@
 
 use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
-use crate::output::manifest::LeakEntry;
+use crate::output::report::leaks::LeakEntry;
 use crate::sides::Summary;
 
 /// A sentence for each warning: what was found, and what to try.
