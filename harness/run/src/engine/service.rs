@@ -93,7 +93,8 @@ impl Services {
         let time_s = service.sent.elapsed().as_secs_f64();
         // A launcher may pass on the error after the answer.
         let late = Instant::now() + LATE;
-        while answer != Ok(0) && !service.error().ends_with('\n') && Instant::now() < late {
+        let is_late = || answer.as_ref().is_ok_and(|&code| code != 0) && Instant::now() < late;
+        while is_late() && !service.error().ends_with('\n') {
             sleep(Duration::from_millis(5));
         }
         let error = service.error();
