@@ -123,8 +123,7 @@ fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
     let fixture = Fixture::new();
     fixture.program("copier", COPYING);
     fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
-    // Two million cells take seconds to write.
-    leaf_set(vec![words_of(|o| o.level < 7)]).create(&fixture.path().join("mesh")).unwrap();
+    leaf_set(vec![words_of(|o| o.level < 5)]).create(&fixture.path().join("mesh")).unwrap();
     let out = fixture.path().join("out");
     fs::create_dir(&out).unwrap();
     let outputs: [&[&str]; 4] = [

@@ -123,7 +123,7 @@ fn quaternion() -> impl Strategy<Value = [f64; 4]> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// Invariants are checked by the answer itself.
     #[test]
