@@ -181,7 +181,8 @@ mod tests {
         let tree = |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level));
         let mut leaks = Leaks::new(&case, tree, 1_000_000, &Silent).unwrap();
         let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
-        let words = leaks.words(report.passage.as_ref().unwrap()).to_vec();
+        let level = report.passage.as_ref().unwrap().spacing.level;
+        let words = leaks.trees[&level].clone();
         drop(leaks);
         (case, report, words)
     }

@@ -24,7 +24,7 @@ use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::octant::LEVEL_MAX;
 use ends::Target;
-use report::{Answers, Destination, Meshed, Passage, Report, SCHEMA, Spacing};
+use report::{Answers, Destination, Meshed, Report, SCHEMA, Spacing};
 use space::{Goal, Space};
 
 /// The search was interrupted.
@@ -87,11 +87,6 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         }
         let facets = FacetTree::new(&case.facets_lattice);
         Ok(Self { case, facets, make, trees: BTreeMap::new(), leaves_max, watch })
-    }
-
-    /// The sorted words of the base tree that a path leads through.
-    pub fn words(&self, passage: &Passage) -> &[u64] {
-        &self.trees[&passage.spacing.level]
     }
 
     /// Answers for pairs of places, with their invariants checked.
@@ -158,7 +153,7 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
             let tree = (level, &self.trees[&level][..]);
             report.passage = Some(passage::widest((self.case, &self.facets), tree, ends, &stop)?);
         }
-        let words = report.passage.as_ref().map_or(&[][..], |passage| self.words(passage));
+        let words = measured.map_or(&[][..], |level| &self.trees[&level]);
         report.check_invariants(self.case, words);
         Ok(report)
     }

@@ -14,7 +14,6 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use crate::section::{Planar, Window};
 use colour::{Colour, Entry, short};
 use contract::case::Facet;
 use contract::lattice::{Root, UNITS_PER_EDGE};
@@ -23,11 +22,14 @@ use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
 use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
-use geometry::tree::Point;
+use geometry::tree::{Aabb, Point};
 use squares::{Detail, Squares, plane_axes};
 
 pub use csv::csv;
 pub use draw::svg;
+
+/// A point in a plane.
+pub type Planar = [f64; 2];
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -276,15 +278,24 @@ fn plane_name(root: &Root, slice: Slice) -> String {
 /// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that
 /// facets in the plane of a leaf's face do not vanish or appear twice.
 fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) -> Vec<[Planar; 2]> {
-    let axes = plane_axes(slice.axis);
+    let (axis, axes) = (slice.axis, plane_axes(slice.axis));
     let layer = i64::from(slice.layer()) * UNITS_PER_CELL;
     let at = if slice.at == layer { layer + UNITS_PER_CELL / 2 } else { slice.at };
-    let mut centre = root.to_user([at; 3]);
-    axes.iter().zip(0..2).for_each(|(&a, i)| centre[a] = (window[0][i] + window[1][i]) / 2.0);
-    let unit = |a: usize| std::array::from_fn(|b| f64::from(u8::from(a == b)));
-    let half = [0, 1].map(|i| (window[1][i] - window[0][i]) / 2.0);
-    let plane = Window { centre, axes: axes.map(unit), half };
-    let to_user = |p: Planar| [0, 1].map(|i| p[i] + centre[axes[i]]);
-    let cut = |facet: &Facet| plane.of_facet(facet.map(|v| v.map(f64::from)));
-    facets.iter().filter_map(cut).map(|ends| ends.map(to_user)).collect()
+    let plane = root.to_user([at; 3])[axis];
+    let corner = |end: usize, beyond: f64| {
+        let mut corner = [plane + beyond; 3];
+        axes.iter().zip(window[end]).for_each(|(&a, coordinate)| corner[a] = coordinate);
+        Point::from_array(corner)
+    };
+    let bounds = Aabb::new(corner(0, -root.edge), corner(1, root.edge));
+    let cut = |facet: &Facet| {
+        let [a, b, c] = facet.map(|v| Point::from_array(v.map(f64::from)));
+        let mut ends = [(a, b), (b, c), (c, a)].into_iter().filter_map(|(p, q)| {
+            let is_cut = (p[axis] < plane) != (q[axis] < plane);
+            is_cut.then(|| p + (q - p) * ((plane - p[axis]) / (q[axis] - p[axis])))
+        });
+        let shown = bounds.clip_segment(ends.next()?, ends.next()?)?;
+        Some([shown.a, shown.b].map(|end| axes.map(|a| end[a])))
+    };
+    facets.iter().filter_map(cut).collect()
 }
