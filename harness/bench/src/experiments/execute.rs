@@ -3,10 +3,10 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use super::variant::Base;
-use crate::failure::Failure;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
+use contract::failure::Failure;
 use run::engine::failure::{End, Failure as Ended};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};

@@ -12,8 +12,8 @@ use crate::experiments::entry::{
 use crate::experiments::execute::Runner;
 use crate::experiments::record::Record;
 use crate::experiments::{feasible, machine, network};
-use crate::failure::Failure;
 use check::promises::Independence;
+use contract::failure::Failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use std::collections::{BTreeMap, BTreeSet, HashMap};

@@ -1,25 +1,25 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use super::programs::ProgramArguments;
-use super::progress::Progress;
 use super::values::{Output, Point, cell_count, with_extension};
-use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::files::{Content, named, write_together};
 use contract::leafset::LeafSet;
 use contract::manifest::Keep;
+use contract::watch::Watch;
+use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
-use geometry::leak::{LeakError, Leaks, Watch};
 use report::json::pretty;
 use report::leak::vtp;
 use run::base_tree::BaseTrees;
-use run::engine::failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
+use run::progress::Progress;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::Duration;
@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}");
+    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}", None);
     let (mut first, ends) = match arguments.from {
         Some(Point(from)) => (None, vec![(from, arguments.to)]),
         None => {
@@ -96,10 +96,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let make = |level| match first.take() {
         Some(words) => Ok(words),
-        None => trees.at(level).map(|tree| tree.words),
+        None => Ok(trees.at(level)?.words),
     };
-    let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress).map_err(failed)?;
-    let answers = leaks.answers(&ends).map_err(failed)?;
+    let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress)?;
+    let answers = leaks.answers(&ends)?;
     progress.finish();
     write(arguments, &answers)?;
     if ends.is_empty() {
@@ -133,14 +133,6 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<([f64; 3], Target)>, String
     }
     let to = seed.filter(|_| is_flow_inside).map_or(Target::Far, |&seed| Target::Point(seed));
     Ok(leaks.iter().map(|leak| (leak.point, to)).collect())
-}
-
-fn failed(error: LeakError<failure::Failure>) -> Failure {
-    match error {
-        LeakError::Interrupted => Failure::interrupted(),
-        LeakError::Source(failure) => failure.into(),
-        LeakError::Input(why) => why.into(),
-    }
 }
 
 /// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.

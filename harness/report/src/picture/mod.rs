@@ -16,10 +16,10 @@ mod tests;
 
 use colour::{Colour, Entry, short};
 use contract::case::Facet;
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
-use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
 use geometry::tree::{Aabb, Point};
@@ -50,10 +50,10 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Returns an error if the mesh does not have what colours show.
-    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+    fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
         if self.colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
             let why = "the sides of this mesh are unknown: choose another colour";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         match self.colour == Colour::Rank && !mesh.has_ranks() {
             true => Err(mesh.ranks_unknown()),
@@ -70,7 +70,7 @@ impl Request<'_> {
         mut window: [[i64; 3]; 2],
         scale: f64,
         detail: &Detail,
-    ) -> Result<Squares, ExportError> {
+    ) -> Result<Squares, Failure> {
         (window[0][slice.axis], window[1][slice.axis]) = (0, UNITS_PER_EDGE);
         let (slice, clip) = (Some(slice), Some(window));
         let selection = Selection { slice, clip, ..self.selection.clone() };
@@ -177,7 +177,7 @@ impl Picture {
     ///
     /// # Errors
     /// If the mesh cannot be read, or the picture would be empty.
-    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, ExportError> {
+    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, Failure> {
         let root = mesh.manifest.root;
         request.check(mesh)?;
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
@@ -186,13 +186,13 @@ impl Picture {
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
         if (0..2).any(|i| window[0][i] >= window[1][i]) {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
         if squares.squares.is_empty() {
             let why =
                 "no leaf of the selection is in the slice: give another --slice or a larger --clip";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         let values = squares.squares.iter().map(|s| s.value).collect();
         let key = request.colour.key(&values, &root);
