@@ -5,7 +5,6 @@
 //! - [`shrink`](mod@shrink): the smallest case that still fails;
 
 pub mod experiments;
-pub mod failure;
 pub mod gate;
 pub mod jsonl;
 pub mod order;

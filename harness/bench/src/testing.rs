@@ -47,7 +47,6 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
         useful_s: Spread::of(&total),
         phases,
         counters: Default::default(),
-        message_matrix: Vec::new(),
     }
 }
 

@@ -6,14 +6,13 @@ mod output;
 mod cli;
 mod commands;
 
-use bench::failure;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Arguments, Command};
-use failure::Failure;
+use contract::failure::Failure;
+use contract::failure::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
 use files::{BUG, Heap};
 use run::engine::interrupt;
-use run::verify::report::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
 use std::io;
 use std::panic::{catch_unwind, set_hook, take_hook};
 use std::process::{ExitCode, exit};

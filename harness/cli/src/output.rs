@@ -1,9 +1,9 @@
 //! Printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
+use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT};
 use files::{Plain, message};
 use run::engine::interrupt;
-use run::verify::report::{EXIT_HOLDS, EXIT_OUTPUT};
 use std::fmt::{self, Arguments};
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::sync::OnceLock;

@@ -101,7 +101,7 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
     for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "HUP", "INT"]] {
         let fixture = Fixture::new();
         fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
-        let why = ["why", "case.toml", "--unneeded", "--mesher", "./mesher"];
+        let why = ["why", "case.toml", "0,0,0", "--mesher", "./mesher"];
         let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
         let shrink = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
         for arguments in [&why[..], &verify, &shrink] {

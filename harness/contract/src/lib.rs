@@ -2,6 +2,7 @@
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
 //!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
+//! - [`failure`]: why a command has no result, with its exit code; [`watch`]: what it reports meanwhile;
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test), [`sets`] (disjoint sets).
@@ -10,6 +11,7 @@ pub mod case;
 pub mod catalogue;
 pub mod digest;
 mod directory;
+pub mod failure;
 pub mod files;
 pub mod htg;
 pub mod import;
@@ -29,4 +31,5 @@ pub mod stl;
 pub mod testing;
 pub mod tree;
 pub mod triangle;
+pub mod watch;
 pub mod word;

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::error::ExportError;
 use crate::foam;
 use crate::htg;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
 use crate::{p8est, vtu};
+use contract::failure::Failure;
 
 /// A format of mesh files.
 #[derive(Debug)]
@@ -22,7 +22,7 @@ pub struct Format {
 }
 
 /// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
-pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, ExportError>;
+pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, Failure>;
 
 /// All formats.
 pub const FORMATS: &[Format] = &[
@@ -57,7 +57,7 @@ pub const FORMATS: &[Format] = &[
 ///
 /// # Errors
 /// If no format has such names.
-pub fn of(path: &Path) -> Result<&'static Format, ExportError> {
+pub fn of(path: &Path) -> Result<&'static Format, Failure> {
     let name = path.to_string_lossy();
     // A shell completes the name of a directory with a slash.
     let name = name.trim_end_matches('/');
@@ -66,7 +66,7 @@ pub fn of(path: &Path) -> Result<&'static Format, ExportError> {
     let fits = |format: &&Format| !matches!(stem(format).chars().last(), None | Some('/'));
     FORMATS.iter().find(fits).ok_or_else(|| {
         let endings: Vec<_> = FORMATS.iter().map(|format| format.ending).collect();
-        ExportError::Request(format!(
+        Failure::input(format!(
             "{name}: no format has such a name: choose one that ends in {}",
             endings.join(", ")
         ))

@@ -8,7 +8,6 @@
 
 #![deny(missing_docs)]
 
-pub mod error;
 pub mod foam;
 pub mod format;
 pub mod htg;

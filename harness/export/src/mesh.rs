@@ -11,9 +11,9 @@ use contract::mesh::{self, Order};
 use contract::npy::PartFile;
 use contract::word;
 
-use crate::error::ExportError;
 use crate::leaf::Leaf;
 use crate::selection::Selection;
+use contract::failure::Failure;
 
 /// A mesh on disk, opened for reading.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub struct Mesh {
 }
 
 /// Asks whether to continue; its error ends a visit.
-pub type Check<'a> = &'a dyn Fn() -> Result<(), ExportError>;
+pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
 
 impl Deref for Mesh {
     type Target = mesh::Mesh;
@@ -38,7 +38,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the directory is not a leaf set.
-    pub fn open(path: &Path) -> Result<Self, ExportError> {
+    pub fn open(path: &Path) -> Result<Self, Failure> {
         Ok(Self { files: mesh::Mesh::open(path)?, leaves_by_rank: OnceLock::new() })
     }
 
@@ -46,7 +46,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the mesh cannot be one of the case.
-    pub fn require_case(&self, case: &Case) -> Result<(), ExportError> {
+    pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
         let stated = |root: Root, level: u8| {
             let Root { origin: [x, y, z], edge } = root;
             format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}")
@@ -56,7 +56,7 @@ impl Mesh {
         if of_mesh == of_case {
             return Ok(());
         }
-        Err(ExportError::Request(format!(
+        Err(Failure::input(format!(
             "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
             case.name
         )))
@@ -68,8 +68,8 @@ impl Mesh {
     }
 
     /// The error of a request that needs them.
-    pub fn ranks_unknown(&self) -> ExportError {
-        ExportError::Request(
+    pub fn ranks_unknown(&self) -> Failure {
+        Failure::input(
             "the ranks of this mesh are unknown, because its tree was written without --cell-ranks"
                 .to_owned(),
         )
@@ -79,7 +79,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the tree cannot be read.
-    pub fn leaves_by_rank(&self) -> Result<&[u64], ExportError> {
+    pub fn leaves_by_rank(&self) -> Result<&[u64], Failure> {
         if let Some(known) = self.leaves_by_rank.get() {
             return Ok(known);
         }
@@ -101,11 +101,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If no leaf is selected, if the mesh cannot be read, and those of `check`.
-    pub(crate) fn count(
-        &self,
-        selection: &Selection,
-        check: Check<'_>,
-    ) -> Result<u64, ExportError> {
+    pub(crate) fn count(&self, selection: &Selection, check: Check<'_>) -> Result<u64, Failure> {
         let mut leaves = 0;
         match *selection == Selection::default() {
             true => leaves = self.len(),
@@ -118,12 +114,12 @@ impl Mesh {
     }
 
     /// The error of an export without leaves.
-    pub(crate) fn nothing_selected(&self) -> ExportError {
+    pub(crate) fn nothing_selected(&self) -> Failure {
         let why = match self.is_empty() {
             true => "the mesh has no leaves",
             false => "no leaf satisfies all conditions of the selection: remove one of them",
         };
-        ExportError::Request(why.to_owned())
+        Failure::input(why.to_owned())
     }
 
     /// Visits the selected leaves in Morton order. All leaves are read once, and `check` is called from time to time.
@@ -134,8 +130,8 @@ impl Mesh {
         &self,
         selection: &Selection,
         check: Check<'_>,
-        visit: &mut dyn FnMut(Leaf) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let (mut order, mut index) = (Order::default(), 0u64);
         let mut one = |word: u64, rank: u32| {
             if index.is_multiple_of(CHECKED) {

@@ -4,7 +4,8 @@ use std::num::NonZero;
 
 use contract::case::Case;
 
-use crate::error::ExportError;
+use contract::failure::Failure;
+use contract::watch::Watch;
 
 /// Options of every export.
 #[derive(Clone, Copy)]
@@ -66,26 +67,17 @@ impl Options<'_> {
     ///
     /// # Errors
     /// If the user has interrupted the export.
-    pub fn check(&self) -> Result<(), ExportError> {
-        if self.watch.is_interrupted() { Err(ExportError::Interrupted) } else { Ok(()) }
+    pub fn check(&self) -> Result<(), Failure> {
+        if self.watch.is_interrupted() { Err(Failure::interrupted()) } else { Ok(()) }
     }
 
     /// The same in a loop of fast steps, of which `count` are done. Most calls do not ask.
     ///
     /// # Errors
     /// As [`Self::check`].
-    pub fn check_at(&self, count: u64) -> Result<(), ExportError> {
+    pub fn check_at(&self, count: u64) -> Result<(), Failure> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
-}
-
-/// Shows progress and passes on the user's interrupt. Threads call it at least every tenth of a second or so.
-pub trait Watch: Sync {
-    /// `done` of `total` leaves are written.
-    fn progress(&self, done: u64, total: u64);
-
-    /// Whether the user has interrupted the export.
-    fn is_interrupted(&self) -> bool;
 }
 
 /// What was written.

@@ -17,12 +17,12 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
-use crate::error::ExportError;
 use crate::leaf::Leaf;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
 use crate::written::Written;
+use contract::failure::Failure;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
@@ -46,13 +46,13 @@ pub fn write(
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
-) -> Result<Summary, ExportError> {
+) -> Result<Summary, Failure> {
     let (leaves, ends) = counted(mesh, selection, options)?;
     if leaves == 0 {
         return Err(mesh.nothing_selected());
     }
     let total = ends[ends.len() - 1];
-    let named = |error| ExportError::write(path, error);
+    let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
         let mut out = BufWriter::new(file);
         let mut start = connectivity(&mesh.manifest.root);
@@ -100,12 +100,12 @@ fn quadrants(
     mesh: &Mesh,
     selection: &Selection,
     options: &Options<'_>,
-    visit: &mut impl FnMut(Quadrant) -> Result<(), ExportError>,
-) -> Result<(), ExportError> {
+    visit: &mut impl FnMut(Quadrant) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     let (mut next, mut part_last) = (0, 0);
     mesh.visit(selection, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
-            return Err(ExportError::Request(format!(
+            return Err(Failure::input(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
             )));
         }
@@ -121,8 +121,8 @@ fn quadrants(
 fn fill(
     mut key: u64,
     end: u64,
-    visit: &mut impl FnMut(Octant) -> Result<(), ExportError>,
-) -> Result<(), ExportError> {
+    visit: &mut impl FnMut(Octant) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     while key < end {
         let fits = |level: &u8| {
             let span = word::span(*level);
@@ -140,7 +140,7 @@ fn counted(
     mesh: &Mesh,
     selection: &Selection,
     options: &Options<'_>,
-) -> Result<(u64, Vec<u64>), ExportError> {
+) -> Result<(u64, Vec<u64>), Failure> {
     let mut ends = vec![0; mesh.leaves_by_rank()?.len().max(1)];
     let mut leaves = 0;
     quadrants(mesh, selection, options, &mut |quadrant| {

@@ -1,10 +1,10 @@
 //! Meshes on disk, for tests.
 
 use crate::mesh::Mesh;
-use crate::options::Watch;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
+use contract::watch::Watch;
 use tempfile::TempDir;
 
 /// The unit cube.
@@ -14,8 +14,6 @@ const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 pub struct Unwatched;
 
 impl Watch for Unwatched {
-    fn progress(&self, _: u64, _: u64) {}
-
     fn is_interrupted(&self) -> bool {
         false
     }

@@ -2,16 +2,17 @@
 //! any content is read or refused, without a panic.
 #![allow(missing_docs)]
 
+use contract::failure::{EXIT_INPUT, Failure};
 use contract::htg::{TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
 use contract::testing::random_words;
+use contract::watch::Watch;
 use contract::word::{self, Leaf as WordLeaf};
-use export::error::ExportError;
 use export::leaf::Leaf;
 use export::mesh::Mesh;
-use export::options::{Foam, Options, Watch};
+use export::options::{Foam, Options};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
@@ -26,8 +27,6 @@ const ROOT: Root = Root { origin: [0.1, -1.0, 1e6], edge: 0.3 };
 struct Quiet;
 
 impl Watch for Quiet {
-    fn progress(&self, _: u64, _: u64) {}
-
     fn is_interrupted(&self) -> bool {
         false
     }
@@ -49,7 +48,7 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let path = dir.path().join("mesh.vtkhdf");
     let options = Options { jobs: NonZero::<usize>::MIN, watch: &Quiet, foam: Foam::default() };
     match export::htg::write(mesh, selection, &path, &options) {
-        Err(ExportError::Request(_)) => return None,
+        Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),
     }
     let manifest = Manifest {

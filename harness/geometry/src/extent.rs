@@ -16,7 +16,6 @@ pub struct Extent {
     /// Least distance to a face of the root, negative if the body extends beyond it, in the user's units.
     pub margin: f64,
     /// The same in cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub margin_cells: Option<f64>,
 }
 

@@ -24,12 +24,8 @@ pub enum Kind {
     Duplicates,
     /// Facets without area on the lattice.
     Degenerate,
-    /// Facets with area whose height is below 1e-3 of the longest edge.
-    Slivers,
     /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
     Intersections,
-    /// Pairs of facets without a common vertex that share boundary points only, on the lattice.
-    Contacts,
     /// Facets with an opposite facet less than one cell away, on the inner side, but not of another solid; by rays.
     ThinWalls,
     /// Facets with an opposite facet less than one cell away, on the outer side.
@@ -48,22 +44,16 @@ pub struct Place {
     /// A point nearby, in the user's units.
     pub at: [f64; 3],
     /// Openings: number of edges.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub edges: Option<u64>,
     /// Openings: largest distance of two vertices, in the user's units.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub diameter: Option<f64>,
     /// The same in cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub diameter_cells: Option<f64>,
     /// Thin walls and gaps: part of their area that is narrower.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub quantile: Option<f64>,
     /// Openings: free width; thin walls and gaps: distance of the facets. In the user's units.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
     /// The same in cells.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub width_cells: Option<f64>,
 }
 
@@ -89,7 +79,6 @@ pub struct Finding {
     /// Whether the search ended before all were counted, so that `count` is a lower bound.
     pub is_lower_bound: bool,
     /// Openings: number of edges with one facet in all, those of T-junctions included.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.
     pub meaning: String,

@@ -12,17 +12,6 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::FacetTree;
 
-/// The relative position of two triangles with area.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Relation {
-    /// They have no common point.
-    Disjoint,
-    /// They have common points, none of which is interior to both.
-    Touching,
-    /// Their interiors, as sets of their planes, have a common point.
-    Intersecting,
-}
-
 /// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or in
 /// one plane. Neither makes two volumes overlap.
 const ROUNDING: f64 = 2.0;
@@ -30,62 +19,37 @@ const ROUNDING: f64 = 2.0;
 /// The search ends when it has found this number of pairs.
 const PAIRS_MAX: usize = 1 << 22;
 
-/// Pairs of facets whose interiors intersect, and pairs without a common vertex that touch. Degenerate facets and
-/// pairs of facets with the same vertices are left out.
-pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> [Finding; 2] {
+/// Pairs of facets whose interiors intersect. Degenerate facets and pairs of facets with the same vertices are left out.
+pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     let facet = |f: u32| &input.lattice[f as usize];
-    let mut pairs: [Vec<(u32, u32)>; 2] = Default::default();
+    let are_same = |a: &FacetLattice, b: &FacetLattice| a.iter().all(|v| b.contains(v));
+    let mut pairs: Vec<(u32, u32)> = Vec::new();
     for f in (0..input.lattice.len() as u32).filter(|&f| !is_degenerate(facet(f))) {
         for g in tree.overlapping(f).into_iter().filter(|&g| f < g && !is_degenerate(facet(g))) {
-            if let Some(kind) = classify(facet(f), facet(g)) {
-                pairs[kind].push((f, g));
-            }
+            let is_pair = !are_same(facet(f), facet(g)) && intersect(facet(f), facet(g));
+            pairs.extend(is_pair.then_some((f, g)));
         }
-        if pairs[0].len() + pairs[1].len() >= PAIRS_MAX {
+        if pairs.len() >= PAIRS_MAX {
             break;
         }
     }
-    let is_lower_bound = pairs[0].len() + pairs[1].len() >= PAIRS_MAX;
-    let [mut crossing, mut touching] = pairs;
     let is_rounding = |&(f, g): &(u32, u32)| depth(facet(f), facet(g)) <= ROUNDING;
-    crossing.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
-    touching.sort_unstable();
-    let finding = |kind, pairs: &[(u32, u32)]| {
-        let places = pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect();
-        Finding { count: pairs.len() as u64, places, is_lower_bound, ..Finding::new(kind) }
-    };
-    let count_changing = crossing.partition_point(|pair| !is_rounding(pair)) as u64;
-    let intersections = Finding { count_changing, ..finding(Kind::Intersections, &crossing) };
-    [intersections, finding(Kind::Contacts, &touching)]
-}
-
-/// Index of the kind of a pair: 0 intersecting, 1 touching without a common vertex; none otherwise.
-fn classify(a: &FacetLattice, b: &FacetLattice) -> Option<usize> {
-    let common = a.iter().filter(|v| b.contains(v)).count();
-    if common == 3 {
-        return None;
-    }
-    match relation(a, b, common == 0) {
-        Relation::Intersecting => Some(0),
-        Relation::Touching if common == 0 => Some(1),
-        _ => None,
+    pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
+    Finding {
+        count: pairs.len() as u64,
+        count_changing: pairs.partition_point(|pair| !is_rounding(pair)) as u64,
+        is_lower_bound: pairs.len() >= PAIRS_MAX,
+        places: pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect(),
+        ..Finding::new(Kind::Intersections)
     }
 }
 
-/// The relation of two triangles with area. Unless `is_exact`, `Touching` may stand for `Disjoint`.
-pub fn relation(a: &FacetLattice, b: &FacetLattice, is_exact: bool) -> Relation {
-    let mut touches = false;
-    for axis in axes(a, b) {
+/// Whether the interiors of two triangles with area, as sets of their planes, have a common point.
+pub fn intersect(a: &FacetLattice, b: &FacetLattice) -> bool {
+    axes(a, b).all(|axis| {
         let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
-        if high_a < low_b || high_b < low_a {
-            return Relation::Disjoint;
-        }
-        touches |= high_a == low_b || high_b == low_a;
-        if touches && !is_exact {
-            break;
-        }
-    }
-    if touches { Relation::Touching } else { Relation::Intersecting }
+        low_a < high_b && low_b < high_a
+    })
 }
 
 /// An upper bound on the length of the least shift that separates the interiors of two intersecting triangles, in
@@ -150,36 +114,40 @@ fn place(input: &Input, f: u32, g: u32) -> Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tree::Point;
     use contract::lattice::UNITS_PER_EDGE;
+    use parry3d_f64::math::Pose;
+    use parry3d_f64::query;
+    use parry3d_f64::shape::Triangle;
     use proptest::prelude::*;
 
     const A: FacetLattice = [[0, 0, 0], [8, 0, 0], [0, 8, 0]];
 
-    fn of(b: FacetLattice) -> Relation {
-        relation(&A, &b, true)
+    fn of(b: FacetLattice) -> bool {
+        intersect(&A, &b)
     }
 
     #[test]
     fn facets_in_different_planes() {
-        assert_eq!(of([[2, 2, -4], [2, 2, 4], [3, 9, 0]]), Relation::Intersecting);
+        assert!(of([[2, 2, -4], [2, 2, 4], [3, 9, 0]]));
         // A vertex on the inside, an edge on an edge, an edge across an edge, a vertex on a vertex.
-        assert_eq!(of([[2, 2, 0], [2, 2, 4], [3, 3, 4]]), Relation::Touching);
-        assert_eq!(of([[2, 0, 0], [9, 0, 0], [4, 0, 7]]), Relation::Touching);
-        assert_eq!(of([[4, 0, -3], [4, 0, 3], [4, -5, 0]]), Relation::Touching);
-        assert_eq!(of([[0, 0, 0], [-1, 0, 3], [0, -1, 3]]), Relation::Touching);
-        assert_eq!(of([[2, 2, 1], [2, 2, 4], [3, 3, 4]]), Relation::Disjoint);
-        assert_eq!(of(A.map(|[x, y, z]| [x, y, z + 1])), Relation::Disjoint);
+        assert!(!of([[2, 2, 0], [2, 2, 4], [3, 3, 4]]));
+        assert!(!of([[2, 0, 0], [9, 0, 0], [4, 0, 7]]));
+        assert!(!of([[4, 0, -3], [4, 0, 3], [4, -5, 0]]));
+        assert!(!of([[0, 0, 0], [-1, 0, 3], [0, -1, 3]]));
+        assert!(!of([[2, 2, 1], [2, 2, 4], [3, 3, 4]]));
+        assert!(!of(A.map(|[x, y, z]| [x, y, z + 1])));
         // On both sides of the other's plane, but beyond its edges.
-        assert_eq!(of([[5, 5, -4], [5, 5, 4], [6, 9, 0]]), Relation::Disjoint);
+        assert!(!of([[5, 5, -4], [5, 5, 4], [6, 9, 0]]));
     }
 
     #[test]
     fn facets_in_one_plane() {
-        assert_eq!(of(A), Relation::Intersecting);
-        assert_eq!(of([[1, 1, 0], [2, 1, 0], [1, 2, 0]]), Relation::Intersecting);
-        assert_eq!(of([[0, 0, 0], [8, 0, 0], [0, -8, 0]]), Relation::Touching);
-        assert_eq!(of([[8, 0, 0], [9, 0, 0], [9, 1, 0]]), Relation::Touching);
-        assert_eq!(of([[5, 4, 0], [9, 9, 0], [4, 5, 0]]), Relation::Disjoint);
+        assert!(of(A));
+        assert!(of([[1, 1, 0], [2, 1, 0], [1, 2, 0]]));
+        assert!(!of([[0, 0, 0], [8, 0, 0], [0, -8, 0]]));
+        assert!(!of([[8, 0, 0], [9, 0, 0], [9, 1, 0]]));
+        assert!(!of([[5, 4, 0], [9, 9, 0], [4, 5, 0]]));
     }
 
     #[test]
@@ -187,9 +155,11 @@ mod tests {
         let (near, far) = (-UNITS_PER_EDGE, 2 * UNITS_PER_EDGE);
         let a = [[near, near, far], [far, near, near], [near, far, far]];
         let b = [[far, far, near], [near, near, near], [far, near, far]];
-        assert_eq!(relation(&a, &b, true), relation(&b, &a, true));
-        let lifted = a.map(|[x, y, z]| [x, y, z.min(far - 1)]);
-        assert_ne!(relation(&a, &lifted, true), Relation::Disjoint);
+        assert_eq!(intersect(&a, &b), intersect(&b, &a));
+        let lowered = a.map(|[x, y, z]| [x, y, z.min(far - 1)]);
+        assert!(!intersect(&a, &lowered), "they have a vertex in common");
+        let tilted = [[near, near, far - 1], [far, near, near + 1], a[2]];
+        assert!(intersect(&a, &tilted));
     }
 
     fn small() -> impl Strategy<Value = FacetLattice> {
@@ -209,36 +179,34 @@ mod tests {
 
         /// Common points are found by cutting each edge with the other triangle's plane.
         #[test]
-        fn disjoint_means_that_no_edge_meets_the_other_triangle(a in small(), b in small()) {
+        fn interiors_intersect_only_if_an_edge_meets_the_other_triangle(a in small(), b in small()) {
             let meets = |f: &FacetLattice, g: &FacetLattice| {
                 (0..3).any(|i| edge_meets(f[i], f[(i + 1) % 3], g))
             };
-            let expected = meets(&a, &b) || meets(&b, &a);
-            prop_assert_eq!(relation(&a, &b, true) != Relation::Disjoint, expected);
+            prop_assert!(!intersect(&a, &b) || meets(&a, &b) || meets(&b, &a));
         }
 
         /// Interiors intersect exactly if the triangles, slightly shrunk, still have a common point.
         #[test]
         fn intersecting_means_that_shrunk_triangles_meet(a in small(), b in small()) {
-            let scale = 1 << 14;
             let shrunk = |f: &FacetLattice| {
-                let centre: [i64; 3] = std::array::from_fn(|x| f[0][x] + f[1][x] + f[2][x]);
-                f.map(|v| std::array::from_fn(|x| 3 * scale * v[x] - (3 * v[x] - centre[x])))
+                let [p, q, r] = f.map(|v| Point::from_array(v.map(|c| c as f64)));
+                let centre = (p + q + r) / 3.0;
+                let [p, q, r] = [p, q, r].map(|v| v + (centre - v) * 1e-4);
+                Triangle::new(p, q, r)
             };
-            let is_met = relation(&shrunk(&a), &shrunk(&b), true) != Relation::Disjoint;
-            prop_assert_eq!(relation(&a, &b, true) == Relation::Intersecting, is_met);
+            let distance = query::distance(&Pose::IDENTITY, &shrunk(&a), &Pose::IDENTITY, &shrunk(&b));
+            prop_assert_eq!(intersect(&a, &b), distance.unwrap().distance < 1e-7);
         }
 
         #[test]
         fn neither_order_nor_axes_matter(a in small(), b in small()) {
-            let expected = relation(&a, &b, true);
+            let expected = intersect(&a, &b);
             let [p, q, r] = a;
-            prop_assert_eq!(relation(&b, &a, true), expected);
-            prop_assert_eq!(relation(&[r, q, p], &b, true), expected);
+            prop_assert_eq!(intersect(&b, &a), expected);
+            prop_assert_eq!(intersect(&[r, q, p], &b), expected);
             let turned = |f: FacetLattice| f.map(|[x, y, z]| [y, z, -x]);
-            prop_assert_eq!(relation(&turned(a), &turned(b), true), expected);
-            let quick = relation(&a, &b, false);
-            prop_assert_eq!(quick == Relation::Intersecting, expected == Relation::Intersecting);
+            prop_assert_eq!(intersect(&turned(a), &turned(b)), expected);
         }
     }
 

@@ -42,12 +42,12 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     findings.extend(edges::findings(input, &edges, first));
     findings.extend(shells.findings(input, first));
     findings.push(facets::duplicates(input, &edges, first));
-    findings.extend(facets::shapes(input, first));
+    findings.push(facets::degenerate(input, first));
     let tree = FacetTree::new(&input.lattice);
-    findings.extend(intersections::intersections(input, &tree, first));
+    findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
     }
     findings.extend(extent::findings(input, first));
-    Diagnosis::new(input, &edges, &shells.all, findings, first)
+    Diagnosis::new(input, &edges, &shells.all, findings)
 }

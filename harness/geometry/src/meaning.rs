@@ -45,12 +45,8 @@ impl Kind {
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
             Self::Degenerate => ("facets without area",
                 "No effect: a facet without area crosses the octants that it touches, and no ray counts it."),
-            Self::Slivers => ("slivers",
-                "No effect: every decision about a facet is exact, however thin it is."),
             Self::Intersections => ("intersecting pairs of facets",
                 "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
-            Self::Contacts => ("touching pairs of facets",
-                "No effect: facets that touch without a common vertex cross the same leaves."),
             Self::ThinWalls => ("facets of thin walls",
                 "No cell fits into the wall: it consists of crossing leaves, without an inside."),
             Self::ThinGaps => ("facets at thin gaps",
@@ -186,9 +182,7 @@ mod tests {
             Kind::Cavities,
             Kind::Duplicates,
             Kind::Degenerate,
-            Kind::Slivers,
             Kind::Intersections,
-            Kind::Contacts,
             Kind::ThinWalls,
             Kind::ThinGaps,
             Kind::OutsideRoot,
@@ -197,8 +191,8 @@ mod tests {
         let text = |kind, changing| of_width(kind, 3.0, changing, true);
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
-        assert!(meanings[16].starts_with("No effect: the facets overlap within one plane"));
-        assert!(meanings[10].starts_with("Where two closed shells overlap"));
+        assert!(meanings[14].starts_with("No effect: the facets overlap within one plane"));
+        assert!(meanings[9].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();
         assert_eq!(meanings.len(), kinds.len() + 1);

@@ -1,4 +1,4 @@
-//! The result of a diagnosis as data; JSON of the schema `octree-geometry/2` when serialised.
+//! The result of a diagnosis as data; JSON of the schema `octree-geometry/3` when serialised.
 //!
 //! Invariants, which [`Diagnosis::check_invariants`] executes:
 //! - edges by class sum to all, and three times the facets of shells to the facets at edges;
@@ -11,7 +11,6 @@
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::stl::Solid;
 use serde::Serialize;
-use std::cmp::Reverse;
 
 use super::edges::{EdgeCounts, Edges};
 use super::extent::{self, Extent};
@@ -21,7 +20,7 @@ use super::meaning;
 use super::shells::Shell;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-geometry/2";
+pub const SCHEMA: &str = "octree-geometry/3";
 
 /// The shells in numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -32,8 +31,6 @@ pub struct Shells {
     pub closed: u64,
     /// Number of their facets: all but those with a repeated vertex.
     pub facets: u64,
-    /// The largest shells.
-    pub largest: Vec<Shell>,
 }
 
 /// The result of a diagnosis.
@@ -69,7 +66,6 @@ impl Diagnosis {
         edges: &Edges,
         shells: &[Shell],
         mut findings: Vec<Finding>,
-        first: usize,
     ) -> Self {
         for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
             if finding.kind.changes_region(input.keep) {
@@ -79,16 +75,13 @@ impl Diagnosis {
         }
         let closed = shells.iter().filter(|shell| shell.is_closed).count() as u64;
         let of_shells = shells.iter().map(|shell| u64::from(shell.facets)).sum();
-        let mut largest = shells.to_vec();
-        largest.sort_by_key(|shell| (Reverse(shell.facets), shell.facet_first));
-        largest.truncate(first);
         let diagnosis = Self {
             schema: SCHEMA,
             facets: input.facets.len() as u64,
             vertices: edges.vertices.into(),
             edges: edges.counts(),
             solids: input.solids.clone(),
-            shells: Shells { count: shells.len() as u64, closed, facets: of_shells, largest },
+            shells: Shells { count: shells.len() as u64, closed, facets: of_shells },
             root: input.root,
             cell: input.cell,
             extent: extent::extent(input),
@@ -137,7 +130,7 @@ impl Diagnosis {
         for finding in &self.findings {
             let most = match finding.kind {
                 Kind::Openings | Kind::Junctions => edges.open,
-                Kind::Intersections | Kind::Contacts => facets * facets.saturating_sub(1) / 2,
+                Kind::Intersections => facets * facets.saturating_sub(1) / 2,
                 _ => edges.all.max(*facets),
             };
             assert!(finding.count <= most, "{} of {most}: {:?}", finding.count, finding.kind);

@@ -2,14 +2,13 @@
 
 use contract::lattice::FacetLattice;
 use contract::sets::Sets;
-use serde::Serialize;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 
 /// A shell.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shell {
     /// Index of the first facet.
     pub facet_first: u32,
@@ -18,16 +17,12 @@ pub struct Shell {
     /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
     pub is_closed: bool,
     /// Whether as many facets traverse every edge in one direction as in the other.
-    #[serde(skip)]
     is_oriented: bool,
     /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
-    #[serde(skip)]
     volume_sixfold: i128,
     /// Least coordinates on the lattice.
-    #[serde(skip)]
     low: [i64; 3],
     /// Greatest coordinates on the lattice.
-    #[serde(skip)]
     high: [i64; 3],
 }
 

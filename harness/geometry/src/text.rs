@@ -49,15 +49,6 @@ impl Diagnosis {
             )?;
         }
         writeln!(f, "shells    {}, {} closed", shells.count, shells.closed)?;
-        for shell in shells.largest.iter().filter(|_| shells.count > 1) {
-            let state = if shell.is_closed { "closed" } else { "open" };
-            writeln!(
-                f,
-                "          {} facets from number {}, {state}",
-                shell.facets, shell.facet_first
-            )?;
-        }
-        more(f, shells.largest.len() as u64, shells.count)?;
         writeln!(f, "extent    {} to {}", point(&extent.low), point(&extent.high))?;
         let cells = |length: f64| in_cells(self.cell.map(|cell| length / cell));
         writeln!(
@@ -131,7 +122,6 @@ mod tests {
     use crate::edges::EdgeCounts;
     use crate::extent::Extent;
     use crate::report::Shells;
-    use crate::shells::Shell;
     use contract::lattice::Root;
     use contract::stl::Solid;
 
@@ -154,11 +144,6 @@ mod tests {
         let sheet =
             Place { quantile: Some(0.05), width: Some(0.125), ..Place::new(vec![1, 2], at) };
         let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
-        let shell = |facet_first, facets, is_closed| {
-            let mut shell = Shell::new(facet_first);
-            (shell.facets, shell.is_closed) = (facets, is_closed);
-            shell
-        };
         let solid = |name: Option<&str>, facets| Solid {
             name: name.map(str::to_owned),
             facet_first: 3,
@@ -172,12 +157,7 @@ mod tests {
             vertices: 17,
             edges: EdgeCounts::default(),
             solids: vec![solid(Some("wing"), 20), solid(None, 10)],
-            shells: Shells {
-                count: 3,
-                closed: 2,
-                facets: 30,
-                largest: vec![shell(0, 16, true), shell(16, 8, false)],
-            },
+            shells: Shells { count: 3, closed: 2, facets: 30 },
             root: Root { origin: [-8.0; 3], edge: 16.0 },
             cell: Some(0.25),
             extent: Extent {
@@ -192,7 +172,7 @@ mod tests {
                 finding(Kind::Winding, 0, 0, vec![]),
                 lower_bound,
                 finding(Kind::ThinWalls, 4, 4, vec![sheet]),
-                finding(Kind::Slivers, 1, 0, one(0..7)),
+                finding(Kind::Degenerate, 1, 0, one(0..7)),
             ],
             changes_region: true,
         }
@@ -202,8 +182,7 @@ mod tests {
     fn a_diagnosis_lists_shells_findings_and_places() {
         let expected = "facets    30, with 17 distinct vertices\n\
             solids    2\n          \"wing\": 20 facets from number 3\n\
-            shells    3, 2 closed\n          16 facets from number 0, closed\n          8 facets from number 16, open\n          \
-            and 1 more (--limit)\n\
+            shells    3, 2 closed\n\
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
             cell      0.250 at the surface\n\n\
@@ -213,7 +192,7 @@ mod tests {
             neighbours, opposite winding            0\n\
             intersecting pairs of facets          >=2  POSSIBLE\n\
             facets of thin walls                    4  POSSIBLE\n\
-            slivers                                 1  none\n\n\
+            facets without area                     1  none\n\n\
             openings: Meaning of Openings.\n  \
             at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells), 2.50 across (10.0 cells), 4 edges; facets 1, 2\n          \
             and 1 more (--limit)\n\n\
@@ -221,7 +200,7 @@ mod tests {
             intersecting pairs of facets: Meaning of Intersections.\n  \
             at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--limit)\n\n\
             facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide, wider than 5 % of the area; facets 1, 2\n\n\
-            slivers: Meaning of Slivers.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            facets without area: Meaning of Degenerate.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
             findings that can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
     }
@@ -231,12 +210,7 @@ mod tests {
         let mut plain = diagnosis();
         (plain.cell, plain.changes_region) = (None, false);
         (plain.solids, plain.findings) = (Vec::new(), Vec::new());
-        plain.shells = Shells {
-            count: 1,
-            closed: 1,
-            facets: 16,
-            largest: vec![plain.shells.largest[0].clone()],
-        };
+        plain.shells = Shells { count: 1, closed: 1, facets: 16 };
         let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
@@ -245,8 +219,8 @@ mod tests {
             no finding that changes the mesh's region";
         assert_eq!(plain.to_string(), expected);
         // Without places, nothing is left unlisted.
-        plain.shells = Shells { count: 2, closed: 0, facets: 2, largest: Vec::new() };
-        plain.findings = vec![finding(Kind::Slivers, 3, 0, Vec::new())];
+        plain.shells = Shells { count: 2, closed: 0, facets: 2 };
+        plain.findings = vec![finding(Kind::Degenerate, 3, 0, Vec::new())];
         assert!(!plain.to_string().contains("more"));
     }
 }

@@ -1,7 +1,7 @@
 //! Facets in a tree of boxes: distances and rays, in lattice units.
 
 use contract::lattice::FacetLattice;
-use parry3d_f64::bounding_volume::Aabb;
+pub use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Pose;
 pub use parry3d_f64::math::Vector as Point;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};

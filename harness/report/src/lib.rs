@@ -5,7 +5,7 @@
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
-//! - [`leak`]: the path of a leak for VTK, and a slice through its narrowest place;
+//! - [`leak`]: the path of a leak for VTK;
 //! - [`picture`]: pictures of meshes.
 
 pub mod benchmark;
@@ -17,7 +17,6 @@ pub mod leak;
 pub mod markdown;
 pub mod page;
 pub mod picture;
-mod section;
 pub mod table;
 pub mod targets;
 pub mod track;

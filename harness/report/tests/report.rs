@@ -87,24 +87,14 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             useful_s: Spread::of(&both_phases),
             phases: vec![phase("refine"), phase("grade")],
             counters: counters.into_iter().chain(exposed).collect(),
-            message_matrix: Vec::new(),
         })))
     };
     (0..6).map(one).collect()
 }
 
-/// A warm-up with a message matrix.
-fn warm_up() -> Line {
-    let mut line = run("strong", Comm::Sim, 4, 50_000_000, 4, "").remove(0);
-    if let Entry::Run(run) = &mut line.entry {
-        (run.warm_up, run.message_matrix) = (true, vec![[0, 1, 3, 96], [3, 0, 1, 4096]]);
-    }
-    line
-}
-
 fn record() -> Vec<Line> {
     let network = Network { latency_s: 1e-6, bandwidth_bytes_per_s: 1e10, measured: true };
-    let mut lines = vec![session(), line(Entry::Network(network)), warm_up()];
+    let mut lines = vec![session(), line(Entry::Network(network))];
     for ranks in [1, 2, 4, 16, 32, 64] {
         lines.extend(run("strong", Comm::Sim, ranks, 50_000_000, 4, ""));
         lines.extend(run("weak", Comm::Sim, ranks, 1_000_000 * ranks as u64, 4, ""));
@@ -166,7 +156,6 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         "per-rank-uav-64",
         "balance-uav-4M-64",
         "balance-exposed-uav-4M-64",
-        "messages-uav-50M-4",
         "rate",
         "memory",
     ] {

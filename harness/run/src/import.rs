@@ -1,10 +1,11 @@
 //! Meshes in the formats of other programs. Those that the crate `contract` does not read are read in Python;
 //! `harness/oracles/imports.py` describes how.
 
-use crate::engine::failure::{End, Failure};
+use crate::engine::failure::{End, Failure as Ended};
 use crate::engine::paths::Paths;
 use crate::engine::python;
 use contract::digest::Digest;
+use contract::failure::Failure;
 use contract::import::cells::Cells;
 use contract::import::{self, Format, ImportError, Request};
 use contract::lattice::Root;
@@ -15,34 +16,6 @@ use std::time::Duration;
 
 /// Exit code of the script for a file that is not such a mesh.
 const CODE_INPUT: i32 = 2;
-/// Why a mesh was not imported.
-#[derive(Debug)]
-pub enum Refusal {
-    /// The file is not a usable mesh.
-    Input(ImportError),
-    /// Python or VTK is missing.
-    Missing(String),
-    /// The user interrupted the harness.
-    Interrupted,
-}
-
-impl Refusal {
-    /// The same with the file's name.
-    #[must_use]
-    pub fn of_file(self, path: &Path) -> Self {
-        match self {
-            Self::Input(error) => Self::Input(error.of_file(path)),
-            other => other,
-        }
-    }
-}
-
-impl From<ImportError> for Refusal {
-    fn from(error: ImportError) -> Self {
-        Self::Input(error)
-    }
-}
-
 /// Reads the cells of a file in any format. A child process that exceeds `limit` is killed.
 ///
 /// # Errors
@@ -53,21 +26,24 @@ pub fn read(
     request: &Request,
     paths: &Paths,
     limit: Duration,
-) -> Result<Cells, Refusal> {
-    match format {
-        Format::LeafWords | Format::P4est => Ok(import::read(path, format, request)?),
+) -> Result<Cells, Failure> {
+    let cells = match format {
+        Format::LeafWords | Format::P4est => {
+            import::read(path, format, request).map_err(Failure::from)
+        }
         Format::Vtk => {
             read_in_python(("vtk", "import_vtk.py"), path, format, request, paths, limit)
         }
         Format::Openfoam => {
             let why = "has no polyMesh: give a case, its directory constant, or polyMesh, and reconstruct a decomposed mesh";
-            let mesh = import::poly_mesh(path).ok_or_else(|| ImportError::content(why))?;
-            read_in_python(CELLS, &mesh, format, request, paths, limit)
+            let mesh = import::poly_mesh(path).ok_or_else(|| Failure::input(why));
+            mesh.and_then(|mesh| read_in_python(CELLS, &mesh, format, request, paths, limit))
         }
         Format::Npy | Format::Csv | Format::Discretize => {
             read_in_python(CELLS, path, format, request, paths, limit)
         }
-    }
+    };
+    cells.map_err(|failure| failure.of_file(path))
 }
 
 /// The reader of all formats but VTK's: its name in messages, and the script.
@@ -97,8 +73,8 @@ fn read_in_python(
     request: &Request,
     paths: &Paths,
     limit: Duration,
-) -> Result<Cells, Refusal> {
-    let place = tempfile::tempdir().map_err(ImportError::from)?;
+) -> Result<Cells, Failure> {
+    let place = tempfile::tempdir().map_err(|error| Failure::from(ImportError::from(error)))?;
     let table = place.path().join("cells");
     let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
     let arguments = [path.as_os_str(), table.as_os_str(), asked.as_ref()];
@@ -107,8 +83,8 @@ fn read_in_python(
     let stated = fs::read(&finished.stdout).ok();
     let stated: Stated = stated
         .and_then(|text| serde_json::from_slice(&text).ok())
-        .ok_or_else(|| ImportError::content("was read, but the script reported no root"))?;
-    let bytes = fs::read(&table).map_err(ImportError::from)?;
+        .ok_or_else(|| Failure::input("was read, but the script reported no root"))?;
+    let bytes = fs::read(&table).map_err(|error| Failure::from(ImportError::from(error)))?;
     Ok(cells(&bytes, stated)?)
 }
 
@@ -127,24 +103,25 @@ fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, ImportError> {
     Ok(cells)
 }
 
-fn refusal(name: &str, failure: &Failure) -> Refusal {
+fn refusal(name: &str, failure: &Ended) -> Failure {
     match &failure.end {
-        End::Interrupted => Refusal::Interrupted,
+        End::Interrupted => Failure::interrupted(),
         End::Missing(why) => {
-            Refusal::Missing(format!("this format is read with {name} in Python, which {why}"))
+            Failure::missing(format!("this format is read with {name} in Python, which {why}"))
         }
-        End::Exited { code: CODE_INPUT, error } => Refusal::Input(ImportError::content(error)),
-        _ => Refusal::Input(ImportError::content(format!("cannot be read: {failure}"))),
+        End::Exited { code: CODE_INPUT, error } => Failure::input(error),
+        _ => Failure::input(format!("cannot be read: {failure}")),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::failure::{EXIT_INPUT, EXIT_MISSING};
     use std::os::unix::fs::PermissionsExt;
 
     /// Reads a file with a shell script instead of Python, which gets the table's path as $4 and the request as $5.
-    fn read_with(script: &str, sides: Option<&str>) -> Result<Cells, Refusal> {
+    fn read_with(script: &str, sides: Option<&str>) -> Result<Cells, Failure> {
         let place = tempfile::tempdir().unwrap();
         let python = place.path().join("python");
         fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();
@@ -182,7 +159,9 @@ mod tests {
     #[test]
     fn each_failure_of_the_script_has_its_own_sentence() {
         let sentence = |script: &str| match read_with(script, None).unwrap_err() {
-            Refusal::Input(error) => error.to_string(),
+            Failure { code: EXIT_INPUT, why } => {
+                why.strip_prefix("mesh.vtu: ").expect("the file's name").to_owned()
+            }
             other => panic!("{other:?}"),
         };
         assert_eq!(sentence("echo has no cells >&2; exit 2"), "has no cells");
@@ -196,6 +175,6 @@ mod tests {
         assert!(sentence(no_table).starts_with("cannot be read"));
         assert!(sentence(&writing("")).contains("no root"));
         let missing = read_with("echo no module >&2; exit 3", None).unwrap_err();
-        assert!(matches!(missing, Refusal::Missing(why) if why.contains("no module")));
+        assert!(missing.code == EXIT_MISSING && missing.why.contains("no module"), "{missing}");
     }
 }

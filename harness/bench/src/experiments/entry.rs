@@ -268,10 +268,6 @@ pub struct Run {
     pub phases: Vec<Phase>,
     /// The program's counters.
     pub counters: BTreeMap<String, Spread>,
-    /// The message matrix, if it was requested: sender, receiver, messages and bytes of every pair of ranks that
-    /// communicated in sparse all-to-alls.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub message_matrix: Vec<[u64; 4]>,
 }
 
 /// A run without a result.

@@ -3,10 +3,10 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use super::variant::Base;
-use crate::failure::Failure;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
+use contract::failure::Failure;
 use run::engine::failure::{End, Failure as Ended};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};
@@ -20,9 +20,6 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-
-/// The greatest number of ranks with a message matrix, which has an entry for every pair of ranks that communicate.
-pub const MATRIX_RANKS_MAX: usize = 64;
 
 /// The partitioner that is not used where it has too few base leaves.
 const METIS: &str = "metis";
@@ -64,8 +61,6 @@ impl Runner<'_> {
         let mesh = self.place.join("mesh");
         let options = RunOptions {
             mesh: checked.then_some(&mesh),
-            // All runs of a setup send the same messages, and recording them should disturb no timed run.
-            message_matrix: warm_up && has_message_matrix(setup),
             sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
@@ -190,12 +185,6 @@ fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), Strin
     }
 }
 
-/// Whether the message matrix of a setup is recorded: in strong scaling of the mesher.
-pub fn has_message_matrix(setup: &Setup) -> bool {
-    let ranks = (2..=MATRIX_RANKS_MAX).contains(&setup.ranks);
-    setup.experiment == "strong" && setup.engine == "mesher" && setup.comm == Comm::Sim && ranks
-}
-
 /// How a setup is distributed over ranks.
 fn layout(setup: &Setup) -> Layout {
     let ranks = match setup.comm {
@@ -222,7 +211,6 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         phases: report.phases.iter().map(phase).collect(),
         counters: report.counters.iter().map(|(name, of)| (name.clone(), spread(of))).collect(),
         digest: report.digest,
-        message_matrix: report.message_matrix,
         setup,
         ..Run::default()
     }
@@ -279,7 +267,7 @@ mod tests {
     use super::*;
 
     const REPORT: &str = r#"{"schema": "octree-mesher-run/1", "facets": 12, "cells": 80, "digest": "00", "ranks": 2,
-        "message_matrix": [[0, 1, 3, 96]], "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
+        "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
         "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0], "time_comm_wall_s": [1.0, 1.0],
           "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
 
@@ -294,7 +282,6 @@ mod tests {
         assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
         assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
         assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
-        assert_eq!(run.message_matrix, [[0, 1, 3, 96]]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
         // All simulated ranks are in one process.

@@ -133,8 +133,6 @@ fn quieten(typical: &mut Run, runs: &[Run]) {
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
-    /// The last run of every setup that contains a message matrix, including warm-ups.
-    pub matrices: Vec<Run>,
     /// Runs that failed or were left out.
     pub left_out: Vec<LeftOut>,
     /// By program: what it does not do or promise.
@@ -150,7 +148,7 @@ impl Groups {
     pub fn of(lines: &[Line]) -> Self {
         let (lines, origins) = apart(lines);
         let (mut network, mut lacks) = (ASSUMED, BTreeMap::new());
-        let (mut left_out, mut runs, mut matrices) = (Vec::new(), Vec::new(), Vec::<Run>::new());
+        let (mut left_out, mut runs) = (Vec::new(), Vec::new());
         for line in &lines {
             match &line.entry {
                 Entry::Network(n) => network = *n,
@@ -160,13 +158,7 @@ impl Groups {
                     let why = format!("{} failed: {why}", setup.engine);
                     left_out.push(LeftOut { setup: setup.clone(), why });
                 }
-                Entry::Run(run) => {
-                    if !run.message_matrix.is_empty() {
-                        matrices.retain(|other| other.setup != run.setup);
-                        matrices.push((**run).clone());
-                    }
-                    runs.extend((!run.warm_up).then_some(&**run));
-                }
+                Entry::Run(run) => runs.extend((!run.warm_up).then_some(&**run)),
                 Entry::Audit(_) | Entry::Target(_) => {}
             }
         }
@@ -174,7 +166,7 @@ impl Groups {
             Group::of(setup, runs.into_iter().cloned().collect(), &network)
         };
         let all = by_key(runs, |run| run.setup.clone()).into_iter().filter_map(group).collect();
-        let groups = Self { all, matrices, left_out, lacks, network, origins };
+        let groups = Self { all, left_out, lacks, network, origins };
         groups.check_invariants();
         groups
     }

@@ -7,8 +7,8 @@
 //! Invariant: a directory that contains the file `built` has the result of the build command in that file.
 
 use super::GateOptions;
-use crate::failure::Failure;
 use crate::git;
+use contract::failure::Failure;
 use run::engine::description::Build;
 use run::engine::failure::End;
 use run::engine::placeholders::{Values, fill};

@@ -7,7 +7,7 @@ use super::measures::{LayerName, Measures, Numbers};
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::Selected;
 use super::subject::Baseline;
-use crate::failure::Failure;
+use contract::failure::Failure;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;

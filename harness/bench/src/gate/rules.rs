@@ -1,10 +1,10 @@
 //! Cases and tolerances of a gate: `engines/gate.toml`, or a user's file of the same format.
 
 use super::measures::LayerName;
-use crate::failure::Failure;
 use crate::refuse;
 use crate::statistics::comparison::rounds_min;
 use contract::case::Case;
+use contract::failure::Failure;
 use run::engine::launcher::Launcher;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
@@ -63,8 +63,6 @@ pub struct TimeRules {
     pub alpha: f64,
     /// Smaller effects are ignored; percent.
     pub effect_min: f64,
-    /// Changes of a phase that are a smaller part of the whole CPU time are ignored; percent.
-    pub phase_min: f64,
     /// "Unchanged" requires that an effect of this size would have been detected; percent.
     pub effect_wanted: f64,
 }
@@ -77,7 +75,6 @@ impl Default for TimeRules {
             budget_s: 20.0,
             alpha: 0.001,
             effect_min: 3.0,
-            phase_min: 0.5,
             effect_wanted: 10.0,
         }
     }
@@ -146,10 +143,9 @@ impl Rules {
 
     /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
     fn check(&self) -> Result<(), String> {
-        let TimeRules { alpha, effect_min, phase_min, rounds_min: fewest, rounds_max, .. } =
-            self.time;
-        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0 && phase_min >= 0.0;
-        let wrong = "alpha must be between 0 and 0.5, and effect_min and phase_min at least 0";
+        let TimeRules { alpha, effect_min, rounds_min: fewest, rounds_max, .. } = self.time;
+        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0;
+        let wrong = "alpha must be between 0 and 0.5, and effect_min at least 0";
         refuse(&[(!is_level, wrong)])?;
         let least = rounds_min(alpha);
         let few = format!(

@@ -4,7 +4,7 @@ use super::GateOptions;
 use super::build::{self, revision_of};
 use super::measures::{Measured, Measures};
 use crate::experiments::machine::digest_of_file;
-use crate::failure::Failure;
+use contract::failure::Failure;
 use run::engine::runner::Engine;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

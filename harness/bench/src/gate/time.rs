@@ -1,29 +1,44 @@
 //! The layer of time: baseline and candidate run interleaved, so that the load of the machine affects both equally, serially and
 //! on the real ranks of the rules.
 //!
-//! Three kinds of quantities are compared: the CPU time and the wall time of the whole process, seen from outside, and the
-//! CPU time of every phase that the program reports, with what lies outside all phases. All of them are tested together:
-//! [`adjusted`] controls the rate of false discoveries.
+//! The CPU time and the wall time of the whole process are compared, seen from outside. Those of all cases are tested together:
+//! [`adjusted`] controls the rate of false discoveries. Which phase a change is in, counters and instructions show.
 
 use super::Bench;
 use super::measures::LayerName;
 use super::numbers::prefix;
-use super::phases::{self, CPU, OUTSIDE, Quantity, WALL, size};
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
-use crate::statistics::comparison::{Round, compare};
+use crate::statistics::comparison::{Comparison, Round, compare};
 use crate::statistics::false_discovery::adjusted;
 use crate::statistics::random::Random;
+use crate::statistics::trimmed_mean::trimmed_mean;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
-use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::path::Path;
 
+/// CPU time of the whole process.
+pub const CPU: &str = "CPU time";
+/// Wall time of the whole process.
+pub const WALL: &str = "wall time";
+
+/// A time that the gate compares, over all rounds of a case on some ranks.
+#[derive(Debug)]
+struct Quantity {
+    case: String,
+    /// Its name in the report.
+    metric: String,
+    /// Logarithms of its times.
+    rounds: Vec<Round>,
+    /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
+    found: Comparison,
+}
+
 /// Compares the times of candidate and baseline.
-pub fn layer(bench: &Bench, layer: &mut Layer) {
+pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
     let left_out = match &bench.baseline {
         Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
         Baseline::Record(..) => {
@@ -36,11 +51,11 @@ pub fn layer(bench: &Bench, layer: &mut Layer) {
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     let rules = &bench.rules.time;
-    let mut measured: Vec<Vec<Quantity>> = Vec::new();
+    let mut measured: Vec<Quantity> = Vec::new();
     'all: for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
             match rounds(bench, baseline, case, ranks) {
-                Ok(times) => measured.push(times),
+                Ok(times) => measured.extend(times),
                 Err(failure) if failure.is_interrupt() => break 'all,
                 Err(why) => {
                     let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
@@ -51,24 +66,20 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
         }
     }
     // All quantities of all cases are tested together.
-    let p_values: Vec<f64> = measured.iter().flatten().map(|quantity| quantity.found.p).collect();
-    for (quantity, p) in measured.iter_mut().flatten().zip(adjusted(&p_values)) {
+    let p_values: Vec<f64> = measured.iter().map(|quantity| quantity.found.p).collect();
+    for (quantity, p) in measured.iter_mut().zip(adjusted(&p_values)) {
         quantity.found.p = p;
     }
-    for times in &measured {
-        let (whole, phases) = times.split_at(2);
-        layer.findings.extend(whole.iter().map(|quantity| whole_finding(quantity, rules)));
-        layer.findings.extend(phases::findings(&whole[0], phases, rules));
-    }
+    layer.findings.extend(measured.iter().map(|quantity| quantity.finding(rules)));
 }
 
-/// Runs all rounds of a case: the two times of the process, then the phases that both programs report, by name.
+/// Runs all rounds of a case.
 fn rounds(
     bench: &Bench,
     baseline: &Engine,
     case: &Selected,
     ranks: Ranks,
-) -> Result<Vec<Quantity>, Failure> {
+) -> Result<[Quantity; 2], Failure> {
     let path = bench.prepare(baseline, case, "time")?;
     let engines = [baseline, baseline, &bench.candidate];
     // The first run reads program and geometry from disk and is not counted.
@@ -79,39 +90,24 @@ fn rounds(
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let mut random = Random(bench.options.seed);
-    let mut names = vec![CPU, WALL];
-    if first.report.time_cpu_s().is_some() && also.report.time_cpu_s().is_some() {
-        let of_candidate = |p: &&PhaseReport| also.report.phases.iter().any(|o| o.name == p.name);
-        let both = first.report.phases.iter().filter(of_candidate);
-        names.extend(both.map(|phase| phase.name.as_str()));
-        names.push(OUTSIDE);
-    }
-    let mut times: Vec<(String, Vec<Round>)> =
-        names.into_iter().map(|name| (name.to_owned(), Vec::new())).collect();
+    let (mut cpu, mut wall) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let mut order = [0, 1, 2];
         random.shuffle(&mut order);
-        let mut runs = [const { None }; 3];
+        let mut times = [(0.0, 0.0); 3];
         for index in order {
-            runs[index] = Some(run(bench, engines[index], &path, ranks)?);
+            let run = run(bench, engines[index], &path, ranks)?;
+            times[index] = (run.time_process_cpu_s, run.time_process_s);
         }
-        let runs = runs.map(|run| run.expect("each was run"));
-        for (name, rounds) in &mut times {
-            // A microsecond is the resolution of the clocks.
-            rounds.push(runs.each_ref().map(|run| seconds(run, name).max(1e-6).ln()));
-        }
+        // A microsecond is the resolution of the clocks.
+        cpu.push(times.map(|(cpu_s, _)| f64::max(cpu_s, 1e-6).ln()));
+        wall.push(times.map(|(_, wall_s)| f64::max(wall_s, 1e-6).ln()));
     }
-    let quantity = |(name, rounds): (String, Vec<Round>)| {
-        let metric = match name.as_str() {
-            CPU | WALL => name.clone(),
-            OUTSIDE => format!("CPU time {OUTSIDE}"),
-            phase => format!("CPU time in {phase}"),
-        };
-        let (case, metric) = (case.rule.name.clone(), format!("{}{metric}", prefix(ranks)));
+    Ok([(CPU, cpu), (WALL, wall)].map(|(name, rounds): (&str, Vec<Round>)| {
+        let (case, metric) = (case.rule.name.clone(), format!("{}{name}", prefix(ranks)));
         let found = compare(&rounds, rules.alpha, bench.options.seed);
         Quantity { case, metric, rounds, found }
-    };
-    Ok(times.into_iter().map(quantity).collect())
+    }))
 }
 
 fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
@@ -119,53 +115,58 @@ fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Comp
     engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit()))
 }
 
-/// A quantity of one run, in seconds.
-fn seconds(run: &Completed, name: &str) -> f64 {
-    match name {
-        CPU => run.time_process_cpu_s,
-        WALL => run.time_process_s,
-        OUTSIDE => run.time_process_cpu_s - run.report.time_cpu_s().unwrap_or(0.0),
-        _ => {
-            let of_phase = run.report.phases.iter().filter(|phase| phase.name == name);
-            of_phase.map(PhaseReport::time_cpu_total_s).sum()
-        }
-    }
-}
-
-/// The finding for a time of the whole process.
-fn whole_finding(quantity: &Quantity, rules: &TimeRules) -> GateFinding {
-    let note = format!(
-        "{} rounds; {}, minimum detectable effect {:.1} %",
-        quantity.rounds.len(),
-        quantity.certainty(),
-        100.0 * quantity.found.visible.max(rules.effect_min / 100.0)
-    );
-    quantity.finding(verdict(quantity, rules), note)
+/// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
+fn size(effect: f64) -> f64 {
+    if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect }
 }
 
 /// An effect with a p-value below this is not reported as unchanged.
 const SUSPICIOUS: f64 = 0.01;
 
-/// "Unchanged" requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious
-/// effect was seen.
-fn verdict(quantity: &Quantity, rules: &TimeRules) -> Verdict {
-    let found = &quantity.found;
-    if quantity.is_changed(rules) {
-        return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
+impl Quantity {
+    /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
+    /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
+    fn times(&self) -> [f64; 2] {
+        let baseline: Vec<f64> = self.rounds.iter().map(|r| (r[0] + r[1]) / 2.0).collect();
+        let baseline = trimmed_mean(&baseline).exp();
+        [baseline, baseline * (1.0 + self.found.effect)]
     }
-    let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-    let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
-    let within = size(found.low) <= wanted && size(found.high) <= wanted;
-    match found.visible <= wanted && within && !suspicious {
-        true => Verdict::Unchanged,
-        false => Verdict::Inconclusive,
+
+    fn finding(&self, rules: &TimeRules) -> GateFinding {
+        let Comparison { low, high, p, floor, visible, .. } = self.found;
+        let visible = visible.max(rules.effect_min / 100.0);
+        let [low, high, floor, visible] = [low, high, floor, visible].map(|ratio| ratio * 100.0);
+        let note = format!(
+            "{} rounds; 99 % interval {low:+.1} to {high:+.1} %, p = {p:.5} among all times; noise floor {floor:.1} %, minimum \
+             detectable effect {visible:.1} %",
+            self.rounds.len()
+        );
+        let verdict = self.verdict(rules);
+        GateFinding::of_values(&self.case, &self.metric, verdict, self.times(), note)
+    }
+
+    /// A change is significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
+    /// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
+    /// seen.
+    fn verdict(&self, rules: &TimeRules) -> Verdict {
+        let found = &self.found;
+        let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
+        if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
+            return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
+        }
+        let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
+        let within = size(found.low) <= wanted && size(found.high) <= wanted;
+        match found.visible <= wanted && within && !suspicious {
+            true => Verdict::Unchanged,
+            false => Verdict::Inconclusive,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::comparison::Comparison;
+    use proptest::prelude::*;
 
     #[test]
     fn a_verdict_needs_significance_and_size() {
@@ -180,7 +181,7 @@ mod tests {
         };
         let of = |found: Comparison| {
             let (case, metric) = ("c".to_owned(), CPU.to_owned());
-            verdict(&Quantity { case, metric, rounds: Vec::new(), found }, &rules)
+            Quantity { case, metric, rounds: Vec::new(), found }.verdict(&rules)
         };
         assert_eq!(of(found), Verdict::Regression);
         assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);
@@ -189,5 +190,16 @@ mod tests {
         assert_eq!(of(Comparison { p: 0.02, high: 0.11, ..found }), Verdict::Inconclusive);
         assert_eq!(of(Comparison { effect: 0.02, ..found }), Verdict::Unchanged);
         assert_eq!(of(Comparison { floor: 0.09, visible: 0.12, ..found }), Verdict::Inconclusive);
+    }
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        /// Of rounds of which half are disturbed, the means of both programs may have the other order than the effect.
+        #[test]
+        fn the_times_have_the_ratio_of_the_effect(rounds in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
+            let found = compare(&rounds, 0.01, 1);
+            let (case, metric, effect) = ("c".to_owned(), CPU.to_owned(), found.effect);
+            let times = Quantity { case, metric, rounds, found }.times();
+            prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);
+        }
     }
 }

@@ -10,7 +10,7 @@ pub mod bundle;
 pub mod probe;
 pub mod reduce;
 
-use crate::failure::Failure;
+use contract::failure::Failure;
 use probe::{Fault, Judged, Trial};
 use run::engine::interrupt;
 use std::time::{Duration, Instant};

@@ -1,10 +1,10 @@
 //! Which checks a case fails: those of the definition or of the engine's promises on a serial run, and the comparison
 //! with the serial run on several ranks.
 
-use crate::failure::Failure;
 use check::checks::{self, CheckResult, Outcome, Subject, identical};
 use check::promises::Independence;
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
 use run::engine::failure::{self, End};

@@ -1,4 +1,4 @@
-//! Steps and drifts of a series that may have trends, autocorrelated noise and outliers.
+//! Steps of a series that may have trends, autocorrelated noise and outliers.
 //!
 //! The model has [segments](super::segments) with constant or linear means, and first-order autoregressive noise. Of all numbers
 //! of boundaries, kinds of means and autocorrelations, the one with the least penalised likelihood is selected (Davis, Lee and
@@ -30,18 +30,14 @@ impl Default for Rules {
     }
 }
 
-/// A step, or a drift: a linear change of the mean between two steps or ends of the series.
+/// A step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Whether it is a drift.
-    pub is_drift: bool,
-    /// Index of the last value before a step, or of the first of a drift.
-    pub from: usize,
-    /// Index of the first value after a step, or of the last of a drift.
+    /// Index of the first value after it.
     pub at: usize,
-    /// Median of the values since the previous step, or mean at the first index of a drift.
+    /// Median of the values since the previous step.
     pub before: f64,
-    /// Median of the values up to the next step, or mean at the last index of a drift.
+    /// Median of the values up to the next step.
     pub after: f64,
     /// The p-value.
     pub p: f64,
@@ -77,7 +73,7 @@ const STEP_MIN: f64 = 1.5;
 /// No p-value is smaller: noise is normal only near its middle.
 const P_MIN: f64 = 1e-9;
 
-/// Returns the steps of a series, then its drifts, each in ascending order.
+/// Returns the steps of a series in ascending order.
 pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     let size = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
     if values.len() < VALUES_MIN || size == 0.0 || !size.is_finite() {
@@ -95,14 +91,9 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     let step = |(w, p): (&[usize], f64)| {
         let at = w[1];
         let (before, after) = (median_of(&values[w[0]..at]), median_of(&values[at..w[2]]));
-        Change { is_drift: false, from: at - 1, at, before, after, p }
+        Change { at, before, after, p }
     };
-    let drifts = model.drifts(least, rules.alpha).into_iter().map(|drift| Change {
-        before: drift.before * size + middle,
-        after: drift.after * size + middle,
-        ..drift
-    });
-    edges.windows(3).zip(p_values).map(step).chain(drifts).collect()
+    edges.windows(3).zip(p_values).map(step).collect()
 }
 
 /// A model of values without outliers.
@@ -227,24 +218,6 @@ impl<'a> Model<'a> {
                 _ => return p_values,
             }
         }
-    }
-
-    /// Returns the drifts between the boundaries.
-    fn drifts(&self, least: f64, alpha: f64) -> Vec<Change> {
-        if self.mean == Mean::Constant {
-            return Vec::new();
-        }
-        let series = Series::new(self.values, self.phi);
-        let drift = |w: &[usize]| {
-            let (from, at) = (w[0], w[1] - 1);
-            let line = series.fit(from, w[1], Mean::Linear);
-            let (before, after) = (line.at(from as f64), line.at(at as f64));
-            let level = series.fit(from, w[1], Mean::Constant);
-            let p = self.p_without(&series, level.cost - line.cost);
-            let counts = p <= alpha && (after - before).abs() > least;
-            counts.then_some(Change { is_drift: true, from, at, before, after, p })
-        };
-        self.edges().windows(2).filter_map(drift).collect()
     }
 }
 

@@ -9,11 +9,11 @@ use super::plan::{Plan, Planned, SessionOptions};
 use crate::experiments::entry::{
     Comm, Entry, Failure as Failed, Judged, LeftOut, Line, Run, Session as Opening, Setup, Verdict,
 };
-use crate::experiments::execute::{Runner, has_message_matrix};
+use crate::experiments::execute::Runner;
 use crate::experiments::record::Record;
 use crate::experiments::{feasible, machine, network};
-use crate::failure::Failure;
 use check::promises::Independence;
+use contract::failure::Failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -186,9 +186,10 @@ impl Session<'_> {
         if points.iter().any(|p| p.setup.comm == Comm::Sim) {
             self.measure_network()?;
         }
-        for index in warmers(points) {
+        for index in 0..points.len() {
             let (mesh, setup) = (points[index].mesh(), points[index].setup.clone());
-            if !self.warm.insert(mesh.clone()) {
+            let may_warm_up = points[index].warm_up && !points[index].failed;
+            if !may_warm_up || !self.warm.insert(mesh.clone()) {
                 continue;
             }
             match feasible::excess(&self.lines, &setup, self.plan.runner.limit) {
@@ -300,56 +301,5 @@ impl Session<'_> {
                 run.digest
             )),
         }
-    }
-}
-
-/// Returns, for every mesh of every engine, the index of the point that warms it up: the one on the most ranks that reports
-/// a message matrix, otherwise the first.
-fn warmers(points: &[Planned]) -> Vec<usize> {
-    let worth = |point: &Planned| match has_message_matrix(&point.setup) {
-        true => point.setup.ranks,
-        false => 0,
-    };
-    let mut best: Vec<usize> = Vec::new();
-    for (index, point) in
-        points.iter().enumerate().filter(|(_, point)| point.warm_up && !point.failed)
-    {
-        match best.iter_mut().find(|b| points[**b].mesh() == point.mesh()) {
-            Some(chosen) if worth(point) > worth(&points[*chosen]) => *chosen = index,
-            Some(_) => {}
-            None => best.push(index),
-        }
-    }
-    best
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn point(comm: Comm, ranks: usize, case: &str) -> Planned {
-        let setup = crate::testing::run(comm, 1, &[("a", &vec![0.0; ranks])]).setup;
-        let (audit, failed, declined) = (false, false, None);
-        Planned { setup, case: case.into(), repeats: 1, warm_up: true, audit, failed, declined }
-    }
-
-    #[test]
-    fn a_mesh_is_warmed_up_once_on_the_layout_with_a_message_matrix() {
-        let points = [
-            point(Comm::Sim, 1, "a"),
-            point(Comm::Sim, 64, "a"),
-            point(Comm::Sim, 16, "a"),
-            point(Comm::Sim, 1024, "a"),
-            point(Comm::Mpi, 2, "b"),
-            point(Comm::Mpi, 4, "b"),
-        ];
-        assert_eq!(warmers(&points), [1, 4]);
-        let mut weak = points;
-        weak.iter_mut().for_each(|p| p.setup.experiment = "weak".into());
-        assert_eq!(warmers(&weak), [0, 4]);
-        weak[2].setup.engine = "another".into();
-        assert_eq!(warmers(&weak), [0, 2, 4]);
-        weak[4].warm_up = false;
-        assert_eq!(warmers(&weak), [0, 2, 5]);
     }
 }

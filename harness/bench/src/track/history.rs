@@ -13,8 +13,8 @@
 use super::unit;
 use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
-use crate::gate::phases::{CPU, WALL};
 use crate::gate::report::GateReport;
+use crate::gate::time::{CPU, WALL};
 use crate::git;
 use crate::jsonl::{self, Line};
 use crate::origin::Origins;

@@ -1,11 +1,11 @@
 //! `harness track`: a history of metrics by commit, and the commits at which they changed.
 //!
-//! [`history`] is the file; [`crate::statistics::change_points`] finds steps and drifts in one metric, and
+//! [`history`] is the file; [`crate::statistics::change_points`] finds steps in one metric, and
 //! [`crate::statistics::false_discovery`] controls how many of all of them are false.
 //!
 //! Invariant: the same history and options give the same result on every machine.
 //!
-//! Invariants of the answer, executed by [`Series::check_invariants`] before it is printed: steps and drifts are in order and
+//! Invariants of the answer, executed by [`Series::check_invariants`] before it is printed: steps are in order and
 //! within the series; both values beside a change lie among the values of their segments, and its percentage is theirs; its
 //! commits are those of the history; p is a probability.
 
@@ -34,26 +34,22 @@ pub struct Series {
     pub unit: &'static str,
     /// Index of the record and value.
     pub points: Vec<(usize, f64)>,
-    /// The steps, then the drifts.
+    /// The steps.
     pub changes: Vec<Change>,
 }
 
-/// A step, or a drift: a slow change over many commits.
+/// A step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Whether it is a drift.
-    pub is_drift: bool,
-    /// Index in `points` of the last old value; of a drift, of its first value.
-    pub from: usize,
-    /// Index of the first new value; of a drift, of its last value.
+    /// Index in `points` of the first new value.
     pub at: usize,
-    /// The commit of the value `from`.
+    /// The commit of the value before `at`.
     pub last_old: String,
     /// The commit of the value `at`.
     pub first_new: String,
-    /// Median of the values since the previous step, or the mean at the first commit of a drift.
+    /// Median of the values since the previous step.
     pub before: f64,
-    /// Median of the values up to the next step, or the mean at the last commit of a drift.
+    /// Median of the values up to the next step.
     pub after: f64,
     /// Relative change in percent; `None` if it was 0.
     pub percent: Option<f64>,
@@ -64,11 +60,6 @@ pub struct Change {
 }
 
 impl Series {
-    /// The steps alone.
-    fn steps(&self) -> impl Iterator<Item = &Change> {
-        self.changes.iter().filter(|change| !change.is_drift)
-    }
-
     /// Executes the invariants at the head of this file.
     fn check_invariants(&self, records: &[Record]) {
         let Self { name, points, changes, .. } = self;
@@ -78,26 +69,20 @@ impl Series {
             (least..=most).contains(&value)
         };
         let mut from = 0;
-        let ends = self.steps().map(|step| step.at).skip(1).chain([points.len()]);
-        for (step, until) in self.steps().zip(ends) {
+        let ends = changes.iter().map(|step| step.at).skip(1).chain([points.len()]);
+        for (step, until) in changes.iter().zip(ends) {
             let at = step.at;
-            assert!(from < at && at < until && step.from + 1 == at, "{name}: in order: {step:?}");
+            assert!(from < at && at < until, "{name}: in order: {step:?}");
             let (old, new) = (&points[from..at], &points[at..until]);
             let beside = is_within(step.before, old) && is_within(step.after, new);
             assert!(beside, "{name}: values beside a step are of their segments: {step:?}");
-            from = at;
-        }
-        for change in changes {
-            let Change { from, at, last_old, first_new, before, after, p, .. } = change;
-            assert!(from <= at && *at < points.len(), "{name}: within the series: {change:?}");
-            let commits = [from, at].map(|at| &records[points[*at].0].commit);
-            assert_eq!([last_old, first_new], commits, "{name}: commits of a step or a drift");
+            let Change { last_old, first_new, before, after, p, .. } = step;
+            let commits = [at - 1, at].map(|at| &records[points[at].0].commit);
+            assert_eq!([last_old, first_new], commits, "{name}: commits of a step");
             let by = percent(*before, *after);
-            assert_eq!(
-                change.percent, by,
-                "{name}: the percentage is that of {before} and {after}"
-            );
+            assert_eq!(step.percent, by, "{name}: the percentage is that of {before} and {after}");
             assert!(*p > 0.0 && *p <= 1.0, "{name}: {p} is a probability");
+            from = at;
         }
     }
 
@@ -109,7 +94,7 @@ impl Series {
     /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
     /// `recent`.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
-        let last = self.steps().last()?;
+        let last = self.changes.last()?;
         let new = self.points.len() - last.at <= recent;
         (self.is_cost() && new && !last.accepted && last.after > last.before).then_some(last)
     }
@@ -150,17 +135,13 @@ pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
     all
 }
 
-/// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test for steps and one
-/// for drifts: its smallest p-value counts, and 1 if nothing was found.
+/// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test: its smallest p-value
+/// counts, and 1 if nothing was found.
 fn control(found: &mut [Vec<Found>], alpha: f64) {
-    for is_drift in [false, true] {
-        let least = |changes: &Vec<Found>| {
-            changes.iter().filter(|c| c.is_drift == is_drift).map(|c| c.p).fold(1.0, f64::min)
-        };
-        let p_values: Vec<f64> = found.iter().map(least).collect();
-        for (changes, p) in found.iter_mut().zip(adjusted(&p_values)) {
-            changes.retain(|change| change.is_drift != is_drift || p <= alpha);
-        }
+    let least = |changes: &Vec<Found>| changes.iter().map(|c| c.p).fold(1.0, f64::min);
+    let p_values: Vec<f64> = found.iter().map(least).collect();
+    for (changes, _) in found.iter_mut().zip(adjusted(&p_values)).filter(|(_, p)| *p > alpha) {
+        changes.clear();
     }
 }
 
@@ -171,17 +152,15 @@ fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
 
 fn series(name: &str, points: Vec<(usize, f64)>, found: Vec<Found>, records: &[Record]) -> Series {
     let commit = |at: usize| records[points[at].0].commit.clone();
-    let change = |Found { is_drift, from, at, before, after, p }| Change {
-        is_drift,
-        from,
+    let change = |Found { at, before, after, p }| Change {
         at,
-        last_old: commit(from),
+        last_old: commit(at - 1),
         first_new: commit(at),
         before,
         after,
         percent: percent(before, after),
         p,
-        accepted: !is_drift && is_accepted(at, &points, records),
+        accepted: is_accepted(at, &points, records),
     };
     let changes = found.into_iter().map(change).collect();
     Series { name: name.to_owned(), unit: unit(name), changes, points }
@@ -235,20 +214,6 @@ mod tests {
             assert_eq!(all[1].changes.len(), 1);
             assert_eq!(all[1].worse_recently(10).is_none(), holds, "{accepted}");
         }
-    }
-
-    #[test]
-    fn a_drift_is_reported_as_one_drift() {
-        let mut records = sample();
-        for (i, record) in records.iter_mut().enumerate() {
-            let noise = (i * 7919 % 13) as f64 / 13.0;
-            record.metrics.insert("uav/words".into(), 1000.0 + 5.0 * i as f64 + 8.0 * noise);
-        }
-        let all = analyse(&records, &Rules::default());
-        let [drift] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
-        assert_eq!((drift.is_drift, drift.from, drift.at), (true, 0, 29));
-        assert!((13.0..16.0).contains(&drift.percent.unwrap()), "{drift:?}");
-        assert!(summary(&all).contains("drifts from"), "{}", summary(&all));
     }
 
     proptest! {

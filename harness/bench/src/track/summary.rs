@@ -2,7 +2,7 @@
 
 use super::Series;
 
-/// Returns a text with one step or drift per line.
+/// Returns a text with one step per line.
 pub fn summary(all: &[Series]) -> String {
     let short = |commit: &str| commit.chars().take(12).collect::<String>();
     let mut text = String::new();
@@ -10,18 +10,15 @@ pub fn summary(all: &[Series]) -> String {
         let is_count = series.unit == "count";
         let unit = if is_count { String::new() } else { format!(" {}", series.unit) };
         for change in &series.changes {
-            // Counts are exact, but not their mean.
-            let exact = is_count && !change.is_drift;
-            let shown = |value| if exact { value } else { rounded(value) };
+            let shown = |value| if is_count { value } else { rounded(value) };
             let [before, after] = [change.before, change.after].map(shown);
             let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
             let commits = format!("{}..{}", short(&change.last_old), short(&change.first_new));
-            let what = match change.is_drift {
-                true => format!("drifts from {before} to {after}{unit} ({by}) over {commits}"),
-                false => format!("{before} -> {after}{unit} ({by}) in {commits}"),
-            };
             let accepted = if change.accepted { ", accepted" } else { "" };
-            text += &format!("{}: {what}, p = {:.2e}{accepted}\n", series.name, change.p);
+            text += &format!(
+                "{}: {before} -> {after}{unit} ({by}) in {commits}, p = {:.2e}{accepted}\n",
+                series.name, change.p
+            );
         }
     }
     if text.is_empty() {

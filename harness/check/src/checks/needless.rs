@@ -30,7 +30,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     };
     result.examined = found.splits;
     for subtree in &found.first {
-        let place = subject.terms.root.describe(&subtree.octant.octant);
+        let place = subject.terms.root.describe(&subtree.octant);
         result.report(format!(
             "nothing requires the split of {place}, which has {} leaves",
             subtree.leaves

@@ -51,7 +51,7 @@ impl fmt::Display for Answer {
             None => writeln!(f, "  not explained")?,
             Some(Split { octant, cause: None, .. }) => writeln!(
                 f,
-                "  its parent, {octant}, is split, and no rule that is known requires it (harness why --unneeded)"
+                "  its parent, {octant}, is split, and no rule that is known requires it (harness audit --case finds all such splits)"
             )?,
             Some(split) => {
                 writeln!(f, "  its parent, {}, is split", split.octant)?;

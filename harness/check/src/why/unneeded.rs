@@ -8,17 +8,11 @@
 //! What is found out about an octant is kept in memory, which therefore grows with the mesh. A mesh for which the memory that is
 //! available does not suffice is refused.
 
-use std::fmt;
 use std::fs;
 
 use super::Mesh;
-use super::answer::Place;
 use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
-use serde::Serialize;
-
-/// Name and version of the JSON form.
-const SCHEMA: &str = "octree-unneeded/2";
 
 /// Memory that the audit takes for each leaf: 22 bytes were measured on 4 million cells, and tables double when they are full.
 const BYTES_PER_LEAF: u64 = 40;
@@ -27,12 +21,8 @@ const BYTES_PER_LEAF: u64 = 40;
 ///
 /// Invariants: needless octants have needless splits, which are some of all splits; the octants that are listed are some of the
 /// needless ones, and their leaves some of all.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Unneeded {
-    /// Name and version of the JSON form.
-    pub schema: &'static str,
-    /// Number of leaves of the mesh.
-    pub leaves: u64,
     /// Number of split octants that were examined.
     pub splits: u64,
     /// Number of splits without a cause.
@@ -46,11 +36,10 @@ pub struct Unneeded {
 }
 
 /// An octant that is split without a cause.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Subtree {
     /// The octant.
-    #[serde(flatten)]
-    pub octant: Place,
+    pub octant: Octant,
     /// Number of leaves in it.
     pub leaves: u64,
 }
@@ -69,15 +58,8 @@ impl Mesh<'_> {
         let leaves = leaves_in(self.tree.root(), &counts);
         let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
         refuse_too_large(leaves, &meminfo)?;
-        let mut found = Unneeded {
-            schema: SCHEMA,
-            leaves,
-            splits: 0,
-            unneeded: 0,
-            subtrees: 0,
-            unneeded_leaves: 0,
-            first: Vec::new(),
-        };
+        let mut found =
+            Unneeded { splits: 0, unneeded: 0, subtrees: 0, unneeded_leaves: 0, first: Vec::new() };
         let mesh = self.distrusting();
         let mut visit = |octant: &Octant, handle: Handle| {
             found.splits += 1;
@@ -90,12 +72,12 @@ impl Mesh<'_> {
             found.subtrees += 1;
             found.unneeded_leaves += leaves;
             if found.first.len() < first {
-                found.first.push(Subtree { octant: mesh.place(octant), leaves });
+                found.first.push(Subtree { octant: *octant, leaves });
             }
             false
         };
         visit_splits(mesh.tree, (Octant::ROOT, mesh.tree.root()), &mut visit);
-        found.check_invariants();
+        found.check_invariants(leaves);
         Ok(found)
     }
 }
@@ -140,13 +122,13 @@ fn leaves_in(handle: Handle, below: &[u64]) -> u64 {
 
 impl Unneeded {
     /// Panics if an invariant of the answer does not hold.
-    pub fn check_invariants(&self) {
-        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, first, .. } = self;
+    pub fn check_invariants(&self, leaves: u64) {
+        let Self { splits, unneeded, subtrees, unneeded_leaves, first, .. } = self;
         assert!(
             subtrees <= unneeded && unneeded <= splits && (*unneeded == 0) == (*subtrees == 0),
             "{unneeded} of {splits} splits in {subtrees} octants are needless"
         );
-        assert!(unneeded_leaves <= leaves, "{unneeded_leaves} of {leaves} leaves are needless");
+        assert!(*unneeded_leaves <= leaves, "{unneeded_leaves} of {leaves} leaves are needless");
         let of_first: u64 = first.iter().map(|subtree| subtree.leaves).sum();
         assert!(
             first.len() as u64 <= *subtrees && of_first <= *unneeded_leaves,
@@ -167,32 +149,11 @@ fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "--unneeded needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
+        "the search for needless splits needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
          case, or use a machine with more memory",
         needed as f64 / 1e9,
         available as f64 / 1e9
     ))
-}
-
-impl fmt::Display for Unneeded {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { leaves, splits, unneeded, subtrees, unneeded_leaves, .. } = self;
-        if *unneeded == 0 {
-            return write!(f, "every split has a cause: {splits} splits, {leaves} leaves");
-        }
-        write!(
-            f,
-            "{unneeded} of {splits} splits have no cause: no facet, box, layer or balance requires them. They make \
-             {unneeded_leaves} leaves, in {subtrees} octants:"
-        )?;
-        for Subtree { octant, leaves } in &self.first {
-            write!(f, "\n  {octant}, {leaves} leaves")?;
-        }
-        match subtrees - self.first.len() as u64 {
-            0 => Ok(()),
-            more => write!(f, "\n  and {more} more (--limit)"),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -201,18 +162,15 @@ mod tests {
 
     #[test]
     fn counts_of_needless_splits_that_contradict_each_other_are_a_bug() {
-        let root = contract::lattice::Root { origin: [0.0; 3], edge: 1.0 };
-        let subtree = Subtree { octant: Place::new(&Octant::ROOT.child(3), &root), leaves: 8 };
+        let subtree = Subtree { octant: Octant::ROOT.child(3), leaves: 8 };
         let correct = Unneeded {
-            schema: SCHEMA,
-            leaves: 64,
             splits: 9,
             unneeded: 2,
             subtrees: 1,
             unneeded_leaves: 8,
             first: vec![subtree],
         };
-        correct.check_invariants();
+        correct.check_invariants(64);
         let faults: [fn(&mut Unneeded); 5] = [
             |u| u.unneeded = 10,
             |u| u.subtrees = 0,
@@ -223,7 +181,7 @@ mod tests {
         for fault in faults {
             let mut wrong = correct.clone();
             fault(&mut wrong);
-            assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong:?}");
+            assert!(std::panic::catch_unwind(|| wrong.check_invariants(64)).is_err(), "{wrong:?}");
         }
     }
 

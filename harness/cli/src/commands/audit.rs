@@ -2,20 +2,20 @@
 
 use super::import::{Imported, Source};
 use super::values::{Input, Output};
-use crate::failure::Failure;
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use check::checks::CheckResult;
 use check::promises::Promises;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use contract::files::named;
 use contract::manifest;
 use run::engine::description::Description;
 use run::engine::failure::End;
 use run::engine::paths::Paths;
 use run::engine::process::{self, Watch};
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;

@@ -2,12 +2,15 @@
 
 use super::files::put;
 use super::programs::ProgramArguments;
-use crate::failure::Failure;
 use bench::experiments::entry::{Entry, Judged, Line, Verdict};
 use bench::experiments::group::Groups;
 use bench::experiments::record;
 use bench::study::{self, SessionOptions, Study};
 use clap::Args;
+use contract::failure::Failure;
+use contract::failure::{
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
+};
 use contract::files::named;
 use report::benchmark::tables;
 use report::targets as page;
@@ -15,9 +18,6 @@ use run::engine::description::is_own;
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{
-    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
-};
 use rustix::fs::{Access, access};
 use std::collections::BTreeMap;
 use std::fs;

@@ -2,7 +2,7 @@
 
 use clap::{Args, Command};
 use clap_complete::{Shell, generate};
-use run::verify::report::EXIT_HOLDS;
+use contract::failure::EXIT_HOLDS;
 
 /// `harness completions`.
 #[derive(Args, Debug)]

@@ -1,11 +1,11 @@
 //! `harness diff`: prints the first difference between two leaf-set directories.
 
 use super::values::Input;
-use crate::failure::Failure;
 use check::diff;
 use clap::Args;
 use contract::case::Case;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 
 /// `harness diff`.
 #[derive(Args, Debug)]

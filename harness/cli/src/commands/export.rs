@@ -1,15 +1,15 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
 use super::foam::FoamArguments;
-use super::progress::Progress;
 use super::selection::SelectionArguments;
 use super::values::Input;
-use crate::failure::Failure;
 use clap::Args;
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use export::format::{self, FORMATS};
 use export::mesh::Mesh;
 use export::options::{Options, Summary};
-use run::verify::report::EXIT_HOLDS;
+use run::progress::Progress;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -76,7 +76,7 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %");
+    let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
     let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.finish();

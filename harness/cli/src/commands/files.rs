@@ -1,9 +1,9 @@
 //! Writing files.
 
 use super::values::Output;
-use crate::failure::Failure;
+use contract::failure::Failure;
+use contract::failure::{EXIT_INPUT, exit_first};
 use contract::files::{named, write_atomically};
-use run::verify::report::{EXIT_INPUT, exit_first};
 use std::path::Path;
 use std::{env, fs, io};
 

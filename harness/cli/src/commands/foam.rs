@@ -1,9 +1,9 @@
 //! The options of `harness export` that only meshes for OpenFOAM have.
 
 use super::values::read_case;
-use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
 use export::options::{Foam, Label, Processors, Regions};
 
 /// Options of meshes for OpenFOAM.

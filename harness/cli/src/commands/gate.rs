@@ -3,14 +3,14 @@
 use super::files::put_forms;
 use super::programs::ProgramArguments;
 use super::values::Output;
-use crate::failure::Failure;
 use bench::gate::report::End;
 use bench::gate::{GateOptions, gate};
 use clap::Args;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
 use report::gate::{junit, markdown, text};
 use report::json::pretty;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
 
 /// `harness gate`.
 #[derive(Args, Debug)]

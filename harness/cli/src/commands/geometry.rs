@@ -4,13 +4,13 @@ use std::num::NonZero;
 
 use super::files::put;
 use super::values::{self, Output, root};
-use crate::failure::Failure;
 use clap::Args;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::lattice::Root;
 use geometry::diagnose;
 use geometry::input::{Input, Requested};
 use report::json::pretty;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 
 /// `harness geometry`.
 #[derive(Args, Debug)]

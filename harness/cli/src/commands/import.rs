@@ -1,9 +1,10 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
 use super::values::{Input, read_case, root};
-use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, Position, Request};
 use contract::lattice::Root;
@@ -11,7 +12,6 @@ use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Sides};
 use contract::word::{self, KEY_END};
 use run::engine::paths::Paths;
-use run::verify::report::EXIT_HOLDS;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -95,8 +95,7 @@ impl Source {
         }
         let request = Request { sides: self.sides.clone(), root, position: self.position };
         let limit = Duration::from_secs(self.timeout);
-        let cells = run::import::read(mesh, format, &request, &Paths::find(), limit);
-        let cells = cells.map_err(|refusal| refusal.of_file(mesh))?;
+        let cells = run::import::read(mesh, format, &request, &Paths::find(), limit)?;
         let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
         if root.is_none() && cells.root.is_none() {
             let Root { origin: [x, y, z], edge } = set.manifest.root;

@@ -1,25 +1,25 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use super::programs::ProgramArguments;
-use super::progress::Progress;
 use super::values::{Output, Point, cell_count, with_extension};
-use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::files::{Content, named, write_together};
 use contract::leafset::LeafSet;
 use contract::manifest::Keep;
+use contract::watch::Watch;
+use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
-use geometry::leak::{LeakError, Leaks, Watch};
 use report::json::pretty;
-use report::leak::{picture, polyline};
+use report::leak::vtp;
 use run::base_tree::BaseTrees;
-use run::engine::failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
+use run::progress::Progress;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::Duration;
@@ -39,7 +39,7 @@ Examples:
   harness leak car.toml                                  where does the body leak?
   harness leak car.toml --from 0,0,1                     does the cabin leak?
   harness leak duct.toml --from 0,0,0 --to 9,0,0         are two rooms joined?
-  harness leak car.toml --from 0,0,1 --picture leak.svg --vtk leak.vtp
+  harness leak car.toml --from 0,0,1 --vtk leak.vtp      its path for ParaView
 
 Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found, or with --closed the facets \
 are not proven to be a closed surface between the two places; 2 invalid input, or nothing to examine; 3 mesher and reference are missing, or one \
@@ -62,9 +62,6 @@ pub struct Arguments {
     /// Write the paths as VTK polylines with the free width at each point
     #[arg(long, value_name = "FILE.vtp", value_parser = with_extension(&["vtp"]))]
     vtk: Option<Output>,
-    /// Write a picture of a slice through the narrowest place of the widest path
-    #[arg(long, value_name = "FILE.svg", value_parser = with_extension(&["svg"]))]
-    picture: Option<Output>,
     /// Refinement in search of an opening ends before a base tree of more leaves
     #[arg(long, value_name = "N", default_value = "2e7", value_parser = cell_count)]
     leaves_max: u64,
@@ -87,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}");
+    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}", None);
     let (mut first, ends) = match arguments.from {
         Some(Point(from)) => (None, vec![(from, arguments.to)]),
         None => {
@@ -99,15 +96,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let make = |level| match first.take() {
         Some(words) => Ok(words),
-        None => trees.at(level).map(|tree| tree.words),
+        None => Ok(trees.at(level)?.words),
     };
-    let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress).map_err(failed)?;
-    let answers = leaks.answers(&ends).map_err(failed)?;
+    let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress)?;
+    let answers = leaks.answers(&ends)?;
     progress.finish();
-    let widest = answers.examined.iter().filter_map(|report| report.passage.as_ref());
-    let widest = widest.max_by(|a, b| a.narrowest.width.total_cmp(&b.narrowest.width));
-    let picture = widest.map(|passage| (passage, leaks.words(passage)));
-    write(arguments, &case, &answers, picture)?;
+    write(arguments, &answers)?;
     if ends.is_empty() {
         println!(
             "no leak: every region that is inside at 2 and 4 times the spacing of {} is inside at this spacing too",
@@ -141,14 +135,6 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<([f64; 3], Target)>, String
     Ok(leaks.iter().map(|leak| (leak.point, to)).collect())
 }
 
-fn failed(error: LeakError<failure::Failure>) -> Failure {
-    match error {
-        LeakError::Interrupted => Failure::interrupted(),
-        LeakError::Source(failure) => failure.into(),
-        LeakError::Input(why) => why.into(),
-    }
-}
-
 /// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
 fn engine<'a>(programs: &'a Programs, given: &ProgramArguments) -> Result<&'a Engine, Failure> {
     let all = [
@@ -170,13 +156,8 @@ fn engine<'a>(programs: &'a Programs, given: &ProgramArguments) -> Result<&'a En
     }
 }
 
-/// Writes the requested files, unless the user interrupts before they are complete. Without a path there is none to draw.
-fn write(
-    arguments: &Arguments,
-    case: &Case,
-    answers: &Answers,
-    widest: Option<(&Passage, &[u64])>,
-) -> Result<(), Failure> {
+/// Writes the requested files, unless the user interrupts before they are complete.
+fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     let passages: Vec<&Passage> =
         answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
     let complete = |written: io::Result<()>| match interrupt::requested() {
@@ -184,19 +165,15 @@ fn write(
         false => written,
     };
     let json: Content<'_> = &|out| complete(out.write_all(pretty(answers).as_bytes()));
-    let vtk: Content<'_> = &|out| complete(polyline::vtp(&passages, out));
-    let svg = |(passage, words)| picture::svg(case, words, passage);
-    let picture: Content<'_> =
-        &|out| complete(widest.map_or(Ok(()), |p| out.write_all(svg(p).as_bytes())));
-    let of_path = [(&arguments.vtk, vtk), (&arguments.picture, picture)];
-    if widest.is_none() && of_path.iter().any(|(file, _)| file.is_some()) {
+    let vtk: Content<'_> = &|out| complete(vtp(&passages, out));
+    if passages.is_empty() && arguments.vtk.is_some() {
         eprintln!(
-            "harness: there is no path to draw, so --vtk and --picture write nothing: files of these names are from an earlier run"
+            "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"
         );
     }
-    let of_path = of_path.into_iter().filter(|_| widest.is_some());
-    let all = [(&arguments.json, json)].into_iter().chain(of_path);
-    let files: Vec<_> = all.filter_map(|(file, fill)| Some((file.as_deref()?, fill))).collect();
+    let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
+    let all = [(arguments.json.as_deref(), json), (of_path, vtk)];
+    let files: Vec<_> = all.into_iter().filter_map(|(file, fill)| Some((file?, fill))).collect();
     write_together(&files, |path, error| Failure::from(named(path, &error)))?;
     if files.is_empty() && interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) }
 }

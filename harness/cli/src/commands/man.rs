@@ -1,10 +1,10 @@
 //! `harness man`: manual pages from the definition of the command line.
 
-use crate::failure::Failure;
 use clap::{Args, Command};
 use clap_mangen::{Man, generate_to};
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use contract::files::named;
-use run::verify::report::EXIT_HOLDS;
 use std::fs;
 use std::path::PathBuf;
 

@@ -2,9 +2,9 @@
 
 use super::programs::ProgramArguments;
 use super::values::Input;
-use crate::failure::Failure;
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::files::named;
 use run::engine::layout::Layout;
 use run::engine::options::RunOptions;

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `progress`, `selection`, `values` and `view` are shared.
+//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
 
 pub mod audit;
 pub mod bench;
@@ -18,7 +18,6 @@ mod paper;
 pub mod picture;
 pub mod planted;
 mod programs;
-mod progress;
 pub mod report;
 mod selection;
 pub mod selftest;

@@ -2,10 +2,10 @@
 
 use super::selection::SelectionArguments;
 use super::values::{Input, Output, read_case, with_extension};
-use crate::failure::Failure;
 use clap::Args;
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use contract::files::{Content, write_together};
-use export::error::ExportError;
 use export::mesh::Mesh;
 use export::near_body::files;
 use export::near_body::front::{Face, front};
@@ -13,7 +13,6 @@ use export::near_body::gap::{Gap, gaps};
 use export::near_body::polygons::Polygons;
 use export::near_body::report::Report;
 use run::engine::interrupt;
-use run::verify::report::EXIT_HOLDS;
 use std::path::Path;
 
 /// `harness near-body`.
@@ -50,7 +49,7 @@ pub struct Arguments {
 /// # Errors
 /// If the mesh cannot be read or has no such surface, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+    let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
     let mesh = Mesh::open(&arguments.mesh)?;
     let case = arguments.case.as_deref().map(read_case).transpose()?;
     case.iter().try_for_each(|case| mesh.require_case(case))?;
@@ -76,7 +75,7 @@ fn write(
     polygons: &Polygons,
     gaps: Option<&[Gap]>,
     report: &Report,
-) -> Result<(), ExportError> {
+) -> Result<(), Failure> {
     let root = &mesh.manifest.root;
     let stl: Content<'_> = &|out| files::stl(root, faces, polygons, out);
     let vtp: Content<'_> = &|out| files::vtp(root, faces, polygons, gaps, mesh.has_ranks(), out);
@@ -88,5 +87,5 @@ fn write(
         |path: &Path| if path.extension().is_some_and(|e| e == "stl") { stl } else { vtp };
     let surfaces = arguments.out.iter().map(|path| (&**path, surface(path)));
     let report = arguments.json.iter().map(|path| (&**path, json));
-    write_together(&surfaces.chain(report).collect::<Vec<_>>(), ExportError::write)
+    write_together(&surfaces.chain(report).collect::<Vec<_>>(), Failure::at)
 }

@@ -2,7 +2,8 @@
 
 use super::meshed::{MeshArguments, Meshed};
 use super::view::{command, write_view};
-use crate::failure::Failure;
+use contract::failure::EXIT_MISSING;
+use contract::failure::Failure;
 use contract::files::{Staging, named, nearest_directory};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
@@ -13,7 +14,6 @@ use report::picture::{DETAIL, Picture, Request, svg};
 use run::engine::layout::{Layout, Ranks};
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
-use run::verify::report::EXIT_MISSING;
 use std::path::Path;
 use std::{fs, io};
 use toml::Value;

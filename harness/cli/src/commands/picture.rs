@@ -4,8 +4,9 @@ use super::meshed::{MeshArguments, Meshed};
 use super::paper;
 use super::selection::SelectionArguments;
 use super::view::{command, write_view};
-use crate::failure::Failure;
 use clap::Args;
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use contract::octant::LEVEL_MAX;
 use export::mesh::Mesh;
 use report::picture::colour::Colour;
@@ -14,7 +15,6 @@ use report::picture::scene::Scene;
 use report::picture::{DETAIL, Picture, Request};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use run::engine::paths::Paths;
-use run::verify::report::EXIT_HOLDS;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\

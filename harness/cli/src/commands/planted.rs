@@ -1,7 +1,7 @@
 //! `harness planted`: ends with a fault of the harness itself, for the tests of its exit codes.
 
 use clap::{Args, ValueEnum};
-use run::verify::report::EXIT_HOLDS;
+use contract::failure::EXIT_HOLDS;
 use std::hint::black_box;
 use std::thread;
 

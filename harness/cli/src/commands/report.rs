@@ -1,11 +1,11 @@
 //! `harness report`: draws figures and a page from records.
 
-use crate::failure::Failure;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::record;
 use clap::Args;
+use contract::failure::EXIT_HOLDS;
+use contract::failure::Failure;
 use report::benchmark::report;
-use run::verify::report::EXIT_HOLDS;
 use std::path::{Path, PathBuf};
 
 /// `harness report`.

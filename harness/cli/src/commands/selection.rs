@@ -2,11 +2,11 @@
 
 use super::values::numbers;
 use clap::Args;
+use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::manifest::Sides;
 use contract::octant::LEVEL_MAX;
 use contract::word::Side;
-use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
 
@@ -43,17 +43,16 @@ impl SelectionArguments {
     ///
     /// # Errors
     /// If no leaf of such a mesh can satisfy a condition, or if its ranks are needed and it cannot be read.
-    pub fn of(&self, mesh: &Mesh) -> Result<Selection, ExportError> {
+    pub fn of(&self, mesh: &Mesh) -> Result<Selection, Failure> {
         self.check(mesh)?;
         let root = &mesh.manifest.root;
-        let slice =
-            self.slice.map(|plane| plane.of(root)).transpose().map_err(ExportError::Request)?;
+        let slice = self.slice.map(|plane| plane.of(root)).transpose().map_err(Failure::input)?;
         let clip = self.clip.map(|corners| corners.map(|corner| root.quantise_clamped(corner)));
         Ok(Selection { clip, level_max: self.level_max, side: self.side, rank: self.rank, slice })
     }
 
     /// Refuses conditions on what the mesh does not have.
-    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+    fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
         if let Some(rank) = self.rank {
             let ranks = mesh.leaves_by_rank()?.len();
             if !mesh.has_ranks() {
@@ -64,12 +63,12 @@ impl SelectionArguments {
                     1 => format!("--rank {rank}: the mesh has one rank, number 0"),
                     _ => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
                 };
-                return Err(ExportError::Request(why));
+                return Err(Failure::input(why));
             }
         }
         if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {
             let why = "--side: the sides of this mesh are unknown, so omit it";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         Ok(())
     }

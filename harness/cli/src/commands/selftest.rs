@@ -1,17 +1,17 @@
 //! `harness selftest`: corrupts correct meshes and prints which check detects each corruption.
 
 use super::programs::ProgramArguments;
-use crate::failure::Failure;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::files::named;
 use contract::leafset;
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
 use run::engine::options::RunOptions;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

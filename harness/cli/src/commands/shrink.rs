@@ -1,15 +1,15 @@
 //! `harness shrink`: reduces a failing case and writes it as a directory.
 
 use super::programs::ProgramArguments;
-use crate::failure::Failure;
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, bundle, fault, shrink};
 use clap::Args;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::files::named;
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

@@ -2,15 +2,15 @@
 
 use super::files::put_forms;
 use super::values::{Input, Output, percentage, probability};
-use crate::failure::Failure;
 use bench::jsonl;
 use bench::statistics::change_points::Rules;
 use bench::track::history::{self, History, Record};
 use bench::track::{analyse, summary};
 use clap::Args;
+use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use report::json::pretty;
 use report::track::{export, page};
-use run::verify::report::{EXIT_FAILED, EXIT_HOLDS};
 use std::path::{Path, PathBuf};
 
 /// `harness track`.

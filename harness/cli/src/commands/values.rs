@@ -1,8 +1,8 @@
 //! Parsers of option values.
 
-use crate::failure::Failure;
 use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::lattice::Root;
 use run::engine::paths::Paths;
 pub use run::verify::options::whole_seconds;

@@ -3,8 +3,8 @@
 use super::files::{put, put_forms};
 use super::programs::ProgramArguments;
 use super::values::Output;
-use crate::failure::Failure;
 use clap::Args;
+use contract::failure::Failure;
 use report::verification::markdown::markdown;
 use report::verification::table::table;
 use report::verification::{json, junit};

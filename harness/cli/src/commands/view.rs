@@ -1,7 +1,7 @@
 //! What a single picture and the pictures of the paper share: views, and the command that the data name.
 
 use super::meshed::MeshArguments;
-use crate::failure::Failure;
+use contract::failure::Failure;
 use report::picture::format::{Format, put};
 use report::picture::scene::{Scene, html};
 use run::engine::failure::End;

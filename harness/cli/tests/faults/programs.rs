@@ -245,9 +245,7 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             ..new(
                 "leak",
                 Harness,
-                format!(
-                    "leak open.toml --from 0.3,0.2,0.2 --json l.json --vtk l.vtp --picture l.svg {programs}"
-                ),
+                format!("leak open.toml --from 0.3,0.2,0.2 --json l.json --vtk l.vtp {programs}"),
                 &["l.json", "l.vtp", "l.svg"],
             )
         },

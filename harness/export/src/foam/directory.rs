@@ -10,7 +10,7 @@ use contract::word;
 
 use super::lists::{ListFile, header, label_max};
 use super::{Mesh, narrow};
-use crate::error::ExportError;
+use contract::failure::Failure;
 
 /// The cells and faces of a directory.
 #[derive(Clone, Debug, Default)]
@@ -77,7 +77,7 @@ impl Directory {
         numbers: &[u32],
         is_part: bool,
         dir: &Path,
-    ) -> Result<(), ExportError> {
+    ) -> Result<(), Failure> {
         let (all, options) = (&mesh.faces, mesh.options);
         let number = |cell: u32| numbers[cell as usize];
         // A face that belongs to a cell of another processor is turned.
@@ -165,7 +165,7 @@ impl Directory {
         (points, numbers)
     }
 
-    fn write_boundary(&self, mesh: &Mesh, dir: &Path) -> Result<(), ExportError> {
+    fn write_boundary(&self, mesh: &Mesh, dir: &Path) -> Result<(), Failure> {
         let mut text = header("ascii", mesh.options.foam.label, "polyBoundaryMesh", "boundary", "");
         let _ = writeln!(text, "{}\n(", self.patches.len() + self.between.len());
         let mut start = self.internal.len();

@@ -13,8 +13,8 @@ use super::leaves::{Leaves, Point};
 use super::patches::Patches;
 use super::points::Points;
 use super::squares::squares;
-use crate::error::ExportError;
 use crate::options::Options;
+use contract::failure::Failure;
 
 /// The faces.
 #[derive(Clone, Debug, Default)]
@@ -41,7 +41,7 @@ impl Faces {
         points: &Points,
         patches: &Patches,
         options: &Options,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, Failure> {
         let mut all = Self::default();
         let mut of_patches = vec![Self::default(); patches.names.len()];
         let (mut of_cell, mut owned) = (Vec::new(), Vec::new());

@@ -7,8 +7,8 @@
 use contract::octant::Octant;
 use contract::word;
 
-use crate::error::ExportError;
 use crate::options::Options;
+use contract::failure::Failure;
 
 /// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
 pub type Point = [u32; 3];
@@ -113,8 +113,8 @@ impl Leaves {
     pub fn walk(
         &self,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        visit: &mut impl FnMut(u32, &Around) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let content = self.content(0, self.words.len(), 0);
         let across = [[Content::Outside; 2]; 3];
         self.descend(&Around { octant: Octant::ROOT, content, across }, options, visit)
@@ -124,8 +124,8 @@ impl Leaves {
         &self,
         around: &Around,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        visit: &mut impl FnMut(u32, &Around) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         if let Content::Cell(number) = around.content {
             options.check_at(u64::from(number))?;
             return visit(number, around);

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use crate::error::ExportError;
 use crate::options::{Label, Options};
+use contract::failure::Failure;
 
 /// Greatest label.
 pub fn label_max(label: Label) -> u64 {
@@ -42,7 +42,7 @@ impl<'a> ListFile<'a> {
         class: &str,
         object: &str,
         note: &str,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, Failure> {
         let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
         out.write_all(header("binary", options.foam.label, class, object, note).as_bytes())?;
         Ok(Self { out, options })
@@ -52,11 +52,7 @@ impl<'a> ListFile<'a> {
     ///
     /// # Errors
     /// If it cannot be written, or if the user interrupts.
-    pub fn labels(
-        &mut self,
-        count: u64,
-        labels: impl Iterator<Item = i64>,
-    ) -> Result<(), ExportError> {
+    pub fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<(), Failure> {
         match self.options.foam.label {
             Label::Bits32 => self.list(count, labels.map(|label| (label as i32).to_le_bytes())),
             Label::Bits64 => self.list(count, labels.map(i64::to_le_bytes)),
@@ -71,7 +67,7 @@ impl<'a> ListFile<'a> {
         &mut self,
         count: u64,
         points: impl Iterator<Item = [f64; 3]>,
-    ) -> Result<(), ExportError> {
+    ) -> Result<(), Failure> {
         let bytes = |point: [f64; 3]| -> [u8; 24] {
             let all = point.map(f64::to_le_bytes);
             std::array::from_fn(|i| all[i / 8][i % 8])
@@ -84,7 +80,7 @@ impl<'a> ListFile<'a> {
         &mut self,
         count: u64,
         items: impl Iterator<Item = [u8; N]>,
-    ) -> Result<(), ExportError> {
+    ) -> Result<(), Failure> {
         let [begin, end] = if count == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{count}\n{begin}")?;
         for (item, number) in items.zip(0..) {
@@ -98,7 +94,7 @@ impl<'a> ListFile<'a> {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(self) -> Result<(), ExportError> {
+    pub fn finish(self) -> Result<(), Failure> {
         let file = self.out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
         Ok(file.sync_all()?)
     }

@@ -32,11 +32,11 @@ use contract::manifest::Sides;
 use contract::octant::Octant;
 use contract::word;
 
-use crate::error::ExportError;
 use crate::mesh;
 use crate::options;
 use crate::options::{Options, Processors, Summary};
 use crate::selection::Selection;
+use contract::failure::Failure;
 use directory::{Directory, directories};
 use faces::Faces;
 use leaves::{CELLS_MAX, CUT, Leaves};
@@ -71,7 +71,7 @@ pub fn write(
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
-) -> Result<Summary, ExportError> {
+) -> Result<Summary, Failure> {
     let has_ranks = mesh.has_ranks();
     let (of_mesh, regions) = read(mesh, selection, options)?;
     let processors = distribute(&of_mesh, options.foam.processors, || {
@@ -84,15 +84,14 @@ pub fn write(
     let numbers = numbers(&processors);
     let targets = targets(path, is_distributed.then_some(parts.len()))?;
 
-    let named = |error| ExportError::write(path, error);
+    let named = |error| Failure::at(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let make = |part: usize| {
         let dir = staging.path().join(part.to_string());
         fs::create_dir(&dir).map_err(named)?;
-        parts[part].write(&of_mesh, &numbers, is_distributed, &dir).map_err(|error| match error {
-            ExportError::Write(error) => named(error),
-            error => error,
-        })
+        parts[part]
+            .write(&of_mesh, &numbers, is_distributed, &dir)
+            .map_err(|failure| failure.of_file(path))
     };
     let cells = u64::from(of_mesh.leaves.count());
     let (mut done, all) = (0, (0..targets.len()).collect::<Vec<_>>());
@@ -114,9 +113,9 @@ pub fn write(
                 fs::create_dir_all(target.parent().unwrap_or(target))?;
                 fs::rename(staged.join(part.to_string()), target)
             };
-            place().map_err(|error| ExportError::write(target, error))?;
+            place().map_err(|error| Failure::at(target, error))?;
         }
-        Ok::<(), ExportError>(())
+        Ok::<(), Failure>(())
     })?;
     let mut notes = notes::notes(&of_mesh, &parts, &regions);
     notes.extend(notes::crossing(mesh, selection));
@@ -140,10 +139,10 @@ fn read<'a>(
     mesh: &mesh::Mesh,
     selection: &Selection,
     options: &'a Options<'a>,
-) -> Result<(Mesh<'a>, Vec<Size>), ExportError> {
+) -> Result<(Mesh<'a>, Vec<Size>), Failure> {
     let root = mesh.manifest.root;
     if options.foam.case.is_some_and(|case| case.root != root) {
-        return Err(ExportError::Request(
+        return Err(Failure::input(
             "the mesh has another root than the case: give the case that was meshed".to_owned(),
         ));
     }
@@ -153,7 +152,7 @@ fn read<'a>(
         let is_exported = selection.has(&leaf);
         cells += u64::from(is_exported);
         if cells > CELLS_MAX {
-            return Err(ExportError::Request(format!(
+            return Err(Failure::input(format!(
                 "a polyMesh can have {CELLS_MAX} cells here: select fewer leaves"
             )));
         }
@@ -169,13 +168,13 @@ fn read<'a>(
         return Err(mesh.nothing_selected());
     }
     let patches = Patches::new(options.foam.case, *selection != Selection::default());
-    let (leaves, patches) = (Leaves::new(words), patches.map_err(ExportError::Request)?);
+    let (leaves, patches) = (Leaves::new(words), patches.map_err(Failure::input)?);
     let has_sides = mesh.manifest.sides == Sides::Known;
     build(leaves, Mesh { has_sides, ..Mesh::empty(patches, ranks, root, options) })
 }
 
 /// Leaves out the regions that are not to be exported, and finds points and faces.
-fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<(Mesh<'a>, Vec<Size>), ExportError> {
+fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<(Mesh<'a>, Vec<Size>), Failure> {
     let regions = Regions::new(&leaves, mesh.options)?;
     if mesh.options.foam.regions == options::Regions::Largest && regions.sizes.len() > 1 {
         let is_kept = |cell: u32| regions.of_cell[cell as usize] == regions.sizes[0].0;
@@ -214,13 +213,13 @@ impl<'a> Mesh<'a> {
 fn distribute(
     mesh: &Mesh,
     processors: Option<Processors>,
-    require_ranks: impl FnOnce() -> Result<(), ExportError>,
-) -> Result<Option<Vec<u32>>, ExportError> {
+    require_ranks: impl FnOnce() -> Result<(), Failure>,
+) -> Result<Option<Vec<u32>>, Failure> {
     let cells = u64::from(mesh.leaves.count());
     let of_cells = match processors {
         None => return Ok(None),
         Some(Processors::Equal(count)) if u64::from(count) > cells => {
-            return Err(ExportError::Request(format!(
+            return Err(Failure::input(format!(
                 "{cells} cells are too few for {count} processors: choose fewer"
             )));
         }
@@ -240,7 +239,7 @@ fn distribute(
     }
     match counts.iter().position(|&count| count == 0) {
         None => Ok(Some(of_cells)),
-        Some(rank) => Err(ExportError::Request(format!(
+        Some(rank) => Err(Failure::input(format!(
             "rank {rank} has no cell that is exported, and OpenFOAM needs one on each processor: choose a number of processors"
         ))),
     }
@@ -279,12 +278,9 @@ fn check_parts(mesh: &Mesh, parts: &[Directory]) {
 }
 
 /// The directories to write, none of which may exist with content.
-fn targets(path: &Path, processors: Option<usize>) -> Result<Vec<PathBuf>, ExportError> {
+fn targets(path: &Path, processors: Option<usize>) -> Result<Vec<PathBuf>, Failure> {
     let exists = |path: &Path| {
-        Err(ExportError::Request(format!(
-            "{} exists: remove it, or choose another case",
-            path.display()
-        )))
+        Err(Failure::input(format!("{} exists: remove it, or choose another case", path.display())))
     };
     let Some(count) = processors else {
         let has_content =
@@ -294,7 +290,7 @@ fn targets(path: &Path, processors: Option<usize>) -> Result<Vec<PathBuf>, Expor
     let case =
         path.parent().filter(|constant| constant.ends_with("constant")).and_then(Path::parent);
     let Some(case) = case else {
-        return Err(ExportError::Request(format!(
+        return Err(Failure::input(format!(
             "{}: processor directories belong to a case: choose a path CASE/constant/polyMesh",
             path.display()
         )));
@@ -312,8 +308,8 @@ fn targets(path: &Path, processors: Option<usize>) -> Result<Vec<PathBuf>, Expor
 }
 
 /// The error of labels that are too narrow.
-fn narrow() -> ExportError {
-    ExportError::Request(
+fn narrow() -> Failure {
+    Failure::input(
         "the mesh has more faces than 32-bit labels can number: choose --label 64".to_owned(),
     )
 }

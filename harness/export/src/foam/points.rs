@@ -8,9 +8,9 @@ use rustc_hash::FxHashMap;
 
 use super::leaves::{Leaves, Point};
 use super::squares::{Square, squares};
-use crate::error::ExportError;
 use crate::near_body::polygons::hanging;
 use crate::options::Options;
+use contract::failure::Failure;
 
 /// Number of points that can be distinguished.
 const POINTS_MAX: usize = u32::MAX as usize;
@@ -36,7 +36,7 @@ impl Points {
     ///
     /// # Errors
     /// If there are too many, or if the user interrupts.
-    pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, ExportError> {
+    pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, Failure> {
         let (mut keys, mut begin, mut of_cell) = (Vec::new(), 0, Vec::new());
         leaves.walk(options, &mut |number, around| {
             squares(leaves, around, &mut of_cell);
@@ -58,7 +58,7 @@ impl Points {
         keys.sort();
         keys.dedup();
         if keys.len() > POINTS_MAX {
-            return Err(ExportError::Request(format!(
+            return Err(Failure::input(format!(
                 "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
             )));
         }

@@ -7,8 +7,8 @@ use contract::word;
 
 use super::leaves::Leaves;
 use super::squares::squares;
-use crate::error::ExportError;
 use crate::options::Options;
+use contract::failure::Failure;
 
 /// The regions.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Regions {
     ///
     /// # Errors
     /// If the user interrupts.
-    pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, ExportError> {
+    pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, Failure> {
         // Sets of cells, which are represented by their first cells.
         let mut sets = Sets::new(leaves.count() as usize);
         let mut of_cell = Vec::new();

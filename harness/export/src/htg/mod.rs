@@ -16,11 +16,11 @@ use contract::files;
 use contract::manifest::Sides;
 use vtkhdf::tree::{Shape, TreeWriter};
 
-use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
 use crate::written::Written;
+use contract::failure::Failure;
 use siblings::{Family, Open};
 use windows::Windows;
 
@@ -36,7 +36,7 @@ pub fn write(
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
-) -> Result<Summary, ExportError> {
+) -> Result<Summary, Failure> {
     let mut nodes = vec![1u64];
     let counted = families(mesh, selection, 0, options, &mut |family| {
         let level = usize::from(family.level);
@@ -51,7 +51,7 @@ pub fn write(
     let root = mesh.manifest.root;
     let shape = Shape { origin: root.origin, edge: root.edge, nodes };
     let with_ranks = mesh.leaves_by_rank()?.len() > 1;
-    let named = |error| ExportError::write(path, error);
+    let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, named, |file: &mut File| {
         let out = BufWriter::with_capacity(1 << 20, file);
         let out = TreeWriter::new(out, shape.clone(), with_ranks).map_err(named)?;
@@ -65,7 +65,7 @@ pub fn write(
         assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
         let file = windows.finish().map_err(named)?;
         let file = file.into_inner().map_err(|error| named(error.into_error()))?;
-        Ok::<_, ExportError>(file.metadata().map_err(named)?.len())
+        Ok::<_, Failure>(file.metadata().map_err(named)?.len())
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
@@ -77,8 +77,8 @@ fn families(
     selection: &Selection,
     total: u64,
     options: &Options<'_>,
-    take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
-) -> Result<Written, ExportError> {
+    take: &mut dyn FnMut(Family) -> Result<(), Failure>,
+) -> Result<Written, Failure> {
     let with_sides = mesh.manifest.sides == Sides::Known;
     let (mut open, mut written) = (Open::default(), Written::default());
     mesh.visit(selection, &|| options.check(), &mut |leaf| {

@@ -4,8 +4,8 @@ use contract::octant::LEVEL_MAX;
 use contract::word::{self, Side};
 use vtkhdf::tree::Siblings;
 
-use crate::error::ExportError;
 use crate::leaf::Leaf;
+use contract::failure::Failure;
 
 /// The eight children of an octant, or the root in place of the first of them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,8 +38,8 @@ impl Open {
         &mut self,
         leaf: &Leaf,
         with_sides: bool,
-        take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        take: &mut dyn FnMut(Family) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let (key, level) = (word::key_of(leaf.octant.corner), leaf.octant.level);
         // The families of the common ancestors stay open, and that of the first octants that differ.
         let shared =
@@ -71,8 +71,8 @@ impl Open {
     /// Passes on all families that are still open.
     pub(super) fn finish(
         mut self,
-        take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        take: &mut dyn FnMut(Family) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         self.close(0, take)
     }
 
@@ -80,8 +80,8 @@ impl Open {
     fn close(
         &mut self,
         count: usize,
-        take: &mut dyn FnMut(Family) -> Result<(), ExportError>,
-    ) -> Result<(), ExportError> {
+        take: &mut dyn FnMut(Family) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         while self.families.len() > count {
             self.families.pop().map_or(Ok(()), &mut *take)?;
         }

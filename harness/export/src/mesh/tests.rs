@@ -5,7 +5,7 @@ use contract::testing::random_words;
 use contract::word::Side;
 use proptest::prelude::*;
 
-fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>, ExportError> {
+fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>, Failure> {
     let mut words = Vec::new();
     mesh.visit(selection, &|| Ok(()), &mut |leaf| {
         words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));

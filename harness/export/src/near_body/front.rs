@@ -12,9 +12,9 @@ use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kinds, Neighbourhood, Tree};
 use contract::word::{self, Side};
 
-use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::selection::Selection;
+use contract::failure::Failure;
 
 /// What a face is exposed to: crossing leaves, and none.
 const OPEN: Kinds = HOLES | 1 << Side::Crossing as u8;
@@ -67,8 +67,8 @@ impl Face {
 pub fn front(
     mesh: &Mesh,
     selection: &Selection,
-    check: &dyn Fn() -> Result<(), ExportError>,
-) -> Result<Vec<Face>, ExportError> {
+    check: &dyn Fn() -> Result<(), Failure>,
+) -> Result<Vec<Face>, Failure> {
     let tree = mesh.tree()?;
     let mut found = Vec::new();
     search(&tree, &Neighbourhood::root(&tree), &mut found, check)?;
@@ -89,8 +89,8 @@ fn search(
     tree: &Tree,
     around: &Neighbourhood,
     found: &mut Vec<(u64, Face)>,
-    check: &dyn Fn() -> Result<(), ExportError>,
-) -> Result<(), ExportError> {
+    check: &dyn Fn() -> Result<(), Failure>,
+) -> Result<(), Failure> {
     if around.handles.iter().all(|&handle| tree.kinds(handle) & OPEN == 0) {
         return Ok(());
     }

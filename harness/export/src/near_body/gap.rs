@@ -9,7 +9,7 @@ use contract::octant::UNITS_PER_CELL;
 use geometry::tree::{FacetTree, Point};
 
 use super::front::Face;
-use crate::error::ExportError;
+use contract::failure::Failure;
 
 /// The distances of a face from the wall, in the user's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +27,8 @@ pub struct Gap {
 pub fn gaps(
     case: &Case,
     faces: &[Face],
-    check: &dyn Fn() -> Result<(), ExportError>,
-) -> Result<Vec<Gap>, ExportError> {
+    check: &dyn Fn() -> Result<(), Failure>,
+) -> Result<Vec<Gap>, Failure> {
     let facets = FacetTree::new(&case.facets_lattice);
     let unit = case.root.edge / UNITS_PER_EDGE as f64;
     let mut gaps = Vec::with_capacity(faces.len());

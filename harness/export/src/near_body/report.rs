@@ -10,8 +10,8 @@ use serde::Serialize;
 use super::front::Face;
 use super::gap::Gap;
 use super::polygons::Polygons;
-use crate::error::ExportError;
 use crate::mesh::Mesh;
+use contract::failure::Failure;
 
 /// Schema of the report as JSON.
 pub const SCHEMA: &str = "octree-near-body/1";
@@ -76,7 +76,7 @@ impl Report {
         polygons: &Polygons,
         gaps: Option<&[Gap]>,
         is_whole: bool,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, Failure> {
         let root = &mesh.manifest.root;
         let area = |face: &Face| edge_of_level(root, face.level).powi(2);
         let mut faces_by_level = [0; LEVEL_MAX as usize + 1];

@@ -21,11 +21,11 @@ use contract::digest::Digest;
 use contract::files;
 use contract::manifest::Sides;
 
-use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
 use crate::written::Written;
+use contract::failure::Failure;
 use file::VtuFile;
 use header::Content;
 use piece::{Encoded, Encoder};
@@ -44,9 +44,9 @@ pub fn write_file(
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
-) -> Result<Summary, ExportError> {
+) -> Result<Summary, Failure> {
     let leaves = mesh.count(selection, &|| options.check())?;
-    let named = |error| ExportError::write(path, error);
+    let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
         let file = file.try_clone().map_err(named)?;
         let mut file =
@@ -66,8 +66,8 @@ fn encode(
     selection: &Selection,
     leaves: u64,
     options: &Options<'_>,
-    take: &mut dyn FnMut(Encoded) -> Result<(), ExportError>,
-) -> Result<(), ExportError> {
+    take: &mut dyn FnMut(Encoded) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     let content = &content(mesh);
     let (mut written, check) = (Written::default(), || options.check());
     let mut flush = |encoders: &mut [Encoder]| {
@@ -83,7 +83,7 @@ fn encode(
             take(piece)?;
             options.watch.progress(written.cells, leaves);
         }
-        Ok::<(), ExportError>(())
+        Ok::<(), Failure>(())
     };
     let jobs = options.jobs.get().min(leaves.div_ceil(PIECE) as usize);
     let mut encoders: Vec<Encoder> = (0..jobs).map(|_| Encoder::default()).collect();

@@ -13,10 +13,10 @@ use contract::files::{self, Staging};
 use super::file::VtuFile;
 use super::header::MARK;
 use super::{PIECE, content, encode};
-use crate::error::ExportError;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
+use contract::failure::Failure;
 
 /// Pieces in one file.
 const PIECES: usize = 4;
@@ -31,17 +31,17 @@ pub fn write_files(
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
-) -> Result<Summary, ExportError> {
+) -> Result<Summary, Failure> {
     let stem = path.file_stem().and_then(|stem| stem.to_str()).ok_or_else(|| {
         let path = path.display();
-        ExportError::Request(format!("{path}: the name is not UTF-8: choose another"))
+        Failure::input(format!("{path}: the name is not UTF-8: choose another"))
     })?;
     let folder = format!("{stem}_pieces");
     let directory = path.with_file_name(&folder);
     refuse_other_files(&directory)?;
     let leaves = mesh.count(selection, &|| options.check())?;
     let mut left = leaves.div_ceil(PIECE) as usize;
-    let named = |error| ExportError::write(&directory, error);
+    let named = |error| Failure::at(&directory, error);
     let place = Staging::beside(&directory).map_err(named)?;
     let (mut whole, mut bytes, mut files) = (content(mesh), 0, Vec::new());
     let mut begun: Option<VtuFile> = None;
@@ -72,7 +72,7 @@ pub fn write_files(
 }
 
 /// An error if the directory exists and has a file that an earlier export did not write.
-fn refuse_other_files(directory: &Path) -> Result<(), ExportError> {
+fn refuse_other_files(directory: &Path) -> Result<(), Failure> {
     let entries = match fs::read_dir(directory) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         entries => entries.map_err(to_write(directory))?,
@@ -80,7 +80,7 @@ fn refuse_other_files(directory: &Path) -> Result<(), ExportError> {
     for entry in entries {
         let path = entry.map_err(to_write(directory))?.path();
         if !is_ours(&path).unwrap_or(false) {
-            return Err(ExportError::Request(format!(
+            return Err(Failure::input(format!(
                 "{}: was not written by harness export, and its directory would be replaced: move it, or choose \
                  another name for the export",
                 path.display()
@@ -91,7 +91,7 @@ fn refuse_other_files(directory: &Path) -> Result<(), ExportError> {
 }
 
 /// Gives all files their final names.
-fn publish(path: &Path, directory: &Path, staged: &Path, xml: &str) -> Result<(), ExportError> {
+fn publish(path: &Path, directory: &Path, staged: &Path, xml: &str) -> Result<(), Failure> {
     let synchronised = File::open(staged).and_then(|directory| directory.sync_all());
     synchronised.map_err(to_write(directory))?;
     refuse_other_files(directory)?;
@@ -112,8 +112,8 @@ fn publish(path: &Path, directory: &Path, staged: &Path, xml: &str) -> Result<()
 }
 
 /// Makes an error of a file that names it.
-fn to_write(path: &Path) -> impl Fn(io::Error) -> ExportError + '_ {
-    |error| ExportError::write(path, error)
+fn to_write(path: &Path) -> impl Fn(io::Error) -> Failure + '_ {
+    |error| Failure::at(path, error)
 }
 
 /// Deletes something that may be missing.

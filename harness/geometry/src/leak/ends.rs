@@ -6,13 +6,16 @@ use contract::word::{self, Side};
 
 use super::passage::to_user;
 use crate::tree::Point;
+use serde::Serialize;
 
 /// Where a path ends, in the user's units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Target {
     /// The far field: any leaf at the root's boundary.
     Far,
     /// The leaf that contains a point.
+    #[serde(untagged)]
     Point([f64; 3]),
 }
 

@@ -8,8 +8,8 @@
 //!   twice the distance to the nearest facet, which is one of the rim.
 //! - Levels that join the ends, the level that closes or opens, and the existence of a path agree.
 
-use super::ends::{is_free, leaf_at};
-use super::report::{Destination, Passage, Report};
+use super::ends::{Target, is_free, leaf_at};
+use super::report::{Passage, Report};
 use crate::tree::{Point, from_edges, from_point, triangle};
 use contract::case::Case;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
@@ -63,7 +63,7 @@ fn is_near(a: f64, b: f64) -> bool {
 }
 
 impl Passage {
-    fn check_invariants(&self, case: &Case, words: &[u64], from: [f64; 3], to: Destination) {
+    fn check_invariants(&self, case: &Case, words: &[u64], from: [f64; 3], to: Target) {
         let (edge, scale) = (UNITS_PER_EDGE as f64, UNITS_PER_EDGE as f64 / case.root.edge);
         let lattice = |at: [f64; 3]| (Point::from(at) - Point::from(case.root.origin)) * scale;
         let points: Vec<Point> = self.points.iter().map(|point| lattice(point.at)).collect();
@@ -72,8 +72,8 @@ impl Passage {
         assert_eq!(outside, None, "a point of the path is outside the root");
         let end = points[points.len() - 1];
         let is_end = match to {
-            Destination::Point(to) => end.distance(lattice(to)) <= ROUNDING,
-            Destination::Far(_) => margin(&end) <= ROUNDING,
+            Target::Point(to) => end.distance(lattice(to)) <= ROUNDING,
+            Target::Far => margin(&end) <= ROUNDING,
         };
         let is_start = points[0].distance(lattice(from)) <= ROUNDING;
         assert!(is_start && is_end, "the path leads from {} to {end}", points[0]);
@@ -152,21 +152,19 @@ impl Passage {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ends::Target;
+    use super::super::Leaks;
     use super::super::report::Spacing;
-    use super::super::{Leaks, Watch};
     use super::*;
+    use contract::failure::Failure;
     use contract::testing::base_tree;
+    use contract::watch::Watch;
     use contract::word::Side;
     use geometries::{Generator, Shape};
-    use std::convert::Infallible;
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
     struct Silent;
 
     impl Watch for Silent {
-        fn step(&self, _: &str) {}
-
         fn is_interrupted(&self) -> bool {
             false
         }
@@ -178,10 +176,11 @@ mod tests {
         facets.remove(77);
         let text = "spacing_min = 0.015625\n[root]\norigin = [-0.99, -1.03, -1.01]\nedge = 2.0";
         let case = Case::from_parts(text, facets).unwrap();
-        let tree = |level| Ok::<_, Infallible>(base_tree(&case.facets_lattice, level));
+        let tree = |level| Ok::<_, Failure>(base_tree(&case.facets_lattice, level));
         let mut leaks = Leaks::new(&case, tree, 1_000_000, &Silent).unwrap();
         let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
-        let words = leaks.words(report.passage.as_ref().unwrap()).to_vec();
+        let level = report.passage.as_ref().unwrap().spacing.level;
+        let words = leaks.trees[&level].clone();
         drop(leaks);
         (case, report, words)
     }

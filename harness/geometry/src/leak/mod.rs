@@ -18,43 +18,15 @@ mod surface;
 mod text;
 
 use std::collections::BTreeMap;
-use std::fmt::Display;
 
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::octant::LEVEL_MAX;
+use contract::watch::Watch;
 use ends::Target;
-use report::{Answers, Destination, Meshed, Passage, Report, SCHEMA, Spacing};
+use report::{Answers, Meshed, Report, SCHEMA, Spacing};
 use space::{Goal, Space};
-
-/// The search was interrupted.
-#[derive(Clone, Copy, Debug)]
-pub struct Interrupted;
-
-/// Why a question has no answer.
-#[derive(Debug)]
-pub enum LeakError<E> {
-    /// The user's input, in one sentence.
-    Input(String),
-    /// A base tree could not be made.
-    Source(E),
-    /// The search was interrupted.
-    Interrupted,
-}
-
-impl<E> From<Interrupted> for LeakError<E> {
-    fn from(_: Interrupted) -> Self {
-        Self::Interrupted
-    }
-}
-
-/// Events during the search.
-pub trait Watch {
-    /// A step begins.
-    fn step(&self, what: &str);
-    /// Whether the user has interrupted the search.
-    fn is_interrupted(&self) -> bool;
-}
 
 /// A case whose openings are searched.
 pub struct Leaks<'a, F> {
@@ -69,7 +41,7 @@ pub struct Leaks<'a, F> {
     watch: &'a dyn Watch,
 }
 
-impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
+impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     /// A case; `make` returns the sorted leaf words of its base tree at another surface level.
     ///
     /// # Errors
@@ -79,26 +51,19 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         make: F,
         leaves_max: u64,
         watch: &'a dyn Watch,
-    ) -> Result<Self, LeakError<E>> {
+    ) -> Result<Self, Failure> {
         if case.facets.is_empty() {
-            return Err(LeakError::Input(
-                "the case has no facets, so nothing separates places".into(),
-            ));
+            return Err(Failure::input("the case has no facets, so nothing separates places"));
         }
         let facets = FacetTree::new(&case.facets_lattice);
         Ok(Self { case, facets, make, trees: BTreeMap::new(), leaves_max, watch })
-    }
-
-    /// The sorted words of the base tree that a path leads through.
-    pub fn words(&self, passage: &Passage) -> &[u64] {
-        &self.trees[&passage.spacing.level]
     }
 
     /// Answers for pairs of places, with their invariants checked.
     ///
     /// # Errors
     /// If an end is outside the root or in a crossing leaf, if a base tree cannot be made, or if `watch` is interrupted.
-    pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers, LeakError<E>> {
+    pub fn answers(&mut self, ends: &[([f64; 3], Target)]) -> Result<Answers, Failure> {
         let examined =
             ends.iter().map(|&(from, to)| self.answer(from, to)).collect::<Result<_, _>>()?;
         let case = self.case;
@@ -106,21 +71,18 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         Ok(Answers { schema: SCHEMA, case: case.name.clone(), facets, root: case.root, examined })
     }
 
-    fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report, LeakError<E>> {
+    fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report, Failure> {
         let (root, level) = (&self.case.root, self.case.level_surface);
-        let start = ends::on_lattice("--from", from, root).map_err(LeakError::Input)?;
-        let (end, to) = match to {
-            Target::Far => (None, Destination::Far("far")),
-            Target::Point(at) => {
-                let end = ends::on_lattice("--to", at, root).map_err(LeakError::Input)?;
-                (Some(end), Destination::Point(at))
-            }
+        let start = ends::on_lattice("--from", from, root)?;
+        let end = match to {
+            Target::Far => None,
+            Target::Point(at) => Some(ends::on_lattice("--to", at, root)?),
         };
         let ends = (start, end);
         self.make_tree(level)?;
         let mut levels = vec![self.search(level, ends)?];
         if levels[0].why.is_some() {
-            return Err(LeakError::Input(self.crossed_end(level, ends)));
+            return Err(Failure::input(self.crossed_end(level, ends)));
         }
         let spacing = |level| Spacing::of(level, root);
         let mut report = Report {
@@ -158,29 +120,25 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
             let tree = (level, &self.trees[&level][..]);
             report.passage = Some(passage::widest((self.case, &self.facets), tree, ends, &stop)?);
         }
-        let words = report.passage.as_ref().map_or(&[][..], |passage| self.words(passage));
+        let words = measured.map_or(&[][..], |level| &self.trees[&level]);
         report.check_invariants(self.case, words);
         Ok(report)
     }
 
-    fn make_tree(&mut self, level: u8) -> Result<(), LeakError<E>> {
+    fn make_tree(&mut self, level: u8) -> Result<(), Failure> {
         if !self.trees.contains_key(&level) {
             self.watch.step(&format!("meshing the base tree of level {level}"));
-            let words = (self.make)(level).map_err(LeakError::Source)?;
+            let words = (self.make)(level)?;
             self.trees.insert(level, words);
         }
         Ok(())
     }
 
     /// Whether free leaves of a base tree join the ends. The coarsest leaves are searched first: few of them lead far.
-    fn search(
-        &self,
-        level: u8,
-        (from, to): (Point, Option<Point>),
-    ) -> Result<Meshed, LeakError<E>> {
+    fn search(&self, level: u8, (from, to): (Point, Option<Point>)) -> Result<Meshed, Failure> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let words = &self.trees[&level];
-        let mut space = Space::new(words, &self.facets).map_err(LeakError::Input)?;
+        let mut space = Space::new(words, &self.facets)?;
         let is_crossed = |at: Point| !ends::is_free(ends::leaf_at(words, at));
         let why = match (is_crossed(from), to.is_some_and(is_crossed)) {
             (true, _) => Some("facets cross the leaf of the start"),
@@ -216,7 +174,7 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         &mut self,
         ends: (Point, Option<Point>),
         levels: &mut Vec<Meshed>,
-    ) -> Result<Option<u8>, LeakError<E>> {
+    ) -> Result<Option<u8>, Failure> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             levels.push(self.search(level, ends)?);
@@ -232,7 +190,7 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
         &mut self,
         ends: (Point, Option<Point>),
         levels: &mut Vec<Meshed>,
-    ) -> Result<Result<u8, String>, LeakError<E>> {
+    ) -> Result<Result<u8, String>, Failure> {
         // Halving the spacing of a surface multiplies its leaves by four.
         const GROWTH: u64 = 4;
         for level in self.case.level_surface + 1..=LEVEL_MAX {
@@ -244,8 +202,8 @@ impl<'a, E: Display, F: FnMut(u8) -> Result<Vec<u64>, E>> Leaks<'a, F> {
                 )));
             }
             match self.make_tree(level) {
-                Err(LeakError::Source(error)) if !self.watch.is_interrupted() => {
-                    return Ok(Err(format!("level {level} could not be meshed: {error}")));
+                Err(failure) if !self.watch.is_interrupted() => {
+                    return Ok(Err(format!("level {level} could not be meshed: {failure}")));
                 }
                 made => made?,
             }

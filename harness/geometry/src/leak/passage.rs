@@ -11,11 +11,11 @@
 //! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
 //! the width counts from there.
 
-use super::Interrupted;
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
 use super::space::{Goal, Space};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 
 /// Ratio of the bounds on the width, at most.
@@ -67,7 +67,7 @@ pub fn widest(
     (level, words): (u8, &[u64]),
     (from, to): (Point, Option<Point>),
     stop: &dyn Fn() -> bool,
-) -> Result<Passage, Interrupted> {
+) -> Result<Passage, Failure> {
     let mut space = Space::new(words, facets).expect("the tree was searched before");
     let from = approach(&mut space, from);
     let to = to.map_or(Vec::new(), |to| approach(&mut space, to));
@@ -133,7 +133,7 @@ fn is_in_root(at: Point) -> bool {
 
 impl Search<'_> {
     /// The widest path, and the radius that no ball on another path exceeds.
-    fn converge(&mut self) -> Result<(Way, f64), Interrupted> {
+    fn converge(&mut self) -> Result<(Way, f64), Failure> {
         let start = self.from[self.from.len() - 1];
         let goal = self.to.last().map_or(Goal::Far, |&to| Goal::At(to));
         let mut cap = f32::INFINITY;

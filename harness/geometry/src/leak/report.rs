@@ -2,6 +2,7 @@
 //!
 //! Its invariants are in [`super::invariants`].
 
+use super::ends::Target;
 use contract::lattice::Root;
 use serde::Serialize;
 
@@ -89,23 +90,13 @@ pub struct Passage {
     pub points: Vec<Point>,
 }
 
-/// The end of the path.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Destination {
-    /// A point.
-    Point([f64; 3]),
-    /// `"far"`: the root's boundary.
-    Far(&'static str),
-}
-
 /// The answer for two places.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The start.
     pub from: [f64; 3],
     /// The end.
-    pub to: Destination,
+    pub to: Target,
     /// The case's surface level and spacing.
     #[serde(flatten)]
     pub spacing: Spacing,

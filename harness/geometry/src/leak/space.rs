@@ -6,8 +6,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::Interrupted;
 use crate::tree::{FacetTree, Point};
+use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::Octant;
 use contract::word::{self, KEY_END, Side};
@@ -234,7 +234,7 @@ impl<'a> Space<'a> {
         cap: f32,
         width: fn(&mut Self, u32) -> f64,
         stop: &dyn Fn() -> bool,
-    ) -> Result<Option<(Vec<u32>, f32)>, Interrupted> {
+    ) -> Result<Option<(Vec<u32>, f32)>, Failure> {
         let end = match goal {
             Goal::At(at) => Some(self.locate(at)),
             Goal::Far => None,
@@ -262,7 +262,7 @@ impl<'a> Space<'a> {
                 return Ok(Some((path, label.0)));
             }
             if stop() {
-                return Err(Interrupted);
+                return Err(Failure::interrupted());
             }
             joined.clear();
             self.neighbours(cell, &mut |next| joined.push(next));

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::report::{Answers, Destination, Meshed, Passage, Report, Spacing};
+use super::ends::Target;
+use super::report::{Answers, Meshed, Passage, Report, Spacing};
 use contract::number::number;
 
 /// Facets at the rim that are printed.
@@ -23,8 +24,8 @@ impl fmt::Display for Answers {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let to = match &self.to {
-            Destination::Point(at) => point(at),
-            Destination::Far(_) => "the far field".to_owned(),
+            Target::Point(at) => point(at),
+            Target::Far => "the far field".to_owned(),
         };
         writeln!(f, "from      {}", point(&self.from))?;
         writeln!(f, "to        {to}")?;
@@ -173,7 +174,7 @@ mod tests {
         let points: Vec<Point> = (0..points).map(point).collect();
         Report {
             from: [0.0, 0.25, 1.0],
-            to: Destination::Far("far"),
+            to: Target::Far,
             spacing,
             is_leak: true,
             closes: Some(Spacing::of(2, &root)),
@@ -216,7 +217,7 @@ mod tests {
     #[test]
     fn a_path_that_is_narrowest_at_its_end_has_no_opening() {
         let mut report = leak(1, narrowest(3..4, 0, true));
-        (report.closes, report.to) = (None, Destination::Point([1.0, 2.0, 3.5]));
+        (report.closes, report.to) = (None, Target::Point([1.0, 2.0, 3.5]));
         let text = report.to_string();
         let start = "from      (0, 0.25, 1)\nto        (1, 2, 3.5)\n";
         assert!(text.starts_with(start), "{text}");

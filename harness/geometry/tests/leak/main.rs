@@ -3,17 +3,18 @@
 mod openings;
 
 use contract::case::{Case, Facet};
+use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
+use contract::watch::Watch;
+use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Report};
-use geometry::leak::{LeakError, Leaks, Watch};
 use openings::{
     Body, ROTATIONS, bodies, crack, hole, missing_facet, pipe, slit, torn_sphere, two_holes,
 };
 use proptest::prelude::*;
-use std::cell::Cell;
-use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Neither the bodies' centre nor their walls are in the planes of cells.
 const ROOT: Root = Root { origin: [-3.91, -4.13, -4.07], edge: 8.0 };
@@ -23,8 +24,6 @@ const LEAVES_MAX: u64 = 1_000_000;
 struct Silent;
 
 impl Watch for Silent {
-    fn step(&self, _: &str) {}
-
     fn is_interrupted(&self) -> bool {
         false
     }
@@ -41,15 +40,11 @@ fn case(facets: &[Facet], level: u8) -> Case {
     case_in(ROOT, facets, level)
 }
 
-fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, LeakError<Infallible>> {
+fn ask(case: &Case, from: [f64; 3], to: Target) -> Result<Report, Failure> {
     answers(case, &[(from, to)], LEAVES_MAX).map(|mut answers| answers.examined.remove(0))
 }
 
-fn answers(
-    case: &Case,
-    ends: &[([f64; 3], Target)],
-    leaves_max: u64,
-) -> Result<Answers, LeakError<Infallible>> {
+fn answers(case: &Case, ends: &[([f64; 3], Target)], leaves_max: u64) -> Result<Answers, Failure> {
     Leaks::new(case, |level| Ok(base_tree(&case.facets_lattice, level)), leaves_max, &Silent)?
         .answers(ends)
 }
@@ -136,7 +131,7 @@ proptest! {
         let case = case_in(Root { origin, edge: 8.0 }, &body.facets, level);
         let report = match ask(&case, [0.0; 3], Target::Far) {
             // Facets cross the leaf of the start at coarse levels.
-            Err(LeakError::Input(why)) => {
+            Err(Failure { why, .. }) => {
                 prop_assert!(why.contains("facets cross"), "{}", why);
                 return Ok(());
             }
@@ -208,22 +203,20 @@ fn a_closed_body_never_opens_and_that_is_proven_without_refinement() {
 
 #[test]
 fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported() {
-    struct Interruptible(Cell<bool>);
+    struct Interruptible(AtomicBool);
     impl Watch for Interruptible {
-        fn step(&self, _: &str) {}
-
         fn is_interrupted(&self) -> bool {
-            self.0.get()
+            self.0.load(Ordering::Relaxed)
         }
     }
     let case = case(&bodies()[0].facets, 3);
     let ask = |interrupts: bool| {
-        let watch = Interruptible(Cell::new(false));
+        let watch = Interruptible(AtomicBool::new(false));
         let tree = |level| match level {
             3 => Ok(base_tree(&case.facets_lattice, level)),
             _ => {
-                watch.0.set(interrupts);
-                Err(format!("no memory for level {level}"))
+                watch.0.store(interrupts, Ordering::Relaxed);
+                Err(Failure::input(format!("no memory for level {level}")))
             }
         };
         let answers = Leaks::new(&case, tree, LEAVES_MAX, &watch)
@@ -235,7 +228,7 @@ fn a_finer_base_tree_that_cannot_be_meshed_ends_the_refinement_and_is_reported()
     assert!(!report.is_leak && report.opens.is_none() && report.passage.is_none());
     assert_eq!(report.limit.unwrap(), "level 4 could not be meshed: no memory for level 4");
     // A mesher that the user's signal ended is no reason to answer.
-    assert!(matches!(ask(true), Err(LeakError::Source(_))));
+    assert!(ask(true).is_err());
 }
 
 #[test]
@@ -263,7 +256,7 @@ fn a_path_to_a_point_ends_there_and_bad_points_are_input_errors() {
     let same = ask(&case, [0.0; 3], Target::Point([0.01; 3])).unwrap();
     assert!(same.is_leak && same.passage.unwrap().narrowest.is_end);
     let why = |from, to| match ask(&case, from, to) {
-        Err(LeakError::Input(why)) => why,
+        Err(Failure { why, .. }) => why,
         other => panic!("{other:?}"),
     };
     assert!(why([9.0; 3], Target::Far).contains("--from [9.0, 9.0, 9.0] is outside the root"));

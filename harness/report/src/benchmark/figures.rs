@@ -1,8 +1,8 @@
-//! The figures of a record: counterparts of the paper's Figures 17 to 23, messages, and time, rate and memory over cells.
+//! The figures of a record: counterparts of the paper's Figures 17 to 23, and time, rate and memory over cells.
 
 use super::groups::{by_case, engines, point, provenance, repetitions};
 use super::paper::{self, cited};
-use super::{balance, matrix, scaling};
+use super::{balance, scaling};
 use crate::figure::{Axis, Body, Figure, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
@@ -15,7 +15,6 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all.extend(by_case(groups, "layers").iter().map(|(case, of)| time_by_layers(case, of)));
     all.extend(scaling::figures(groups));
     all.extend(balance::figures(groups));
-    all.extend(groups.matrices.iter().map(matrix::figure));
     all.extend(rate_and_memory(groups));
     all
 }

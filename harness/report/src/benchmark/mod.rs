@@ -5,7 +5,6 @@ mod figures;
 mod groups;
 mod html;
 mod latex;
-mod matrix;
 mod paper;
 mod rules;
 mod scaling;

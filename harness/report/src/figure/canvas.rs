@@ -203,16 +203,6 @@ impl Canvas<'_> {
         );
     }
 
-    /// Outlined polygons of one colour.
-    pub fn polygons(&mut self, polygons: &[Vec<At>], fill: &str, stroke: &str) {
-        let point = |p: &At| format!("{},{}", round(p.0), round(p.1));
-        let path = |polygon: &Vec<At>| {
-            format!("M{}z", polygon.iter().map(point).collect::<Vec<_>>().join(" "))
-        };
-        let path: String = polygons.iter().map(path).collect();
-        self.path(&path, &format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"1.5\""));
-    }
-
     /// Segments of one colour and width, with round ends.
     pub fn segments(&mut self, segments: &[[At; 2]], colour: &str, width: f64) {
         let path = |[p, q]: &[At; 2]| {

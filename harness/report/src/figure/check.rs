@@ -2,10 +2,10 @@
 //!
 //! - Names of figures are those of files and differ; axes have labels, and a caption states what is shown.
 //! - Numbers are finite; a point is within its interval; on a logarithmic axis it is positive, because it would be missing there.
-//! - Bars have a value for each category and segment, and none is negative; entries of a matrix lie in it.
+//! - Bars have a value for each category and segment, and none is negative.
 //! - A point above the ideal line has a reason in the caption.
 
-use super::{Axis, Body, Figure, HeatMap, Layer, Point, Provenance, Series};
+use super::{Axis, Body, Figure, Point, Provenance, Series};
 use std::collections::BTreeSet;
 
 /// Asserts the invariants of the figures of a report.
@@ -43,7 +43,6 @@ pub fn check_figure(figure: &Figure) {
             let are_complete = bars.segments.iter().all(|(_, values)| values.len() == count);
             assert!(are_complete, "figure {id}: a segment has more or fewer values than {count}");
         }
-        Body::HeatMap(map) => check_matrix(id, map),
     }
 }
 
@@ -73,20 +72,9 @@ fn check_ideal(figure: &Figure, series: &[Series]) {
     );
 }
 
-fn check_matrix(id: &str, HeatMap { order, layers, .. }: &HeatMap) {
-    for Layer { label, entries } in layers {
-        let is_within = |e: &(usize, usize, f64)| e.0.max(e.1) < *order && e.2 >= 0.0;
-        let wrong = entries.iter().find(|e| !is_within(e) || e.2.is_infinite());
-        assert!(wrong.is_none(), "figure {id}, {label}: {wrong:?} in a matrix of {order}");
-        let places: BTreeSet<_> = entries.iter().map(|e| (e.0, e.1)).collect();
-        let count = entries.len();
-        assert_eq!(places.len(), count, "figure {id}, {label}: two entries in one place");
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{figure, heat_map, series};
+    use super::super::samples::{figure, series};
     use super::super::{Bars, name_apart};
     use super::*;
     use proptest::prelude::*;
@@ -127,11 +115,6 @@ mod tests {
         bars
     }
 
-    fn map_of(figure: &mut Figure) -> &mut HeatMap {
-        let Body::HeatMap(map) = &mut figure.body else { panic!("no matrix") };
-        map
-    }
-
     #[test]
     fn planted_wrong_figures_are_noticed() {
         assert_noticed(&points(), "not a name of a file", |f| f.id = "two words".into());
@@ -146,8 +129,6 @@ mod tests {
         });
         assert_noticed(&bars(), "no length", |f| bars_of(f).segments[0].1[0] = -1.0);
         assert_noticed(&bars(), "more or fewer", |f| bars_of(f).categories.truncate(1));
-        assert_noticed(&heat_map(), "in a matrix of 3", |f| map_of(f).layers[0].entries[0].1 = 3);
-        assert_noticed(&heat_map(), "two entries", |f| map_of(f).layers[0].entries[1].1 = 1);
         assert_noticed(&points(), "gives no reason", |f| {
             let ends = [1.0, 4.0].map(|x| Point::exact(x, x / 2.0)).to_vec();
             series_of(f).push(Series::new("ideal", Provenance::Bound, 0, ends));

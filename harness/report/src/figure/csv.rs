@@ -2,10 +2,10 @@
 
 use super::{Body, Figure, Point, Series};
 
-/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title, the axes and the command of a run. Rows that belong
+/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes. Rows that belong
 /// together have the same number `plot`.
 pub fn csv(figure: &Figure) -> String {
-    let mut head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
+    let head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
     let (columns, rows): (&[&str], Vec<Vec<String>>) = match &figure.body {
         Body::Points { series, .. } => {
             let point = |plot: usize, s: &Series, p: &Point| {
@@ -33,15 +33,6 @@ pub fn csv(figure: &Figure) -> String {
                 rows.extend(ends.map(|x| row(plot, &[x, *level], &["", name, "bound"])));
             }
             (&["plot", "x", "value", "bar", "part", "how"], rows)
-        }
-        Body::HeatMap(map) => {
-            head += &format!("# {}\n", map.command);
-            let layers = map.layers.iter().enumerate();
-            let rows = layers.flat_map(|(plot, layer)| {
-                let entries = layer.entries.iter();
-                entries.map(move |e| row(plot, &[e.0 as f64, e.1 as f64, e.2], &[&layer.label]))
-            });
-            (&["plot", "row", "column", "value", "quantity"], rows.collect())
         }
     };
     head + &table(columns, rows)
@@ -77,18 +68,8 @@ pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> S
 #[cfg(test)]
 mod tests {
     use super::super::Provenance;
-    use super::super::samples::{figure, heat_map, series};
+    use super::super::samples::{figure, series};
     use super::*;
-
-    #[test]
-    fn a_matrix_has_its_command_and_a_line_per_entry() {
-        let text = csv(&heat_map());
-        assert!(
-            text.contains("# mesher a,b\nplot,row,column,value,quantity\n0,0,1,10,bytes\n"),
-            "{text}"
-        );
-        assert_eq!(text.lines().count(), 4 + 3);
-    }
 
     #[test]
     fn every_point_is_a_line_and_text_is_plain() {

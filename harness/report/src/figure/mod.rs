@@ -1,4 +1,4 @@
-//! The model of a figure: axes, series, bars, heat maps. SVG ([`svg`], by `plotters`) and CSV ([`csv`]) are produced from it, PNG and PDF
+//! The model of a figure: axes, series, bars. SVG ([`svg`], by `plotters`) and CSV ([`csv`]) are produced from it, PNG and PDF
 //! from the SVG, and an axis of `pgfplots` that reads the CSV ([`tex`]).
 //!
 //! Invariants: every value states its provenance; points are joined only where interpolation between them is
@@ -8,7 +8,6 @@ pub(crate) mod axes;
 pub mod canvas;
 pub mod check;
 pub mod csv;
-pub mod heat;
 pub mod palette;
 #[cfg(feature = "figures")]
 pub mod raster;
@@ -160,26 +159,6 @@ pub struct Bars {
     pub provenance: Provenance,
 }
 
-/// Square matrices, drawn side by side.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeatMap {
-    /// Number of rows and of columns.
-    pub order: usize,
-    /// The matrices.
-    pub layers: Vec<Layer>,
-    /// Command line of the run that the matrices are from.
-    pub command: String,
-}
-
-/// A sparse matrix.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Layer {
-    /// Quantity and unit.
-    pub label: String,
-    /// Row, column and value of every nonzero entry.
-    pub entries: Vec<(usize, usize, f64)>,
-}
-
 /// The data of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Body {
@@ -192,8 +171,6 @@ pub enum Body {
     },
     /// Bars over categories.
     Bars(Bars),
-    /// Matrices in colours; the first row is at the top.
-    HeatMap(HeatMap),
 }
 
 impl Body {
@@ -295,18 +272,5 @@ pub(crate) mod samples {
         });
         let name = format!("UAV, {}", provenance.word());
         Series::new(&name, provenance, 0, points.to_vec())
-    }
-
-    pub(crate) fn heat_map() -> Figure {
-        let layer =
-            Layer { label: "bytes".into(), entries: vec![(0, 1, 10.0), (0, 2, 11.0), (2, 0, 1e6)] };
-        let map = HeatMap { order: 3, layers: vec![layer], command: "mesher a,b".into() };
-        Figure {
-            id: "messages".into(),
-            caption: "On 3 simulated ranks, without collective calls.".into(),
-            x: Axis::linear("to rank"),
-            y: Axis::linear("from rank"),
-            ..figure(Body::HeatMap(map))
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Colours, dashes and markers of series, and the colour map of heat maps.
+//! Colours, dashes and markers of series, and the colour map of levels.
 
 use plotters::style::RGBColor;
 
@@ -27,7 +27,7 @@ pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// Number of colours in a heat map.
+/// Number of colours in the map.
 pub const SHADES: usize = 24;
 
 /// Cividis from its light to its dark end: it looks alike with and without deficiencies of colour vision, and larger

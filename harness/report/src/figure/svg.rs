@@ -6,7 +6,7 @@ use super::axes::{BELOW, ToPage, axes, left};
 use super::canvas::*;
 use super::palette::colour;
 use super::scale::range;
-use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series, heat};
+use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series};
 use plotters::style::colors::BLACK;
 
 /// The figure as an SVG document.
@@ -15,7 +15,6 @@ pub fn svg(figure: &Figure) -> String {
         match &figure.body {
             Body::Points { series, marks } => points(canvas, figure, series, marks),
             Body::Bars(bars) => draw_bars(canvas, figure, bars),
-            Body::HeatMap(map) => heat::draw(canvas, figure, map),
         }
         figure.height
     })

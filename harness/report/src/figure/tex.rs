@@ -1,5 +1,4 @@
-//! A figure for LaTeX, set in the fonts of the document: a `pgfplots` axis that reads the CSV file beside it. TeX reads the thousands of entries
-//! of a matrix too slowly: its figure is the PDF file.
+//! A figure for LaTeX, set in the fonts of the document: a `pgfplots` axis that reads the CSV file beside it.
 
 use super::palette::{COLOURS, MARKERS};
 use super::scale::{SUPERSCRIPTS, range, tick_label, ticks};
@@ -19,14 +18,8 @@ const MARKS: [(&str, &str); MARKERS] = [
     ("pentagon*", "pentagon"),
 ];
 
-/// The figure as a `tikzpicture`, or as its PDF. `\figures` is the directory of its other files.
+/// The figure as a `tikzpicture`. `\figures` is the directory of its other files.
 pub fn tex(figure: &Figure) -> String {
-    if let Body::HeatMap(_) = figure.body {
-        let id = &figure.id;
-        return format!(
-            "\\providecommand{{\\figures}}{{figures}}\n\\includegraphics[width=\\linewidth]{{\\figures/{id}.pdf}}\n"
-        );
-    }
     let mut out = format!(
         "% Requires {PREAMBLE}\n\\providecommand{{\\figures}}{{figures}}\n\\begin{{tikzpicture}}\n"
     );
@@ -37,7 +30,6 @@ pub fn tex(figure: &Figure) -> String {
     match &figure.body {
         Body::Points { series, marks } => points(&mut out, figure, series, marks),
         Body::Bars(b) => bars(&mut out, figure, b),
-        Body::HeatMap(_) => {}
     }
     out.push_str("\\end{tikzpicture}\n");
     out
@@ -182,7 +174,7 @@ pub fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{figure, heat_map, series};
+    use super::super::samples::{figure, series};
     use super::*;
 
     /// Asserts that braces and environments are closed.
@@ -200,13 +192,6 @@ mod tests {
         assert!(
             text.contains("{\\thisrow{plot}}{1:1}") && text.contains("{\\figures/speedup.csv}")
         );
-        assert_closed(&text);
-    }
-
-    #[test]
-    fn a_matrix_is_its_pdf() {
-        let text = tex(&heat_map());
-        assert!(text.contains("{\\figures/messages.pdf}") && !text.contains("axis"), "{text}");
         assert_closed(&text);
     }
 

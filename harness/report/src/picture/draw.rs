@@ -1,13 +1,12 @@
 //! The layout of a picture: the squares, the section line, axes and a legend.
 
-use super::Picture;
 use super::colour::Entry;
 use super::squares::Square;
+use super::{Picture, Planar};
 use crate::figure::Axis;
 use crate::figure::axes;
 use crate::figure::canvas::{Canvas, INK, SYMBOL, WIDTH, document, width};
 use crate::figure::palette::hex;
-use crate::section::Planar;
 use std::collections::BTreeSet;
 
 /// Least space for the ticks and the label of the vertical axis, and space at the right.

@@ -14,20 +14,22 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use crate::section::{Planar, Window};
 use colour::{Colour, Entry, short};
 use contract::case::Facet;
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
-use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
-use geometry::tree::Point;
+use geometry::tree::{Aabb, Point};
 use squares::{Detail, Squares, plane_axes};
 
 pub use csv::csv;
 pub use draw::svg;
+
+/// A point in a plane.
+pub type Planar = [f64; 2];
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -48,10 +50,10 @@ pub struct Request<'a> {
 
 impl Request<'_> {
     /// Returns an error if the mesh does not have what colours show.
-    fn check(&self, mesh: &Mesh) -> Result<(), ExportError> {
+    fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
         if self.colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
             let why = "the sides of this mesh are unknown: choose another colour";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         match self.colour == Colour::Rank && !mesh.has_ranks() {
             true => Err(mesh.ranks_unknown()),
@@ -68,7 +70,7 @@ impl Request<'_> {
         mut window: [[i64; 3]; 2],
         scale: f64,
         detail: &Detail,
-    ) -> Result<Squares, ExportError> {
+    ) -> Result<Squares, Failure> {
         (window[0][slice.axis], window[1][slice.axis]) = (0, UNITS_PER_EDGE);
         let (slice, clip) = (Some(slice), Some(window));
         let selection = Selection { slice, clip, ..self.selection.clone() };
@@ -175,7 +177,7 @@ impl Picture {
     ///
     /// # Errors
     /// If the mesh cannot be read, or the picture would be empty.
-    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, ExportError> {
+    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, Failure> {
         let root = mesh.manifest.root;
         request.check(mesh)?;
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
@@ -184,13 +186,13 @@ impl Picture {
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
         if (0..2).any(|i| window[0][i] >= window[1][i]) {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
         if squares.squares.is_empty() {
             let why =
                 "no leaf of the selection is in the slice: give another --slice or a larger --clip";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         let values = squares.squares.iter().map(|s| s.value).collect();
         let key = request.colour.key(&values, &root);
@@ -276,15 +278,24 @@ fn plane_name(root: &Root, slice: Slice) -> String {
 /// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that
 /// facets in the plane of a leaf's face do not vanish or appear twice.
 fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) -> Vec<[Planar; 2]> {
-    let axes = plane_axes(slice.axis);
+    let (axis, axes) = (slice.axis, plane_axes(slice.axis));
     let layer = i64::from(slice.layer()) * UNITS_PER_CELL;
     let at = if slice.at == layer { layer + UNITS_PER_CELL / 2 } else { slice.at };
-    let mut centre = root.to_user([at; 3]);
-    axes.iter().zip(0..2).for_each(|(&a, i)| centre[a] = (window[0][i] + window[1][i]) / 2.0);
-    let unit = |a: usize| std::array::from_fn(|b| f64::from(u8::from(a == b)));
-    let half = [0, 1].map(|i| (window[1][i] - window[0][i]) / 2.0);
-    let plane = Window { centre, axes: axes.map(unit), half };
-    let to_user = |p: Planar| [0, 1].map(|i| p[i] + centre[axes[i]]);
-    let cut = |facet: &Facet| plane.of_facet(facet.map(|v| v.map(f64::from)));
-    facets.iter().filter_map(cut).map(|ends| ends.map(to_user)).collect()
+    let plane = root.to_user([at; 3])[axis];
+    let corner = |end: usize, beyond: f64| {
+        let mut corner = [plane + beyond; 3];
+        axes.iter().zip(window[end]).for_each(|(&a, coordinate)| corner[a] = coordinate);
+        Point::from_array(corner)
+    };
+    let bounds = Aabb::new(corner(0, -root.edge), corner(1, root.edge));
+    let cut = |facet: &Facet| {
+        let [a, b, c] = facet.map(|v| Point::from_array(v.map(f64::from)));
+        let mut ends = [(a, b), (b, c), (c, a)].into_iter().filter_map(|(p, q)| {
+            let is_cut = (p[axis] < plane) != (q[axis] < plane);
+            is_cut.then(|| p + (q - p) * ((plane - p[axis]) / (q[axis] - p[axis])))
+        });
+        let shown = bounds.clip_segment(ends.next()?, ends.next()?)?;
+        Some([shown.a, shown.b].map(|end| axes.map(|a| end[a])))
+    };
+    facets.iter().filter_map(cut).collect()
 }

@@ -7,9 +7,9 @@ use super::surface::{Surface, ranks_at};
 use super::{Colour, Request, halfway, middle, plane_name, zoomed};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::octant::LEVEL_MAX;
-use export::error::ExportError;
 use export::mesh::Mesh;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -81,7 +81,7 @@ impl Scene {
     ///
     /// # Errors
     /// If the mesh cannot be read, or no slice has a leaf.
-    pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, ExportError> {
+    pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, Failure> {
         request.check(mesh)?;
         let root = mesh.manifest.root;
         let first = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
@@ -98,7 +98,7 @@ impl Scene {
         if slices.iter().all(|(_, squares)| squares.squares.is_empty()) {
             let why =
                 "no leaf of the selection is in any slice: give another --slice or a larger --clip";
-            return Err(ExportError::Request(why.to_owned()));
+            return Err(Failure::input(why.to_owned()));
         }
         let surface = request.body.map(Surface::of);
         let ranks = match (&surface, request.colour) {

@@ -6,8 +6,8 @@
 //! four have the same value, which does not change the picture.
 
 use super::colour::Colour;
+use contract::failure::Failure;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
-use export::error::ExportError;
 use export::leaf::Leaf;
 use export::mesh::Mesh;
 use export::selection::Selection;
@@ -95,7 +95,7 @@ impl Squares {
         colour: Colour,
         root_edge: f64,
         detail: &Detail,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<Self, Failure> {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let deepest = |edge: f64| (root_edge / edge).log2().floor().clamp(0.0, 19.0) as u8;
         let level_drawn = deepest(EDGE_MIN).min(detail.level_max);
@@ -103,7 +103,7 @@ impl Squares {
         let mut found =
             Self { squares: Vec::new(), level_outlined, level_drawn, is_merged: false, leaves: 0 };
         let mut last = None;
-        let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+        let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
         mesh.visit(selection, &check, &mut |leaf| {
             let octant = leaf.octant.ancestor(leaf.octant.level.min(detail.level_max));
             // Leaves merged to the deepest level are one cell of the mesh that is shown.

@@ -1,10 +1,10 @@
 //! The surface of a body for a view: few triangles, and the ranks that own them.
 
 use contract::case::Facet;
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word;
-use export::error::ExportError;
 use export::mesh::Mesh;
 use export::selection::Selection;
 use run::engine::interrupt;
@@ -88,7 +88,7 @@ impl Surface {
 ///
 /// # Errors
 /// If the mesh cannot be read.
-pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, ExportError> {
+pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, Failure> {
     let root: &Root = &mesh.manifest.root;
     let key = |at: &[f64; 3]| {
         let last = CELLS_PER_EDGE - 1;
@@ -101,7 +101,7 @@ pub fn ranks_at(mesh: &Mesh, points: &[[f64; 3]]) -> Result<Vec<Option<u32>>, Ex
     order.sort_unstable();
     let mut ranks = vec![None; points.len()];
     let mut next = order.as_slice();
-    let check = || if interrupt::requested() { Err(ExportError::Interrupted) } else { Ok(()) };
+    let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
     mesh.visit(&Selection::default(), &check, &mut |leaf| {
         let start = word::key_of(leaf.octant.corner);
         let end = start + word::span(leaf.octant.level);

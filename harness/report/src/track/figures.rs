@@ -13,7 +13,7 @@ fn case_and_metric(series: &Series) -> (&str, &str) {
     series.name.rsplit_once('/').unwrap_or(("", &series.name))
 }
 
-/// The figure of one metric, with its steps as vertical lines and its drifts as dashed lines. Outliers do not widen the
+/// The figure of one metric, with its steps as vertical lines. Outliers do not widen the
 /// axis: they are drawn at its ends.
 pub fn of_metric(records: &[Record], series: &Series) -> Figure {
     let note = |&(commit, value): &(usize, f64)| {
@@ -30,10 +30,8 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
             (true, false, false) => ("decrease", 2),
         };
         // Between the last commit with the old value and the first with the new one.
-        Mark { name: name.to_owned(), x: x(change.from).midpoint(x(change.at)), style }
+        Mark { name: name.to_owned(), x: x(change.at - 1).midpoint(x(change.at)), style }
     };
-    let (drifts, steps): (Vec<&Change>, Vec<&Change>) =
-        series.changes.iter().partition(|change| change.is_drift);
     let (low, high) = range(series);
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
@@ -49,13 +47,8 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
         let name = "beyond the axis, drawn at its end";
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
     }
-    lines.extend(drifts.into_iter().map(|drift| {
-        let ends = [(x(drift.from), drift.before), (x(drift.at), drift.after)];
-        let points = ends.map(|(x, y)| Point::exact(x, y.clamp(low, high)));
-        Plotted::new("drift", Provenance::Bound, 4, points.to_vec())
-    }));
     let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
-    let marks = steps.into_iter().map(mark).collect();
+    let marks = series.changes.iter().map(mark).collect();
     Figure {
         height: HEIGHT,
         ..Figure::new(

@@ -1,4 +1,4 @@
-//! The trend page: the steps and drifts as a table, then a figure per metric.
+//! The trend page: the steps as a table, then a figure per metric.
 
 use super::figures::{of_metric, short_commit};
 use crate::figure::svg::svg;
@@ -50,7 +50,7 @@ fn linked(commit: &str, link: Option<&str>) -> Markup {
     }
 }
 
-/// All steps and drifts, the latest first. The class of a change is that of its cell in the style sheet.
+/// All steps, the latest first. The class of a change is that of its cell in the style sheet.
 fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     let of_series = |series| -> Vec<(&Series, &Change)> {
         let series: &Series = series;
@@ -69,21 +69,14 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
         };
         let by = change.percent.map_or("new".to_owned(), |by| format!("{by:+.2} %"));
         let sign = if change.after > change.before { "worse" } else { "better" };
-        let remark = match (change.is_drift, change.accepted) {
-            (true, _) => {
-                format!("drift over {} of {} commits", change.at - change.from + 1, records.len())
-            }
-            (false, true) => "accepted".to_owned(),
-            (false, false) => String::new(),
-        };
         vec![
             html! { (series.name) },
             value(change.before),
             value(change.after),
             html! { span class=[series.is_cost().then_some(sign)] { (by) } },
             html! { (linked(&change.last_old, link)) ".." (linked(&change.first_new, link)) },
-            html! { (remark) },
-            html! { @if !change.is_drift { (records[first_new(both)].subject) } },
+            html! { @if change.accepted { "accepted" } },
+            html! { (records[first_new(both)].subject) },
         ]
     };
     let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];

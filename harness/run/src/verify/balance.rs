@@ -12,6 +12,7 @@ use crate::engine::process::{self, Watch};
 use check::checks::{CheckResult, identical};
 use contract::npy::PartFile;
 use contract::plain::{PlainCase, StlForm};
+use contract::watch::Watch as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use toml::Value;

@@ -3,12 +3,12 @@
 use super::needs::Needs;
 use super::options::Options;
 pub use super::outcome::RUNS;
-use super::progress::Progress;
 use super::report::{CaseReport, Check, Outcome};
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
 use crate::engine::programs::Programs;
+use crate::progress::Progress;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;

@@ -9,7 +9,6 @@ pub mod needs;
 pub mod options;
 pub mod oracles;
 pub mod outcome;
-pub mod progress;
 pub mod ranks;
 pub mod report;
 pub mod run;
@@ -18,53 +17,42 @@ pub mod workplace;
 
 use crate::engine::interrupt;
 use crate::engine::programs::Programs;
+use crate::progress::Progress;
 use case::CaseRun;
 use contract::catalogue::Selected;
+use contract::failure::Failure;
 use needs::Needs;
 use options::Options;
-use progress::Progress;
 use report::{Asked, CaseReport, Check, Outcome, Report};
 use std::path::Path;
 use std::time::Instant;
 use workplace::Workplace;
 
-/// Why a verification could not begin.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    /// The user's input: an unknown case, or a directory that must not be overwritten.
-    #[error("{0}")]
-    Input(String),
-    /// A required program is missing.
-    #[error("{0}")]
-    Missing(String),
-}
-
 /// Verifies the cases that the options select.
 ///
 /// # Errors
 /// If the verification could not begin. Failures after that are in the report.
-pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyError> {
+pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure> {
     let start = Instant::now();
     for (program, engine) in [("mesher", &programs.engine), ("reference", &programs.reference)] {
         if !engine.program().is_file() {
             let path = engine.program().display();
-            return Err(VerifyError::Missing(format!(
+            return Err(Failure::missing(format!(
                 "the {program} is missing: build {path}, or give another path with --{program}"
             )));
         }
     }
-    let selected = programs
-        .paths
-        .catalogue
-        .select(&options.cases, &options.size)
-        .map_err(VerifyError::Input)?;
+    let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     if selected.is_empty() {
         let why = format!("no case in {} has this size", programs.paths.catalogue.path().display());
-        return Err(VerifyError::Input(why));
+        return Err(Failure::input(why));
     }
     let mut workplace = Workplace::new(options)?;
     let mut needs = Needs::probe(options, programs);
-    let progress = Progress::new(&selected);
+    let progress = Progress::new(
+        "{spinner} {pos}/{len} [{elapsed}] {prefix}: {wide_msg}",
+        Some(selected.len()),
+    );
     let mut cases = Vec::new();
     for one in &selected {
         if interrupt::requested() {
@@ -108,7 +96,7 @@ fn verify_case(
     needs: &mut Needs,
     workplace: &mut Workplace,
     progress: &Progress,
-) -> Result<CaseReport, VerifyError> {
+) -> Result<CaseReport, Failure> {
     let start = Instant::now();
     progress.case(&selected.name);
     if let Some(why) = &selected.absent {

@@ -11,6 +11,7 @@ use check::oracle::watertight::is_watertight;
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::parity::Parity;
+use contract::watch::Watch;
 use contract::word::{self, Side};
 use std::collections::BTreeMap;
 use std::fs;

@@ -11,6 +11,7 @@ use check::checks::{self, CheckResult, Subject};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::leafset::LeafSet;
+use contract::watch::Watch;
 use std::fs;
 
 /// Numbers of threads that are compared with one.
@@ -85,7 +86,7 @@ impl CaseRun<'_> {
         serial: &LeafSet,
         layout: &Layout,
     ) -> Result<(), Failure> {
-        self.progress.step(layout.to_string());
+        self.progress.step(&layout.to_string());
         let meshed = self.run(&Request {
             program: Program::Mesher,
             layout,

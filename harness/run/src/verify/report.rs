@@ -12,6 +12,7 @@ use super::outcome::RUNS;
 pub use super::outcome::{Check, Outcome, Tally};
 use crate::engine::layout::Layout;
 use check::checks::identical;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use serde::{Deserialize, Serialize};
 
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
@@ -184,25 +185,6 @@ pub struct Report {
     pub interrupted: bool,
     /// Wall time, in seconds.
     pub time_s: f64,
-}
-
-/// Exit code: all checks hold.
-pub const EXIT_HOLDS: u8 = 0;
-/// Exit code: at least one check failed.
-pub const EXIT_FAILED: u8 = 1;
-/// Exit code: invalid input.
-pub const EXIT_INPUT: u8 = 2;
-/// Exit code: a required prerequisite is missing.
-pub const EXIT_MISSING: u8 = 3;
-/// Exit code: standard output cannot be written.
-pub const EXIT_OUTPUT: u8 = 4;
-/// Exit code: interrupted by the user.
-pub const EXIT_INTERRUPTED: u8 = 130;
-
-/// Returns the exit code of a command for which both codes apply: the first of 130, 1, 2 and 3.
-pub fn exit_first(a: u8, b: u8) -> u8 {
-    let order = [EXIT_INTERRUPTED, EXIT_FAILED, EXIT_INPUT, EXIT_MISSING];
-    order.into_iter().find(|code| [a, b].contains(code)).unwrap_or(EXIT_HOLDS)
 }
 
 impl Report {

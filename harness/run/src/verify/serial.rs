@@ -11,6 +11,7 @@ use check::checks::{self, CheckResult, Subject, identical, kept};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::manifest::{Ambiguous, Components, Manifest};
+use contract::watch::Watch;
 use std::path::{Path, PathBuf};
 
 /// Meshes that later steps use.
@@ -141,7 +142,7 @@ impl CaseRun<'_> {
         name: &str,
         ungraded: bool,
     ) -> Option<Meshed> {
-        self.progress.step(format!("{name}: {}", if ungraded { "base tree" } else { "mesh" }));
+        self.progress.step(&format!("{name}: {}", if ungraded { "base tree" } else { "mesh" }));
         let request = Request { ungraded, ..serial(program, &self.selected.path, name) };
         match self.run(&request) {
             Ok(meshed) => {

@@ -3,9 +3,9 @@
 //! Invariants: only directories that a verification made are removed, which a marker file proves; without `--out` and
 //! `--keep`, only the directories of failed cases are kept; that of a case under way does not outlive an interrupt.
 
-use super::VerifyError;
 use super::options::Options;
 use crate::engine::interrupt;
+use contract::failure::Failure;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,9 +27,9 @@ impl Workplace {
     ///
     /// # Errors
     /// If it cannot be made.
-    pub fn new(options: &Options) -> Result<Self, VerifyError> {
+    pub fn new(options: &Options) -> Result<Self, Failure> {
         let wrong = |error: io::Error| {
-            VerifyError::Input(format!("the directory for results cannot be made: {error}"))
+            Failure::input(format!("the directory for results cannot be made: {error}"))
         };
         if let Some(out) = &options.out {
             fs::create_dir_all(out).map_err(wrong)?;
@@ -45,20 +45,19 @@ impl Workplace {
     ///
     /// # Errors
     /// If something else has that name, or the directory cannot be made.
-    pub fn enter(&self, case: &str) -> Result<PathBuf, VerifyError> {
+    pub fn enter(&self, case: &str) -> Result<PathBuf, Failure> {
         let place = self.root.join(case);
         let shown = place.display();
         if place.join(MARKER).is_file() {
-            fs::remove_dir_all(&place).map_err(|error| {
-                VerifyError::Input(format!("{shown} cannot be replaced: {error}"))
-            })?;
+            fs::remove_dir_all(&place)
+                .map_err(|error| Failure::input(format!("{shown} cannot be replaced: {error}")))?;
         }
         let mark = |()| {
             interrupt::note_directory(&place);
             fs::write(place.join(MARKER), "")
         };
         let made = fs::create_dir(&place).and_then(mark);
-        made.map_err(|error| VerifyError::Input(format!("{shown} cannot be made: {error}")))?;
+        made.map_err(|error| Failure::input(format!("{shown} cannot be made: {error}")))?;
         Ok(place)
     }
 
@@ -128,8 +127,6 @@ mod tests {
         assert!(!place.join("mesh").exists());
         fs::create_dir(out.path().join("precious")).unwrap();
         let refused = workplace.enter("precious").unwrap_err();
-        assert!(
-            matches!(refused, VerifyError::Input(why) if why.contains("precious cannot be made"))
-        );
+        assert!(refused.why.contains("precious cannot be made"), "{refused}");
     }
 }

@@ -150,14 +150,6 @@ fn without_times_by_rank_the_typical_run_is_a_measured_one() {
 }
 
 #[test]
-fn message_matrices_come_from_warm_ups() {
-    let mut warm = run(Comm::Sim, 9, &[("a", &[2.0, 2.0])]);
-    (warm.warm_up, warm.message_matrix) = (true, vec![[0, 1, 1, 8]]);
-    let groups = Groups::of(&[line_of(warm.clone()), line_of(warm)]);
-    assert_eq!((groups.all.len(), groups.matrices.len()), (0, 1));
-}
-
-#[test]
 fn projections_are_compared_with_the_same_mesh_on_equally_many_ranks() {
     let mut crowd = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0, 1.0, 1.0])]);
     crowd.oversubscribed = true;

@@ -3,15 +3,6 @@ use crate::testing::report;
 use proptest::prelude::*;
 
 #[test]
-fn a_failed_check_takes_precedence_over_a_report_that_cannot_be_written() {
-    assert_eq!(exit_first(EXIT_FAILED, EXIT_INPUT), EXIT_FAILED);
-    assert_eq!(exit_first(EXIT_INPUT, EXIT_MISSING), EXIT_INPUT);
-    assert_eq!(exit_first(EXIT_HOLDS, EXIT_INPUT), EXIT_INPUT);
-    assert_eq!(exit_first(EXIT_INPUT, EXIT_INTERRUPTED), EXIT_INTERRUPTED);
-    assert_eq!(exit_first(EXIT_HOLDS, EXIT_HOLDS), EXIT_HOLDS);
-}
-
-#[test]
 fn exit_codes_have_an_order_of_precedence() {
     let mut report = crate::testing::report();
     assert_eq!(report.exit_code(), EXIT_FAILED);

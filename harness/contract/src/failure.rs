@@ -1,0 +1,115 @@
+//! Why a command has no result: the exit code and the one sentence that `harness` prints.
+
+use crate::case::CaseError;
+use crate::files::named;
+use crate::import::ImportError;
+use crate::leafset::ReadError;
+use std::fmt::Display;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+/// Exit code: all checks hold.
+pub const EXIT_HOLDS: u8 = 0;
+/// Exit code: at least one check failed.
+pub const EXIT_FAILED: u8 = 1;
+/// Exit code: invalid input.
+pub const EXIT_INPUT: u8 = 2;
+/// Exit code: a required prerequisite is missing.
+pub const EXIT_MISSING: u8 = 3;
+/// Exit code: standard output cannot be written.
+pub const EXIT_OUTPUT: u8 = 4;
+/// Exit code: interrupted by the user.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
+/// Returns the exit code of a command for which both codes apply: the first of 130, 1, 2 and 3.
+pub fn exit_first(a: u8, b: u8) -> u8 {
+    let order = [EXIT_INTERRUPTED, EXIT_FAILED, EXIT_INPUT, EXIT_MISSING];
+    order.into_iter().find(|code| [a, b].contains(code)).unwrap_or(EXIT_HOLDS)
+}
+
+/// Why a command has no result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// The exit code.
+    pub code: u8,
+    /// The reason, in one sentence.
+    pub why: String,
+}
+
+impl Failure {
+    /// Invalid input, or an output that cannot be written.
+    pub fn input(why: impl Display) -> Self {
+        Self { code: EXIT_INPUT, why: why.to_string() }
+    }
+
+    /// A required program or file is missing, or nothing was checked.
+    pub fn missing(why: impl Display) -> Self {
+        Self { code: EXIT_MISSING, why: why.to_string() }
+    }
+
+    /// The user interrupted the command.
+    pub fn interrupted() -> Self {
+        Self { code: EXIT_INTERRUPTED, why: "interrupted".to_owned() }
+    }
+
+    /// A file or directory could not be written or read.
+    pub fn at(path: &Path, error: io::Error) -> Self {
+        named(path, &error).into()
+    }
+
+    /// Whether the user interrupted the command.
+    pub fn is_interrupt(&self) -> bool {
+        self.code == EXIT_INTERRUPTED
+    }
+
+    /// The same, if it is one of the input, with the file's name.
+    #[must_use]
+    pub fn of_file(self, path: &Path) -> Self {
+        match self.code {
+            EXIT_INPUT => Self::input(format!("{}: {}", path.display(), self.why)),
+            _ => self,
+        }
+    }
+}
+
+impl Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.why)
+    }
+}
+
+/// Errors that are always those of the input.
+macro_rules! inputs {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::input(error)
+            }
+        }
+    )*};
+}
+
+inputs!(String, CaseError, ImportError, ReadError);
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            ErrorKind::Interrupted => Self::interrupted(),
+            _ => Self::input(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_check_takes_precedence_over_a_report_that_cannot_be_written() {
+        assert_eq!(exit_first(EXIT_FAILED, EXIT_INPUT), EXIT_FAILED);
+        assert_eq!(exit_first(EXIT_INPUT, EXIT_MISSING), EXIT_INPUT);
+        assert_eq!(exit_first(EXIT_HOLDS, EXIT_INPUT), EXIT_INPUT);
+        assert_eq!(exit_first(EXIT_INPUT, EXIT_INTERRUPTED), EXIT_INTERRUPTED);
+        assert_eq!(exit_first(EXIT_HOLDS, EXIT_HOLDS), EXIT_HOLDS);
+    }
+}
