@@ -16,6 +16,7 @@ pub mod run;
 pub mod serial;
 pub mod workplace;
 
+use crate::engine::description;
 use crate::engine::interrupt;
 use crate::engine::programs::Programs;
 use case::CaseRun;
@@ -45,13 +46,21 @@ pub enum VerifyError {
 /// If the verification could not begin. Failures after that are in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, VerifyError> {
     let start = Instant::now();
-    for (program, engine) in [("mesher", &programs.engine), ("reference", &programs.reference)] {
-        if !engine.program().is_file() {
-            let path = engine.program().display();
-            return Err(VerifyError::Missing(format!(
-                "the {program} is missing: build {path}, or give another path with --{program}"
-            )));
-        }
+    let engine = &programs.engine;
+    let used = [("mesher", engine), ("reference", &programs.reference)];
+    // Only the definition is compared with the reference.
+    let used = &used[..1 + usize::from(engine.description().promises.definition)];
+    if let Some((program, engine)) = used.iter().find(|(_, engine)| !engine.program().is_file()) {
+        let path = engine.program().display();
+        let fix = match description::is_own(engine.name()) {
+            true => format!("build {path}, or give another path with --{program}"),
+            false => format!(
+                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {}: correct it, as \
+                 in program = \"{{here}}/my-mesher\", or give --{program} PATH",
+                engine.name()
+            ),
+        };
+        return Err(VerifyError::Missing(format!("the {program} is missing: {fix}")));
     }
     let selected = programs
         .paths
@@ -93,7 +102,7 @@ fn asked(selected: &[Selected], options: &Options, programs: &Programs) -> Asked
     Asked {
         cases: selected.iter().map(|case| case.name.clone()).collect(),
         named: !options.cases.is_empty(),
-        ranks: options.rank_counts(),
+        ranks: options.rank_counts(programs.engine.description()),
         subjects: case::steps(&programs.engine.description().promises)
             .iter()
             .map(|(subject, _)| (*subject).to_owned())
