@@ -14,6 +14,8 @@ UNIT = {"origin": [0.0, 0.0, 0.0], "edge": 1.0}
 
 def numbers(text, kind=np.float64):
     """The numbers in a text, up to the first word that is none."""
+    if not text.strip():  # NumPy finds a number in it.
+        return np.empty(0, kind)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -23,6 +25,12 @@ def numbers(text, kind=np.float64):
 
 
 # Tables.
+
+
+def table(path, request):
+    """A table of either form: the first bytes of NumPy's are known."""
+    with open(path, "rb") as file:
+        return (npy if file.read(6) == b"\x93NUMPY" else csv)(path, request)
 
 
 def npy(path, request):
@@ -44,7 +52,7 @@ def npy(path, request):
     for name, column in columns.items():
         if column.ndim != 1 or column.dtype.kind not in "iuf":
             raise Refused(f"has a column {name} of type {column.dtype}: convert it to float64 or to integers")
-    return table({name: column.astype(np.float64) for name, column in columns.items()}, request)
+    return rows({name: column.astype(np.float64) for name, column in columns.items()}, request)
 
 
 def csv(path, request):
@@ -54,16 +62,16 @@ def csv(path, request):
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     names = lines[0].split() if lines else []
     is_named = bool(names) and not is_number(names[0])
-    rows = lines[is_named:]
-    if not rows:
+    cells = lines[is_named:]
+    if not cells:
         raise Refused("has no cells")
     try:
-        columns = np.loadtxt(rows, ndmin=2, comments=None).T
+        columns = np.loadtxt(cells, ndmin=2, comments=None).T
     except ValueError as why:
         raise Refused(f"is no table of numbers: {why} (comments and the names of columns do not count)") from None
     if is_named and len(names) != len(columns):
         raise Refused(f"has {len(columns)} fields in a line, but {len(names)} names of columns")
-    return table(dict(zip(names, columns)) if is_named else named(columns), request)
+    return rows(dict(zip(names, columns)) if is_named else named(columns), request)
 
 
 def is_number(field):
@@ -85,7 +93,7 @@ def named(columns):
     return dict(zip(["x", "y", "z", "level", *map(str, range(4, len(columns)))], columns))
 
 
-def table(columns, request):
+def rows(columns, request):
     """The cells of a table of x, y and z, and either level or edge."""
     columns = {name.lower(): column for name, column in reversed(columns.items())}
 
@@ -293,9 +301,9 @@ def openfoam(path, request):
     begins, vertices = Foam(at / "faces").faces(len(points))
     faces = len(begins) - 1
     # A cell has at least four faces, and a face at most two cells.
-    owners = Foam(at / "owner").labels(faces // 2 + 1)
-    count = int(owners.max(initial=-1)) + 1
-    neighbours = Foam(at / "neighbour").labels(count)
+    owners, neighbours = (Foam(at / name).labels(faces // 2 + 1) for name in ("owner", "neighbour"))
+    # The last cell need not own a face.
+    count = int(max(owners.max(initial=-1), neighbours.max(initial=-1))) + 1
     if len(owners) != faces or len(neighbours) > faces:
         raise Refused(
             f"has {faces} faces with {len(owners)} owners and {len(neighbours)} neighbours: its files belong to different meshes"
@@ -348,7 +356,7 @@ def cubes(points, begins, vertices, owners, neighbours, count):
     return low, edges
 
 
-READERS = {"npy": npy, "csv": csv, "discretize": discretize, "openfoam": openfoam}
+READERS = {"table": table, "discretize": discretize, "openfoam": openfoam}
 
 if __name__ == "__main__":
     run(lambda path, request: READERS[request["format"]](path, request))

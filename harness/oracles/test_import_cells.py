@@ -1,6 +1,7 @@
 """Tables and meshes of discretize and OpenFOAM are read as their programs state them, and damaged ones are refused in a sentence. Run with:
 python -m unittest discover harness/oracles"""
 
+import itertools
 import pathlib
 import random
 import shutil
@@ -29,7 +30,7 @@ KNOWN = {
 
 def read(path, sides=None, root=None, position="corner"):
     """Corners, edges and what else is known of the cells in a file."""
-    kind = {".csv": "csv", ".npy": "npy", ".json": "discretize", ".msh": "discretize"}.get(path.suffix, "openfoam")
+    kind = {".csv": "table", ".npy": "table", ".json": "discretize", ".msh": "discretize"}.get(path.suffix, "openfoam")
     corners, edges, more = import_cells.READERS[kind](str(path), {"sides": sides, "root": root, "position": position})
     for values in (corners, edges, more.get("levels"), more.get("sides")):
         assert values is None or len(values) == len(edges)
@@ -88,6 +89,27 @@ class CellsTest(unittest.TestCase):
                 self.assertEqual("levels" in more and more["levels"] is not None, name.startswith("foam") or ".json" in name)
                 if root:
                     np.testing.assert_allclose([*more["root"]["origin"], more["root"]["edge"]], root, atol=1e-9)
+
+    def test_the_last_cell_of_a_foam_need_not_own_a_face(self):
+        """Of 3 x 3 x 3 cubes the one in the middle comes last, as cells do that snappyHexMesh has split."""
+        cells = sorted(itertools.product(range(3), repeat=3), key=lambda cell: (cell == (1, 1, 1), cell))
+        around = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+        faces = {}
+        for number, (x, y, z) in enumerate(cells):
+            for face in around:
+                points = [(x + (p & 1)) + 4 * (y + (p >> 1 & 1)) + 16 * (z + (p >> 2)) for p in face]
+                faces.setdefault(frozenset(points), [points]).append(number)
+        faces = sorted(faces.values(), key=lambda face: len(face) == 2)
+        lists = {
+            "points": ["({} {} {})".format(p % 4, p // 4 % 4, p // 16) for p in range(64)],
+            "faces": ["4({} {} {} {})".format(*face[0]) for face in faces],
+            "owner": [str(face[1]) for face in faces],
+            "neighbour": [str(face[2]) for face in faces if len(face) == 3],
+        }
+        for name, items in lists.items():
+            (self.at / name).write_text(f"FoamFile {{ format ascii; class {name}; }}\n{len(items)}\n(\n" + "\n".join(items) + "\n)\n")
+        corners, edges, _ = read(self.at)
+        self.assertEqual((corners.tolist(), set(edges.tolist())), ([list(map(float, cell)) for cell in cells], {1.0}))
 
     def test_a_given_root_replaces_one_that_the_file_rounded(self):
         exact = root_of([0.0, 0.0, 0.0, 0.25])

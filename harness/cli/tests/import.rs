@@ -44,6 +44,13 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
         ["import", words.to_str().unwrap(), "--root", "0,0,0,1", "--out", second.to_str().unwrap()];
     assert_eq!(result(&arguments).0, 0);
     assert_eq!(digest(&first), digest(&second));
+    // Meshes are compared in whatever form they have.
+    let forest = sample("unitcube.p8est");
+    let (code, output, error) = result(&["diff", &forest, second.to_str().unwrap()]);
+    assert_eq!((code, error.as_str()), (0, ""), "{output}");
+    assert!(output.contains("106 compared"), "{output}");
+    let (code, output, _) = result(&["diff", &forest, &sample("brick.p8est"), "--ignore-root"]);
+    assert!(code == 1 && output.contains("the leaves differ"), "{output}");
     // An existing mesh is not overwritten.
     let (code, _, error) = result(&arguments);
     assert!(code == 2 && error.contains("not empty"), "{error}");

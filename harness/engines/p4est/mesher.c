@@ -1,6 +1,6 @@
 /* An oct-tree mesher on p4est: refinement by distance from the facets, then p8est_balance.
  *
- *   p4est-mesher CASE [--out DIR] [--json FILE]           or with mpirun -n RANKS
+ *   p4est-mesher CASE [--out FOREST] [--json FILE]        or with mpirun -n RANKS
  *
  * Reads a case file with a geometry file, a [root] table and keep = "all", as the harness writes it for an engine with
  * `generator = false`. An octant of level l is split if a facet meets its box enlarged on every side by reach[l]:
@@ -8,7 +8,7 @@
  *   reach[D - 1] = (n - 1) cells of level D,     reach[l - 1] = reach[l] + n cells of level l.
  *
  * These are the least distances that promise layers of n cells, because every octant within reach of a facet is split
- * whatever the other octants do. DIR receives one part per rank; FILE receives the run report.
+ * whatever the other octants do. FOREST is the file of p8est_save; FILE receives the run report.
  *
  * Exit codes: 0 success, 2 the case cannot be read or is not supported, 4 the result could not be written.
  */
@@ -16,10 +16,11 @@
 
 #include <math.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <time.h>
 
-#include "leaves.h"
+#include <p8est_bits.h>
+#include <p8est_extended.h>
+
 #include "search.h"
 
 const char *const program_name = "p4est-mesher";
@@ -143,30 +144,10 @@ static void balance(p8est_t *forest, double cpu_s[PHASES])
     cpu_s[PARTITION] += clock_s(CLOCK_PROCESS_CPUTIME_ID) - balanced;
 }
 
-static uint64_t scrambled(uint64_t x)
-{
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
-    return x ^ x >> 31;
-}
-
-/* The digest of the leaves of one rank (reference/DEFINITION.md, section 8): upper and lower half. */
-static void digest_of(const sc_array_t *quadrants, uint64_t digest[2])
-{
-    unsigned __int128 total = 0;
-    for (size_t i = 0; i < quadrants->elem_count; ++i) {
-        uint64_t word = word_of(p8est_quadrant_array_index((sc_array_t *) quadrants, i));
-        uint64_t a = scrambled(word + 0x9e3779b97f4a7c15u), b = scrambled(a ^ (word << 32 | word >> 32));
-        total += (unsigned __int128) a << 64 | b;
-    }
-    digest[0] = (uint64_t) (total >> 64);
-    digest[1] = (uint64_t) total;
-}
-
 /* What every rank reports. */
 struct figures {
     double cpu_s[PHASES], time_wall_s;
-    uint64_t digest[2], peak_rss_bytes;
+    uint64_t peak_rss_bytes;
 };
 
 static void write_json(const char *path, const struct figures *ranks, int count, const p8est_t *forest, size_t facets)
@@ -174,14 +155,10 @@ static void write_json(const char *path, const struct figures *ranks, int count,
     FILE *file = fopen(path, "w");
     if (file == NULL)
         fail(EXIT_WRITE, "%s cannot be written", path);
-    unsigned __int128 total = 0;
     double time_s = 0;
-    for (int rank = 0; rank < count; ++rank) {
-        total += (unsigned __int128) ranks[rank].digest[0] << 64 | ranks[rank].digest[1];
+    for (int rank = 0; rank < count; ++rank)
         time_s = fmax(time_s, ranks[rank].time_wall_s);
-    }
-    fprintf(file, "{\"cells\": %" PRId64 ", \"digest\": \"%016" PRIx64 "%016" PRIx64 "\", \"ranks\": %d, \"facets\": %zu",
-            (int64_t) forest->global_num_quadrants, (uint64_t) (total >> 64), (uint64_t) total, count, facets);
+    fprintf(file, "{\"cells\": %" PRId64 ", \"ranks\": %d, \"facets\": %zu", (int64_t) forest->global_num_quadrants, count, facets);
     fprintf(file, ", \"time_wall_s\": %.6f, \"peak_rss_bytes\": [", time_s);
     for (int rank = 0; rank < count; ++rank)
         fprintf(file, "%s%" PRIu64, rank ? ", " : "", ranks[rank].peak_rss_bytes);
@@ -201,7 +178,7 @@ int main(int argc, char **argv)
     for (int i = 2; i + 1 < argc; i += 2)
         *(strcmp(argv[i], "--out") == 0 ? &out : &json) = argv[i + 1];
     if (argc < 2 || argc % 2 != 0 || argv[1][0] == '-') {
-        fprintf(stderr, "usage: p4est-mesher CASE [--out DIR] [--json FILE]\n");
+        fprintf(stderr, "usage: p4est-mesher CASE [--out FOREST] [--json FILE]\n");
         return EXIT_INPUT;
     }
     sc_MPI_Init(&argc, &argv);
@@ -222,15 +199,9 @@ int main(int argc, char **argv)
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     own.peak_rss_bytes = (uint64_t) usage.ru_maxrss * 1024;
-    const sc_array_t empty = {.elem_size = sizeof(p8est_quadrant_t)};
-    const sc_array_t *leaves =
-        forest->local_num_quadrants > 0 ? &p8est_tree_array_index(forest->trees, 0)->quadrants : &empty;
-    if (out != NULL) {
-        mkdir(out, 0777);
-        write_part(out, forest->mpirank, leaves);
-    }
+    if (out != NULL)
+        p8est_save(out, forest, 0);
     if (json != NULL) {
-        digest_of(leaves, own.digest);
         struct figures *all = malloc((size_t) forest->mpisize * sizeof own);
         sc_MPI_Gather(&own, sizeof own, sc_MPI_BYTE, all, sizeof own, sc_MPI_BYTE, 0, sc_MPI_COMM_WORLD);
         if (forest->mpirank == 0)

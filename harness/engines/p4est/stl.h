@@ -2,9 +2,11 @@
 #ifndef STL_H
 #define STL_H
 
+#include <inttypes.h>
 #include <stdbool.h>
+#include <string.h>
 
-#include "leaves.h"
+#include "fail.h"
 
 enum { EXIT_INPUT = 2 };
 

@@ -4,23 +4,102 @@
 use crate::engine::failure::{End, Failure as Ended};
 use crate::engine::paths::Paths;
 use crate::engine::python;
+use contract::case::Case;
 use contract::digest::Digest;
 use contract::failure::Failure;
 use contract::import::cells::Cells;
+use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, ImportError, Request};
 use contract::lattice::Root;
+use contract::leafset::LeafSet;
+use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::time::Duration;
 
 /// Exit code of the script for a file that is not such a mesh.
 const CODE_INPUT: i32 = 2;
-/// Reads the cells of a file in any format. A child process that exceeds `limit` is killed.
+
+/// A mesh that was read.
+#[derive(Debug)]
+pub enum Imported {
+    /// Its leaves are in memory.
+    Words {
+        /// The leaves.
+        set: Box<LeafSet>,
+        /// Whether neither a request, a case nor the file states the root.
+        is_root_derived: bool,
+    },
+    /// Its leaves are in a tree of any size.
+    Tree(Box<ImportedTree>),
+}
+
+impl Imported {
+    /// The manifest of its leaves.
+    pub fn manifest(&mut self) -> &mut Manifest {
+        match self {
+            Self::Words { set, .. } => &mut set.manifest,
+            Self::Tree(tree) => &mut tree.manifest,
+        }
+    }
+
+    /// Writes leaf words as a new directory.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn create(&self, dir: &Path) -> io::Result<()> {
+        match self {
+            Self::Words { set, .. } => set.create(dir),
+            Self::Tree(tree) => tree.create(dir),
+        }
+    }
+
+    /// The same, but a tree becomes a link, so the file that was imported must remain.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn link(&self, dir: &Path) -> io::Result<()> {
+        match self {
+            Self::Words { set, .. } => set.create(dir),
+            Self::Tree(tree) => fs::create_dir_all(dir).and_then(|()| tree.link(dir)),
+        }
+    }
+}
+
+/// Reads a mesh in any format, by default the one that its content shows. The root is that of the request, of the case, or of the
+/// file, and else derived. The manifest states the requirements of the case, and names `program`. A child process that exceeds
+/// `limit` is killed.
 ///
 /// # Errors
-/// If the file is not a mesh of this format, or if what its format requires is missing.
-pub fn read(
+/// If the file is not a usable mesh, or if what its format requires is missing.
+pub fn import(
+    path: &Path,
+    format: Option<Format>,
+    request: &Request,
+    case: Option<&Case>,
+    program: String,
+    paths: &Paths,
+    limit: Duration,
+) -> Result<Imported, Failure> {
+    let input = |error: ImportError| Failure::from(error.of_file(path));
+    let root = request.root.or(case.map(|case| case.root));
+    let format = format.map_or_else(|| import::guess(path), Ok).map_err(input)?;
+    if format == Format::Vtk {
+        let sides = request.sides.as_deref();
+        let tree = ImportedTree::open(path, sides, root, case, program.clone());
+        if let Some(tree) = tree.map_err(input)? {
+            return Ok(Imported::Tree(Box::new(tree)));
+        }
+    }
+    let cells = read(path, format, &Request { root, ..request.clone() }, paths, limit)?;
+    let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
+    Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
+}
+
+/// Reads the cells of a file.
+fn read(
     path: &Path,
     format: Format,
     request: &Request,
@@ -39,7 +118,7 @@ pub fn read(
             let mesh = import::poly_mesh(path).ok_or_else(|| Failure::input(why));
             mesh.and_then(|mesh| read_in_python(CELLS, &mesh, format, request, paths, limit))
         }
-        Format::Npy | Format::Csv | Format::Discretize => {
+        Format::Table | Format::Discretize => {
             read_in_python(CELLS, path, format, request, paths, limit)
         }
     };

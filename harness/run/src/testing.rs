@@ -19,6 +19,7 @@ pub fn report() -> Report {
         cells: 7600,
         digest: "0".repeat(32),
         time_wall_s: 0.1,
+        is_time_reported: true,
         time_process_s: 0.2,
         peak_rss_bytes: 76_000,
     };

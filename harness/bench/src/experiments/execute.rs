@@ -7,6 +7,7 @@ use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
 use contract::failure::Failure;
+use run::engine::description::is_own;
 use run::engine::failure::{End, Failure as Ended};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};
@@ -57,10 +58,12 @@ impl Runner<'_> {
         warm_up: bool,
     ) -> Result<Run, Failure> {
         let engine = self.engine(setup);
-        let checked = warm_up && !engine.description().promises.definition;
+        let written = warm_up && !is_own(engine.name());
+        let checked = written && !engine.description().promises.definition;
         let mesh = self.place.join("mesh");
         let options = RunOptions {
-            mesh: checked.then_some(&mesh),
+            // Its digest need not be in the run report.
+            mesh: written.then_some(&mesh),
             sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
@@ -93,7 +96,7 @@ impl Runner<'_> {
             command: shown(&command),
             time_launch_s: time_process_s,
             time_cpu_s: time_process_cpu_s,
-            ..measurements(setup.clone(), report)
+            ..measurements(setup.clone(), report, time_process_s)
         })
     }
 
@@ -199,8 +202,8 @@ fn layout(setup: &Setup) -> Layout {
 }
 
 /// The measurements in a run report.
-fn measurements(setup: Setup, report: RunReport) -> Run {
-    let time_wall_s = report.time_wall_s.unwrap_or(0.0);
+fn measurements(setup: Setup, report: RunReport, time_process_s: f64) -> Run {
+    let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
     Run {
         facets: report.facets,
         geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
@@ -210,15 +213,16 @@ fn measurements(setup: Setup, report: RunReport) -> Run {
         useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
         phases: report.phases.iter().map(phase).collect(),
         counters: report.counters.iter().map(|(name, of)| (name.clone(), spread(of))).collect(),
-        digest: report.digest,
+        digest: report.digest.unwrap_or_default(),
         setup,
         ..Run::default()
     }
 }
 
-/// CPU time outside calls to other ranks, per rank; the wall time if there are no phases.
+/// CPU time outside calls to other ranks, per rank; the wall time if there are no phases, or those of rank 0 alone.
 fn useful_s(ranks: usize, phases: &[PhaseReport], time_wall_s: f64) -> Vec<f64> {
-    if phases.is_empty() {
+    let known = phases.iter().map(|phase| phase.time_cpu_s.len()).max();
+    if known.is_none_or(|known| known < ranks) {
         return vec![time_wall_s; ranks];
     }
     let mut total = vec![0.0; ranks];
@@ -278,20 +282,20 @@ mod tests {
     #[test]
     fn useful_time_is_cpu_time_outside_calls() {
         let report: RunReport = serde_json::from_str(REPORT).unwrap();
-        let run = measurements(setup(Comm::Mpi, 2), report.clone());
+        let run = measurements(setup(Comm::Mpi, 2), report.clone(), 1.0);
         assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
         assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
         assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
         // All simulated ranks are in one process.
-        assert_eq!(measurements(setup(Comm::Sim, 2), report).peak_rss_bytes.sum, 70.0);
+        assert_eq!(measurements(setup(Comm::Sim, 2), report, 1.0).peak_rss_bytes.sum, 70.0);
     }
 
     #[test]
     fn the_useful_time_of_a_program_without_phases_is_its_wall_time() {
         let text = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
-        let run = measurements(setup(Comm::Solo, 1), serde_json::from_str(text).unwrap());
+        let run = measurements(setup(Comm::Solo, 1), serde_json::from_str(text).unwrap(), 1.0);
         assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
     }
 

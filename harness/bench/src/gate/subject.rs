@@ -98,7 +98,10 @@ impl Subject {
     fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         if Path::new(named).is_file() {
             let mode = fs::metadata(named).map_or(0, |metadata| metadata.permissions().mode());
-            if mode & 0o111 == 0 {
+            // One that another program interprets need not be executable.
+            let is_started =
+                engine.description().run.serial.first().is_some_and(|word| word == "{program}");
+            if is_started && mode & 0o111 == 0 {
                 let why =
                     "neither a record of harness gate --record nor a program that can be executed";
                 return Err(Failure::input(format!("{named} is {why}")));

@@ -31,7 +31,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if !subject.promises.definition && deletes {
         return Survey::of(subject, result, Survey::check_complete);
     }
-    match subject.truth() {
+    // How fine a leaf must be is no matter of the promise of completeness.
+    match subject.truth().filter(|_| subject.promises.definition) {
         Some(truth) => {
             truth.compare(tree, &mut |found| compare(&found, terms, result));
             if let Some(base) = subject.tree_base() {

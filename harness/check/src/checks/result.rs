@@ -8,8 +8,8 @@ use std::fmt;
 use super::Outcome;
 use contract::leafset::ReadError;
 
-/// Findings that are listed in full; further ones are counted only.
-pub const FINDINGS_LISTED: usize = 20;
+/// Findings that are listed in full; further ones are counted only, so that a check takes five lines.
+pub const FINDINGS_LISTED: usize = 4;
 
 /// Name of the check that a directory can be read as a leaf set.
 pub const FILES: &str = "files";
@@ -170,12 +170,12 @@ mod tests {
         (1..FINDINGS_LISTED).for_each(|i| result.report(format!("finding {i}")));
         let listed = result.to_string();
         assert!(
-            listed.starts_with("balance    20 findings, ") && listed.ends_with("\n    finding 19"),
+            listed.starts_with("balance    4 findings, ") && listed.ends_with("\n    finding 3"),
             "{listed}"
         );
         result.report_with(|| unreachable!("this text is not listed"));
         assert!(!result.holds());
-        assert!(result.to_string().ends_with("\n    finding 19\n    and 1 more"));
+        assert!(result.to_string().ends_with("\n    finding 3\n    and 1 more"));
         let mut nothing = CheckResult::new("sides");
         nothing.lacks("no leaves");
         assert!(nothing.holds() && !nothing.was_run());

@@ -1,17 +1,15 @@
 //! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
-use super::import::{Imported, Source};
+use super::import::Source;
 use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
 use check::checks::CheckResult;
 use check::promises::Promises;
 use clap::Args;
-use contract::case::Case;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use contract::files::named;
-use contract::manifest;
 use run::engine::description::Description;
 use run::engine::failure::End;
 use run::engine::paths::Paths;
@@ -19,7 +17,6 @@ use run::engine::process::{self, Watch};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
-use tempfile::TempDir;
 
 /// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
 const LIMIT: Duration = Duration::from_secs(86_400);
@@ -33,15 +30,16 @@ Examples:
   harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
   harness audit mesh --case body.toml --promises p4est a mesh that need not keep the whole definition
+  harness audit mesh.vtu --promises 'balance = \"face\"' nothing but these promises
 
 Exit codes: 0 all checks hold; 1 a check has findings; 2 invalid input; 3 nothing was checked, memory does not suffice, or \
 Python, VTK or the proven checker is missing.")]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
     mesh: Input,
-    /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines or path of a file
-    /// with a table of promises
-    #[arg(long, value_name = "ENGINE")]
+    /// Check these promises instead of the definition, with the geometry of --case: name in harness/engines, path of a file with
+    /// a table of promises, or the promises themselves, such as 'complete = true, balance = "face"'
+    #[arg(long, value_name = "ENGINE|PROMISES")]
     promises: Option<String>,
     /// Also prove the mesh right by the checker of reference/proof, given the directory of T0 (mesher --ungraded --out BASE)
     #[arg(long, value_name = "BASE")]
@@ -66,24 +64,16 @@ pub struct Arguments {
 /// If the mesh cannot be read, or the engine does not support the case.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { mesh, promises, proved, require_checks, nodes_max, json, source } = arguments;
-    let find = |name: &String| Description::find(name, &Paths::find());
-    let engine = promises.as_ref().map(find).transpose()?;
+    let engine = promises.as_deref().map(promising).transpose()?;
     let case = source.read_case()?;
     if let (Some(engine), Some(case)) = (&engine, &case)
         && let Some(why) = engine.declines(case)
     {
         return Err(Failure::missing(format!("left out: {why}")));
     }
-    // The temporary directory of an imported mesh lives as long as this value.
-    let imported = match mesh.join(manifest::FILE).exists() {
-        true if source.is_given() => {
-            let why = "has a manifest, which states root and sides: omit the options for them";
-            return Err(Failure::input(format!("{} {why}", mesh.display())));
-        }
-        true => None,
-        false => Some(imported(mesh, source, case.as_ref())?),
-    };
-    let directory = imported.as_ref().map_or(&**mesh, TempDir::path);
+    source.refuse_unused(&[mesh])?;
+    let opened = source.open(mesh, case.as_ref())?;
+    let directory = &opened.dir;
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let definition = Promises::of_definition();
@@ -117,6 +107,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     })
 }
 
+/// What an engine promises, or what the text itself states, as a table `[promises]` would.
+fn promising(text: &str) -> Result<Description, String> {
+    match text.contains('=') {
+        true => Description::parse(&format!("promises = {{ {text} }}")).map_err(|why| {
+            format!("--promises '{text}': {why}; for example 'complete = true, balance = \"face\"'")
+        }),
+        false => Description::find(text, &Paths::find()),
+    }
+}
+
 /// The proven checker.
 fn checker() -> Result<PathBuf, Failure> {
     let checker = Paths::find().proven_checker;
@@ -147,14 +147,4 @@ fn prove(checker: &Path, mesh: &Path, base: &Path, leaves: u64) -> Result<CheckR
         Err(failure) => return Err(failure.into()),
     }
     Ok(proof)
-}
-
-/// The leaf set of a mesh without a manifest, in a temporary directory.
-fn imported(mesh: &Path, source: &Source, case: Option<&Case>) -> Result<TempDir, Failure> {
-    let place = tempfile::tempdir()?;
-    match source.read(mesh, case)? {
-        Imported::Words(set) => set.create(place.path()),
-        Imported::Tree(tree) => tree.link(place.path()),
-    }?;
-    Ok(place)
 }

@@ -1,9 +1,9 @@
-//! `harness diff`: prints the first difference between two leaf-set directories.
+//! `harness diff`: prints the first difference between two meshes.
 
+use super::import::Source;
 use super::values::Input;
 use check::diff;
 use clap::Args;
-use contract::case::Case;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 
@@ -13,27 +13,30 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 Prints the inputs and counts that differ, the first leaf that differs, and the rule of reference/DEFINITION.md that decides \
 which mesh is right.
 
-Exit codes: 0 the meshes are the same; 1 their leaves or their roots differ; 2 invalid input.")]
+Options for reading apply to each mesh that is not a leaf-set directory. Exit codes: 0 the meshes are the same; 1 their leaves \
+or their roots differ; 2 invalid input; 3 Python or VTK is missing.")]
 pub struct Arguments {
-    /// A leaf-set directory
+    /// A leaf-set directory, or a mesh in any format of harness import
     a: Input,
-    /// The leaf-set directory to compare with
+    /// The mesh to compare with
     b: Input,
-    /// The case of both meshes: its facets help to find the deciding rule
-    #[arg(long)]
-    case: Option<Input>,
     /// Compare the leaves as octants, whatever the roots are
     #[arg(long)]
     ignore_root: bool,
+    /// How to read a mesh without a manifest; the facets of the case also help to find the deciding rule.
+    #[command(flatten)]
+    source: Source,
 }
 
 /// Compares and prints; returns the exit code.
 ///
 /// # Errors
 /// If a mesh or the case cannot be read.
-pub fn run(Arguments { a, b, case, ignore_root }: &Arguments) -> Result<u8, Failure> {
-    let case = case.as_deref().map(Case::read).transpose()?;
-    let report = diff::diff(a, b, case.as_ref()).map_err(Failure::input)?;
+pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8, Failure> {
+    source.refuse_unused(&[a, b])?;
+    let case = source.read_case()?;
+    let [of_a, of_b] = [source.open(a, case.as_ref())?, source.open(b, case.as_ref())?];
+    let report = diff::diff(&of_a.dir, &of_b.dir, case.as_ref()).map_err(Failure::input)?;
     println!("A {}\nB {}\n{report}", a.display(), b.display());
     let is_same = report.same_mesh() || *ignore_root && report.same_leaves();
     Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED })

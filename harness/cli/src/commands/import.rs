@@ -5,16 +5,15 @@ use clap::Args;
 use contract::case::Case;
 use contract::failure::EXIT_HOLDS;
 use contract::failure::Failure;
-use contract::import::htg::ImportedTree;
-use contract::import::{self, Format, Position, Request};
+use contract::import::{Format, Position, Request};
 use contract::lattice::Root;
-use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Sides};
+use contract::manifest::{self, Manifest, Sides};
 use contract::word::{self, KEY_END};
 use run::engine::paths::Paths;
-use std::io;
+use run::import::{Imported, import};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// `harness import`.
 #[derive(Args, Debug)]
@@ -63,10 +62,21 @@ pub struct Source {
 }
 
 impl Source {
-    /// Whether any option is given that has no effect on a leaf-set directory.
-    pub fn is_given(&self) -> bool {
+    /// Refuses options that have no effect, because each of the meshes is a leaf-set directory.
+    ///
+    /// # Errors
+    /// If any is given.
+    pub fn refuse_unused(&self, meshes: &[&Path]) -> Result<(), Failure> {
         let Self { format, root, case: _, sides, position, timeout: _ } = self;
-        format.is_some() || root.is_some() || sides.is_some() || *position != Position::default()
+        let is_given = format.is_some()
+            || root.is_some()
+            || sides.is_some()
+            || *position != Position::default();
+        if is_given && meshes.iter().all(|mesh| has_manifest(mesh)) {
+            let why = "has a manifest, which states root and sides: omit the options for them";
+            return Err(Failure::input(format!("{} {why}", meshes[0].display())));
+        }
+        Ok(())
     }
 
     /// Reads the case, if one is given.
@@ -78,57 +88,44 @@ impl Source {
     }
 
     /// Reads the mesh.
-    ///
-    /// # Errors
-    /// If it is not a usable mesh, or if Python or VTK is missing.
-    pub fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
-        let input = |error: import::ImportError| Failure::input(error.of_file(mesh));
-        let root = self.root.or(case.map(|case| case.root));
-        let format = self.format.map_or_else(|| import::guess(mesh), Ok).map_err(input)?;
+    fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
+        let Self { format, root, sides, position, timeout, case: _ } = self;
+        let request = Request { sides: sides.clone(), root: *root, position: *position };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        if format == Format::Vtk {
-            let sides = self.sides.as_deref();
-            let tree = ImportedTree::open(mesh, sides, root, case, program.clone());
-            if let Some(tree) = tree.map_err(input)? {
-                return Ok(Imported::Tree(Box::new(tree)));
-            }
-        }
-        let request = Request { sides: self.sides.clone(), root, position: self.position };
-        let limit = Duration::from_secs(self.timeout);
-        let cells = run::import::read(mesh, format, &request, &Paths::find(), limit)?;
-        let set = import::leaf_set(&cells, root, case, program).map_err(input)?;
-        if root.is_none() && cells.root.is_none() {
-            let Root { origin: [x, y, z], edge } = set.manifest.root;
+        let limit = Duration::from_secs(*timeout);
+        let mut imported = import(mesh, *format, &request, case, program, &Paths::find(), limit)?;
+        if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
+            let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(
                 "harness: the root {x},{y},{z},{edge} is the least that holds the cells; --root gives another"
             );
         }
-        Ok(Imported::Words(Box::new(set)))
+        Ok(imported)
+    }
+
+    /// The directory of a mesh, which is imported if it is no leaf set.
+    ///
+    /// # Errors
+    /// If it is not a usable mesh, or if Python or VTK is missing.
+    pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Opened, Failure> {
+        if has_manifest(mesh) {
+            return Ok(Opened { dir: mesh.to_owned(), _made: None });
+        }
+        let made = tempfile::tempdir()?;
+        self.read(mesh, case)?.link(made.path())?;
+        Ok(Opened { dir: made.path().to_owned(), _made: Some(made) })
     }
 }
 
-/// A mesh that was read.
-pub enum Imported {
-    /// Its leaves are in memory.
-    Words(Box<LeafSet>),
-    /// Its leaves are in a tree of any size.
-    Tree(Box<ImportedTree>),
+fn has_manifest(mesh: &Path) -> bool {
+    mesh.join(manifest::FILE).exists()
 }
 
-impl Imported {
-    fn manifest(&self) -> &Manifest {
-        match self {
-            Self::Words(set) => &set.manifest,
-            Self::Tree(tree) => &tree.manifest,
-        }
-    }
-
-    fn create(&self, dir: &Path) -> io::Result<()> {
-        match self {
-            Self::Words(set) => set.create(dir),
-            Self::Tree(tree) => tree.create(dir),
-        }
-    }
+/// A leaf-set directory. One that was made is deleted with this value.
+pub struct Opened {
+    /// The directory.
+    pub dir: PathBuf,
+    _made: Option<TempDir>,
 }
 
 /// Reads and writes; returns the exit code.
@@ -137,9 +134,9 @@ impl Imported {
 /// If the mesh cannot be read or written.
 pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
     let case = source.read_case()?;
-    let set = source.read(mesh, case.as_ref())?;
-    set.create(out)?;
-    println!("{}: {}", out.display(), summary(set.manifest()));
+    let mut imported = source.read(mesh, case.as_ref())?;
+    imported.create(out)?;
+    println!("{}: {}", out.display(), summary(imported.manifest()));
     Ok(EXIT_HOLDS)
 }
 

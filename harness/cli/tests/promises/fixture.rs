@@ -102,9 +102,14 @@ impl Fixture {
 
     /// Runs the harness in the directory.
     pub fn harness(&self, arguments: &str) -> Outcome {
+        self.harness_with(&arguments.split(' ').collect::<Vec<_>>())
+    }
+
+    /// The same with arguments that may contain blanks.
+    pub fn harness_with(&self, arguments: &[&str]) -> Outcome {
         let path = format!("{}:/usr/bin:/bin", self.path("bin").display());
         let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.args(arguments.split(' ')).current_dir(self.0.path());
+        command.args(arguments).current_dir(self.0.path());
         command.env("PATH", path).env("HARNESS_ROOT", self.0.path());
         command.env_remove("GITHUB_STEP_SUMMARY");
         let output = command.output().unwrap();

@@ -107,6 +107,81 @@ fn a_mesh_that_depends_on_what_it_must_not_is_reported() {
     assert!(failed(&verified, "3 ranks: layer: "), "{}", verified.printed);
 }
 
+/// An engine that copies a forest of p4est, and whose run report, of rank 0 alone, has neither a digest nor a number of ranks.
+const FOREST: &str = r#"
+[run]
+serial = ["sh", "{here}/copy"]
+parallel = ["{launcher}", "sh", "{here}/copy"]
+out = ["{out}.p8est"]
+json = ["{json}"]
+format = "p4est"
+[promises]
+complete = true
+balance = "corner"
+deterministic = true
+independent_of = ["ranks"]
+"#;
+
+fn copying(fixture: &Fixture, sample: &str) {
+    let samples = format!("{}/../contract/tests/samples", env!("CARGO_MANIFEST_DIR"));
+    let cells =
+        std::fs::read_to_string(format!("{samples}/{sample}.csv")).unwrap().lines().count() - 1;
+    let script = format!(
+        "echo run >> ${{0%/*}}/seen\nfor file; do case $file in *.p8est) cp {samples}/{sample}.p8est $file ;; \
+         *) echo '{{\"cells\": {cells}}}' > $file ;; esac; done\n"
+    );
+    fixture.write("copy", &script);
+}
+
+#[test]
+fn an_engine_in_a_format_of_its_own_needs_neither_digest_nor_ranks() {
+    let fixture = Fixture::new();
+    fixture.write("forest.toml", FOREST);
+    copying(&fixture, "unitcube");
+    let verify = "verify case.toml --engine forest.toml --ranks 2,3";
+    let verified = fixture.harness(verify);
+    assert_eq!(verified.code, 0, "{}", verified.printed);
+    assert!(verified.printed.contains("0 fail, 0 left out"), "{}", verified.printed);
+    assert!(verified.printed.contains("no run report states `ranks`"), "{}", verified.printed);
+    // What it does not promise needs no oracle, and its time is the harness's.
+    assert!(!verified.printed.contains("oracles"), "{}", verified.printed);
+    let serial = verified.printed.lines().find(|line| line.contains(" serial ")).unwrap();
+    assert_eq!(serial.split_whitespace().nth(8), Some("-"), "{serial}");
+    // This forest fills a part of its root.
+    copying(&fixture, "brick");
+    let verified = fixture.harness(verify);
+    assert!(failed(&verified, "serial: complete: "), "{}", verified.printed);
+    fixture.write("forest.toml", &FOREST.replace("[\"{out}.p8est\"]", "[\"{out}.json\"]"));
+    let unwritten = fixture.harness(verify);
+    assert!(failed(&unwritten, "wrote a mesh that cannot be imported: "), "{}", unwritten.printed);
+    fixture.write("forest.toml", &FOREST.replace("[\"{out}.p8est\"]", "[\"-\", \"{out}.p8es\"]"));
+    std::fs::remove_file(fixture.path("seen")).unwrap();
+    fixture.write("case.toml", "spacing_min = 'fine'\n");
+    let refused = fixture.harness(verify);
+    assert_eq!((refused.code, fixture.path("seen").exists()), (2, false), "{}", refused.printed);
+    let why = "case.toml: line 1, spacing_min: invalid type: string \"fine\", expected a number; for example spacing_min = 0.01";
+    assert!(refused.printed.contains(why), "{}", refused.printed);
+}
+
+#[test]
+fn promises_can_be_given_on_the_command_line() {
+    let fixture = Fixture::new();
+    fixture.engine("corner", "complete = true");
+    assert_eq!(fixture.verify("--no-mpi --out out --keep").code, 0);
+    let audit = |promises: &str| {
+        let words =
+            ["audit", "out/case/serial/mesh", "--case", "case.toml", "--promises", promises];
+        fixture.harness_with(&words)
+    };
+    let outcome = audit("complete = true, balance = 'edge'");
+    assert_eq!(outcome.code, 0, "{}", outcome.printed);
+    let outcome = audit("balance = 'corner'");
+    assert!(failed(&outcome, "finding"), "{}", outcome.printed);
+    let outcome = audit("balance = corner");
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("for example"), "{}", outcome.printed);
+}
+
 #[test]
 fn shrinking_keeps_the_named_check_and_no_other() {
     let fixture = Fixture::new();

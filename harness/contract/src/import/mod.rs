@@ -21,7 +21,7 @@ use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
 use cells::Cells;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -33,15 +33,13 @@ pub use leaf_set::leaf_set;
 pub const TOLERANCE: f64 = 0.01;
 
 /// A format of mesh files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// Leaf words in one .npy file, or in the parts of a directory without a manifest
     LeafWords,
-    /// A NumPy array of x, y, z and level or edge
-    Npy,
-    /// Lines of x, y, z and level or edge, with or without a header
-    Csv,
+    /// x, y, z and level or edge: a NumPy array, or lines with or without a header
+    Table,
     /// VTK: legacy .vtk, .vtu, .pvtu, .htg, and VTKHDF with a hyper-tree grid or unstructured grid
     Vtk,
     /// A forest that p4est wrote with p8est_save
@@ -53,7 +51,7 @@ pub enum Format {
 }
 
 /// The place of a cell that x, y and z give in a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Position {
     /// The minimum corner, in the units of the geometry
@@ -143,7 +141,7 @@ fn of_content(head: &[u8]) -> Option<Format> {
         let is_words =
             ["<u8", ">u8"].iter().any(|kind| text.contains(&format!("'descr': '{kind}'")))
                 && text.contains(",), ");
-        return Some(if is_words { Format::LeafWords } else { Format::Npy });
+        return Some(if is_words { Format::LeafWords } else { Format::Table });
     }
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") {
         return Some(Format::Vtk);
@@ -162,7 +160,7 @@ fn of_content(head: &[u8]) -> Option<Format> {
     let first = text.lines().find(|line| !is_comment(line) && !line.starts_with('!'))?;
     match fields(first).count() {
         3 => Some(Format::Discretize),
-        n if n > 3 => Some(Format::Csv),
+        n if n > 3 => Some(Format::Table),
         _ => None,
     }
 }
@@ -231,16 +229,16 @@ mod tests {
         let cases: [(&[u8], Option<Format>); 15] = [
             (b"<VTKFile type=\"UnstructuredGrid\">\n<AppendedData>_\xff\xfe", Some(Format::Vtk)),
             (&words, Some(Format::LeafWords)),
-            (&rows, Some(Format::Npy)),
-            (&crate::npy::header("<u8", "(5, 4)"), Some(Format::Npy)),
+            (&rows, Some(Format::Table)),
+            (&crate::npy::header("<u8", "(5, 4)"), Some(Format::Table)),
             (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
             (b"<?xml version=\"1.0\"?>\n<VTKFile type=\"HyperTreeGrid\">", Some(Format::Vtk)),
             (b"\x89HDF\r\n\x1a\n\0\0", Some(Format::Vtk)),
             (b"p8est\0\0\x002.2", Some(Format::P4est)),
             (b"{\"h\": [[1.0", Some(Format::Discretize)),
             (b"! octree\n16 16 16\n0 0 8\n", Some(Format::Discretize)),
-            (b"# made by hand\nx,y,z,level\n0,0,0,1\n", Some(Format::Csv)),
-            (b"0 0 0 1\n", Some(Format::Csv)),
+            (b"# made by hand\nx,y,z,level\n0,0,0,1\n", Some(Format::Table)),
+            (b"0 0 0 1\n", Some(Format::Table)),
             (b"p4est\0\0\0", None),
             (b"", None),
             (b"solid body\n", None),
@@ -254,7 +252,7 @@ mod tests {
     #[test]
     fn a_character_that_is_cut_off_does_not_hide_the_format() {
         for cut in [&b"\xc3"[..], b"\xe2\x82", b"\xf0\x9f\x98"] {
-            assert_eq!(of_content(&[b"0 0 0 1\n", cut].concat()), Some(Format::Csv));
+            assert_eq!(of_content(&[b"0 0 0 1\n", cut].concat()), Some(Format::Table));
             assert_eq!(of_content(&[b"0 0 0 1\n", cut, b" "].concat()), None);
         }
     }

@@ -29,7 +29,7 @@ mod tests {
         let text = markdown(&sample());
         let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
         assert_eq!(rows.len(), 4);
-        assert!(rows.iter().all(|row| row.matches(" |").count() == 13), "{text}");
+        assert!(rows.iter().all(|row| row.matches(" |").count() == 12), "{text}");
     }
 
     #[test]

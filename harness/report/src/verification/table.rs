@@ -4,7 +4,7 @@ use super::remarks::remarks;
 use crate::table::Table;
 use run::verify::report::{CaseReport, Check, Outcome, Report, Run, Tally};
 
-/// The table, with the speedup over the 38,000 cells per second that the paper reports on one core.
+/// The table.
 pub(super) fn table_of(report: &Report) -> Table {
     let columns = vec![
         "case",
@@ -19,7 +19,6 @@ pub(super) fn table_of(report: &Report) -> Table {
         "process s",
         "M cells/s",
         "B/cell",
-        "x paper",
     ];
     let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
     check_invariants(&rows, report);
@@ -79,13 +78,15 @@ fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
         vec![tally.pass.to_string(), tally.fail.to_string(), tally.left_out.to_string()];
     match run {
         Some(run) => fields.extend([
-            format!("{:.3}", run.time_wall_s),
+            match run.is_time_reported {
+                true => format!("{:.3}", run.time_wall_s),
+                false => "-".to_owned(),
+            },
             format!("{:.3}", run.time_process_s),
             format!("{:.3}", run.cells_per_s() / 1e6),
             format!("{:.1}", run.bytes_per_cell()),
-            format!("{:.1}", run.speedup_over_paper()),
         ]),
-        None => fields.extend(vec!["-".to_owned(); 5]),
+        None => fields.extend(vec!["-".to_owned(); 4]),
     }
     fields
 }
@@ -104,7 +105,7 @@ mod tests {
             lines[2][..9],
             ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100"]
         );
-        assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.200", "0.152", "10.0", "4.0"]);
+        assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.200", "0.152", "10.0"]);
     }
 
     #[test]

@@ -24,3 +24,4 @@ pub mod service;
 mod session;
 pub mod takes;
 pub mod templates;
+mod written;

@@ -1,8 +1,9 @@
 //! The run report: the JSON file in which a program describes its run.
 //!
-//! `cells` and `digest` are required. Everything else may be missing, and then
-//! - `ranks` is 1, which fails on several, and `facets` is 0;
-//! - `time_wall_s` is the wall time of the process, and `peak_rss_bytes` is what was sampled from outside, or empty;
+//! `cells` is required. Everything else may be missing, and then
+//! - `digest` is that of the mesh, if the run wrote one;
+//! - it is unknown how many ranks there were, and `facets` is 0;
+//! - `peak_rss_bytes` is what was sampled from outside, or empty, and the time is that of the process;
 //! - phases, counters and the message matrix are empty, and so is every list that is missing from a phase.
 //!
 //! An engine without a run report is described by the manifest of its mesh, which has cells and digest only.
@@ -18,9 +19,10 @@ pub struct RunReport {
     /// Cells of the final mesh, or leaves of the base tree.
     pub cells: u64,
     /// The digest of the mesh: 32 hexadecimal digits.
-    pub digest: String,
-    /// Number of ranks; `None` if the engine writes no run report.
-    #[serde(default = "one")]
+    #[serde(default)]
+    pub digest: Option<String>,
+    /// Number of ranks; `None` if it is not reported.
+    #[serde(default)]
     pub ranks: Option<usize>,
     /// Number of facets.
     #[serde(default)]
@@ -31,7 +33,7 @@ pub struct RunReport {
     /// The partitioner that was used; `None` if it is not reported, or for a single rank.
     #[serde(default)]
     pub partitioner: Option<String>,
-    /// Wall time by the program's own clock, in seconds.
+    /// Wall time by the program's own clock, in seconds; `None` if it is not reported.
     #[serde(default)]
     pub time_wall_s: Option<f64>,
     /// Peak resident memory, per rank or of the whole program.
@@ -77,10 +79,6 @@ pub struct PhaseReport {
     pub message_bytes: Vec<u64>,
 }
 
-fn one() -> Option<usize> {
-    Some(1)
-}
-
 fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged)]
@@ -107,7 +105,7 @@ impl RunReport {
 
     /// The report of a run that wrote a mesh and no run report.
     pub fn of_mesh(manifest: &Manifest) -> Self {
-        let digest = manifest.digest.to_string();
+        let digest = Some(manifest.digest.to_string());
         Self { cells: manifest.leaves, digest, ..Self::default() }
     }
 
@@ -158,15 +156,16 @@ mod tests {
         assert_eq!(mesher.message_matrix, [[0, 1, 3, 96]]);
         let reference =
             parse(r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#);
-        assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (Some(1), 9));
+        assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (None, 9));
     }
 
     #[test]
-    fn only_cells_and_digest_are_required() {
-        let least = parse(r#"{"cells": 8, "digest": "00"}"#);
-        assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (Some(1), None, None));
+    fn only_cells_are_required() {
+        let least = parse(r#"{"cells": 8}"#);
+        assert_eq!((least.ranks, least.time_wall_s, least.time_cpu_s()), (None, None, None));
+        assert!(least.digest.is_none());
         assert!(least.peak_rss_bytes.is_empty() && least.counters.is_empty());
-        let error = serde_json::from_str::<RunReport>(r#"{"cells": 8}"#).unwrap_err();
-        assert!(error.to_string().contains("digest"), "{error}");
+        let error = serde_json::from_str::<RunReport>(r#"{"digest": "00"}"#).unwrap_err();
+        assert!(error.to_string().contains("cells"), "{error}");
     }
 }

@@ -11,9 +11,8 @@ use super::placeholders::{LAUNCHER, Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use super::service::Services;
-use contract::case::Case;
+use super::written;
 use contract::leafset::{self, LeafSet};
-use contract::manifest::{self, Tree};
 use contract::mesh::Mesh;
 use contract::plain::{PlainCase, StlForm};
 use std::fs;
@@ -54,7 +53,7 @@ impl Engine {
         let description = Description::find(name, paths)?;
         if description.run.serial.is_empty() {
             return Err(format!(
-                "{name} cannot be run: its engine file has no command `serial` in [run]"
+                "{name} cannot be run: its engine file has no command `serial` in [run], as in serial = [\"my-mesher\", \"{{case}}\", \"{{out}}\"]"
             ));
         }
         let places = description.places(paths);
@@ -114,7 +113,12 @@ impl Engine {
         self.description.run.json.is_some()
     }
 
-    /// The directory to which a run writes its mesh, if it writes one.
+    /// Whether the engine writes its mesh in a format that is imported.
+    fn is_imported(&self) -> bool {
+        self.description.run.format.is_some()
+    }
+
+    /// The leaf-set directory of the mesh of a run, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let always = self.description.run.always_writes_mesh();
         let unrequested = || always.then(|| options.place.join("mesh"));
@@ -148,7 +152,11 @@ impl Engine {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut values = self.places.clone();
         values.insert("program", text(&self.program));
-        values.extend(self.mesh_path(options).map(|mesh| ("out", text(&mesh))));
+        let out = |mesh: PathBuf| match self.is_imported() {
+            true => written::foreign(options.place),
+            false => mesh,
+        };
+        values.extend(self.mesh_path(options).map(|mesh| ("out", text(&out(mesh)))));
         command::assemble(&self.description.run, &self.launcher, values, case, layout, options)
             .map_err(|end| self.failure(end))
     }
@@ -166,22 +174,21 @@ impl Engine {
         let mut command = self.command(case, layout, options)?;
         // An earlier run's report must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
+        if let Some(mesh) = self.mesh_path(options).filter(|_| self.is_imported()) {
+            let cleared = written::clear(options.place, &mesh);
+            cleared.map_err(|error| self.unusable(format!("has no place to write to: {error}")))?;
+        }
         let finished = self.execute(&mut command, layout.ranks, options)?;
         let mesh = self.mesh_path(options);
-        if let Some(mesh) = mesh.as_ref().filter(|mesh| !mesh.join(manifest::FILE).exists()) {
-            // Our programs write it last: without it their mesh is incomplete.
-            if description::is_own(self.name()) {
-                return Err(self.unusable(format!("wrote no {}", manifest::FILE)));
-            }
-            let tree = if options.ungraded { Tree::Base } else { Tree::Final };
-            self.describe(mesh, case, tree)
-                .map_err(|why| self.unusable(format!("wrote a mesh that cannot be read: {why}")))?;
+        if let Some(mesh) = &mesh {
+            written::complete(&self.description, self.label(), &command, case, mesh, options)
+                .map_err(|end| self.failure(end))?;
         }
         let written =
             mesh.as_deref().map(Mesh::open).transpose().map_err(|error| {
                 self.unusable(format!("wrote a mesh that cannot be read: {error}"))
             })?;
-        let report = match &written {
+        let mut report = match &written {
             Some(mesh) if !options.report || !self.writes_report() => {
                 RunReport::of_mesh(&mesh.manifest)
             }
@@ -192,6 +199,10 @@ impl Engine {
         if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
             let (stated, found) = (report.cells, mesh.len());
             return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
+        }
+        // A digest in the report is compared with that of the leaves by whoever reads them.
+        if let Some(mesh) = &written {
+            report.digest.get_or_insert_with(|| mesh.manifest.digest.to_string());
         }
         let (launched, reported) = (layout.ranks.count(), report.ranks);
         if let Some(ranks) = reported.filter(|&ranks| ranks != launched) {
@@ -207,21 +218,9 @@ impl Engine {
             };
             return Err(self.unusable(why));
         }
-        let report = completed(report, &finished);
+        let report = completed(report, &finished, launched);
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
-    }
-
-    /// Writes the manifest of leaves that the engine wrote without one: the inputs of the case, the counts and digests
-    /// of the leaves.
-    fn describe(&self, mesh: &Path, case: &Path, tree: Tree) -> Result<(), String> {
-        let parts = leafset::read_parts(mesh).map_err(|error| error.to_string())?;
-        let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
-        let case = Case::read(case).map_err(|error| error.to_string())?;
-        let empty = case.manifest(tree, self.label());
-        let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
-        set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
-        set.manifest.write(mesh).map_err(|error| format!("{}: {error}", mesh.display()))
     }
 
     fn execute(
@@ -320,9 +319,12 @@ impl Completed {
     }
 }
 
-/// The report, with values measured from outside where the program reported none.
-fn completed(mut report: RunReport, finished: &Finished) -> RunReport {
-    report.time_wall_s.get_or_insert(finished.time_wall_s);
+/// The report, with the memory that was measured from outside where the program reported none, or that of rank 0 alone.
+fn completed(mut report: RunReport, finished: &Finished, ranks: usize) -> RunReport {
+    let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
+    if is_of_one && finished.peak_rss_bytes.is_some() {
+        report.peak_rss_bytes.clear();
+    }
     if report.peak_rss_bytes.is_empty() {
         report.peak_rss_bytes.extend(finished.peak_rss_bytes);
     }

@@ -2,6 +2,7 @@
 
 use super::placeholders::{LAUNCHER, placeholders};
 use check::promises::{Independence, Promises};
+use contract::import::{Format, Position};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -22,6 +23,13 @@ pub struct Templates {
     /// Appended to write the leaf-set directory `{out}`. Without it, the commands themselves contain `{out}`, and every
     /// run writes its mesh.
     pub out: Option<Vec<String>>,
+    /// What the engine writes, if not leaf words: `{out}` then begins the path of that file or directory.
+    pub format: Option<Format>,
+    /// The cell array or column with the sides, in that format.
+    pub sides: Option<String>,
+    /// What x, y and z are in a table.
+    #[serde(default)]
+    pub position: Position,
     /// Appended to write the run report `{json}`.
     pub json: Option<Vec<String>>,
     /// Appended to include the message matrix in the run report.
@@ -66,6 +74,14 @@ impl Templates {
 
     /// Refuses promises that no command could show to be kept.
     pub(super) fn check_promises(&self, promises: &Promises) -> Result<(), String> {
+        let on_sides = promises.definition || promises.crossing || promises.sides.is_some();
+        if self.format.is_some() && self.sides.is_none() && on_sides {
+            return Err(
+                "the promises include sides (`definition` does, which is assumed without [promises]), but [run] names no cell array \
+                 for them: add it, as in sides = \"side\", or promise less, as in balance = \"face\""
+                    .to_owned(),
+            );
+        }
         let environment = self.environment.values();
         let mut words = environment.chain(&self.serial).chain(self.threads.iter().flatten());
         let threads = words.any(|word| word.contains("{threads}"));
@@ -136,7 +152,8 @@ impl Templates {
             let writes = |words: &Vec<String>| words.iter().any(|word| word.contains("{out}"));
             if starts && self.out.is_none() && template.is_some_and(|words| !writes(words)) {
                 return Err(format!(
-                    "`{key}` has no {{out}}, the directory of the mesh: add it, or the key `out`"
+                    "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
+                     key `out`, as in out = [\"--out\", \"{{out}}\"]"
                 ));
             }
         }

@@ -98,12 +98,15 @@ impl<'a> CaseRun<'a> {
         &self.programs.engine.description().promises
     }
 
-    /// Reads the case. If the harness cannot read it, the mesher must refuse it too.
+    /// Reads the case. If the harness cannot read it, a mesher that promises the definition must refuse it too, and no other sees it.
     fn read(&mut self) -> Option<Case> {
         match Case::read(&self.selected.path) {
             Ok(case) => Some(case),
             Err(error) => {
-                self.verify_refusal(&error.to_string());
+                match self.promises().definition {
+                    true => self.verify_refusal(&error.to_string()),
+                    false => self.report.input_error = Some(error.to_string()),
+                }
                 None
             }
         }

@@ -15,6 +15,7 @@ pub mod run;
 pub mod serial;
 pub mod workplace;
 
+use crate::engine::description;
 use crate::engine::interrupt;
 use crate::engine::programs::Programs;
 use crate::progress::Progress;
@@ -34,13 +35,21 @@ use workplace::Workplace;
 /// If the verification could not begin. Failures after that are in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure> {
     let start = Instant::now();
-    for (program, engine) in [("mesher", &programs.engine), ("reference", &programs.reference)] {
-        if !engine.program().is_file() {
-            let path = engine.program().display();
-            return Err(Failure::missing(format!(
-                "the {program} is missing: build {path}, or give another path with --{program}"
-            )));
-        }
+    let engine = &programs.engine;
+    let used = [("mesher", engine), ("reference", &programs.reference)];
+    // Only the definition is compared with the reference.
+    let used = &used[..1 + usize::from(engine.description().promises.definition)];
+    if let Some((program, engine)) = used.iter().find(|(_, engine)| !engine.program().is_file()) {
+        let path = engine.program().display();
+        let fix = match description::is_own(engine.name()) {
+            true => format!("build {path}, or give another path with --{program}"),
+            false => format!(
+                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {}: correct it, as \
+                 in program = \"{{here}}/my-mesher\", or give --{program} PATH",
+                engine.name()
+            ),
+        };
+        return Err(Failure::missing(format!("the {program} is missing: {fix}")));
     }
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     if selected.is_empty() {
@@ -81,7 +90,7 @@ fn asked(selected: &[Selected], options: &Options, programs: &Programs) -> Asked
     Asked {
         cases: selected.iter().map(|case| case.name.clone()).collect(),
         named: !options.cases.is_empty(),
-        ranks: options.rank_counts(),
+        ranks: options.rank_counts(programs.engine.description()),
         subjects: case::steps(&programs.engine.description().promises)
             .iter()
             .map(|(subject, _)| (*subject).to_owned())

@@ -18,6 +18,9 @@ pub struct Needs {
     pub mpi: Option<String>,
     /// Whether the ranks that were asked for, or a promise about ranks, require MPI.
     mpi_required: bool,
+    /// Of what the engine has no use: of MPI without a command for it, and of what is compared with the definition if it does not
+    /// promise that.
+    unused: Vec<Need>,
     /// Programs that stay.
     pub services: Services,
     /// The oracles, once they were tried: their packages are imported while the first case is meshed.
@@ -62,24 +65,29 @@ impl Needs {
         };
         if needs.mpi.is_none() {
             // All start at the same time, while the first case is meshed serially. What fails is found by the first run.
-            let counts = options.rank_counts().into_iter();
+            let counts = options.rank_counts(engine).into_iter();
             counts.for_each(|ranks| drop(programs.engine.start_ranks(ranks, &needs.services)));
         }
-        let p4est = &programs.paths.p4est;
-        needs.p4est = match (options.no_p4est, p4est.is_file()) {
-            (true, _) => Some("--no-p4est was given".to_owned()),
-            (_, false) => Some(format!("{} is missing (ci/setup compiles it)", p4est.display())),
-            (_, true) => None,
+        let unused = (!engine.promises.definition)
+            .then(|| format!("{} does not promise the definition", engine.name));
+        let unless = |given: bool, option: &str| {
+            unused.clone().or_else(|| given.then(|| format!("--{option} was given")))
         };
-        match options.no_oracles {
+        let p4est = &programs.paths.p4est;
+        let built = || format!("{} is missing (ci/setup compiles it)", p4est.display());
+        needs.p4est =
+            unless(options.no_p4est, "no-p4est").or_else(|| (!p4est.is_file()).then(built));
+        match unless(options.no_oracles, "no-oracles") {
             // Those that cannot be started are found when they are tried.
-            false => ORACLES
+            None => ORACLES
                 .iter()
                 .for_each(|o| drop(oracle::start(o, &needs.services, &programs.paths))),
-            true => {
-                let lacking = Some("--no-oracles was given".to_owned());
-                needs.oracles = OnceCell::from(Oracles { lacking, ..Oracles::default() });
-            }
+            lacking => needs.oracles = OnceCell::from(Oracles { lacking, ..Oracles::default() }),
+        }
+        let of_definition = [Need::Oracles, Need::P4est].into_iter().filter(|_| unused.is_some());
+        needs.unused = of_definition.collect();
+        if engine.run.parallel.is_none() && options.ranks.is_none() {
+            needs.unused.push(Need::Mpi);
         }
         needs
     }
@@ -131,6 +139,7 @@ impl Needs {
         let missing = all.into_iter().filter_map(|(need, why)| {
             let required = match need {
                 _ if options.require.contains(&need) => true,
+                _ if self.unused.contains(&need) => return None,
                 Need::Mpi => self.mpi_required,
                 Need::Checks => nothing,
                 _ => false,

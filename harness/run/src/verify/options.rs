@@ -117,11 +117,16 @@ impl Options {
         Duration::from_secs(self.timeout)
     }
 
+    /// Whether runs on MPI are wanted: those that were asked for, and all of which the engine is capable.
+    pub fn wants_ranks(&self, engine: &Description) -> bool {
+        !self.no_mpi && (self.ranks.is_some() || engine.run.parallel.is_some())
+    }
+
     /// Rank counts of the runs on MPI, each once: a run has one directory.
-    pub fn rank_counts(&self) -> Vec<usize> {
+    pub fn rank_counts(&self, engine: &Description) -> Vec<usize> {
         let mut counts = Vec::new();
         for &count in self.ranks.as_deref().unwrap_or(&RANKS) {
-            if !self.no_mpi && !counts.contains(&count) {
+            if self.wants_ranks(engine) && !counts.contains(&count) {
                 counts.push(count);
             }
         }
@@ -140,7 +145,7 @@ impl Options {
         let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
         let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
         let mut layouts = Vec::new();
-        for ranks in self.rank_counts() {
+        for ranks in self.rank_counts(engine) {
             for partitioner in &partitioners {
                 for level_base in &level_bases {
                     layouts.push(Layout {

@@ -17,8 +17,8 @@ use std::fs;
 /// Numbers of threads that are compared with one.
 const THREADS: [usize; 2] = [2, 4];
 
-/// What remains unknown about the ranks of an engine without a run report.
-const DOUBT: &str = "it is unknown whether the ranks communicate: the engine writes no run report";
+/// What remains unknown about the ranks of an engine that does not report their number.
+const DOUBT: &str = "it is unknown whether the ranks communicate: no run report states `ranks`";
 
 /// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
 const HANGS_MAX: usize = 3;
@@ -96,9 +96,10 @@ impl CaseRun<'_> {
             write: true,
         })?;
         self.report().runs.push(meshed.run);
+        let is_doubtful = meshed.report.ranks.is_none();
         let mut check = Check::of_layout(layout, RUNS, ended_well());
         let is_first = self.report().checks.iter().all(|check| check.ranks.is_none());
-        if is_first && check.ranks.is_some() && !self.programs.engine.writes_report() {
+        if is_first && check.ranks.is_some() && is_doubtful {
             check.notes.push(DOUBT.to_owned());
         }
         self.add(check, Some(layout));

@@ -18,9 +18,6 @@ use serde::{Deserialize, Serialize};
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
 pub const SCHEMA: &str = "octree-verify/1";
 
-/// The paper's speed on one core, in cells per second.
-pub const PAPER_CELLS_PER_S: f64 = 38_000.0;
-
 /// One run of mesher or reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Run {
@@ -32,8 +29,11 @@ pub struct Run {
     pub cells: u64,
     /// Digest of the final mesh.
     pub digest: String,
-    /// Wall time by the program's own clock, in seconds; without writing files if that is measured separately.
+    /// Wall time by the program's own clock, in seconds; without writing files if that is measured separately. That of the process if
+    /// the program reports none.
     pub time_wall_s: f64,
+    /// Whether the program reported that time.
+    pub is_time_reported: bool,
     /// Wall time by the harness's clock, in seconds, including the start and end of the processes.
     pub time_process_s: f64,
     /// Peak resident memory of all ranks together.
@@ -49,11 +49,6 @@ impl Run {
     /// Peak memory per cell.
     pub fn bytes_per_cell(&self) -> f64 {
         self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
-    }
-
-    /// Speed relative to the paper's on one core.
-    pub fn speedup_over_paper(&self) -> f64 {
-        self.cells_per_s() / PAPER_CELLS_PER_S
     }
 }
 
@@ -72,7 +67,7 @@ pub struct CaseReport {
     pub runs: Vec<Run>,
     /// All checks.
     pub checks: Vec<Check>,
-    /// The mesher's error message, if the case is invalid.
+    /// The error message of the mesher, or of the harness if the mesher was not asked, if the case is invalid.
     pub input_error: Option<String>,
     /// Directory of the results, if they were kept.
     pub kept: Option<String>,

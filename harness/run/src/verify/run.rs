@@ -94,10 +94,11 @@ impl CaseRun<'_> {
 /// Compares cells and digest in the run report with those of the mesh.
 fn compare(report: &RunReport, mesh: &LeafSet) -> Result<(), String> {
     let (digest, leaves) = (mesh.manifest.digest.to_string(), mesh.words.len() as u64);
-    if report.digest != digest || report.cells != leaves {
+    let reported = report.digest.as_ref().unwrap_or(&digest);
+    if *reported != digest || report.cells != leaves {
         return Err(format!(
-            "reports {} cells and digest {}, but its mesh has {leaves} leaves and digest {digest}",
-            report.cells, report.digest
+            "reports {} cells and digest {reported}, but its mesh has {leaves} leaves and digest {digest}",
+            report.cells
         ));
     }
     Ok(())
@@ -113,8 +114,9 @@ fn measurements(request: &Request, completed: &Completed) -> Run {
         program: program.to_owned(),
         layout: request.layout.rank_count().map(|_| request.layout.clone()),
         cells: report.cells,
-        digest: report.digest.clone(),
+        digest: report.digest.clone().unwrap_or_default(),
         time_wall_s: report.time_wall_s.unwrap_or(completed.time_process_s),
+        is_time_reported: report.time_wall_s.is_some(),
         time_process_s: completed.time_process_s,
         peak_rss_bytes: report.peak_rss_bytes_total(),
     }

@@ -1,0 +1,118 @@
+//! What an engine wrote, as a leaf-set directory: leaf words without a manifest get one, and any other format is imported.
+
+use super::description::{self, Description};
+use super::failure::End;
+use super::options::RunOptions;
+use super::paths::Paths;
+use crate::import::{Imported, import};
+use contract::case::Case;
+use contract::failure::{EXIT_MISSING, Failure};
+use contract::import::{Format, Request};
+use contract::leafset::{self, LeafSet};
+use contract::manifest::{self, Tree};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What ends a path within a command of a shell.
+const ENDS: [char; 6] = [' ', '\'', '"', ';', '&', '|'];
+
+/// The beginning of the paths that a run writes in a format that is imported: the value of `{out}`.
+pub(super) fn foreign(place: &Path) -> PathBuf {
+    place.join("written/mesh")
+}
+
+/// Makes the place of these paths, empty: what an earlier run wrote must not be mistaken for this run's.
+pub(super) fn clear(place: &Path, mesh: &Path) -> std::io::Result<()> {
+    let written = place.join("written");
+    let _ = (fs::remove_dir_all(&written), fs::remove_dir_all(mesh));
+    fs::create_dir_all(written)
+}
+
+/// The path that a command writes: `{out}` and what follows it there, such as an extension.
+fn path_in(command: &Command, out: &Path) -> PathBuf {
+    let out = out.to_string_lossy();
+    let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
+    let rest = words.filter_map(|word| Some(word.split_once(&*out)?.1.to_owned())).next();
+    let rest = rest.unwrap_or_default();
+    PathBuf::from(format!("{out}{}", rest.split(ENDS).next().unwrap_or_default()))
+}
+
+/// Makes the mesh of a run that ended well a leaf-set directory, unless it is one. Its manifest has the inputs of the case, and names
+/// `label` as the program.
+pub(super) fn complete(
+    engine: &Description,
+    label: String,
+    command: &Command,
+    case: &Path,
+    mesh: &Path,
+    options: &RunOptions,
+) -> Result<(), End> {
+    let tree = if options.ungraded { Tree::Base } else { Tree::Final };
+    let unreadable =
+        |why: String| End::Unusable(format!("wrote a mesh that cannot be read: {why}"));
+    let read_case = || Case::read(case).map_err(|error| End::Unusable(error.to_string()));
+    if let Some(format) = engine.run.format {
+        let written = path_in(command, &foreign(options.place));
+        if !written.exists() {
+            return Err(End::Unusable(format!(
+                "wrote no {}, which {{out}} stands for in [run] of {}",
+                written.display(),
+                engine.name
+            )));
+        }
+        let mut imported = imported(engine, format, &written, &read_case()?, label, options)?;
+        imported.manifest().tree = tree;
+        return imported.link(mesh).map_err(|error| unreadable(error.to_string()));
+    }
+    if mesh.join(manifest::FILE).exists() {
+        return Ok(());
+    }
+    // Our programs write it last: without it their mesh is incomplete.
+    if description::is_own(&engine.name) {
+        return Err(End::Unusable(format!("wrote no {}", manifest::FILE)));
+    }
+    let parts = leafset::read_parts(mesh).map_err(|error| unreadable(error.to_string()))?;
+    let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
+    let empty = read_case()?.manifest(tree, label);
+    let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
+    set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
+    set.manifest.write(mesh).map_err(|error| unreadable(format!("{}: {error}", mesh.display())))
+}
+
+fn imported(
+    engine: &Description,
+    format: Format,
+    written: &Path,
+    case: &Case,
+    label: String,
+    options: &RunOptions,
+) -> Result<Imported, End> {
+    let (sides, position) = (engine.run.sides.clone(), engine.run.position);
+    let request = Request { sides, position, root: None };
+    let paths = Paths::find();
+    let read = import(written, Some(format), &request, Some(case), label, &paths, options.limit);
+    let why = |why: String| format!("wrote a mesh that cannot be imported: {why}");
+    read.map_err(|failure| match failure {
+        failure if failure.is_interrupt() => End::Interrupted,
+        Failure { code: EXIT_MISSING, why: missing } => End::Missing(why(missing)),
+        Failure { why: unusable, .. } => End::Unusable(why(unusable)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Whatever surrounds `{out}` in a word, the path begins with it and ends where a shell would end it.
+        #[test]
+        fn a_path_begins_with_out(before in "[a-z=-]{0,8}", rest in "[a-z./_0-9]{0,12}", after in "([ ;'\"&|][ -~]{0,8})?") {
+            let out = Path::new("/a place/written/mesh");
+            let mut command = Command::new("sh");
+            command.arg("-c").arg(format!("{before}{}{rest}{after}", out.display()));
+            prop_assert_eq!(path_in(&command, out), PathBuf::from(format!("{}{rest}", out.display())));
+        }
+    }
+}
