@@ -4,7 +4,7 @@ use super::remarks::remarks;
 use crate::table::Table;
 use run::verify::report::{CaseReport, Check, Outcome, Report, Run, Tally};
 
-/// The table, with the speedup over the 38,000 cells per second that the paper reports on one core.
+/// The table, with the speedup over the paper's rate on one processor.
 pub(super) fn table_of(report: &Report) -> Table {
     let columns = vec![
         "case",

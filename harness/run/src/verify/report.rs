@@ -17,9 +17,6 @@ use serde::{Deserialize, Serialize};
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
 pub const SCHEMA: &str = "octree-verify/1";
 
-/// The paper's speed on one core, in cells per second.
-pub const PAPER_CELLS_PER_S: f64 = 38_000.0;
-
 /// One run of mesher or reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Run {
@@ -50,9 +47,9 @@ impl Run {
         self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
     }
 
-    /// Speed relative to the paper's on one core.
+    /// Speed relative to the paper's on one processor.
     pub fn speedup_over_paper(&self) -> f64 {
-        self.cells_per_s() / PAPER_CELLS_PER_S
+        self.cells_per_s() / contract::paper::cells_per_s()
     }
 }
 
