@@ -2,8 +2,8 @@
 //!
 //! [`initial`] partitions T0 before it is refined, by an estimate of the leaves. [`repartition`] shifts the boundaries after
 //! refinement and after gradation, when the work is known better. Both rest on [`ownership`], which maps octants to ranks,
-//! and on [`curve`], which divides the Morton curve into intervals of equal weight. The paper's own method, METIS on the graph of *base
-//! leaves*, is an option of [`initial`]. No module here imports a phase of the mesher.
+//! and on [`curve`], which divides the Morton curve into intervals of equal weight. METIS on the graph of *base
+//! leaves* is an option of [`initial`]. No module here imports a phase of the mesher.
 //!
 //! Invariants:
 //! - every rank has the same map from the curve to owners, and the intervals of all ranks tile the curve;
@@ -26,7 +26,7 @@ use bricks::octant::Level;
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Partitioner {
-    /// METIS, the paper's choice, on the graph of base leaves that share a face
+    /// METIS, as in the paper, on the graph of base leaves; ours are neighbours if they share a face
     Metis,
     /// Intervals of the Morton curve with equal weight
     #[default]
@@ -37,7 +37,7 @@ pub enum Partitioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Weights {
-    /// 1 for each base leaf (the paper's choice)
+    /// 1 for each base leaf, as in the paper (section V)
     Unit,
     /// The number of leaves estimated from facet areas and from the volumes of boxes
     Area,

@@ -3,6 +3,7 @@
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
 //!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
 //! - [`failure`]: why a command has no result, with its exit code; [`watch`]: what it reports meanwhile;
+//! - [`paper`]: the numbers that we cite;
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test), [`sets`] (disjoint sets).
@@ -22,6 +23,7 @@ pub mod mesh;
 pub mod npy;
 pub mod number;
 pub mod octant;
+pub mod paper;
 pub mod parity;
 pub mod plain;
 mod seed;

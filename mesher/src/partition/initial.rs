@@ -5,8 +5,7 @@
 //! the owners in the rough partition. So each rank knows one interval of the curve in detail, and the final boundaries
 //! follow from the sums over the intervals.
 //!
-//! METIS, weights of 1 and a given `level_base` need *base leaves*, the paper's subtrees of T0 that are assigned to ranks as a whole.
-//! Here they are the octants of one level in which facets or boxes have weight, the same on all ranks; an octant without weight goes
+//! METIS, weights of 1 and a given `level_base` need *base leaves*, octants that are assigned to ranks as a whole. Here they are the octants of one level in which facets or boxes have weight, the same on all ranks; an octant without weight goes
 //! with the base leaf before it.
 
 use crate::error::Error;

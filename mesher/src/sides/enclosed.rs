@@ -1,7 +1,7 @@
 //! Enclosed components: outside components that the far field does not reach, such as sealed cavities and the
 //! overlap of two solids, which is outside by the parity of rays.
 //!
-//! The paper floods from a cell in the far field and deletes what the flood does not reach. Here the far
+//! The paper floods from one cell that rays find outside, and deletes what the flood does not reach. Here the far
 //! field is every outside component with a face on the root's boundary.
 
 use super::global::Label;

@@ -8,6 +8,7 @@ use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::order::by_key;
+use contract::paper::number;
 
 /// Rank counts of the paper's Figures 21 to 23.
 const SHOWN: [usize; 3] = [16, 32, 64];
@@ -19,7 +20,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         for ranks in SHOWN {
             let sims = all.iter().filter(|g| g.setup.ranks == ranks && g.setup.comm == Comm::Sim);
             // Of several meshes, the one whose size is nearest to the paper's.
-            let distance = |g: &&&Group| (g.cells() as f64 / paper::CELLS_OF_BALANCE).ln().abs();
+            let distance = |g: &&&Group| (g.cells() as f64 / number("second_cells")).ln().abs();
             let nearest = sims.min_by(|a, b| distance(a).total_cmp(&distance(b)));
             out.extend(nearest.and_then(|g| per_rank(subject, g)));
         }
@@ -42,9 +43,14 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
     let ranks = run.setup.ranks;
     let mean = run.useful_s.sum / ranks as f64;
     let lambda = run.useful_s.lambda(ranks);
+    let counterpart = match paper::is_counterpart(subject.case) {
+        true => {
+            " The paper's Figures 21 to 23, at 100 million cells on 16, 32 and 64 ranks, are the counterparts."
+        }
+        false => "",
+    };
     let caption = format!(
-        "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks. The paper's Figures 21 to 23 show \
-         the load on 16, 32 and 64 ranks at 100 million cells around its UAV. Load imbalance λ = max/mean: {lambda:.3} by time, {:.3} by cells. {}.",
+        "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks.{counterpart} Load imbalance λ = max/mean: {lambda:.3} by time, {:.3} by cells. {}.",
         grouped(run.cells),
         run.counters.get("leaves").map_or(1.0, |leaves| leaves.lambda(ranks)),
         group.rank_times_caption()
@@ -78,7 +84,7 @@ fn imbalance(
             "balance-exposed",
             "exposed faces",
             "by faces",
-            " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly.",
+            " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly (section V).",
         ),
     };
     let lambda = |g: &&Group| Some(g.typical.counters.get(counter)?.lambda(ranks));
@@ -93,8 +99,7 @@ fn imbalance(
     let (millions, cells) = (cells as f64 / 1e6, grouped(cells));
     let caption = format!(
         "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
-         tree and the weights of its leaves. The paper gives every base leaf weight 1 (unit), of a base tree with a typical depth of 7; here the depth is \
-         automatic. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
+         tree and the weights of its leaves. The depth of that tree is automatic, so that unit weights with METIS are not the paper's partition. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
     );
     let bars = Bars {
         categories: of.iter().map(|g| g.setup.division()).collect(),

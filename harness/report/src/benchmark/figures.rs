@@ -7,6 +7,10 @@ use crate::figure::{Axis, Body, Figure, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
 use bench::statistics::Median;
+use contract::paper::number;
+
+/// The name of the paper's runs.
+const PAPER: &str = "the paper: 1, 2, 32 and 64 ranks";
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -58,36 +62,46 @@ fn series(all: &[&Group], value: impl Fn(&Group) -> Point) -> Vec<Series> {
 /// The counterpart of the paper's Figure 17.
 fn time_by_spacing(case: &str, all: &[&Group]) -> Figure {
     let mut series = series(all, |group| at(group, group.time_s));
-    let runs = paper::RUNS.map(|(cells, _, time_s)| (cells, time_s));
-    series.push(cited("the paper: 1, 32 and 64 ranks", runs));
-    let caption = format!(
-        "Run time of {} over the number of cells of {case} at n = {} (the paper's Figure 17). The spacing is halved from \
-         point to point. {}. Lines join meshes of one family of spacings. The points of the paper are from its text: 50 million cells \
-         in 22 min on 1 rank and in 117 s on 32 ranks, 1e9 cells in under 45 min on 64 ranks, on Intel X5355 CPUs and for another geometry.",
+    let mut caption = format!(
+        "Run time of {} over the number of cells of {case} at n = {}. The spacing is halved from point to point. {}. Lines join meshes \
+         of one family of spacings.",
         engines(all),
         all[0].setup.layer_cells_min,
         repetitions(all)
     );
+    if paper::is_counterpart(case) {
+        let runs = paper::runs().map(|(cells, _, time_s)| (cells, time_s));
+        series.push(cited(PAPER, runs));
+        caption += &format!(
+            " The paper's Figure 17, which is linear, is the counterpart; its n is not stated. {}",
+            paper::runs_text()
+        );
+    }
     let title = format!("Run time over cells, by spacing: {case}");
     over_cells(format!("time-over-cells-{case}"), title, caption, "run time / s", series)
 }
 
-/// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: its time is so far above ours that the curves would
-/// look flat.
+/// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: it has no number of ranks.
 fn time_by_layers(case: &str, all: &[&Group]) -> Figure {
     let mut layers: Vec<u32> = all.iter().map(|g| g.setup.layer_cells_min).collect();
     layers.sort_unstable();
     layers.dedup();
     let layers: Vec<String> = layers.iter().map(u32::to_string).collect();
-    let caption = format!(
+    let mut caption = format!(
         "Run time of {} over the number of cells of {case} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to \
-         right (the paper's Figure 18, which is not linear). {}. Lines join consecutive values of n. The largest mesh in \
-         the text of the paper, 1.6e9 cells in 132 min, was made with thicker layers on \"the same hardware\".",
+         right. {}. Lines join consecutive values of n.",
         engines(all),
         all[0].setup.spacing_min,
         layers.join(", "),
         repetitions(all)
     );
+    if paper::is_counterpart(case) {
+        let [cells, min] = ["thick_cells", "thick_min"].map(number);
+        caption += &format!(
+            " The paper's Figure 18, which \"does not scale linearly\", is the counterpart. Its largest mesh, {cells:e} cells in {min} min, \
+             has thicker layers and was made \"on the same hardware\" (section IV.B), without a number of ranks."
+        );
+    }
     let title = format!("Run time over cells, by layer thickness: {case}");
     let series = series(all, |group| at(group, group.time_s));
     over_cells(format!("time-over-layers-{case}"), title, caption, "run time / s", series)
@@ -104,31 +118,36 @@ fn rate_and_memory(groups: &Groups) -> Vec<Figure> {
     let cases = distinct(all.iter().map(|group| group.setup.case.as_str())).join(", ");
     let of = format!("over the number of cells: {cases}. {}.", repetitions(&all));
     let engines = engines(&all);
-    let rates = paper::RUNS.map(|(cells, ranks, time_s)| (cells, cells / time_s / ranks / 1e6));
-    let rates = cited("the paper: 1, 32 and 64 ranks", rates);
-    let memory = cited("the paper: 84 bytes per voxel", [(50e6, 84.0)]);
-    let with = |mut series: Vec<Series>, cited| {
-        series.push(cited);
-        series
-    };
+    let mut rates = series(&all, rate);
+    let [mut of_rates, mut of_memory] = [const { String::new() }; 2];
+    if all.iter().any(|group| paper::is_counterpart(&group.setup.case)) {
+        let runs = paper::runs();
+        let runs = runs.map(|(cells, ranks, time_s)| (cells, cells / time_s / ranks / 1e6));
+        rates.push(cited(PAPER, runs));
+        of_rates = format!(" {}", paper::runs_text());
+        let bytes = number("voxel_bytes");
+        of_memory = format!(
+            " A voxel of the paper takes {bytes} bytes (section II), and a tree has more voxels than cells: that is not memory per cell."
+        );
+    }
     vec![
         over_cells(
             "rate".to_owned(),
             "Cells per second and core".to_owned(),
             format!(
-                "Cells per second and core of {engines} {of} Rates are cells over median times."
+                "Cells per second and core of {engines} {of} Rates are cells over median times.{of_rates}"
             ),
             "million cells / (s core)",
-            with(series(&all, rate), rates),
+            rates,
         ),
         over_cells(
             "memory".to_owned(),
             "Peak memory per cell".to_owned(),
             format!(
-                "Peak resident memory of all ranks of {engines}, program and facets included, {of}"
+                "Peak resident memory of all ranks of {engines}, program and facets included, {of}{of_memory}"
             ),
             "bytes per cell",
-            with(series(&all, |g| at(g, g.bytes_per_cell())), memory),
+            series(&all, |g| at(g, g.bytes_per_cell())),
         ),
     ]
 }

@@ -8,6 +8,7 @@ use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, Factor, above_one, phase_s};
 use bench::order::{by_key, distinct};
+use contract::paper::number;
 
 /// Maximum number of phases that have a segment of their own.
 const PHASES_SHOWN: usize = 6;
@@ -78,7 +79,7 @@ impl Study<'_> {
         distinct(of.iter().map(text)).join("; ")
     }
 
-    /// The counterpart of the paper's Figures 19 and 20.
+    /// The counterpart of the paper's Figure 19. The baseline of its Figure 20 is ambiguous.
     fn speedup(&self) -> Figure {
         let Self { groups, subject, all, .. } = self;
         let mut series = vec![ideal(all, |r| r)];
@@ -101,9 +102,14 @@ impl Study<'_> {
             let why = above_one(&self.efficiencies(all), "strong");
             notes += &format!(" {}", why.as_deref().unwrap_or(disturbed));
         }
-        if (45_000_000..=55_000_000).contains(&cells) {
+        if paper::is_counterpart(subject.case) && (45_000_000..=55_000_000).contains(&cells) {
             series.push(cited("the paper, 50 M cells", paper::speedups()));
-            notes += " The points of the paper are from its text (22 min on 1 rank, 117 s on 32) and are for another geometry.";
+            notes += &format!(
+                " The points of the paper are those of its Figure 19 that its text states ({} min on 1 rank, {} s on {}), around another UAV.",
+                number("serial_min"),
+                number("parallel_s"),
+                number("parallel_ranks"),
+            );
         }
         let cells_text = grouped(cells);
         let caption = format!(

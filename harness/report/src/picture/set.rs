@@ -1,8 +1,7 @@
 //! The pictures of the paper, made of any case: the algorithm from the geometry to the final mesh.
 //!
 //! The paper's Figures 1 to 16 are pictures of its method and of its meshes; Figures 17 to 23 are diagrams, which
-//! [`crate::benchmark`] makes. The pictures are numbered in the order of the algorithm. Which of them has which number in
-//! the paper is not known here, so the names state what is shown.
+//! [`crate::benchmark`] makes. The pictures are numbered in the order of the algorithm, and the page names their counterparts.
 
 use self::Made::{Base, Final, Layers, WithoutCrossing};
 use self::Part::{BaseMesh, Body, CloseUp, Root, View, ViewOfBody};
@@ -129,8 +128,8 @@ pub fn page(case: &str, command: &str, pictures: &[(Member, Drawn)]) -> String {
     let content = html! {
         p {
             "The method and its meshes in pictures, from the geometry to the final mesh, for the case " code { (case) }
-            " on " (RANKS) " simulated ranks: what the paper's Figures 1 to 16 show of its own geometry. The order is that of the algorithm; "
-            "the names state what is shown, because the paper's own numbers are not known here. The files beside this page have the "
+            " on " (RANKS) " simulated ranks, in the order of the algorithm. Counterparts in the paper are Figures 3 (base mesh), 4 (balance), 5, 9 and 10 "
+            "(layers), 11 and 12 (partition), and 13 (gap). The files beside this page have the "
             "pictures as SVG, their data as CSV, and the views as HTML, which a mouse turns."
         }
         p { "Made by " code { (command) } "." }
