@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct Paths {
     /// The program `mpirun`.
     pub mpirun: PathBuf,
-    /// A Python with the oracles' packages: `HARNESS_PYTHON`, or that of the repository's `.venv`.
+    /// A Python with the oracles' packages: `HARNESS_PYTHON`, that of the repository's `.venv`, or one beside the harness.
     pub python: PathBuf,
     /// Directory of the oracles' scripts.
     pub oracles: PathBuf,
@@ -39,7 +39,10 @@ impl Paths {
         let target = directory.parent().unwrap_or(Path::new("..")).to_owned();
         Self {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
-            python: from_env("HARNESS_PYTHON").unwrap_or_else(|| root.join(".venv/bin/python")),
+            python: from_env("HARNESS_PYTHON").unwrap_or_else(|| {
+                let [own, beside] = [root.join(".venv/bin/python"), directory.join("python")];
+                if !own.is_file() && beside.is_file() { beside } else { own }
+            }),
             oracles: root.join("harness/oracles"),
             p4est: from_env("HARNESS_P4EST")
                 .unwrap_or_else(|| built(&target, &root, "engines/p4est-balance")),
@@ -66,9 +69,10 @@ fn repository(directory: &Path) -> PathBuf {
         return root.into();
     }
     let here = env::current_dir().unwrap_or_default();
-    let mut above = directory.ancestors().chain(here.ancestors());
-    let root = above.find(|place| place.join("harness/oracles/protocol.py").is_file());
-    root.map_or(here.clone(), Path::to_owned)
+    let above = directory.ancestors().chain(here.ancestors());
+    // A wheel has what the programs read in a folder of its own.
+    let mut places = above.flat_map(|place| [place.to_owned(), place.join("share/octree")]);
+    places.find(|place| place.join("harness/oracles/protocol.py").is_file()).unwrap_or(here)
 }
 
 /// The first program of that name in the directories of `PATH`.
