@@ -41,9 +41,6 @@ pub struct Args {
     /// Also write the report to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Include the message matrix in the JSON report: messages and bytes for every pair of ranks
-    #[arg(long, requires = "json")]
-    pub message_matrix: bool,
     /// Stop at the base tree T0: all leaves with their sides, none deleted, none graded
     #[arg(long)]
     pub ungraded: bool,
@@ -66,7 +63,7 @@ pub struct Args {
     #[arg(long)]
     pub check: bool,
     /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
-    #[arg(long, conflicts_with_all = ["message_matrix", "weight_exposed"])]
+    #[arg(long, conflicts_with = "weight_exposed")]
     pub plan: bool,
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]

@@ -349,7 +349,6 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         return finish(done, advice, &|to| write_json(to, &plan));
     }
     let report = planner::mesh(&case, &options, args.force, comm, record)?;
-    let report = if args.message_matrix { report.with_message_matrix(comm) } else { report };
     let advice = match options.out {
         Some(_) => "the mesh is complete, only its report is missing; free disk space",
         None => advice,

@@ -10,7 +10,6 @@
 
 mod agree;
 pub mod launch;
-pub mod matrix;
 mod message_buffer;
 mod metered;
 #[cfg(feature = "mpi")]
@@ -60,11 +59,6 @@ pub trait Comm {
     /// The messages that this rank has sent, and the time in its calls, as far as they were [metered](Metered).
     fn traffic(&self) -> Traffic {
         Traffic::default()
-    }
-
-    /// The metered messages of sparse all-to-alls that this rank has sent, by receiver.
-    fn sent(&self) -> Vec<matrix::Entry> {
-        Vec::new()
     }
 
     /// Runs `body` without counting or timing its calls: for checks, which must not change the counters.

@@ -1,9 +1,8 @@
 //! Counts and times the calls of a rank.
 
-use crate::{Comm, Gathered, MessageBuffer, matrix};
+use crate::{Comm, Gathered, MessageBuffer};
 use cpu_time::ThreadTime;
-use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 /// The messages that a rank has sent to other ranks so far, and the time in its calls.
@@ -30,15 +29,12 @@ pub struct Metered<C> {
     comm: C,
     total: Cell<Traffic>,
     is_paused: Cell<bool>,
-    /// Messages and bytes of sparse all-to-alls by receiver.
-    row: RefCell<BTreeMap<usize, (u64, u64)>>,
 }
 
 impl<C: Comm> Metered<C> {
     /// Meters the calls of a rank.
     pub fn new(comm: C) -> Self {
-        let (total, is_paused, row) = Default::default();
-        Self { comm, total, is_paused, row }
+        Self { comm, total: Cell::default(), is_paused: Cell::default() }
     }
 
     fn count(&self, messages: u64, words: u64) {
@@ -90,13 +86,8 @@ impl<C: Comm> Comm for Metered<C> {
     }
 
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
-        for (receiver, words) in to.messages().filter(|m| m.0 != self.rank()) {
+        for (_, words) in to.messages().filter(|m| m.0 != self.rank()) {
             self.count(1, words.len() as u64);
-            if !self.is_paused.get() {
-                let mut row = self.row.borrow_mut();
-                let (messages, bytes) = row.entry(receiver).or_default();
-                (*messages, *bytes) = (*messages + 1, *bytes + 8 * words.len() as u64);
-            }
         }
         self.count(1 + self.doublings(), 0);
         self.timed(|comm| comm.sparse_all_to_all(to))
@@ -110,12 +101,6 @@ impl<C: Comm> Comm for Metered<C> {
         self.total.get()
     }
 
-    fn sent(&self) -> Vec<matrix::Entry> {
-        let row = self.row.borrow();
-        let from = self.rank() as u64;
-        row.iter().map(|(&to, &(messages, bytes))| [from, to as u64, messages, bytes]).collect()
-    }
-
     fn uncounted(&self, body: &mut dyn FnMut()) {
         let before = self.is_paused.replace(true);
         body();
@@ -125,7 +110,6 @@ impl<C: Comm> Comm for Metered<C> {
     fn next_run(&self) {
         self.comm.next_run();
         self.total.take();
-        self.row.take();
     }
 
     fn limit_calls(&self, limit: Duration) {
@@ -151,11 +135,11 @@ mod tests {
         };
         sim::run(3, 1, |c| {
             calls(c);
-            let counted = (c.traffic(), c.sent());
+            let counted = c.traffic();
             c.uncounted(&mut || calls(c));
-            assert_eq!((c.traffic(), c.sent()), counted);
+            assert_eq!(c.traffic(), counted);
             calls(c);
-            assert_eq!(c.traffic().messages, 2 * counted.0.messages);
+            assert_eq!(c.traffic().messages, 2 * counted.messages);
         });
     }
 

@@ -22,7 +22,6 @@ use crate::sides::Summary;
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
 use leaks::LeakEntry;
-use ranks::{Comm, matrix};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -116,9 +115,6 @@ pub struct Report {
     pub phases: Vec<PhaseEntry>,
     /// Counters by rank.
     pub counters: BTreeMap<String, Vec<u64>>,
-    /// Sender, receiver, messages and bytes for every pair of ranks that exchanged messages; only on request.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub message_matrix: Option<Vec<matrix::Entry>>,
 }
 
 impl Report {
@@ -155,7 +151,6 @@ impl Report {
             peak_rss_bytes: Vec::new(),
             phases: Vec::new(),
             counters: BTreeMap::new(),
-            message_matrix: None,
         }
     }
 
@@ -241,11 +236,6 @@ impl Report {
         }
         let slowest = walls.into_iter().fold(0.0, f64::max);
         assert_eq!(self.time_wall_s, slowest, "the wall time must be that of the slowest rank");
-    }
-
-    /// Adds the message matrix of the run to the report of rank 0. Collective.
-    pub fn with_message_matrix(self, comm: &dyn Comm) -> Self {
-        Self { message_matrix: Some(matrix::gather(comm)), ..self }
     }
 }
 

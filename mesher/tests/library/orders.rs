@@ -25,7 +25,7 @@ use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::partition::{Division, Partitioner, Weights};
 use proptest::prelude::*;
 use ranks::sim::Sim;
-use ranks::{Comm, Gathered, MessageBuffer, Traffic, matrix};
+use ranks::{Comm, Gathered, MessageBuffer, Traffic};
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -335,10 +335,6 @@ impl Comm for Faulty<'_> {
 
     fn traffic(&self) -> Traffic {
         self.sim.traffic()
-    }
-
-    fn sent(&self) -> Vec<matrix::Entry> {
-        self.sim.sent()
     }
 
     fn uncounted(&self, body: &mut dyn FnMut()) {

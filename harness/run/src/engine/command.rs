@@ -99,7 +99,6 @@ fn appended<'a>(
     let parts = [
         (mesh, templates.out.as_ref()),
         (options.report, templates.json.as_ref()),
-        (options.report && options.message_matrix, templates.message_matrix.as_ref()),
         (options.status, templates.status.as_ref()),
         (options.ungraded, templates.ungraded.as_ref()),
         (layout.partitioner.is_some(), templates.partitioner.as_ref()),

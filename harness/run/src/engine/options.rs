@@ -16,8 +16,6 @@ pub struct RunOptions<'a> {
     pub mesh: Option<&'a Path>,
     /// Write a run report. Without one, cells and digest are read from the mesh.
     pub report: bool,
-    /// Include the message matrix in the run report.
-    pub message_matrix: bool,
     /// Keep the ranks' activity on disk, to report it if the run hangs.
     pub status: bool,
     /// Stop at the base tree.
@@ -36,7 +34,6 @@ impl<'a> RunOptions<'a> {
             limit,
             mesh: None,
             report: true,
-            message_matrix: false,
             status: false,
             ungraded: false,
             sample_memory: false,

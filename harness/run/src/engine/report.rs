@@ -4,7 +4,7 @@
 //! - `digest` is that of the mesh, if the run wrote one;
 //! - it is unknown how many ranks there were, and `facets` is 0;
 //! - `peak_rss_bytes` is what was sampled from outside, or empty, and the time is that of the process;
-//! - phases, counters and the message matrix are empty, and so is every list that is missing from a phase.
+//! - phases and counters are empty, and so is every list that is missing from a phase.
 //!
 //! An engine without a run report is described by the manifest of its mesh, which has cells and digest only.
 
@@ -45,9 +45,6 @@ pub struct RunReport {
     /// Counters by name.
     #[serde(default)]
     pub counters: BTreeMap<String, Vec<u64>>,
-    /// Sender, receiver, messages and bytes of every pair of ranks that communicated.
-    #[serde(default)]
-    pub message_matrix: Vec<[u64; 4]>,
 }
 
 /// The facets of a run.
@@ -147,13 +144,12 @@ mod tests {
     fn reports_of_mesher_and_reference_are_read() {
         let mesher = parse(
             r#"{"schema": "octree-mesher-run/1", "cells": 8, "digest": "00", "ranks": 2, "time_wall_s": 0.5,
-                "peak_rss_bytes": [3, 4], "counters": {"leaves": [3, 5]}, "message_matrix": [[0, 1, 3, 96]],
+                "peak_rss_bytes": [3, 4], "counters": {"leaves": [3, 5]},
                 "phases": [{"name": "read", "time_cpu_s": [2.0, 1.0], "time_comm_cpu_s": [0.5, 1.5]}]}"#,
         );
         assert_eq!((mesher.ranks, mesher.peak_rss_bytes_total()), (Some(2), 7));
         assert_eq!((mesher.time_cpu_s(), &mesher.counters["leaves"]), (Some(3.0), &vec![3, 5]));
         assert_eq!(mesher.phases[0].time_useful_s(), [1.5, 0.0]);
-        assert_eq!(mesher.message_matrix, [[0, 1, 3, 96]]);
         let reference =
             parse(r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#);
         assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (None, 9));

@@ -370,10 +370,9 @@ mod tests {
             weight_exposed: Some(4),
             ..Layout::on(Ranks::Simulated { ranks: 3, seed: 7 })
         };
-        let matrix = RunOptions { message_matrix: true, ..plain };
-        let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json --message-matrix \
+        let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json \
                         --partitioner metis --weights area --weight-exposed 4";
-        assert_eq!(words(&mesher, &simulated, &matrix), expected);
+        assert_eq!(words(&mesher, &simulated, &plain), expected);
         let on_mpi = Layout { level_base: Some("2".into()), ..Layout::on(Ranks::Mpi(3)) };
         let expected = "mpirun -n 3 mesher a.toml --comm mpi --quiet --out mesh --status p/status \
                         --ungraded --level-base 2";

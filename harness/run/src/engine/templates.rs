@@ -32,8 +32,6 @@ pub struct Templates {
     pub position: Position,
     /// Appended to write the run report `{json}`.
     pub json: Option<Vec<String>>,
-    /// Appended to include the message matrix in the run report.
-    pub message_matrix: Option<Vec<String>>,
     /// Appended to keep the current activity of each rank in the directory `{status}`.
     pub status: Option<Vec<String>>,
     /// Appended to stop at the base tree.
@@ -116,14 +114,13 @@ impl Templates {
             None => (&["out"], &["seed", "out"]),
             Some(_) => (&[], &["seed"]),
         };
-        let templates: [(_, _, &[&str]); 15] = [
+        let templates: [(_, _, &[&str]); 14] = [
             ("serial", Some(&self.serial), in_command),
             ("parallel", self.parallel.as_ref(), in_command),
             ("serve", self.serve.as_ref(), &[]),
             ("simulated", self.simulated.as_ref(), in_simulated),
             ("out", self.out.as_ref(), &["out"]),
             ("json", self.json.as_ref(), &["json"]),
-            ("message_matrix", self.message_matrix.as_ref(), &[]),
             ("status", self.status.as_ref(), &["status"]),
             ("ungraded", self.ungraded.as_ref(), &[]),
             ("partitioner", self.partitioner.as_ref(), &["partitioner"]),

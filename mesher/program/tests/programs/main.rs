@@ -14,7 +14,6 @@ mod interrupts;
 mod leaf_set;
 mod leaks;
 mod memory;
-mod message_matrix;
 #[path = "../support/process.rs"]
 mod process;
 mod regions;

@@ -149,7 +149,6 @@ mod tests {
             peak_rss_bytes: vec![2_000_000, 4_000_000],
             phases: vec![phase],
             counters: [("leaves".into(), vec![1, 3])].into(),
-            message_matrix: None,
         };
         let text = "facets         1,280\n\
                     root edge      8 (level 0), surface level 2\n\
