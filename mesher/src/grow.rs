@@ -3,22 +3,27 @@
 use crate::check;
 use crate::error::Error;
 use crate::grade::{self, exposed};
-use crate::input::lattice::Keep;
-use crate::input::quantise::Quantised;
+use crate::input::lattice::{Bounds, Keep, Rules};
+use crate::input::quantise::{FacetCounts, Quantised};
 use crate::job::Job;
 use crate::mesh::Mesh;
+use crate::options::Options;
 use crate::output::report::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition;
+use crate::partition::{Division, PAPER_DEPTH, Partitioner};
+use crate::record::Recorder;
 use crate::refine;
 use crate::refine::voxelise::BinnedFacets;
 use crate::sides::{self, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
+use bricks::octant::{Level, Side};
 use bricks::tree::Tree;
-use ranks::{Comm, uncounted};
+use ranks::{Comm, Solo, uncounted};
 use std::borrow::Borrow;
+use std::convert::Infallible;
 
 /// Phases 3 to 8: from the facets and the rules on the lattice to the tree. `count` sees the base tree. Collective.
 ///
@@ -38,8 +43,9 @@ pub fn grow<F: Borrow<[Facet]>>(
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
     let Partition { mut ownership, level_base, partitioner } = match is_parallel {
         false => Partition::solo(),
-        true => job.phase("base tree", |comm| {
-            initial::partition(facets.borrow(), &rules, division, comm)
+        true => job.phase("base tree", |comm| match division.partitioner {
+            Partitioner::Paper => of_base_mesh((facets.borrow(), counts), &rules, division, comm),
+            _ => initial::partition(facets.borrow(), &rules, division, comm),
         })?,
     };
     job.check(|comm| check::ownership(&ownership, comm));
@@ -166,6 +172,41 @@ pub fn grow<F: Borrow<[Facet]>>(
         job.counters.exposed_faces = Some(owned);
     }
     Ok(mesh)
+}
+
+/// The paper's partition (section III). Every rank makes the same base mesh, T0 down to a fixed depth, deletes the leaves that the mesh
+/// does not keep, and calls METIS for the others. The facets, which the paper's ranks read, are gathered. Collective.
+fn of_base_mesh(
+    (facets, counts): (&[Facet], FacetCounts),
+    rules: &Rules,
+    division: &Division,
+    comm: &dyn Comm,
+) -> Result<Partition, Error> {
+    let depth =
+        division.level_base.unwrap_or(PAPER_DEPTH).clamp(1, initial::level_last(rules).max(1));
+    let mut base = Rules { level_surface: depth.min(rules.level_surface), ..rules.clone() };
+    base.boxes.iter_mut().for_each(|b| b.level = b.level.min(depth));
+    let facets = check::base::all_facets(facets, comm);
+    let options = Options { ungraded: true, ..Options::default() };
+    let (bounds, mut record) = (Bounds::EMPTY, Recorder::default());
+    let quantised = Quantised { rules: base, bounds, facets, counts };
+    let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record), |_, _| {});
+    let gone = match rules.keep {
+        Keep::Outside => Some(Side::Inside as u64),
+        Keep::Inside => Some(Side::Outside as u64),
+        Keep::All => None,
+    };
+    let leaves = mesh.map(|mesh| {
+        let mut leaves = Vec::new();
+        let kept = |words: &[u64]| {
+            let kept = words.iter().filter(|&word| Some(word & 3) != gone);
+            leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
+            Ok::<(), Infallible>(())
+        };
+        let Ok(_) = mesh.leaves().emit(kept);
+        leaves
+    });
+    initial::of_base_mesh(leaves, depth, comm)
 }
 
 /// Repartitions by the numbers of leaves, with the exposed faces and the weight of each if given. Collective.

@@ -31,6 +31,9 @@ pub enum Partitioner {
     /// Intervals of the Morton curve with equal weight
     #[default]
     Morton,
+    /// As in the paper: METIS on every rank, for the leaves of a base mesh of fixed depth (--level-base, 7 unless given), without those that
+    /// the mesh does not keep, each with weight 1; or an error
+    Paper,
 }
 
 /// The weight of a part of T0.
@@ -46,6 +49,9 @@ pub enum Weights {
     #[default]
     Rebalance,
 }
+
+/// The depth of base meshes that the paper calls typical (section III).
+pub const PAPER_DEPTH: Level = 7;
 
 /// How to divide the work among ranks. Without effect on the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::output::write::Output;
-use mesher::partition::{Partitioner, Weights};
+use mesher::partition::{Division, Partitioner, Weights};
 use program::case_file::{self, LAYER_CELLS_MIN, ROOT_SCALE};
 use ranks::{Comm, agree, launch, text_of_first, uncounted};
 use std::ffi::OsString;
@@ -45,11 +45,11 @@ pub struct Args {
     #[arg(long)]
     pub ungraded: bool,
     /// Method that assigns base leaves to ranks
-    #[arg(long, value_enum, default_value = "morton")]
+    #[arg(long, visible_alias = "preset", value_enum, default_value = "morton")]
     pub partitioner: Partitioner,
-    /// Weights of the partition
-    #[arg(long, value_enum, default_value = "rebalance")]
-    pub weights: Weights,
+    /// Weights of the partition [default: rebalance; unit with --preset paper]
+    #[arg(long, value_enum)]
+    weights: Option<Weights>,
     /// Count the faces exposed to crossing leaves, deleted or not, and weigh each like W leaves in the last repartition: 0 counts them only
     #[arg(long, value_name = "W", conflicts_with = "ungraded", value_parser = value_parser!(u32).range(0..=1000))]
     pub weight_exposed: Option<u32>,
@@ -281,6 +281,24 @@ fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
         _ => exit(0),
     }
+}
+
+/// How to divide the work among ranks.
+///
+/// # Errors
+/// If the weights contradict the paper's.
+pub fn division(args: &Args) -> Result<Division, Error> {
+    let (partitioner, level_base) = (args.partitioner, args.level_base.0);
+    let weights = match (partitioner, args.weights) {
+        (Partitioner::Paper, None | Some(Weights::Unit)) => Weights::Unit,
+        (Partitioner::Paper, Some(_)) => {
+            let why =
+                "--preset paper gives every cell of the base mesh weight 1: leave out --weights";
+            return Err(Error::input(why));
+        }
+        (_, weights) => weights.unwrap_or_default(),
+    };
+    Ok(Division { partitioner, weights, level_base })
 }
 
 /// The files to write; none without --out.

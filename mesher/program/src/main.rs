@@ -13,7 +13,6 @@ use mesher::error::Error;
 use mesher::input::agreement;
 use mesher::input::ingest::Source;
 use mesher::output::write::write_json;
-use mesher::partition::Division;
 use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
 use std::fmt::Display;
@@ -325,11 +324,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         )?;
     }
     let options = Options {
-        division: Division {
-            partitioner: args.partitioner,
-            weights: args.weights,
-            level_base: args.level_base.0,
-        },
+        division: cli::division(args)?,
         ungraded: args.ungraded,
         out: cli::output(args),
         check: args.check,

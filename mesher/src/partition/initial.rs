@@ -18,7 +18,7 @@ use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, Weights};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, edge};
-use ranks::{Comm, MessageBuffer, all_gather_reduced};
+use ranks::{Comm, MessageBuffer, agree, all_gather_reduced};
 
 /// Fine octants per rank, about, which are the base leaves: boundaries lie between them.
 const FINE_PER_RANK: u64 = 16;
@@ -61,7 +61,7 @@ pub fn partition(
 }
 
 /// Deepest level that base leaves may have.
-fn level_last(rules: &Rules) -> Level {
+pub fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
 }
 
@@ -101,7 +101,7 @@ fn by_base_leaves(
     }
     let by_metis = match division.partitioner {
         Partitioner::Metis => assign_metis(&leaves, level, comm)?,
-        Partitioner::Morton => None,
+        Partitioner::Morton | Partitioner::Paper => None,
     };
     let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
     let along_curve = || curve::partition_known(&leaves, comm.size());
@@ -109,14 +109,35 @@ fn by_base_leaves(
     Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
 }
 
+/// The partition of base leaves in their order along the curve, given by code and level, by METIS on every rank. Collective.
+pub fn of_base_mesh(
+    leaves: Result<Vec<(u64, Level)>, Error>,
+    level_base: Level,
+    comm: &dyn Comm,
+) -> Result<Partition, Error> {
+    let boundaries = leaves.and_then(|leaves| assign_equal(&leaves, comm.size()));
+    let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
+    Ok(Partition { ownership, level_base, partitioner: Some(Partitioner::Paper) })
+}
+
 #[cfg(feature = "metis")]
-use metis::assign as assign_metis;
+use metis::{assign as assign_metis, assign_equal};
+
+#[cfg(not(feature = "metis"))]
+fn assign_equal(_: &[(u64, Level)], _: usize) -> Result<Vec<Boundary>, Error> {
+    Err(without_metis())
+}
 
 #[cfg(not(feature = "metis"))]
 fn assign_metis(_: &[Bin], _: Level, _: &dyn Comm) -> Result<Option<Vec<Boundary>>, Error> {
-    Err(Error::input(
+    Err(without_metis())
+}
+
+#[cfg(not(feature = "metis"))]
+fn without_metis() -> Error {
+    Error::input(
         "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
-    ))
+    )
 }
 
 fn all_to_rank_0() -> Vec<Boundary> {

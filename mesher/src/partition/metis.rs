@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::partition::curve::{Bin, Boundary};
-use bricks::octant::{LEVEL_MAX, Level, neighbour};
+use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
 use ranks::{Comm, agree, gather};
 use std::sync::{Mutex, PoisonError};
 
@@ -11,6 +11,9 @@ static TURN: Mutex<()> = Mutex::new(());
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
 const LEAVES_PER_RANK_MIN: usize = 8;
+
+/// A base leaf: the code of its minimum corner, and its level.
+pub type Leaf = (u64, Level);
 
 /// The boundaries between base leaves, octants of a level, by METIS on rank 0; none if it is not used. The leaves are the same on all
 /// ranks. Collective; the result is the same on all ranks.
@@ -22,13 +25,32 @@ pub fn assign(
     if comm.size() == 1 || !has_enough(leaves, comm.size()) {
         return Ok(None);
     }
-    let on_rank_0 = || parts(leaves, level, comm.size());
+    let octants: Vec<Leaf> = leaves.iter().map(|leaf| (leaf.0, level)).collect();
+    let weights: Vec<u64> = leaves.iter().map(|leaf| leaf.1).collect();
+    let on_rank_0 = || parts(&octants, &weights, comm.size());
     let parts = agree(comm, if comm.rank() == 0 { on_rank_0() } else { Ok(Vec::new()) })?;
-    let starts = leaves.iter().map(|leaf| leaf.0);
-    let owners = gather(comm, &parts).into_iter().map(|part| part as usize);
-    let mut boundaries: Vec<Boundary> = starts.zip(owners).collect();
+    Ok(Some(boundaries(&octants, gather(comm, &parts))))
+}
+
+/// The boundaries between base leaves of weight 1, which may be of several levels, in their order along the curve.
+pub fn assign_equal(leaves: &[Leaf], ranks: usize) -> Result<Vec<Boundary>, Error> {
+    let enough = leaves.len() >= ranks;
+    let parts = if enough { parts(leaves, &vec![1; leaves.len()], ranks)? } else { Vec::new() };
+    let empty = (0..ranks as u64).filter(|rank| !parts.contains(rank)).count();
+    if empty > 0 {
+        return Err(Error::input(format!(
+            "METIS leaves {empty} of {ranks} ranks without any of the {} cells of the base mesh: use fewer ranks, or a greater --level-base",
+            leaves.len()
+        )));
+    }
+    Ok(boundaries(leaves, parts))
+}
+
+fn boundaries(leaves: &[Leaf], parts: Vec<u64>) -> Vec<Boundary> {
+    let owners = parts.into_iter().map(|part| part as usize);
+    let mut boundaries: Vec<Boundary> = leaves.iter().map(|leaf| leaf.0).zip(owners).collect();
     boundaries[0].0 = 0;
-    Ok(Some(boundaries))
+    boundaries
 }
 
 /// Whether base leaves are enough for METIS, which bisects recursively, and prints complaints on standard
@@ -40,12 +62,12 @@ fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
 }
 
 /// The part of each base leaf.
-fn parts(leaves: &[Bin], level: Level, ranks: usize) -> Result<Vec<u64>, Error> {
-    let total: u128 = leaves.iter().map(|leaf| u128::from(leaf.1)).sum();
-    let (xadj, adjncy) = graph(leaves, level);
+fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Error> {
+    let total: u128 = weights.iter().copied().map(u128::from).sum();
+    let (xadj, adjncy) = graph(leaves);
     // METIS sums weights in i32 without a check for overflow.
     let scale = |w: u64| (u128::from(w) * (1 << 30) / total.max(1 << 30)).max(1) as metis::Idx;
-    let scaled: Vec<metis::Idx> = leaves.iter().map(|leaf| scale(leaf.1)).collect();
+    let scaled: Vec<metis::Idx> = weights.iter().copied().map(scale).collect();
     let mut parts = vec![0 as metis::Idx; leaves.len()];
     let failed = |e: &dyn std::fmt::Display| {
         Error::input(format!("METIS failed ({e}): use --partitioner morton"))
@@ -60,24 +82,32 @@ fn parts(leaves: &[Bin], level: Level, ranks: usize) -> Result<Vec<u64>, Error> 
     Ok(parts.into_iter().map(|part| part as u64).collect())
 }
 
-/// The graph of base leaves that share a face, in the compressed form of METIS.
-fn graph(leaves: &[Bin], level: Level) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
-    let shift = 3 * (LEVEL_MAX - level);
-    let index = |code: u64| leaves.binary_search_by_key(&(code << shift), |leaf| leaf.0).ok();
-    let (mut xadj, mut adjncy) = (vec![0], Vec::new());
-    for leaf in leaves {
-        let across = |(axis, up)| neighbour(level, leaf.0 >> shift, axis, up).and_then(index);
+/// The graph of base leaves that share part of a face, in the compressed form of METIS.
+fn graph(leaves: &[Leaf]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
+    // The leaf that contains an octant.
+    let leaf_at = |start: u64, l: Level| {
+        let at = leaves.partition_point(|leaf| leaf.0 <= start).checked_sub(1)?;
+        let (first, level) = leaves[at];
+        (level <= l && start < first + start57(level, 1)).then_some(at)
+    };
+    let mut pairs = Vec::new();
+    for (a, &(start, l)) in leaves.iter().enumerate() {
+        let code = start >> (3 * (LEVEL_MAX - l));
         let faces = (0..3).flat_map(|axis| [(axis, false), (axis, true)]);
-        adjncy.extend(faces.filter_map(across).map(|at| at as metis::Idx));
-        xadj.push(adjncy.len() as metis::Idx);
+        let across = faces.filter_map(|(axis, up)| neighbour(l, code, axis, up));
+        let others = across.filter_map(|code| leaf_at(start57(l, code), l));
+        pairs.extend(others.flat_map(|b| [(a, b), (b, a)]));
     }
-    (xadj, adjncy)
+    pairs.sort_unstable();
+    pairs.dedup();
+    let xadj = (0..=leaves.len()).map(|a| pairs.partition_point(|p| p.0 < a) as metis::Idx);
+    (xadj.collect(), pairs.iter().map(|p| p.1 as metis::Idx).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bricks::octant::{position, start57};
+    use bricks::octant::position;
 
     const LEVEL: Level = 3;
 
@@ -85,10 +115,14 @@ mod tests {
         (0..512).map(|code| (start57(LEVEL, code), weight)).collect()
     }
 
+    fn octants() -> Vec<Leaf> {
+        cube(1).into_iter().map(|leaf| (leaf.0, LEVEL)).collect()
+    }
+
     #[test]
     fn parts_are_equal_whatever_the_sum_of_weights() {
         for weight in [1, 1 << 40] {
-            let parts = parts(&cube(weight), LEVEL, 8).unwrap();
+            let parts = parts(&octants(), &[weight; 512], 8).unwrap();
             for r in 0..8 {
                 let n = parts.iter().filter(|&&part| part == r).count();
                 assert!((55..=75).contains(&n), "{n} of 64");
@@ -108,7 +142,7 @@ mod tests {
 
     #[test]
     fn leaves_that_share_a_face_are_joined() {
-        let (xadj, adjncy) = graph(&cube(1), LEVEL);
+        let (xadj, adjncy) = graph(&octants());
         assert_eq!(adjncy.len(), 2 * 3 * 7 * 64, "three planes of faces within the cube");
         for (a, range) in xadj.windows(2).enumerate() {
             for &b in &adjncy[range[0] as usize..range[1] as usize] {
@@ -117,5 +151,25 @@ mod tests {
                 assert_eq!(apart, 1);
             }
         }
+    }
+
+    #[test]
+    fn leaves_of_several_levels_are_joined_with_all_across_their_faces() {
+        // Seven octants of level 1 and, instead of the last, eight of level 2.
+        let coarse = (0..7).map(|code| (start57(1, code), 1));
+        let leaves: Vec<Leaf> = coarse.chain((56..64).map(|code| (start57(2, code), 2))).collect();
+        let (xadj, adjncy) = graph(&leaves);
+        let degree = |a: usize| xadj[a + 1] - xadj[a];
+        // Three coarse neighbours; those of the refined octant have four fine ones instead of one.
+        assert_eq!((0..7).map(degree).collect::<Vec<_>>(), [3, 3, 3, 6, 3, 6, 6]);
+        assert_eq!((degree(7), degree(14)), (6, 3));
+        assert_eq!(adjncy.len(), 3 * 4 + 3 * 6 + 8 * 3 + 12);
+    }
+
+    #[test]
+    fn too_few_equal_leaves_are_an_error() {
+        assert_eq!(assign_equal(&octants(), 8).unwrap().len(), 512);
+        let why = assign_equal(&octants()[..7], 8).unwrap_err().to_string();
+        assert!(why.contains("8 of 8 ranks") && why.contains("7 cells"), "{why}");
     }
 }

@@ -234,6 +234,23 @@ fn the_mesh_of_each_of_48_images_of_a_body_is_the_image_of_its_mesh() {
     }
 }
 
+#[test]
+fn the_papers_partition_gives_the_same_mesh_or_an_error() {
+    for keep in [Keep::Outside, Keep::Inside, Keep::All] {
+        let case = Small { keep, ..crooked() };
+        let want = case.outcome(&Run::SOLO, false);
+        for (level_base, ranks, is_enough) in
+            [(None, 7, true), (Some(3), 2, true), (Some(1), 9, false)]
+        {
+            let (partitioner, weights) = (Partitioner::Paper, Weights::Unit);
+            let division = Division { partitioner, weights, level_base };
+            let got = case.try_outcome(&Run { ranks, seed: 3, division }, false);
+            assert_eq!(got.is_ok(), is_enough, "{keep:?} {ranks} {:?}", got.err());
+            assert!(got.is_err() || got.unwrap() == want, "{keep:?} {ranks}");
+        }
+    }
+}
+
 /// Includes ranks without base leaves.
 #[test]
 fn every_partition_gives_the_same_mesh() {

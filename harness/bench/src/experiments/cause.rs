@@ -48,7 +48,7 @@ pub fn sentence(run: &Run, reference: &Run, network: &Network) -> String {
         }
     };
     let s = if ranks == 1 { "" } else { "s" };
-    let above = pop::above_one(&[e], &run.setup.experiment);
+    let above = pop::above_one(&[e]);
     let above = above.map_or(String::new(), |reason| format!(". {reason}"));
     format!("{global:.0} % at {ranks} rank{s}: {why}{above}")
 }

@@ -199,8 +199,11 @@ pub struct Setup {
     pub ranks: usize,
     /// How they communicate.
     pub comm: Comm,
-    /// `metis` or `morton`; empty if the choice was left to the program.
+    /// `metis`, `morton` or `paper`; empty if the choice was left to the program.
     pub partitioner: String,
+    /// Level of the base leaves, if it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_base: Option<u32>,
     /// `unit`, `area` or `rebalance`; empty if the choice was left to the program.
     pub weights: String,
     /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
@@ -221,9 +224,10 @@ impl Setup {
             ("", "") => "default".to_owned(),
             (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
         };
+        let depth = self.level_base.map_or(String::new(), |level| format!(" depth {level}"));
         match self.weight_exposed {
-            None | Some(0) => chosen,
-            Some(weight) => format!("{chosen} W={weight}"),
+            None | Some(0) => chosen + &depth,
+            Some(weight) => format!("{chosen}{depth} W={weight}"),
         }
     }
 }

@@ -68,9 +68,11 @@ pub struct RunSpec {
     /// How ranks communicate.
     #[serde(default = "mpi")]
     pub comm: Comm,
-    /// `metis` or `morton`; the default of the mesher if empty.
-    #[serde(default)]
+    /// `metis`, `morton` or `paper`; the default of the mesher if empty.
+    #[serde(default, alias = "preset")]
     pub partitioner: String,
+    /// Level of the base leaves: the depth of the paper's base mesh.
+    pub level_base: Option<u32>,
     /// `unit`, `area` or `rebalance`; the default of the mesher if empty.
     #[serde(default)]
     pub weights: String,
@@ -184,6 +186,7 @@ impl Study {
             && setup.case == run.mesh
             && (setup.ranks, setup.comm) == (run.ranks, run.comm)
             && (&setup.partitioner, &setup.weights) == (&run.partitioner, &run.weights)
+            && setup.level_base == run.level_base
             && mesh.spacing_min.is_none_or(|s| s == setup.spacing_min)
             && mesh.layer_cells_min.is_none_or(|n| n == setup.layer_cells_min)
     }
@@ -214,6 +217,10 @@ impl Study {
             (!self.mesh.contains_key(&run.mesh), &format!("no mesh is called {:?}", run.mesh)),
             (wrong_ranks, &format!("it cannot have {} ranks", run.ranks)),
             (run.repeats == 0, "repeats is at least 1"),
+            (
+                run.partitioner == "paper" && !["", "unit"].contains(&run.weights.as_str()),
+                "the paper's partition has weights of 1",
+            ),
         ])
     }
 

@@ -4,7 +4,7 @@
 //! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
 //! has none; a row without a value, and an efficiency above 1, states the reason.
 
-use super::file::{EXPERIMENT, Row, Study};
+use super::file::{Row, Study};
 use super::measure::{Input, Measure, Sample};
 use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
@@ -141,7 +141,7 @@ fn measured(
     let efficiencies = runs.iter().map(|run| run.efficiency(against, &groups.network));
     let efficiencies: Vec<Efficiency> =
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
-    let why = above_one(&efficiencies, EXPERIMENT).unwrap_or_default();
+    let why = above_one(&efficiencies).unwrap_or_default();
     // The least trustworthy run counts.
     let rank =
         |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
@@ -184,6 +184,7 @@ impl Judged {
 
 #[cfg(test)]
 mod tests {
+    use super::super::file::EXPERIMENT;
     use super::*;
     use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
     use crate::testing::line;

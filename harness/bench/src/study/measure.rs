@@ -75,7 +75,7 @@ const fn measure(
 }
 
 /// All measures.
-pub static MEASURES: [Measure; 17] = [
+pub static MEASURES: [Measure; 18] = [
     measure("cells_per_second_per_core", Alone, cells_rate, |s| Ok(s.run().rate())),
     measure("facets_per_second_per_core", Alone, facets_rate, |s| {
         let run = s.run();
@@ -83,6 +83,7 @@ pub static MEASURES: [Measure; 17] = [
     }),
     measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
     measure("speed_up", Against, plain, |s| Ok(s.against().time_s.value / s.run().time_s.value)),
+    measure("slow_down", Against, plain, |s| Ok(s.run().time_s.value / s.against().time_s.value)),
     measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against().rate())),
     measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
     measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),

@@ -175,6 +175,7 @@ impl Plan<'_> {
             comm: spec.comm,
             partitioner: spec.partitioner.clone(),
             weights: spec.weights.clone(),
+            level_base: spec.level_base,
             ..Setup::serial(&spec.mesh, spacing, n)
         };
         let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);

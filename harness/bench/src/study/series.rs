@@ -68,7 +68,8 @@ pub(super) type Choice = (&'static str, &'static str, Option<u32>);
 
 /// The choices of the experiment on weights, which counts exposed faces. `rebalance` with METIS is identical to `area`;
 /// in the last row an exposed face weighs as much as ten cells.
-const CHOICES: [Choice; 6] = [
+const CHOICES: [Choice; 7] = [
+    ("", "paper", Some(0)),
     ("unit", "metis", Some(0)),
     ("unit", "morton", Some(0)),
     ("area", "metis", Some(0)),

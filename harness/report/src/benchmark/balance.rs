@@ -96,10 +96,16 @@ fn imbalance(
         let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
         references.extend(bound.map(|b| (format!("lower bound, {b:.2}"), b)));
     }
+    let baseline = match of.iter().any(|g| g.setup.partitioner == "paper") {
+        true => {
+            "The baseline is the paper's partition (paper) in the root of this case, which is ours; other depths are automatic."
+        }
+        false => "Their depth is automatic, so that no partition here is the paper's.",
+    };
     let (millions, cells) = (cells as f64 / 1e6, grouped(cells));
     let caption = format!(
         "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
-         tree and the weights of its leaves. The depth of that tree is automatic, so that unit weights with METIS are not the paper's partition. With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
+         tree and the weights of its leaves. {baseline} With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
     );
     let bars = Bars {
         categories: of.iter().map(|g| g.setup.division()).collect(),

@@ -99,7 +99,7 @@ impl Study<'_> {
         let mut notes = String::new();
         if series[1..].iter().flat_map(|s| &s.points).any(|p| p.y > p.x) {
             let disturbed = "A speedup per rank above 1 means that the base case was disturbed.";
-            let why = above_one(&self.efficiencies(all), "strong");
+            let why = above_one(&self.efficiencies(all));
             notes += &format!(" {}", why.as_deref().unwrap_or(disturbed));
         }
         if paper::is_counterpart(subject.case) && (45_000_000..=55_000_000).contains(&cells) {
@@ -153,7 +153,10 @@ impl Study<'_> {
         }
         let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
         let size = match *experiment {
-            "weak" => format!("{} cells per rank", grouped(last.cells() / last.setup.ranks as u64)),
+            "weak" => {
+                let cells = grouped(last.cells() / last.setup.ranks as u64);
+                format!("{cells} cells per rank, {}", facets(&simulated))
+            }
             _ => format!("{} cells", grouped(last.cells())),
         };
         let caption = format!(
@@ -162,7 +165,7 @@ impl Study<'_> {
             last.setup.layer_cells_min,
             self.base_cases(&[last]),
             last.rank_times_caption(),
-            above_one(&efficiencies, experiment).unwrap_or_default()
+            above_one(&efficiencies).unwrap_or_default()
         );
         let y = Axis { range: Some((0.0, efficiency_max * 1.1)), ..Axis::linear("efficiency") };
         let title = format!("Efficiency in {experiment} scaling: {subject}, {size}");
@@ -210,6 +213,15 @@ impl Study<'_> {
         let title = format!("Time by phase in {experiment} scaling: {subject}");
         let axes = [Axis::linear("ranks"), Axis::linear(unit)];
         Some(Figure::new(self.id("phases", last.cells), title, caption, axes, Body::Bars(bars)))
+    }
+}
+
+/// Whether weak scaling keeps its facets, whose cost per cell then falls, or refines them with the mesh.
+fn facets(all: &[&Group]) -> String {
+    let of = |group: Option<&&Group>| group.map_or(0, |group| group.typical.facets);
+    match (of(all.first()), of(all.last())) {
+        (first, last) if first == last => format!("facets fixed at {}", grouped(first)),
+        (first, last) => format!("facets growing from {} to {}", grouped(first), grouped(last)),
     }
 }
 

@@ -72,13 +72,13 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],
     );
-    explained(table, &of, name)
+    explained(table, &of)
 }
 
 /// The table with the reasons for efficiencies above 1.
-fn explained<T>(table: Table, of: &[With<T>], experiment: &str) -> Table {
+fn explained<T>(table: Table, of: &[With<T>]) -> Table {
     let efficiencies: Vec<Efficiency> = of.iter().map(|(_, e)| *e).collect();
-    Table { notes: above_one(&efficiencies, experiment).into_iter().collect(), ..table }
+    Table { notes: above_one(&efficiencies).into_iter().collect(), ..table }
 }
 
 /// Projected and measured times of the same meshes on equally many ranks; `None` if the record has no such pairs.
@@ -147,7 +147,7 @@ fn phases(groups: &Groups, group: &Group) -> Table {
             ("max MB / rank", &|(p, _)| format!("{:.3}", p.message_bytes.max / 1e6)),
         ],
     );
-    explained(table, &of, &s.experiment)
+    explained(table, &of)
 }
 
 /// Several programs on one core, the meshes that are missing, and what the programs do not provide.

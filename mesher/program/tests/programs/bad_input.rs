@@ -53,6 +53,19 @@ fn libraries_print_nothing() {
 }
 
 #[test]
+fn what_contradicts_the_papers_partition_is_refused() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    let with = |option| ["body.stl", "--spacing-min=0.1", "--preset=paper", option];
+    refused(&workspace, &with("--weights=area"), INPUT, &["--preset paper", "--weights"]);
+    refused(&workspace, &with("--partitioner=metis"), INPUT, &["cannot be used multiple times"]);
+    let few =
+        ["body.stl", "--spacing-min=0.1", "--preset=paper", "--level-base=1", "--comm=sim:40"];
+    run(workspace.mesher(&few)).refuses(INPUT, &["METIS", "40 ranks", "--level-base"]);
+    run(workspace.mesher(&with("--comm=sim:3"))).succeeds();
+}
+
+#[test]
 fn files_that_are_not_stl_are_refused() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../geometries/bad");
     let workspace = Workspace::new();

@@ -32,6 +32,7 @@ impl fmt::Display for Report {
             None => "",
             Some(Partitioner::Metis) => ", partitioned by METIS",
             Some(Partitioner::Morton) => ", partitioned along the curve",
+            Some(Partitioner::Paper) => ", partitioned as in the paper",
         };
         writeln!(
             f,

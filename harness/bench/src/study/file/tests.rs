@@ -1,6 +1,7 @@
 use super::*;
 use crate::testing::study as read;
 use run::engine::description::Description;
+use std::collections::BTreeSet;
 
 const FILE: &str = r#"
     [mesh.cube]
@@ -48,11 +49,33 @@ fn of_repository(name: &str) -> Study {
 
 #[test]
 fn the_targets_of_this_repository_are_consistent() {
-    let study = of_repository("targets.toml");
-    // A run that no row needs is a mistake.
-    let used = |name| study.row.iter().any(|r| study.runs_of(r).contains(&name));
-    let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
-    assert!(unused.is_empty(), "{unused:?}");
+    for name in ["targets.toml", "paper-partition.toml"] {
+        let study = of_repository(name);
+        // A run that no row needs is a mistake.
+        let used = |name| study.row.iter().any(|r| study.runs_of(r).contains(&name));
+        let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
+        assert!(unused.is_empty(), "{unused:?}");
+    }
+}
+
+#[test]
+fn the_papers_partition_is_swept_over_depths_and_its_bound_is_that_of_its_speedup() {
+    let study = of_repository("paper-partition.toml");
+    let paper = study.run.values().filter(|run| run.partitioner == "paper" && run.ranks == 32);
+    let swept: BTreeSet<_> = paper.map(|run| (&run.mesh, run.level_base)).collect();
+    assert_eq!(swept.len(), 16);
+    let bound = (contract::paper::imbalance_max()[0] * 100.0).round() / 100.0;
+    let kept = study.row.iter().filter(|row| row.at_most.is_some());
+    let bounds: Vec<_> = kept.map(|row| (row.measure.name, row.at_most)).collect();
+    assert_eq!(bounds, vec![("lambda_cells", Some(bound)); 16]);
+}
+
+#[test]
+fn weights_that_contradict_the_paper_are_refused() {
+    let text = "mesh.a.case = 'cube-small'\nrun.one = { mesh = 'a', preset = 'paper', weights = 'area' }\n\
+                [[row]]\nname = 'r'\nrun = 'one'\nmeasure = 'seconds'\n";
+    assert!(read(text).unwrap_err().contains("weights of 1"));
+    assert_eq!(read(&text.replace("area", "unit")).unwrap().run["one"].partitioner, "paper");
 }
 
 #[test]
@@ -83,7 +106,7 @@ fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out(
     assert!(of(&weak, &serial, false).is_empty());
     let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
     assert!(of(&weights, &parallel, false).is_empty());
-    assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "", None)][..]));
+    assert_eq!((weights.choices().len(), strong.choices()), (7, &[("", "", None)][..]));
 }
 
 #[test]
