@@ -38,7 +38,11 @@ fn main() -> ExitCode {
         exit(BUG);
     };
     let code = output::finish(ended.unwrap_or_else(print_failure));
-    interrupt::uninstall();
+    match interrupt::requested() {
+        // What other threads of an interrupted command were making.
+        true => interrupt::clean(),
+        false => interrupt::uninstall(),
+    }
     // A command that fails because its programs were ended has been interrupted.
     let is_interrupted = code != EXIT_HOLDS && interrupt::requested();
     ExitCode::from(if is_interrupted { EXIT_INTERRUPTED } else { code })
