@@ -79,11 +79,11 @@ impl Root {
         (0..=LEVEL_MAX).find(fits)
     }
 
-    /// An octant as text: path, level, and bounds on the lattice and in the user's units.
+    /// An octant as text: path, level, and bounds in the user's units.
     pub fn describe(&self, octant: &Octant) -> String {
         let (low, high) = octant.bounds();
         let (from, to) = (self.rounded(self.to_user(low)), self.rounded(self.to_user(high)));
-        format!("{octant}, lattice {low:?} to {high:?}, user {from:?} to {to:?}")
+        format!("{octant}, {from:?} to {to:?}")
     }
 }
 
@@ -143,9 +143,8 @@ mod tests {
     }
 
     #[test]
-    fn an_octant_is_described_by_path_lattice_and_user_coordinates() {
-        let text = "octant 3.1 (level 2), lattice [100663296, 67108864, 0] to [134217728, 100663296, 33554432], \
-            user [2.0, 2.0, 2.0] to [3.0, 3.0, 3.0]";
+    fn an_octant_is_described_by_path_and_user_coordinates() {
+        let text = "octant 3.1 (level 2), [2.0, 2.0, 2.0] to [3.0, 3.0, 3.0]";
         assert_eq!(ROOT.describe(&Octant::ROOT.child(3).child(1)), text);
     }
 

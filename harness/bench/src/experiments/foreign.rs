@@ -85,6 +85,14 @@ fn reported_time_and_memory_take_precedence() {
 }
 
 #[test]
+fn a_report_of_rank_0_alone_is_none_of_the_efficiency_and_needs_no_digest() {
+    let report =
+        r#"{"cells": 8, "time_wall_s": 7.5, "phases": [{"name": "all", "time_cpu_s": [2.0]}]}"#;
+    let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
+    assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![7.5, 7.5], ""));
+}
+
+#[test]
 fn a_run_without_the_required_output_is_a_failure() {
     let script = "echo '{\"ranks\": 2, \"cells\": 8, \"digest\": \"ab\"}' > $2";
     assert!(scripted(script, REPORTS, Comm::Sim).unwrap_err().contains("no phases"));

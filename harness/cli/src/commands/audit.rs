@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.
 fn promising(text: &str) -> Result<Description, String> {
-    match text.contains('=') {
+    match text.contains('=') && !text.ends_with(".toml") {
         true => Description::parse(&format!("promises = {{ {text} }}")).map_err(|why| {
             format!("--promises '{text}': {why}; for example 'complete = true, balance = \"face\"'")
         }),

@@ -103,7 +103,12 @@ impl Description {
             (Err(error), Some((_, text))) if error.kind() == ErrorKind::NotFound => {
                 (*text).to_owned()
             }
-            (text, _) => text.map_err(|error| wrong(error.to_string()))?,
+            (text, _) => text.map_err(|error| {
+                wrong(format!(
+                    "{error}: give a name in {}, or a path that ends in .toml",
+                    paths.engines.display()
+                ))
+            })?,
         };
         let mut description = Self::parse(&text).map_err(wrong)?;
         description.name = name.to_owned();
@@ -227,13 +232,13 @@ mod tests {
         };
         assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
         let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
-        assert!(deep.contains("levels up to 3"), "{deep}");
+        assert!(deep.contains("levels up to 3 (level_max in [limits])"), "{deep}");
         assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
         let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
-        assert!(seeds.ends_with("does not support seeds"), "{seeds}");
+        assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
         let enclosed =
             declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
-        assert!(enclosed.ends_with("enclosed = keep"), "{enclosed}");
+        assert!(enclosed.ends_with("enclosed = keep (keep_enclosed in [takes])"), "{enclosed}");
         let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
                      max = [1.0, 1.0, 1.0]\nspacing = 1.0";
         assert!(declines(boxed).unwrap().contains("boxes"));

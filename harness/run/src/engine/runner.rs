@@ -24,6 +24,8 @@ use std::process::Command;
 pub struct Engine {
     description: Description,
     program: PathBuf,
+    /// Whether the program is not the one that the engine file names.
+    is_given: bool,
     places: Values<'static>,
     launcher: Launcher,
 }
@@ -66,12 +68,13 @@ impl Engine {
                 found.unwrap_or_else(|| PathBuf::from(program))
             }
         };
-        Ok(Self { description, program, places, launcher: Launcher::mpirun(&paths.mpirun) })
+        let launcher = Launcher::mpirun(&paths.mpirun);
+        Ok(Self { description, program, is_given: given.is_some(), places, launcher })
     }
 
     /// The same engine with another program: another revision of it.
     pub fn with_program(&self, program: PathBuf) -> Self {
-        Self { program, ..self.clone() }
+        Self { program, is_given: true, ..self.clone() }
     }
 
     /// The same engine, whose ranks on MPI are started by another launcher.
@@ -92,6 +95,11 @@ impl Engine {
     /// The program.
     pub fn program(&self) -> &Path {
         &self.program
+    }
+
+    /// The program, if it is not the one that the engine file names.
+    pub fn program_given(&self) -> Option<&Path> {
+        self.is_given.then_some(&self.program)
     }
 
     /// Why no run on MPI can be started; `None` if one can.

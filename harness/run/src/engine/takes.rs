@@ -63,12 +63,16 @@ impl Limits {
         let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
         if level > self.level_max {
             return Some(format!(
-                "supports levels up to {}, and the case needs {level}",
+                "supports levels up to {} (level_max in [limits]), and the case needs {level}",
                 self.level_max
             ));
         }
-        (facets > self.facets_max)
-            .then(|| format!("supports {} facets, and the case has {facets}", self.facets_max))
+        (facets > self.facets_max).then(|| {
+            format!(
+                "supports {} facets (facets_max in [limits]), and the case has {facets}",
+                self.facets_max
+            )
+        })
     }
 }
 
@@ -76,12 +80,18 @@ impl Takes {
     /// A feature of a case that is not supported; `None` if there is none.
     pub fn lacks(&self, case: &Case) -> Option<String> {
         let features = [
-            (!case.boxes.is_empty() && !self.boxes, "extent boxes"),
-            (!case.keep_crossing && !self.drop_crossing, "keep_crossing = false"),
-            (!case.seeds.is_empty() && !self.seeds, "seeds"),
-            (case.enclosed == Enclosed::Keep && !self.keep_enclosed, "enclosed = keep"),
+            (!case.boxes.is_empty() && !self.boxes, "extent boxes (boxes in [takes])"),
+            (
+                !case.keep_crossing && !self.drop_crossing,
+                "keep_crossing = false (drop_crossing in [takes])",
+            ),
+            (!case.seeds.is_empty() && !self.seeds, "seeds (seeds in [takes])"),
+            (
+                case.enclosed == Enclosed::Keep && !self.keep_enclosed,
+                "enclosed = keep (keep_enclosed in [takes])",
+            ),
         ];
-        let keep = || format!("keep = {:?}", case.keep).to_lowercase();
+        let keep = || format!("keep = {:?} (keep in [takes])", case.keep).to_lowercase();
         let lacked =
             features.into_iter().find(|(lacked, _)| *lacked).map(|(_, name)| name.to_owned());
         lacked.or_else(|| (!self.keep.contains(&case.keep)).then(keep))

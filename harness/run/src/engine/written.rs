@@ -72,6 +72,14 @@ pub(super) fn complete(
     if description::is_own(&engine.name) {
         return Err(End::Unusable(format!("wrote no {}", manifest::FILE)));
     }
+    if !mesh.exists() {
+        return Err(End::Unusable(format!(
+            "wrote no directory of leaf words {}: if it writes another format to a path that begins so, [run] of {} must state it, as in \
+             format = \"vtk\"",
+            mesh.display(),
+            engine.name
+        )));
+    }
     let parts = leafset::read_parts(mesh).map_err(|error| unreadable(error.to_string()))?;
     let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
     let empty = read_case()?.manifest(tree, label);

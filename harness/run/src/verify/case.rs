@@ -155,7 +155,10 @@ impl<'a> CaseRun<'a> {
     pub fn add_failure(&mut self, subject: &str, layout: Option<&Layout>, failure: &Failure) {
         let why = match &failure.end {
             End::Interrupted => return,
-            End::Exited { code: CODE_INPUT, error } => format!("it refuses the case: {error}"),
+            // The code may mean anything else for a program that was not written for the harness.
+            End::Exited { code: CODE_INPUT, error } if self.promises().definition => {
+                format!("it refuses the case: {error}")
+            }
             _ => failure.to_string(),
         };
         let check = Check::new(subject, RUNS, Outcome::fail(why));
@@ -175,9 +178,9 @@ impl<'a> CaseRun<'a> {
         words.push("--keep".into());
         let programs = [("mesher", &self.programs.engine), ("reference", &self.programs.reference)];
         for (name, engine) in programs {
-            if engine.program() != paths.harness.with_file_name(name) {
+            if let Some(program) = engine.program_given() {
                 words.push(format!("--{name}"));
-                words.push(engine.program().to_string_lossy().into_owned());
+                words.push(program.to_string_lossy().into_owned());
             }
         }
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
