@@ -83,16 +83,14 @@ pub static MEASURES: [Measure; 18] = [
     }),
     measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
     measure("speed_up", Against, plain, |s| Ok(s.against().time_s.value / s.run().time_s.value)),
-    measure("slow_down", Against, plain, |s| Ok(s.run().time_s.value / s.against().time_s.value)),
     measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against().rate())),
     measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
     measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),
     measure("bytes_per_cell_beyond", Against, per_cell, |s| beyond(s.run(), s.against())),
     measure("time_per_cell_growth", Series, plain, |s| Ok(growth(s.runs))),
-    measure("lambda_cells", Alone, plain, |s| {
-        let leaves = s.run().typical.counters.get("leaves");
-        let leaves = leaves.ok_or("the program does not count leaves by rank")?;
-        Ok(leaves.lambda(s.run().setup.ranks))
+    measure("lambda_cells", Alone, plain, |s| lambda_cells(s.run())),
+    measure("lambda_cells_ratio", Against, plain, |s| {
+        Ok(lambda_cells(s.run())? / lambda_cells(s.against())?)
     }),
     measure("lambda_cpu", Alone, plain, |s| {
         Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
@@ -166,6 +164,11 @@ fn holds(value: f64) -> String {
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
 fn peak(run: &Group) -> f64 {
     run.median_of(|run| Some(run.peak_rss_bytes.sum)).map_or(f64::NAN, |median| median.value)
+}
+
+fn lambda_cells(run: &Group) -> Result<f64, String> {
+    let leaves = run.typical.counters.get("leaves");
+    Ok(leaves.ok_or("the program does not count leaves by rank")?.lambda(run.setup.ranks))
 }
 
 /// Marginal memory per cell. The other run has the same facets on equally many ranks at a coarse spacing, so its memory is that of the
