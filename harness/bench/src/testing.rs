@@ -13,7 +13,6 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
         name: (*name).to_owned(),
         useful_s: Spread::of(u),
         wall_s: Spread::of(u),
-        comm_s: Spread::of(&vec![0.0; ranks]),
         messages: Spread::of(&vec![0.0; ranks]),
         message_bytes: Spread::of(&vec![0.0; ranks]),
     };

@@ -27,7 +27,7 @@ pub enum Command {
     /// Execute a study: series of runs, and targets that are met or missed; append every result to a record
     #[command(visible_alias = "targets")]
     Bench(Box<commands::bench::Arguments>),
-    /// Make figures, a web page, a LaTeX fragment and an artifact description from benchmark records
+    /// Make figures, a web page, and a LaTeX fragment from benchmark records
     Report(commands::report::Arguments),
     /// Keep a history of metrics by commit and detect where they changed
     Track(Box<commands::track::Arguments>),

@@ -139,9 +139,8 @@ fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
     assert!(output.contains("faces of each patch: xMin "), "{output}");
     let files = ["boundary", "cellLevel", "faces", "neighbour", "owner", "points", "rank", "side"];
     assert_eq!(names(&place.path().join("case/constant/polyMesh")), files);
-    let (code, output, _) = export(&place, "case/constant/polyMesh/", &["--processors", "ranks"]);
+    let (code, ..) = export(&place, "case/constant/polyMesh/", &["--processors", "ranks"]);
     assert_eq!(code, 0);
-    assert!(output.contains("2 processors of 49 to 99 cells, "), "{output}");
     let addressing = ["boundary", "cell", "face", "point"].map(|of| format!("{of}ProcAddressing"));
     let mut of_processor = [&files.map(str::to_owned)[..], &addressing].concat();
     of_processor.sort();

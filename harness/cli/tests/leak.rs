@@ -99,7 +99,7 @@ fn a_leak_is_described_in_text_json_and_vtk() {
     let answer = &json["examined"][0];
     assert_eq!(
         (json["schema"].as_str(), answer["is_leak"].as_bool()),
-        (Some("octree-leak/2"), Some(true))
+        (Some("octree-leak/3"), Some(true))
     );
     let width = answer["passage"]["narrowest"]["width"].as_f64().unwrap();
     assert!((width / 2.0 - 1.0).abs() < 0.05, "{width}");

@@ -75,7 +75,6 @@ fn a_case_is_meshed_on_ranks_and_drawn_with_its_geometry() {
     assert!(calls.contains("sim:3") && calls.contains("--ungraded"), "{calls}");
     let svg = fixture.read("a.svg");
     assert!(svg.contains(">rank<") && svg.contains(">geometry<"), "{svg}");
-    assert!(fixture.read("a.csv").contains("# harness picture case.toml --out a.svg"));
 }
 
 #[test]
@@ -111,10 +110,7 @@ fn impossible_requests_are_one_sentence_and_leave_no_file() {
         let (code, text) = fixture.picture(arguments);
         assert!(code == expected && text.contains(why), "{arguments}: {code} {text}");
         let created = |name: &str| fixture.path(name).exists();
-        assert!(
-            !["a.svg", "a.csv", "a.png", "a.html", "a.vtu"].into_iter().any(created),
-            "{arguments}"
-        );
+        assert!(!["a.svg", "a.png", "a.html", "a.vtu"].into_iter().any(created), "{arguments}");
     }
 }
 
@@ -137,11 +133,10 @@ fn an_interrupted_picture_is_not_written() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted\n");
-    assert!(!fixture.path("a.csv").exists());
 }
 
 #[test]
-fn the_set_has_every_picture_its_data_and_a_page_without_network() {
+fn the_set_has_every_picture_and_a_page_without_network() {
     let fixture = Fixture::new();
     let (code, text) = fixture.picture("case.toml --paper --out set");
     assert_eq!(code, 0, "{text}");
@@ -154,7 +149,7 @@ fn the_set_has_every_picture_its_data_and_a_page_without_network() {
         let files = fs::read_dir(fixture.path("set")).unwrap().flatten().map(|f| f.path());
         files.filter(|path| path.extension().is_some_and(|e| e == extension)).count()
     };
-    assert_eq!(["svg", "csv", "html"].map(count), [13, 13, 3 + 1]);
+    assert_eq!(["svg", "html"].map(count), [13, 3 + 1]);
     let page = fixture.read("set/index.html");
     assert_eq!(page.matches("<figure").count(), 16);
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));

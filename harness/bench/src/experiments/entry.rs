@@ -174,8 +174,6 @@ pub struct Phase {
     pub useful_s: Spread,
     /// Wall time, in seconds; meaningless for simulated ranks.
     pub wall_s: Spread,
-    /// Wall time in calls to other ranks, including waiting, in seconds; meaningless for simulated ranks.
-    pub comm_s: Spread,
     /// Messages sent.
     pub messages: Spread,
     /// Bytes sent.

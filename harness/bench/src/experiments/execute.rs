@@ -238,7 +238,6 @@ fn phase(phase: &PhaseReport) -> Phase {
         name: phase.name.clone(),
         useful_s: Spread::of(&phase.time_useful_s()),
         wall_s: Spread::brief(&phase.time_wall_s),
-        comm_s: Spread::brief(&phase.time_comm_wall_s),
         messages: spread(&phase.messages),
         message_bytes: spread(&phase.message_bytes),
     }

@@ -33,8 +33,6 @@ pub struct Efficiency {
     pub transfer: f64,
     /// Useful work per cell of the reference run over that of this one.
     pub computation_scaling: f64,
-    /// Greatest over mean useful time.
-    pub lambda: f64,
     /// T.
     pub time_s: f64,
     /// Whether the reference has as many facets and another number of cells.
@@ -67,14 +65,11 @@ impl Efficiency {
 
     /// Ranks wait for each other at the end of phases, so neither their balance nor their waiting can gain time.
     fn check_invariants(&self) {
-        let Self { load_balance, serialisation, transfer, computation_scaling, lambda, .. } = *self;
-        let is_balance = load_balance <= 1.0 + ROUNDING && lambda >= 1.0 - ROUNDING;
-        assert!(is_balance, "load balance of at most 1: {self:?}");
+        let Self { load_balance, serialisation, transfer, computation_scaling, .. } = *self;
+        assert!(load_balance <= 1.0 + ROUNDING, "load balance of at most 1: {self:?}");
         assert!(serialisation <= 1.0 + ROUNDING, "serialisation of at most 1: {self:?}");
         let are_positive = transfer >= 0.0 && computation_scaling >= 0.0;
         assert!(are_positive, "efficiencies of at least 0: {self:?}");
-        let is_inverse = (load_balance * lambda - 1.0).abs() < ROUNDING;
-        assert!(is_inverse, "load balance is 1 / lambda: {self:?}");
     }
 }
 
@@ -147,13 +142,11 @@ fn factors(
     time_s: f64,
     before: f64,
 ) -> Efficiency {
-    let lambda = useful_s.lambda(run.setup.ranks);
     let efficiency = Efficiency {
-        load_balance: 1.0 / lambda,
+        load_balance: 1.0 / useful_s.lambda(run.setup.ranks),
         serialisation: ratio(useful_s.max, path_s),
         transfer: ratio(path_s, time_s),
         computation_scaling: ratio(before, per_cell(useful_s, run)),
-        lambda,
         time_s,
         has_fixed_facets: run.facets == reference.facets && run.cells != reference.cells,
     };
@@ -236,12 +229,11 @@ mod tests {
     }
 
     #[test]
-    fn load_balance_is_mean_over_max_and_lambda_its_inverse() {
+    fn load_balance_is_mean_over_max() {
         let one = run(Comm::Sim, 100, &[("a", &[4.0])]);
         let two = run(Comm::Sim, 100, &[("a", &[3.0, 1.0])]);
         let e = efficiency(&two, &one, &FREE);
         close(e.load_balance, 2.0 / 3.0);
-        close(e.lambda, 1.5);
         close(e.global(), 4.0 / 3.0 / 2.0);
     }
 

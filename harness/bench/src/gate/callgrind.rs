@@ -1,4 +1,4 @@
-//! Parses the output of valgrind's callgrind: instructions and calls by function.
+//! Parses the output of valgrind's callgrind: instructions by function.
 //!
 //! The format: `fn=(1) name` opens a function, and later `fn=(1)` is the same; a line that begins with a
 //! position (`12`, `+3`, `-1`, `*`) has the function's own cost; after a `calls=COUNT ...` line the next such line is
@@ -12,12 +12,7 @@ use std::collections::{BTreeSet, HashMap};
 pub struct Profile {
     /// Instructions by function, excluding callees.
     pub own: Numbers,
-    /// Number of calls by function.
-    calls: Numbers,
 }
-
-/// Functions that allocate memory.
-const ALLOCATORS: [&str; 5] = ["malloc", "calloc", "realloc", "posix_memalign", "aligned_alloc"];
 
 impl Profile {
     /// Returns the number of instructions.
@@ -25,29 +20,20 @@ impl Profile {
         self.own.values().sum()
     }
 
-    /// Returns the number of allocations.
-    pub fn allocations(&self) -> u64 {
-        ALLOCATORS.iter().filter_map(|name| self.calls.get(*name)).sum()
-    }
-
     /// Adds the content of a callgrind file. A process that was replaced by another program has no costs.
     pub fn add(&mut self, text: &str) {
         let mut names: HashMap<&str, &str> = HashMap::new();
-        let (mut function, mut callee) = ("", "");
-        let mut after_calls = false;
+        let (mut function, mut after_calls) = ("", false);
         for line in text.lines() {
             if let Some(rest) = line.strip_prefix("fn=") {
                 function = name_of(rest, &mut names);
             } else if let Some(rest) = line.strip_prefix("cfn=") {
-                callee = name_of(rest, &mut names);
-            } else if let Some(rest) = line.strip_prefix("calls=") {
-                // Versions of a symbol of the C library are one function.
-                let plain = callee.split(['@', '\'']).next().unwrap_or(callee);
-                *self.calls.entry(plain.to_owned()).or_default() += first_number(rest);
+                name_of(rest, &mut names);
+            } else if line.starts_with("calls=") {
                 after_calls = true;
             } else if is_cost(line) && !std::mem::take(&mut after_calls) {
-                let cost = line.split_whitespace().nth(1).map_or(0, first_number);
-                *self.own.entry(function.to_owned()).or_default() += cost;
+                let cost = line.split_whitespace().nth(1).and_then(|cost| cost.parse().ok());
+                *self.own.entry(function.to_owned()).or_default() += cost.unwrap_or(0);
             }
         }
     }
@@ -80,11 +66,6 @@ fn name_of<'a>(text: &'a str, names: &mut HashMap<&'a str, &'a str>) -> &'a str 
     }
 }
 
-fn first_number(text: &str) -> u64 {
-    let digits = text.split(|c: char| !c.is_ascii_digit()).next();
-    digits.and_then(|digits| digits.parse().ok()).unwrap_or(0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,10 +85,9 @@ mod tests {
         let one = profile(&[FILE]);
         assert_eq!(one.instructions(), 116);
         assert_eq!((one.own["main"], one.own["malloc@GLIBC"]), (9, 100));
-        assert_eq!((one.calls["malloc"], one.allocations()), (5, 5));
         assert_eq!(profile(&["events: Ir\n"]), Profile::default());
         let sum = profile(&[FILE, FILE]);
-        assert_eq!((sum.instructions(), sum.own["main"], sum.allocations()), (232, 18, 10));
+        assert_eq!((sum.instructions(), sum.own["main"]), (232, 18));
     }
 
     #[test]

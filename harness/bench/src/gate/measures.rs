@@ -55,7 +55,7 @@ pub enum LayerName {
     Counters,
     /// Peak memory.
     Memory,
-    /// Instructions and allocations, counted by valgrind.
+    /// Instructions, counted by valgrind.
     Instructions,
     /// Run times of baseline and candidate in one session.
     Time,

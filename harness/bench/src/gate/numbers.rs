@@ -237,7 +237,7 @@ pub(super) fn prefix(ranks: Ranks) -> String {
     }
 }
 
-/// Instructions and allocations of a serial run under valgrind, of all its processes. They do not depend on the load of
+/// Instructions of a serial run under valgrind, of all its processes. They do not depend on the load of
 /// the machine, so a difference of a percent is significant.
 pub(super) fn instructions(
     bench: &Bench,
@@ -257,8 +257,7 @@ pub(super) fn instructions(
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
     process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place))?;
     let profile = profile_of_all(&place).map_err(|why| engine.unusable(why))?;
-    let counted = [(INSTRUCTIONS, profile.instructions()), ("allocations", profile.allocations())];
-    let counted = counted.map(|(name, count)| (name.to_owned(), count)).into();
+    let counted = [(INSTRUCTIONS.to_owned(), profile.instructions())].into();
     Ok(CaseMeasures { counted, functions: profile.own, ..CaseMeasures::default() })
 }
 

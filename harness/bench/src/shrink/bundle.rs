@@ -1,10 +1,7 @@
 //! Writes a shrunk case as a directory for a bug report.
 
 use super::Shrunk;
-use super::probe::Probe;
 use super::reduce::size;
-use check::diff;
-use contract::case::Case;
 use contract::plain::StlForm;
 use run::engine::layout::Ranks;
 use std::fs;
@@ -16,24 +13,18 @@ use std::path::Path;
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write(
-    shrunk: &Shrunk,
-    probe: &Probe,
-    options: &[&str],
-    directory: &Path,
-) -> io::Result<String> {
+pub fn write(shrunk: &Shrunk, options: &[&str], directory: &Path) -> io::Result<String> {
     fs::create_dir_all(directory)?;
     let case = shrunk.trial.case.write(directory, StlForm::Any)?;
     let minimal =
         if shrunk.minimal { "nothing more can be removed" } else { "the budget is exhausted" };
     let text = format!(
-        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {}\n{}",
+        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {}\n",
         shrunk.fault,
         shrunk.facets_before,
         shrunk.trials,
         size(&shrunk.trial),
-        repeat(shrunk, options, &case),
-        divergence(shrunk, probe, &case)
+        repeat(shrunk, options, &case)
     );
     fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
     Ok(text)
@@ -50,28 +41,5 @@ fn repeat(shrunk: &Shrunk, options: &[&str], case: &Path) -> String {
         Ranks::Serial => line,
         Ranks::Mpi(ranks) => format!("{line} --ranks {ranks} --mpi"),
         Ranks::Simulated { ranks, seed } => format!("{line} --ranks {ranks} --seed {seed}"),
-    }
-}
-
-/// The first differing leaf and the rule that decides it, if there are two meshes.
-fn divergence(shrunk: &Shrunk, probe: &Probe, case: &Path) -> String {
-    if shrunk.fault.check == "runs" {
-        return String::new();
-    }
-    let compared = probe.meshes(&shrunk.trial).map_err(|failure| failure.why).and_then(|meshes| {
-        let Some(([engine, truth], name)) = meshes else { return Ok(None) };
-        let case = Case::read(case).ok();
-        let report = diff::diff(&engine, &truth, case.as_ref());
-        report.map(|report| Some((report, name))).map_err(|error| error.to_string())
-    });
-    match compared {
-        Ok(None) => String::new(),
-        Ok(Some((report, truth))) => {
-            let indented = report.to_string().replace('\n', "\n    ");
-            format!(
-                "\nThe difference between the meshes, where A is the engine's and B that of {truth}:\n\n    {indented}\n"
-            )
-        }
-        Err(why) => format!("\nThe meshes could not be compared: {why}\n"),
     }
 }

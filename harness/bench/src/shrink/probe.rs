@@ -161,22 +161,6 @@ impl Probe {
         Ok(results)
     }
 
-    /// Both meshes of a trial, for `harness diff`: that of the engine, and the expected one, with the name of its program. `None` if
-    /// only promises are checked.
-    ///
-    /// # Errors
-    /// If one of them cannot be made.
-    pub fn meshes(&self, trial: &Trial) -> Result<Option<([PathBuf; 2], &'static str)>, Failure> {
-        let Some((truth, name)) = &self.truth else { return Ok(None) };
-        let case = self.write(&trial.case)?;
-        let run = |engine, ranks, name| -> Result<PathBuf, Failure> {
-            self.run(engine, &case, ranks, name, false)?;
-            Ok(self.place.path().join(name).join("mesh"))
-        };
-        let engine = run(&self.engine, trial.ranks, "engine")?;
-        Ok(Some(([engine, run(truth, Ranks::Serial, "truth")?], name)))
-    }
-
     fn write(&self, case: &PlainCase) -> Result<PathBuf, Failure> {
         Ok(case.write(self.place.path(), self.engine.description().takes.stl)?)
     }

@@ -37,22 +37,16 @@ pub struct Study {
 }
 
 /// A mesh.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mesh {
     /// A name in geometries/catalogue.toml, or the path of a case file.
-    pub case: Option<String>,
-    /// An STL file, as an alternative to `case`.
-    pub geometry: Option<PathBuf>,
-    /// A generated shape, as an alternative to `case`: the `[generator]` table of a case file.
-    pub generator: Option<toml::Table>,
-    /// Root edge in longest edges of the bounding box; with `geometry` and `generator` only.
-    pub root_scale: Option<f64>,
+    pub case: String,
     /// n; replaces that of the case.
     pub layer_cells_min: Option<u32>,
     /// The spacing; replaces that of the case, in the same root.
     pub spacing_min: Option<f64>,
-    /// Approximate number of cells, with `case` only: the spacing is extrapolated from coarser meshes, and the root fits it.
+    /// Approximate number of cells: the spacing is extrapolated from coarser meshes, and the root fits it.
     pub cells: Option<f64>,
 }
 
@@ -252,18 +246,8 @@ impl Study {
 
 impl Mesh {
     fn check(&self) -> Result<(), String> {
-        let Self { case, geometry, generator, root_scale, spacing_min, cells, .. } = self;
-        let given = [case.is_some(), geometry.is_some(), generator.is_some()];
+        let Self { spacing_min, cells, .. } = self;
         refuse(&[
-            (
-                given.iter().filter(|&&given| given).count() != 1,
-                "give one of case, geometry and [generator]",
-            ),
-            (case.is_some() && root_scale.is_some(), "the case defines root_scale"),
-            (
-                case.is_none() && (spacing_min.is_none() || cells.is_some()),
-                "without a case, spacing_min is required and cells is not allowed",
-            ),
             (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
             (cells.is_some_and(|cells| !CELLS.contains(&cells)), "cells is from 1e3 to 1e12"),
         ])

@@ -1,6 +1,6 @@
 //! Which runs a series and a row need: their cases, written for the programs, and how often each is repeated.
 
-use super::file::{EXPERIMENT, Experiment, Mesh, Series, Study};
+use super::file::{EXPERIMENT, Experiment, Series, Study};
 use crate::experiments::entry::{Network, Setup};
 use crate::experiments::execute::Runner;
 use crate::experiments::network;
@@ -12,7 +12,7 @@ use contract::failure::Failure;
 use run::engine::launcher::Launcher;
 use run::verify::options::whole_seconds;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The options of a session, as on the command line.
 #[derive(Args, Clone, Debug)]
@@ -69,7 +69,7 @@ pub(super) struct Plan<'a> {
     pub options: &'a SessionOptions,
     pub runner: Runner<'a>,
     pub progress: &'a dyn Fn(&str),
-    /// Geometries read so far, by their source, with the known sizes of their meshes by n.
+    /// Geometries read so far, by case, with the known sizes of their meshes by n.
     pub bases: BTreeMap<String, (Base, BTreeMap<u32, Sizes>)>,
 }
 
@@ -87,15 +87,15 @@ impl Plan<'_> {
             let experiment = series.experiment;
             (self.progress)(&format!("{engine} cannot run the series {experiment}"));
         }
-        let mesh = Mesh { case: Some(series.case.clone()), ..Mesh::default() };
-        let key = self.base(&series.case, &mesh)?;
-        let of_case = [self.bases[&key].0.layer_cells_min];
+        let key = &series.case;
+        self.base(key)?;
+        let of_case = [self.bases[key].0.layer_cells_min];
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
         for (&n, &(comm, ranks)) in layers.iter().flat_map(|n| layouts.iter().map(move |l| (n, l)))
         {
-            for spacing in self.spacings(&key, series.experiment, cells, ranks)? {
-                let base = &self.bases[&key].0;
+            for spacing in self.spacings(key, series.experiment, cells, ranks)? {
+                let base = &self.bases[key].0;
                 let case = base.variant(spacing, n)?;
                 let declined = description.declines(&Case::read(&case)?);
                 points.extend(series.choices().iter().map(|&choice| Planned {
@@ -154,8 +154,9 @@ impl Plan<'_> {
     pub fn run(&mut self, name: &str) -> Result<Planned, Failure> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
-        let key = self.base(&spec.mesh, mesh)?;
-        let base = self.bases[&key].0.clone();
+        let key = &mesh.case;
+        self.base(key)?;
+        let base = self.bases[key].0.clone();
         let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
         let (case, spacing) = match mesh.cells {
             None => {
@@ -164,7 +165,7 @@ impl Plan<'_> {
             }
             Some(cells) => {
                 (self.progress)(&format!("{}: looking for the spacing", spec.mesh));
-                let spacing = self.spacing(&key, n, cells)?;
+                let spacing = self.spacing(key, n, cells)?;
                 (base.variant(spacing, n), spacing)
             }
         };
@@ -192,37 +193,16 @@ impl Plan<'_> {
         }
     }
 
-    /// Writes the geometry of a mesh as a binary STL file, once; returns its key.
-    fn base(&mut self, name: &str, mesh: &Mesh) -> Result<String, Failure> {
-        let Mesh { case, geometry, generator, root_scale, .. } = mesh;
-        let key = format!("{case:?} {geometry:?} {generator:?} {root_scale:?}");
-        if self.bases.contains_key(&key) {
-            return Ok(key);
+    /// Writes the geometry of a case as a binary STL file, once.
+    fn base(&mut self, case: &str) -> Result<(), Failure> {
+        if self.bases.contains_key(case) {
+            return Ok(());
         }
-        (self.progress)(&format!("{name}: reading the geometry"));
-        let (place, directory) = (self.runner.place, &self.study.directory);
-        let path = match case {
-            Some(case) => self.runner.programs.paths.catalogue.case_file(case, directory),
-            None => given_case(mesh, directory, place.join(format!("{name}-given.toml"))),
-        };
-        let base = path.and_then(|path| Base::read(&path, place))?;
-        self.bases.insert(key.clone(), (base, BTreeMap::new()));
-        Ok(key)
+        (self.progress)(&format!("{case}: reading the geometry"));
+        let catalogue = &self.runner.programs.paths.catalogue;
+        let path = catalogue.case_file(case, &self.study.directory)?;
+        let base = Base::read(&path, self.runner.place)?;
+        self.bases.insert(case.to_owned(), (base, BTreeMap::new()));
+        Ok(())
     }
-}
-
-/// Writes a case file for a geometry that was given without one; returns its path.
-fn given_case(mesh: &Mesh, directory: &Path, path: PathBuf) -> Result<PathBuf, String> {
-    let wrong = |error| format!("{}: {error}", path.display());
-    let mut table = toml::Table::new();
-    if let Some(file) = &mesh.geometry {
-        let file = std::path::absolute(directory.join(file)).map_err(wrong)?;
-        table.insert("geometry".into(), file.to_string_lossy().into_owned().into());
-    }
-    table.extend(mesh.generator.clone().map(|generator| ("generator".into(), generator.into())));
-    for (key, value) in [("root_scale", mesh.root_scale), ("spacing_min", mesh.spacing_min)] {
-        table.extend(value.map(|v| (key.to_owned(), v.into())));
-    }
-    std::fs::write(&path, table.to_string()).map_err(wrong)?;
-    Ok(path)
 }

@@ -1,14 +1,11 @@
 //! 2:1 balance: leaves that touch in a face, an edge or a corner differ by at most one level, deleted crossing
 //! leaves included.
 //!
-//! Section 7 of reference/DEFINITION.md (the paper's 4:1 rule: at most one hanging node per edge, which is
-//! counted as well). The check cannot detect needless refinement. If crossing leaves are deleted and T0 is
+//! Section 7 of reference/DEFINITION.md; the paper's 4:1 rule, at most one hanging node per edge, follows. The check cannot detect needless refinement. If crossing leaves are deleted and T0 is
 //! unknown, it cannot detect imbalance between a deleted leaf and its neighbours.
 
-use std::fmt::Write;
-
 use super::gap::{ALL_AXES, Gap};
-use super::{Check, CheckResult, Subject, hanging, several_levels};
+use super::{Check, CheckResult, Subject, several_levels};
 use crate::promises::Touching;
 use contract::lattice::Root;
 use contract::tree::Tree;
@@ -25,21 +22,15 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let (tree, root) = (subject.tree_with_deleted(), &subject.terms.root);
-    if let Some(touching) = subject.promises.balance {
-        return touching_leaves(subject.tree(), root, touching, subject.promises.levels(), result);
+    let root = &subject.terms.root;
+    match subject.promises.balance {
+        Some(touching) => {
+            touching_leaves(subject.tree(), root, touching, subject.promises.levels(), result);
+        }
+        None => {
+            touching_leaves(subject.tree_with_deleted(), root, Touching::Corner, 1, result);
+        }
     }
-    touching_leaves(tree, root, Touching::Corner, 1, result);
-    if subject.mesh.is_none() {
-        // They follow from the balance; counting them takes longer than all other checks of a large mesh.
-        return;
-    }
-    let counts = hanging::count(tree);
-    if let Some(edge) = &counts.worst {
-        result.report(format!("more than one hanging node on an edge of {}", root.describe(edge)));
-    }
-    let [none, one, more] = counts.edges;
-    let _ = write!(result.note, "leaf edges with 0, 1, more hanging nodes: {none}, {one}, {more}");
 }
 
 /// Leaves that touch in this way differ by at most `levels` levels.

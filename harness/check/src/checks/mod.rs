@@ -12,7 +12,6 @@ pub mod contact;
 pub mod crossing;
 pub mod facets;
 pub mod gap;
-pub mod hanging;
 pub mod identical;
 pub mod kept;
 pub mod layer;

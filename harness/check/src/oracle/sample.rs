@@ -4,6 +4,7 @@
 //! depends on the leaves and the seed only.
 
 use contract::case::Case;
+use contract::digest::mix;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::word::{self, Side};
 
@@ -18,8 +19,6 @@ pub struct Sample {
     pub band: f64,
     /// Number of leaves that the band excludes.
     pub in_band: u64,
-    /// Number of all leaves that are not crossing.
-    pub candidates: u64,
 }
 
 /// Chooses at most `points_max` leaves of a base tree outside the band; all of them, if they are no more than that.
@@ -33,12 +32,12 @@ pub fn choose(case: &Case, base: &[u64], points_max: usize, seed: u64) -> Sample
     let mut words: Vec<u64> = candidates.filter(clear).collect();
     let in_band = count - words.len();
     if words.len() > points_max {
-        words.select_nth_unstable_by_key(points_max, |&leaf| shuffle_key(leaf ^ seed));
+        words.select_nth_unstable_by_key(points_max, |&leaf| mix(leaf ^ seed));
         words.truncate(points_max);
         words.sort_unstable();
     }
     let points = words.iter().map(|&leaf| case.root.to_user(word::octant(leaf).centre())).collect();
-    Sample { words, points, band, in_band: in_band as u64, candidates: count as u64 }
+    Sample { words, points, band, in_band: in_band as u64 }
 }
 
 /// A generous bound of the displacement of the surface by single precision and by the lattice. The oracles
@@ -50,14 +49,6 @@ fn band(case: &Case) -> f64 {
     let single = 16.0 * f64::from(f32::EPSILON) * largest;
     let lattice = 4.0 * case.root.edge / UNITS_PER_EDGE as f64;
     single.max(lattice)
-}
-
-/// One step of SplitMix64, a fixed permutation of all words.
-fn shuffle_key(word: u64) -> u64 {
-    let mut x = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ x >> 31
 }
 
 #[cfg(test)]
@@ -84,7 +75,7 @@ mod tests {
     #[test]
     fn a_small_mesh_is_sampled_completely_except_for_crossing_leaves() {
         let sample = choose(&case(8.0, -4.0, BODY), &leaves(), 1000, 0);
-        assert_eq!((sample.words.len(), sample.candidates, sample.in_band), (342, 342, 0));
+        assert_eq!((sample.words.len(), sample.in_band), (342, 0));
         assert!(sample.words.iter().all(|&leaf| word::side(leaf) != Side::Crossing));
         assert_eq!(sample.points[0], [-3.5; 3]);
         assert_eq!(choose(&case(8.0, -4.0, BODY), &leaves(), 342, 0), sample);
@@ -129,18 +120,10 @@ mod tests {
         let case = case(8.0, -4.0, BODY);
         for seed in [1, 2, u64::MAX / 3] {
             let mut expected = choose(&case, &leaves(), 1000, seed).words;
-            expected.sort_by_key(|&leaf| shuffle_key(leaf ^ seed));
+            expected.sort_by_key(|&leaf| mix(leaf ^ seed));
             expected.truncate(100);
             expected.sort_unstable();
             assert_eq!(choose(&case, &leaves(), 100, seed).words, expected, "{seed}");
         }
-    }
-
-    /// The first numbers of the published generator with seed 0.
-    #[test]
-    fn leaves_are_shuffled_by_splitmix64() {
-        let gamma = 0x9e37_79b9_7f4a_7c15u64;
-        let numbers = [0u64, 1, 2].map(|i| shuffle_key(i.wrapping_mul(gamma)));
-        assert_eq!(numbers, [0xe220_a839_7b1d_cdaf, 0x6e78_9e6a_a1b9_65f4, 0x06c4_5d18_8009_454f]);
     }
 }

@@ -68,14 +68,10 @@ pub struct Dissent {
 pub struct Tally {
     /// One entry per oracle.
     pub dissents: Vec<Dissent>,
-    /// Number of points where the oracles disagree with each other.
-    pub disputed: u64,
     /// Indices of points where all six exact rays contradict the mesh.
     pub exact_against: Vec<usize>,
     /// Indices of points where all oracles contradict the mesh.
     pub all_against: Vec<usize>,
-    /// Number of points where the exact rays disagree with each other.
-    pub exact_undecided: u64,
 }
 
 /// Counts the votes.
@@ -84,7 +80,6 @@ pub fn count(ballot: &Ballot) -> Tally {
     let mut count =
         Tally { dissents: ballot.oracles.iter().map(dissent).collect(), ..Tally::default() };
     for (point, (&mesh, &exact)) in ballot.mesh.iter().zip(ballot.exact).enumerate() {
-        count.exact_undecided += u64::from(exact.is_none());
         if exact == Some(!mesh) {
             count.exact_against.push(point);
         }
@@ -97,7 +92,6 @@ pub fn count(ballot: &Ballot) -> Tally {
                 dissent.wrong += u64::from(exact == Some(mesh));
             }
         }
-        count.disputed += u64::from(against != 0 && against != ballot.oracles.len());
         if against == ballot.oracles.len() && against >= MAJORITY {
             count.all_against.push(point);
         }
@@ -194,15 +188,15 @@ mod tests {
 
     #[test]
     fn unanimous_answers_have_no_failure_and_no_notes() {
-        let (count, failure, notes) = vote(TRUE, [YES, YES, YES], true);
-        assert_eq!((count.disputed, failure, notes), (0, None, vec![]));
+        let (_, failure, notes) = vote(TRUE, [YES, YES, YES], true);
+        assert_eq!((failure, notes), (None, vec![]));
     }
 
     #[test]
     fn one_wrong_oracle_is_noted_and_does_not_fail() {
         let (count, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
         let dissent = Dissent { name: "oracle 1".into(), points: 2, right: 0, wrong: 2 };
-        assert_eq!((&count.dissents[1], count.disputed, failure), (&dissent, 2, None));
+        assert_eq!((&count.dissents[1], failure), (&dissent, None));
         assert_eq!(notes.len(), 1);
         assert!(
             notes[0].starts_with("oracle 1 differs from the mesh at 2 of 3 points"),
@@ -243,8 +237,8 @@ mod tests {
     fn contradictions_on_a_body_that_is_not_watertight_are_noted_and_do_not_fail() {
         let exact = [Some(true), Some(true), None];
         let no: &[u8] = &[1, 1, 0];
-        let (count, failure, notes) = vote(exact, [no, no, no], false);
-        assert_eq!((failure, count.exact_undecided, notes.len()), (None, 1, 4));
+        let (_, failure, notes) = vote(exact, [no, no, no], false);
+        assert_eq!((failure, notes.len()), (None, 4));
         assert!(notes[0].ends_with("right at 1, wrong at 0, undecided at 1"), "{}", notes[0]);
     }
 

@@ -80,7 +80,7 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.finish();
-    Ok(written?)
+    written
 }
 
 #[cfg(test)]

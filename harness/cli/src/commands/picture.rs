@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 A slice is drawn at page width with the section of the geometry, axes and a legend; cells too small to be seen \
-are merged, and their greatest value counts. Its data are written beside it as .csv. A view shows the geometry and three \
+are merged, and their greatest value counts. A view shows the geometry and three \
 slices, which a mouse turns in any browser without network (.html), or the first slice (.png, with pyvista). An existing \
 file is replaced.
 

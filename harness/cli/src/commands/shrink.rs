@@ -89,8 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let mut options = vec!["--engine", &arguments.engine];
     options.extend(program.iter().flat_map(|program| ["--mesher", program]));
-    let readme =
-        bundle::write(&shrunk, &probe, &options, &out).map_err(|error| named(&out, &error))?;
+    let readme = bundle::write(&shrunk, &options, &out).map_err(|error| named(&out, &error))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

@@ -41,7 +41,7 @@ fn every_form_of_the_report_lists_skipped_checks() {
     );
     assert!(reasons.iter().any(|why| why.contains("ci/setup compiles it")), "{reasons:?}");
     let json: serde_json::Value = serde_json::from_str(&fixture.read("report.json")).unwrap();
-    assert_eq!(json["schema"], "octree-verify/1");
+    assert_eq!(json["schema"], "octree-verify/2");
     let checks = json["cases"][0]["checks"].as_array().unwrap();
     assert_eq!(checks.iter().filter(|check| check["outcome"] == "left_out").count(), reasons.len());
     let summary = fixture.read("summary.md");

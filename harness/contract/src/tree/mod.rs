@@ -13,13 +13,11 @@ mod region;
 mod store;
 #[cfg(test)]
 mod tests;
-mod walk;
 
 pub use build::{Builder, Refusal, digit, shared_levels};
 pub use neighbourhood::{Neighbourhood, OFFSETS};
 pub use region::{Coarsest, Region};
 use store::Store;
-pub use walk::walk;
 
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word;

@@ -105,6 +105,15 @@ fn equal_subtrees_are_stored_once() {
     assert_eq!(tree.coarsest_level(tree.root(), 0), 4);
 }
 
+/// Visits every leaf with its neighbourhood, in Morton order.
+fn walk(tree: &Tree, at: &Neighbourhood, leaf: &mut dyn FnMut(&Neighbourhood, Kind)) {
+    if let Some(kind) = at.centre().as_leaf() {
+        leaf(at, kind);
+    } else if at.centre().is_node() {
+        (0..8).for_each(|d| walk(tree, &at.child(tree, d), leaf));
+    }
+}
+
 proptest! {
     #[test]
     fn locating_a_cell_agrees_with_a_linear_search(words in random_words(4), cells in prop::collection::vec(any::<[u32; 3]>(), 50)) {
@@ -173,7 +182,7 @@ proptest! {
     fn a_walk_visits_every_leaf_with_its_neighbourhood(words in random_words(3)) {
         let tree = Tree::of_words(&words);
         let mut found = Vec::new();
-        walk(&tree, &mut |neighbourhood, kind| {
+        walk(&tree, &Neighbourhood::root(&tree), &mut |neighbourhood, kind| {
             let Octant { corner, level } = neighbourhood.octant;
             found.push(word::key_of(corner) << 7 | u64::from(level) << 2 | u64::from(kind));
             let same = Neighbourhood::of(&tree, neighbourhood.octant);

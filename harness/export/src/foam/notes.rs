@@ -29,7 +29,6 @@ pub fn notes(mesh: &Mesh, parts: &[Directory], regions: &[Size]) -> Vec<String> 
             empty.join(", ")
         ));
     }
-    notes.extend((parts.len() > 1).then(|| processors(parts)));
     notes.extend((regions.len() > 1).then(|| unconnected(regions, mesh.options.foam.regions)));
     if parts.len() > 1 && !mesh.has_addressing() {
         notes.push("no addressing for reconstructPar: 32-bit labels cannot number the faces of the whole mesh".to_owned());
@@ -45,18 +44,6 @@ pub fn crossing(mesh: &mesh::Mesh, selection: &Selection) -> Option<String> {
          keep_crossing = false for a solver"
             .to_owned()
     })
-}
-
-fn processors(parts: &[Directory]) -> String {
-    let cells = || parts.iter().map(|part| part.cells.len());
-    let faces = parts.iter().flat_map(|part| part.between.values().map(Vec::len));
-    format!(
-        "{} processors of {} to {} cells, {} faces between them",
-        parts.len(),
-        cells().min().unwrap_or(0),
-        cells().max().unwrap_or(0),
-        faces.sum::<usize>() / 2
-    )
 }
 
 fn unconnected(regions: &[Size], kept: options::Regions) -> String {

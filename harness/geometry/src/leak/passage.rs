@@ -17,6 +17,8 @@ use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::query::PointQuery as _;
 
 /// Ratio of the bounds on the width, at most.
 const PRECISION: f64 = 1.05;
@@ -254,13 +256,8 @@ fn least_between(facets: &FacetTree, from: Point, to: Point) -> (f64, Point) {
 
 /// The point of the root's boundary nearest to a point of the root.
 fn at_boundary(at: Point) -> Point {
-    let edge = UNITS_PER_EDGE as f64;
-    let faces = (0..3).flat_map(|axis| [(axis, 0.0), (axis, edge)]);
-    let nearest = faces.min_by(|p, q| (at[p.0] - p.1).abs().total_cmp(&(at[q.0] - q.1).abs()));
-    let (axis, face) = nearest.expect("a cube has faces");
-    let mut on_face = at;
-    on_face[axis] = face;
-    on_face
+    let root = Aabb::new(Point::ZERO, Point::splat(UNITS_PER_EDGE as f64));
+    root.project_local_point(at, false).point
 }
 
 /// The path in the user's units.
@@ -290,25 +287,11 @@ fn described(
     }
     let ends = if is_far { vec![inner.0] } else { vec![inner.0, inner.1] };
     let is_end = ends.iter().any(|&end| facets.distance(points[end]) <= PRECISION * clearance);
-    let along = |from: usize, step: isize| {
-        let mut i = from;
-        while let Some(next) = i.checked_add_signed(step).filter(|&n| n < points.len()) {
-            i = next;
-            if points[i].distance(at) > clearance / 2.0 {
-                break;
-            }
-        }
-        points[i]
-    };
-    let direction = (along(index, 1) - along(index, -1)).normalize_or(Point::X);
     let rim = facets.within(at, RIM * clearance);
-    let nearest = facets.triangle(rim[0].0);
     let points: Vec<Stop> = points
         .iter()
         .map(|&at| Stop { at: user(at), width: 2.0 * unit * facets.distance(at) })
         .collect();
-    let length =
-        points.windows(2).map(|p| Point::from(p[0].at).distance(Point::from(p[1].at))).sum();
     let width = 2.0 * unit * clearance;
     Passage {
         spacing: Spacing::of(level, &case.root),
@@ -318,15 +301,10 @@ fn described(
             width_min: (1.0 - MARCH) * width,
             width_max: 2.0 * unit * bound,
             width_cells: width / Spacing::of(case.level_surface, &case.root).spacing,
-            direction: direction.to_array(),
-            touches: user(
-                parry3d_f64::query::PointQuery::project_local_point(nearest, at, true).point,
-            ),
             facets: rim.into_iter().map(|(facet, _)| facet).collect(),
             index,
             is_end,
         },
-        length,
         inner,
         points,
     }

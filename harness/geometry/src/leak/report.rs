@@ -1,4 +1,4 @@
-//! The answer as data; JSON of the schema `octree-leak/2` when serialised. Lengths are in the user's units.
+//! The answer as data; JSON of the schema `octree-leak/3` when serialised. Lengths are in the user's units.
 //!
 //! Its invariants are in [`super::invariants`].
 
@@ -7,7 +7,7 @@ use contract::lattice::Root;
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-leak/2";
+pub const SCHEMA: &str = "octree-leak/3";
 
 /// A surface level and its spacing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -62,10 +62,6 @@ pub struct Narrowest {
     pub width_max: f64,
     /// `width` in cells of the case's surface level.
     pub width_cells: f64,
-    /// The direction of the path, a unit vector.
-    pub direction: [f64; 3],
-    /// A facet's point that the ball touches.
-    pub touches: [f64; 3],
     /// The facets at the rim, which the ball touches to within 5 % of its radius, by number from 0; nearest first.
     pub facets: Vec<u32>,
     /// Index among the points of the path.
@@ -82,8 +78,6 @@ pub struct Passage {
     pub spacing: Spacing,
     /// The narrowest place.
     pub narrowest: Narrowest,
-    /// Length of the path.
-    pub length: f64,
     /// Indices of the first and the last point between which the width counts: the path leads away from the facets near its ends.
     pub inner: (usize, usize),
     /// The points, from the start to the end.

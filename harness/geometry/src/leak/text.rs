@@ -102,8 +102,6 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         )?;
     }
     writeln!(f, "at        {}", point(&narrowest.at))?;
-    let [x, y, z] = narrowest.direction;
-    writeln!(f, "direction ({x:.3}, {y:.3}, {z:.3})")?;
     let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
     let listed: Vec<String> = listed.collect();
     let more = match narrowest.facets.len().saturating_sub(FACETS_MAX) {
@@ -117,7 +115,7 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
         )?;
     }
-    writeln!(f, "\nThe path: {} points, length {}", passage.points.len(), number(passage.length))
+    Ok(())
 }
 
 fn spacing(spacing: &Spacing) -> String {
@@ -152,8 +150,6 @@ mod tests {
             width_min: 0.124,
             width_max: 0.128,
             width_cells: 0.25,
-            direction: [0.0, 0.6, -0.8],
-            touches: [0.5, 0.0, -1.1875],
             facets: facets.collect(),
             index,
             is_end,
@@ -181,13 +177,7 @@ mod tests {
             opens: None,
             is_separated: false,
             limit: None,
-            passage: Some(Passage {
-                spacing,
-                narrowest,
-                length: 12.5,
-                inner: (0, points.len() - 1),
-                points,
-            }),
+            passage: Some(Passage { spacing, narrowest, inner: (0, points.len() - 1), points }),
             levels: vec![meshed(4, true, None), meshed(2, false, Some("the end is in a wall"))],
         }
     }
@@ -202,8 +192,7 @@ mod tests {
             \nThe narrowest place of the widest path (level 4)\n\
             width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
             Spacings above 0.128 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
-            at        (0.5, 0, -1.25)\ndirection (0.000, 0.600, -0.800)\nfacets    3, 4\n\
-            \nThe path: 3 points, length 12.5\n";
+            at        (0.5, 0, -1.25)\nfacets    3, 4\n";
         assert_eq!(leak(3, narrowest(3..5, 1, false)).to_string(), format!("{HEAD}{expected}"));
     }
 
@@ -224,7 +213,7 @@ mod tests {
         let verdict = "\nJOINED: start and end lie in one space, or one of them within the opening, at every spacing\n";
         assert!(text.contains(verdict), "{text}");
         let remark = "facets    3\n          This is an end of the path: no place on the way is narrower, so there is no opening between \
-            the ends.\n\nThe path: 1 points";
+            the ends.\n";
         assert!(text.contains(remark) && !text.contains("Spacings above"), "{text}");
     }
 

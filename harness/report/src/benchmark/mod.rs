@@ -1,4 +1,4 @@
-//! `harness report DIR`: figures, a page, a LaTeX fragment and an artifact description from records.
+//! `harness report DIR`: figures, a page and a LaTeX fragment from records.
 
 mod balance;
 mod figures;
@@ -34,7 +34,7 @@ pub struct Written {
     pub broken: Vec<Broken>,
 }
 
-/// Writes figures, page, LaTeX fragment and artifact description of a record into `directory`.
+/// Writes figures, page and LaTeX fragment of a record into `directory`.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -52,7 +52,6 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let page = directory.join("index.html");
     write(&page, html::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
-    write(&directory.join("artifact.md"), latex::artifact(&figures, lines))?;
     Ok(Written { page, figures: figures.len(), broken })
 }
 
@@ -68,7 +67,7 @@ fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<Drawn<'a
         write(&path("png"), raster::png(&svg).map_err(io::Error::other)?)?;
         write(&path("pdf"), raster::pdf(&svg).map_err(io::Error::other)?)?;
     }
-    Ok(Drawn { figure, svg, csv })
+    Ok((figure, svg))
 }
 
 fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {

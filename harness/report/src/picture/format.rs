@@ -1,8 +1,8 @@
 //! The formats of pictures, by the name of the file.
 
-use super::{Picture, csv, svg};
+use super::{Picture, svg};
 use clap::ValueEnum;
-use contract::files::{Content, named, write_atomically, write_together};
+use contract::files::{named, write_atomically};
 use run::engine::interrupt;
 use std::io::{self, Write};
 use std::path::Path;
@@ -53,16 +53,12 @@ impl Format {
     }
 }
 
-/// Writes a slice, and its data beside it as CSV.
+/// Writes a slice.
 ///
 /// # Errors
-/// If a file cannot be written or the format is not available; the message names the file.
+/// If the file cannot be written or the format is not available; the message names the file.
 pub fn write(picture: &Picture, format: Format, path: &Path) -> io::Result<()> {
-    let drawn = format.draw(picture).map_err(io::Error::other)?;
-    let (table, data) = (path.with_extension("csv"), csv(picture));
-    let content: [(&Path, Content<'_>); 2] =
-        [(path, &|out| fill(out, &drawn)), (&table, &|out| fill(out, data.as_bytes()))];
-    write_together(&content, |path, error| named(path, &error))
+    put(path, &format.draw(picture).map_err(io::Error::other)?)
 }
 
 /// Writes a file, which is either complete or absent.

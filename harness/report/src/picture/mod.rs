@@ -4,7 +4,6 @@
 //! window. Reading takes time in proportion to the slice, and no picture has more squares than can be shown.
 
 pub mod colour;
-mod csv;
 mod draw;
 pub mod format;
 pub mod scene;
@@ -25,7 +24,6 @@ use export::selection::{Selection, Slice};
 use geometry::tree::{Aabb, Point};
 use squares::{Detail, Squares, plane_axes};
 
-pub use csv::csv;
 pub use draw::svg;
 
 /// A point in a plane.
@@ -44,7 +42,7 @@ pub struct Request<'a> {
     pub zoom: f64,
     /// Leaves deeper than this are merged into their ancestors: the base mesh of a partition, for example.
     pub level_max: u8,
-    /// Command that makes the picture, which its data name.
+    /// Command that makes the picture, which a view names.
     pub command: String,
 }
 
@@ -96,8 +94,6 @@ pub struct Picture {
     pub key: Vec<Entry>,
     /// The segments in which the plane cuts the body, in the user's units; `None` if the body is not known.
     pub section: Option<Vec<[Planar; 2]>>,
-    /// Command that makes the picture.
-    pub command: String,
 }
 
 /// Squares of a slice: about two megabytes of SVG.
@@ -197,8 +193,7 @@ impl Picture {
         let values = squares.squares.iter().map(|s| s.value).collect();
         let key = request.colour.key(&values, &root);
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
-        let (colour, command) = (request.colour, request.command.clone());
-        let picture = Self { root, slice, colour, window, squares, key, section, command };
+        let picture = Self { root, slice, colour: request.colour, window, squares, key, section };
         picture.check_invariants();
         Ok(picture)
     }

@@ -130,7 +130,7 @@ pub fn page(case: &str, command: &str, pictures: &[(Member, Drawn)]) -> String {
             "The method and its meshes in pictures, from the geometry to the final mesh, for the case " code { (case) }
             " on " (RANKS) " simulated ranks, in the order of the algorithm. Counterparts in the paper are Figures 3 (base mesh), 4 (balance), 5, 9 and 10 "
             "(layers), 11 and 12 (partition), and 13 (gap). The files beside this page have the "
-            "pictures as SVG, their data as CSV, and the views as HTML, which a mouse turns."
+            "pictures as SVG, and the views as HTML, which a mouse turns."
         }
         p { "Made by " code { (command) } "." }
         @for ((name, .., caption), drawn) in pictures { (figure(name, caption, drawn)) }
@@ -141,9 +141,7 @@ pub fn page(case: &str, command: &str, pictures: &[(Member, Drawn)]) -> String {
 fn figure(name: &str, caption: &str, drawn: &Drawn) -> Markup {
     let link = |extension: &str, text: &str| html! { a href={ (name) "." (extension) } { (text) } };
     let (drawing, links) = match drawn {
-        Drawn::Slice(svg) => {
-            (PreEscaped(svg.clone()), html! { (link("svg", "SVG")) ", " (link("csv", "data")) })
-        }
+        Drawn::Slice(svg) => (PreEscaped(svg.clone()), link("svg", "SVG")),
         Drawn::View(png) => {
             let drawing = html! {
                 @if let Some(png) = png {

@@ -186,27 +186,12 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 }
 
 #[test]
-fn csv_has_every_shape() {
-    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
-    let cube = cube();
-    let shown = Request { selection: at(2, 3.0), body: Some(&cube), ..request(Colour::Level) };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
-    let csv = csv(&picture);
-    assert!(csv.starts_with(
-        "# Slice z = 3 of a mesh, 7 cells by level\n# harness picture mesh --out a.svg\n"
-    ));
-    assert!(csv.contains("shape,x0,y0,x1,y1,level,cells\nsquare,0,0,2,2,2,1\n"), "{csv}");
-    assert_eq!(csv.matches("\nsquare,").count(), 7);
-    assert_eq!(csv.matches("\nsection,").count(), picture.section.unwrap().len());
-}
-
-#[test]
-fn a_picture_and_its_data_are_written_beside_each_other() {
+fn a_picture_is_written_in_the_format_of_its_name() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
     let picture = Picture::collect(&mesh, &request(Colour::Level), &DETAIL).unwrap();
     let path = place.path().join("a.svg");
     write(&picture, Format::of(&path).unwrap(), &path).unwrap();
-    assert!(path.is_file() && place.path().join("a.csv").is_file());
+    assert!(path.is_file());
     let error = write(&picture, Format::Svg, &place.path().join("no/a.svg")).unwrap_err();
     assert!(error.to_string().contains("no/a.svg"), "{error}");
     for (name, why) in

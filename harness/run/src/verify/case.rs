@@ -141,12 +141,8 @@ impl<'a> CaseRun<'a> {
             let check = Check::new(subject, result.name, result.outcome());
             let notes =
                 Some(result.note).filter(|_| layout.is_none()).filter(|note| !note.is_empty());
-            let counts = [
-                ("examined".to_owned(), result.examined),
-                ("findings".to_owned(), result.findings_total),
-            ];
             let ranks = layout.and_then(Layout::rank_count);
-            let check = Check { ranks, figures: notes, counts: counts.into(), ..check };
+            let check = Check { ranks, figures: notes, findings: result.findings_total, ..check };
             self.add(check, layout);
         }
     }

@@ -13,7 +13,6 @@ use contract::catalogue::Size;
 use contract::parity::Parity;
 use contract::watch::Watch;
 use contract::word::{self, Side};
-use std::collections::BTreeMap;
 use std::fs;
 use std::time::Instant;
 
@@ -108,20 +107,6 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
             None => Outcome::held(ballot.decisive()),
         },
     };
-    let mut counts = BTreeMap::from([
-        ("leaves".to_owned(), sample.candidates),
-        ("points".to_owned(), sample.words.len() as u64),
-        ("in_band".to_owned(), sample.in_band),
-        ("watertight".to_owned(), u64::from(ballot.watertight)),
-        ("disputed".to_owned(), count.disputed),
-        ("exact_undecided".to_owned(), count.exact_undecided),
-        ("exact_against_mesh".to_owned(), count.exact_against.len() as u64),
-    ]);
-    for dissent in &count.dissents {
-        counts.insert(format!("{}_differs", dissent.name), dissent.points);
-        counts.insert(format!("{}_right", dissent.name), dissent.right);
-        counts.insert(format!("{}_wrong", dissent.name), dissent.wrong);
-    }
     let mut notes = count.notes(&ballot);
     if sample.in_band > 0 {
         notes.insert(
@@ -132,7 +117,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
             ),
         );
     }
-    Check { notes, counts, ..Check::new(SUBJECT, NAME, outcome) }
+    Check { notes, ..Check::new(SUBJECT, NAME, outcome) }
 }
 
 /// Whether a leaf's centroid is inside by all exact rays; `None` if the rays disagree.

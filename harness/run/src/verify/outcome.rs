@@ -1,9 +1,8 @@
-//! The checks of a verification with their outcomes, and their counts.
+//! The checks of a verification with their outcomes.
 
 use crate::engine::layout::Layout;
 pub use check::checks::Outcome;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Name of the check that a program runs to its end and that its run report is true.
 pub const RUNS: &str = "runs";
@@ -31,12 +30,12 @@ pub struct Check {
     pub notes: Vec<String>,
     /// Figures of the check, as text.
     pub figures: Option<String>,
-    /// Counts of the check, by name.
-    pub counts: BTreeMap<String, u64>,
+    /// Number of findings, if it counts them.
+    pub findings: u64,
 }
 
 impl Check {
-    /// A check without remarks and counts.
+    /// A check without remarks.
     pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
         let (subject, name) = (subject.into(), name.into());
         Self {
@@ -47,7 +46,7 @@ impl Check {
             time_s: 0.0,
             notes: Vec::new(),
             figures: None,
-            counts: BTreeMap::new(),
+            findings: 0,
         }
     }
 

@@ -16,7 +16,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, E
 use serde::{Deserialize, Serialize};
 
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
-pub const SCHEMA: &str = "octree-verify/1";
+pub const SCHEMA: &str = "octree-verify/2";
 
 /// One run of mesher or reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -102,36 +102,24 @@ impl CaseRun<'_> {
         self.add(Check::new("serial", "deterministic", outcome), None);
     }
 
-    /// Adds the numbers of components to the check that has compared them, with remarks about what a user may not expect.
+    /// Adds remarks about components that a user may not expect to the check that has counted them.
     fn note_components(&mut self, manifest: &Manifest) {
         let mut checks = self.report().checks.iter_mut();
         let Some(check) = checks.rfind(|check| check.name == kept::NAME) else { return };
         let Ambiguous { count: ambiguous, example } = manifest.components_ambiguous;
-        check.counts.insert("components_ambiguous".into(), ambiguous);
-        if let Some(components) = &manifest.components {
-            let Components { outside, inside, enclosed } = components;
-            check.counts.extend([
-                ("components_outside".to_owned(), *outside),
-                ("components_inside".to_owned(), *inside),
-                ("components_enclosed".to_owned(), enclosed.count),
-                ("enclosed_leaves".to_owned(), enclosed.leaves),
-            ]);
-            if let (count @ 1.., Some(at)) = (enclosed.count, enclosed.example) {
-                check.notes.push(format!(
-                    "{count} of {outside} outside components are enclosed, and their {} leaves of T0 are deleted, for \
-                     example at {at:?}",
-                    enclosed.leaves
-                ));
-            }
+        if let Some(Components { outside, enclosed, .. }) = &manifest.components
+            && let (count @ 1.., Some(at)) = (enclosed.count, enclosed.example)
+        {
+            check.notes.push(format!(
+                "{count} of {outside} outside components are enclosed, and their {} leaves of T0 are deleted, for \
+                 example at {at:?}",
+                enclosed.leaves
+            ));
         }
         if let Some(at) = example {
             check.notes.push(format!(
                 "the rays of {ambiguous} components disagree, and their majority decides, for example at {at:?}"
             ));
-        }
-        if !manifest.seeds.is_empty() {
-            let seeds = manifest.seeds.len();
-            check.notes.push(format!("{seeds} seeds determine the sides instead of rays"));
         }
     }
 
