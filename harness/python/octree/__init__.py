@@ -12,9 +12,12 @@ The programs `mesher`, `harness` and `reference` are installed with this module,
 from __future__ import annotations
 
 import json
+import operator
+import shutil
 import subprocess
 import sysconfig
 import tempfile
+import weakref
 from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -46,7 +49,10 @@ def run(program: str, *arguments: str | PathLike[str]) -> str:
     """Runs one of the installed programs; returns what it printed, and prints its warnings.
 
     Raises `Failed` if its exit code is not 0."""
-    path = Path(sysconfig.get_path("scripts")) / program
+    beside = Path(sysconfig.get_path("scripts")) / program
+    path = beside if beside.is_file() else shutil.which(program)
+    if path is None:
+        raise Failed(3, f"{program} is neither {beside} nor on the PATH: install the wheel into an environment")
     ended = subprocess.run([path, *map(fspath, arguments)], capture_output=True, text=True)
     if ended.returncode != 0:
         raise Failed(ended.returncode, (ended.stderr.strip() or ended.stdout.strip()))
@@ -139,14 +145,6 @@ class Mesh:
         return corners
 
 
-class _Temporary(Mesh):
-    """A mesh whose directory is deleted with it."""
-
-    def __init__(self, place: tempfile.TemporaryDirectory[str]):
-        super().__init__(Path(place.name) / "mesh")
-        self._place = place
-
-
 def mesh(
     body: str | PathLike[str],
     *,
@@ -160,9 +158,22 @@ def mesh(
     `spacing` is the greatest edge of the cells at the surface, `layer_cells` the least thickness of the layers of each level, in cells.
     `options` are further ones of `mesher`, as in `["--keep", "inside", "--seed", "0.1,0,0"]`. The mesh stays in the new directory `out`;
     without one it exists as long as the result. Raises `Failed` if there is no mesh."""
-    place = None if out else tempfile.TemporaryDirectory(prefix="octree-")
-    directory = out or Path(place.name) / "mesh"
-    settings = [("--spacing-min", spacing), ("--layer-cells-min", layer_cells)]
-    given = [word for name, value in settings if value is not None for word in (name, repr(value))]
-    run("mesher", body, *given, *options, "--quiet", "--out", directory)
-    return _Temporary(place) if place else Mesh(directory)
+    if isinstance(options, str):
+        raise TypeError("options are a list of words, as in ['--keep', 'inside']")
+    given: list[str] = []
+    if spacing is not None:
+        given += ["--spacing-min", repr(float(spacing))]
+    if layer_cells is not None:
+        given += ["--layer-cells-min", str(operator.index(layer_cells))]
+    place = None if out else tempfile.mkdtemp(prefix="octree-")
+    directory = Path(out) if out else Path(place) / "mesh"
+    try:
+        run("mesher", body, *given, *options, "--quiet", "--out", directory)
+        made = Mesh(directory)
+    except BaseException:
+        if place:
+            shutil.rmtree(place)
+        raise
+    if place:
+        weakref.finalize(made, shutil.rmtree, place)
+    return made
