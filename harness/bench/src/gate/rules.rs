@@ -25,8 +25,6 @@ pub struct Rules {
     /// The cases.
     #[serde(default, rename = "case")]
     pub cases: Vec<CaseRule>,
-    #[serde(skip)]
-    directory: PathBuf,
 }
 
 /// Tolerated growth, in percent.
@@ -84,8 +82,11 @@ impl Default for TimeRules {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaseRule {
-    /// Name in the catalogue, or path of a case file.
+    /// Name in the catalogue. The file may have the path of a case file here, whose stem becomes the name: records must not depend on the
+    /// directory of a checkout.
     pub name: String,
+    #[serde(skip)]
+    file: Option<PathBuf>,
     /// Layers that include the case.
     pub layers: Vec<LayerName>,
     /// Numbers of simulated ranks on which counters and memory are also compared; ranks on MPI for an engine without them.
@@ -136,7 +137,12 @@ impl Rules {
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let mut rules: Self =
             toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
-        rules.directory = path.parent().unwrap_or(Path::new("")).to_owned();
+        let directory = path.parent().unwrap_or(Path::new(""));
+        for case in rules.cases.iter_mut().filter(|case| case.name.ends_with(".toml")) {
+            let file = directory.join(&case.name);
+            case.name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            case.file = Some(file);
+        }
         rules.check().map_err(wrong)?;
         Ok(rules)
     }
@@ -181,16 +187,15 @@ impl Rules {
             )));
         }
         let named = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
-        self.cases.iter().filter(named).map(|rule| self.find(rule, programs)).collect()
+        self.cases.iter().filter(named).map(|rule| Self::find(rule, programs)).collect()
     }
 
-    fn find(&self, rule: &CaseRule, programs: &Programs) -> Result<Selected, Failure> {
-        let path = match rule.name.ends_with(".toml") {
-            true => {
-                let path = self.directory.join(&rule.name);
-                std::fs::canonicalize(&path).map_err(|error| format!("{}: {error}", path.display()))
+    fn find(rule: &CaseRule, programs: &Programs) -> Result<Selected, Failure> {
+        let path = match &rule.file {
+            Some(path) => {
+                std::fs::canonicalize(path).map_err(|error| format!("{}: {error}", path.display()))
             }
-            false => {
+            None => {
                 let catalogue = &programs.paths.catalogue;
                 let found = catalogue.named(&rule.name)?;
                 found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
@@ -264,6 +269,24 @@ mod tests {
         let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, LayerName::Memory);
         assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 10.0]);
         assert_eq!(of("3 ranks/halo"), 8.0);
+    }
+
+    /// Records of two checkouts continue each other.
+    #[test]
+    fn a_case_is_named_by_its_file_wherever_that_is() {
+        let of = |cases: &str| {
+            let place = tempfile::tempdir().unwrap();
+            let path = place.path().join("gate.toml");
+            let cases = cases.replace("HERE", place.path().to_str().unwrap());
+            std::fs::write(&path, cases).unwrap();
+            Rules::read(&path).map(|rules| rules.cases[0].name.clone())
+        };
+        let case = |name: &str| format!("[[case]]\nname = '{name}'\nlayers = ['counters']\n");
+        for name in ["HERE/mesh/ring.toml", "../mesh/ring.toml", "ring.toml", "ring"] {
+            assert_eq!(of(&case(name)).unwrap(), "ring", "{name}");
+        }
+        let two = of(&(case("a/ring.toml") + &case("b/ring.toml"))).unwrap_err();
+        assert!(two.why.contains("case ring is there twice"), "{two}");
     }
 
     #[test]

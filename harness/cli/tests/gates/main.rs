@@ -51,7 +51,7 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     ));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(
-        outcome.printed.contains("regression   case.toml: words 40 -> 41 (+2.50 %)"),
+        outcome.printed.contains("regression   case: words 40 -> 41 (+2.50 %)"),
         "{}",
         outcome.printed
     );
@@ -60,7 +60,7 @@ fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
         let outcome = fixture.harness(&format!("{gate} {better}"));
         assert_eq!(outcome.code, 0, "{}", outcome.printed);
         assert!(
-            outcome.printed.contains("improvement  case.toml: 2 ranks/words 41 -> 40"),
+            outcome.printed.contains("improvement  case: 2 ranks/words 41 -> 40"),
             "{}",
             outcome.printed
         );
@@ -198,13 +198,13 @@ fn a_gate_that_compared_nothing_is_not_green() {
     assert!(record.printed.contains("no baseline was given"), "{}", record.printed);
     let now = fs::read_to_string(fixture.path("now.json")).unwrap();
     let mut measures: serde_json::Value = serde_json::from_str(&now).unwrap();
-    let case = measures["cases"]["case.toml"].clone();
+    let case = measures["cases"]["case"].clone();
     let mut empty = case.clone();
     (empty["exact"], empty["digest"]) = (serde_json::json!({}), serde_json::Value::Null);
     for (cases, why) in [
         (serde_json::json!({}), "the record does not contain this case"),
         (serde_json::json!({"other.toml": case}), "the record does not contain this case"),
-        (serde_json::json!({"case.toml": empty}), "no quantity is in both"),
+        (serde_json::json!({"case": empty}), "no quantity is in both"),
     ] {
         measures["cases"] = cases;
         fixture.write("old.json", &measures.to_string());
@@ -212,7 +212,7 @@ fn a_gate_that_compared_nothing_is_not_green() {
             let outcome = fixture.harness(&format!("{gate} --baseline old.json{also}"));
             assert_eq!(outcome.code, 3, "{}", outcome.printed);
             assert!(
-                outcome.printed.contains("INCOMPLETE: counters of case.toml"),
+                outcome.printed.contains("INCOMPLETE: counters of case"),
                 "{}",
                 outcome.printed
             );

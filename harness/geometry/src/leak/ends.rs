@@ -4,7 +4,6 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word::{self, Side};
 
-use super::passage::to_user;
 use crate::tree::Point;
 use serde::Serialize;
 
@@ -33,6 +32,12 @@ pub fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<Point, String
             root.rounded(root.origin)
         )
     })
+}
+
+/// A point of the lattice in the user's units.
+pub fn to_user(root: &Root, at: Point) -> [f64; 3] {
+    let unit = root.edge / UNITS_PER_EDGE as f64;
+    root.rounded((Point::from(root.origin) + at * unit).to_array())
 }
 
 /// The leaf that contains a point of the root, among the sorted words of a tree that fills it.

@@ -11,12 +11,13 @@
 //! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
 //! the width counts from there.
 
+use super::ends::to_user;
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
 use super::space::{Goal, Space};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::Failure;
-use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
 
@@ -308,10 +309,4 @@ fn described(
         inner,
         points,
     }
-}
-
-/// A point of the lattice in the user's units.
-pub fn to_user(root: &Root, at: Point) -> [f64; 3] {
-    let unit = root.edge / UNITS_PER_EDGE as f64;
-    root.rounded((Point::from(root.origin) + at * unit).to_array())
 }
