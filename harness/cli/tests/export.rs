@@ -23,6 +23,8 @@ fn mesh() -> TempDir {
 fn export(place: &TempDir, file: &str, options: &[&str]) -> (i32, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
     let command = command.current_dir(place.path()).args(["export", "mesh", file]).args(options);
+    // The programs may lie outside of the repository.
+    let command = command.env("HARNESS_ROOT", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let output = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))

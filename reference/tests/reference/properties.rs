@@ -1,6 +1,6 @@
 //! Properties of base trees and meshes on random cases, and their equality with those of the
 //! dense-grid implementation.
-mod support;
+use crate::support;
 
 use reference::{Components, Keep, base_tree, mesh};
 use std::cell::Cell;

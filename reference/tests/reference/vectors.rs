@@ -6,7 +6,7 @@ use reference::{BoxSpec, Case, Enclosed, Error, Keep, Root, Side, digest, mix};
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {
-    let vectors: Value = serde_json::from_str(include_str!("../vectors/digest.json")).unwrap();
+    let vectors: Value = serde_json::from_str(include_str!("../../vectors/digest.json")).unwrap();
     assert_eq!(vectors["schema"], "octree-test-vectors/1");
     let cases = vectors[name].as_array().unwrap().clone();
     assert!(!cases.is_empty());

@@ -1,5 +1,5 @@
 //! The crossing test, which clips, agrees with a second one, which uses separating axes.
-mod support;
+use crate::support;
 
 use proptest::array::uniform3;
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
 //! Meshes small enough to verify by hand.
-mod support;
+use crate::support;
 
 use reference::{Case, Keep, base_tree, mesh};
 use support::{ROOT_EDGE, UNIT, block, block_of_units, box_of_level, case, levels, sides, units};

@@ -1,5 +1,5 @@
 //! Sides of components whose rays disagree, which closed bodies do not produce.
-mod support;
+use crate::support;
 
 use reference::{Case, base_tree};
 use support::{UNIT, block_of_units, box_of_level, case, levels, sides, units};

@@ -1,5 +1,4 @@
 //! Cases on the lattice, second implementations of geometric predicates, and random inputs.
-#![allow(dead_code)] // Each test is a separate crate and uses a subset.
 
 pub mod dense;
 pub mod leaf;

@@ -1,5 +1,5 @@
 //! Invalid cases: each kind has its own error, and the limits of valid values are exact.
-mod support;
+use crate::support;
 
 use reference::{BoxSpec, Case, Error, mesh};
 use support::{ROOT_EDGE, case};

@@ -1,5 +1,5 @@
 //! Octant algebra, tested on all octants to level 3.
-mod support;
+use crate::support;
 
 use reference::octant::{Extent, LEVEL_MAX, Octant, Side};
 use support::ROOT_EDGE;

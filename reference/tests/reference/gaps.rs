@@ -1,6 +1,6 @@
 //! The limit on gaps (`DEFINITION.md`, section 4): which slits connect the two sides of a sheet. The
 //! table there is the result of these tests.
-mod support;
+use crate::support;
 
 use reference::{Case, Keep, base_tree};
 use std::cell::Cell;
@@ -110,7 +110,7 @@ fn table() -> String {
 #[test]
 fn the_table_of_the_definition_is_the_one_computed() {
     let table = table();
-    let definition = include_str!("../DEFINITION.md");
+    let definition = include_str!("../../DEFINITION.md");
     assert!(definition.contains(&table), "DEFINITION.md, section 4, must contain\n{table}");
 }
 

@@ -1,5 +1,5 @@
 //! Ray parities, verified by hand and by a second method.
-mod support;
+use crate::support;
 
 use proptest::array::{uniform3, uniform4};
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
 //! Seeds: the sides that they determine, and the errors of seeds that mark no flow.
-mod support;
+use crate::support;
 
 use proptest::array::uniform3;
 use proptest::prelude::*;

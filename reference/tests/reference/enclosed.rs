@@ -1,5 +1,5 @@
 //! Enclosed space: outside components that do not reach the boundary of the root.
-mod support;
+use crate::support;
 
 use reference::{Case, Enclosed, Keep, base_tree, mesh};
 use support::dense::{self, CROSSING, INSIDE};
