@@ -16,6 +16,7 @@ pub mod mesh;
 pub mod near_body;
 pub mod options;
 pub mod p8est;
+pub mod polydata;
 pub mod selection;
 #[cfg(test)]
 mod testing;

@@ -5,7 +5,6 @@
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
-//! - [`leak`]: the path of a leak for VTK;
 //! - [`picture`]: pictures of meshes.
 
 pub mod benchmark;
@@ -13,7 +12,6 @@ pub mod figure;
 pub mod gate;
 pub mod json;
 mod junit;
-pub mod leak;
 pub mod markdown;
 pub mod page;
 pub mod picture;

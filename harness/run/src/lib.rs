@@ -12,6 +12,7 @@ pub mod engine;
 pub mod import;
 pub mod oracle;
 pub mod progress;
+pub mod proof;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod verify;

@@ -39,7 +39,8 @@ pub enum Placement {
 /// The owners of all octants, as seen from one rank.
 #[derive(Clone, Debug)]
 pub struct Ownership {
-    rank: usize,
+    /// This rank; none in a view from outside all ranks.
+    rank: Option<usize>,
     ranks: usize,
     intervals: Arc<Intervals>,
     /// This rank's longest interval: most queries are for octants within it.
@@ -59,9 +60,6 @@ struct Intervals {
     starts: Vec<u64>,
     owners: Vec<usize>,
 }
-
-/// The rank in a view that owns nothing: see [`Ownership::non_owning_view`].
-const RANK_NONE: usize = usize::MAX;
 
 impl Ownership {
     /// The ownership of a single rank.
@@ -94,7 +92,7 @@ impl Ownership {
         let is_single = intervals.of(rank).count() == 1;
         let own = intervals.of(rank).max_by_key(|own| own.end - own.start).unwrap_or(0..0);
         Self {
-            rank,
+            rank: Some(rank),
             ranks,
             intervals: Arc::new(intervals),
             own,
@@ -106,7 +104,7 @@ impl Ownership {
 
     /// The same partition seen from outside all ranks: every brick is fully replicated or remote.
     pub fn non_owning_view(&self) -> Self {
-        Self { rank: RANK_NONE, own: 0..0, is_single: false, ..self.clone() }
+        Self { rank: None, own: 0..0, is_single: false, ..self.clone() }
     }
 
     /// The largest octants that this rank owns all of, in Morton order: level and code.
@@ -126,7 +124,7 @@ impl Ownership {
 
     /// The level-19 codes that this rank owns, in order.
     pub fn intervals(&self) -> impl Iterator<Item = Range<u64>> + '_ {
-        self.intervals.of(self.rank)
+        self.rank.into_iter().flat_map(|rank| self.intervals.of(rank))
     }
 
     /// The longest of them; at the start of the curve if this rank owns nothing.
@@ -217,13 +215,15 @@ impl Ownership {
             _ if l < 2 => Placement::FullyReplicated,
             1 => self.placement_of(owners[0]),
             OWNERS_MANY.. => Placement::FullyReplicated,
-            _ if owners.contains(&self.rank) => Placement::PartiallyReplicated,
+            _ if self.rank.is_some_and(|rank| owners.contains(&rank)) => {
+                Placement::PartiallyReplicated
+            }
             _ => Placement::Remote(owners[0]),
         }
     }
 
     fn placement_of(&self, owner: usize) -> Placement {
-        if owner == self.rank { Placement::Local } else { Placement::Remote(owner) }
+        if Some(owner) == self.rank { Placement::Local } else { Placement::Remote(owner) }
     }
 
     /// The rank that owns brick `key` of level `l`.
@@ -239,7 +239,7 @@ impl Ownership {
         self.ranks == 1
             || l > self.level_replicated + 1
             || self.own.contains(&brick_start(l, key))
-            || self.owner(l, key) == self.rank
+            || Some(self.owner(l, key)) == self.rank
     }
 
     /// Whether several ranks hold a brick of level `l`.

@@ -1,6 +1,6 @@
 //! Judges rows from the declaration and the lines of a record alone.
 //!
-//! Invariants of a judged row, executed by [`check_invariants`] before it is printed or recorded: it has a value if and only if it is
+//! Invariants of a judged row, executed by `check_invariants` before it is printed or recorded: it has a value if and only if it is
 //! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
 //! has none; a row without a value, and an efficiency above 1, states the reason.
 

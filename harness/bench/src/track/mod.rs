@@ -5,7 +5,7 @@
 //!
 //! Invariant: the same history and options give the same result on every machine.
 //!
-//! Invariants of the answer, executed by [`Series::check_invariants`] before it is printed: steps are in order and
+//! Invariants of the answer, executed by `Series::check_invariants` before it is printed: steps are in order and
 //! within the series; both values beside a change lie among the values of their segments, and its percentage is theirs; its
 //! commits are those of the history; p is a probability.
 

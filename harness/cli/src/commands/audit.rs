@@ -4,18 +4,14 @@ use super::import::Source;
 use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
 use check::audit::{AuditOptions, audit_against};
-use check::checks::CheckResult;
 use check::promises::Promises;
 use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use contract::files::named;
 use run::engine::description::Description;
-use run::engine::failure::End;
 use run::engine::paths::Paths;
-use run::engine::process::{self, Watch};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use run::proof;
 use std::time::Duration;
 
 /// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
@@ -78,13 +74,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
     let definition = Promises::of_definition();
     let promises = engine.as_ref().map_or(&definition, |engine| &engine.promises);
-    let checker = proved.as_ref().map(|_| checker()).transpose()?;
+    let checker = Paths::find().proven_checker;
+    if let Some(why) = proved.as_ref().and_then(|_| proof::lacks(&checker)) {
+        return Err(Failure::missing(why));
+    }
     let mut report = audit_against(directory, &options, case.as_ref(), promises);
     let mut unproven = None;
-    if let (Some(checker), Some(base)) = (&checker, proved) {
-        match prove(checker, directory, base, report.leaves) {
+    if let Some(base) = proved {
+        match proof::check(&checker, (directory, base), report.leaves, LIMIT) {
             Ok(proof) => report.checks.push(proof),
-            Err(failure) => unproven = Some(failure),
+            Err(failure) => unproven = Some(Failure::from(failure)),
         }
     }
     report.check_invariants();
@@ -115,36 +114,4 @@ fn promising(text: &str) -> Result<Description, String> {
         }),
         false => Description::find(text, &Paths::find()),
     }
-}
-
-/// The proven checker.
-fn checker() -> Result<PathBuf, Failure> {
-    let checker = Paths::find().proven_checker;
-    match checker.is_file() {
-        true => Ok(checker),
-        false => Err(Failure::missing(format!(
-            "{} is missing: ci/prove proves and builds it",
-            checker.display()
-        ))),
-    }
-}
-
-/// What the proven checker finds of a mesh with so many leaves.
-fn prove(checker: &Path, mesh: &Path, base: &Path, leaves: u64) -> Result<CheckResult, Failure> {
-    let place = tempfile::tempdir()?;
-    let mut command = Command::new(checker);
-    command.arg(mesh).arg(base);
-    let mut proof = CheckResult::new("proof");
-    proof.examined = leaves;
-    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers; not proven: which leaves facets cross, boxes, \
-                  rays, and that no split is needless"
-        .to_owned();
-    match process::run(&mut command, &Watch::new("the proven checker", LIMIT, place.path())) {
-        Ok(_) => {}
-        Err(failure) if matches!(failure.end, End::Exited { code: 1, .. }) => {
-            proof.report("the checker of reference/proof rejects the mesh".to_owned());
-        }
-        Err(failure) => return Err(failure.into()),
-    }
-    Ok(proof)
 }

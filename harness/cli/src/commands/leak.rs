@@ -10,11 +10,12 @@ use contract::files::{Content, named, write_together};
 use contract::leafset::LeafSet;
 use contract::manifest::Keep;
 use contract::watch::Watch;
+use export::polydata;
 use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
 use report::json::pretty;
-use report::leak::vtp;
+
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
@@ -165,7 +166,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
         false => written,
     };
     let json: Content<'_> = &|out| complete(out.write_all(pretty(answers).as_bytes()));
-    let vtk: Content<'_> = &|out| complete(vtp(&passages, out));
+    let vtk: Content<'_> = &|out| complete(polydata::paths(&passages, out));
     if passages.is_empty() && arguments.vtk.is_some() {
         eprintln!(
             "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"

@@ -6,15 +6,13 @@ use contract::lattice::Root;
 use contract::octant::UNITS_PER_CELL;
 use geometries::Facet;
 use geometries::write_stl_binary;
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version,
-    VertexNumbers, Vtk,
-};
+use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
 use super::front::Face;
 use super::gap::Gap;
 use super::polygons::Polygons;
 use super::report::edge_of_level;
+use crate::polydata::{array, write};
 
 /// Writes the polygons as triangles, whose normals point away from the body. Coordinates have single precision.
 ///
@@ -81,16 +79,5 @@ pub fn vtp(
         data: Attributes { point: Vec::new(), cell },
         ..PolyDataPiece::default()
     };
-    let surface = Vtk {
-        version: Version { major: 1, minor: 0 },
-        title: "front towards the body".into(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(piece),
-        file_path: None,
-    };
-    surface.write_xml(out).map_err(|error| io::Error::other(format!("{error:?}")))
-}
-
-fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
-    Attribute::DataArray(DataArray { data: values.into(), ..DataArray::scalars(name, 1) })
+    write("front towards the body", piece, out)
 }

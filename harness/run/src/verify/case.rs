@@ -188,17 +188,21 @@ pub const ORACLES: (&str, &str) = ("sides", "oracles");
 /// Subject and name of the check of the balance by p4est.
 pub const P4EST: (&str, &str) = ("p4est", "balance");
 
+/// Subject and name of the check by the proven checker.
+pub const PROOF: (&str, &str) = ("proof", "accepted");
+
 /// Subject and name of the checks by other programs, which need the definition.
 pub fn steps(promises: &Promises) -> &'static [(&'static str, &'static str)] {
     match promises.definition {
-        true => &[ORACLES, P4EST],
+        true => &[PROOF, ORACLES, P4EST],
         false => &[],
     }
 }
 
 /// The options of `harness verify` that select this layout and nothing else.
 fn options_of(layout: &Layout) -> Vec<String> {
-    let mut words = vec!["--no-oracles".to_owned(), "--no-p4est".to_owned()];
+    let mut words =
+        vec!["--no-oracles".to_owned(), "--no-p4est".to_owned(), "--no-proof".to_owned()];
     let choices = [
         ("--ranks", Some(layout.ranks.count().to_string())),
         ("--partitioners", layout.partitioner.clone()),

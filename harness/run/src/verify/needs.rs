@@ -7,6 +7,7 @@ use crate::engine::paths::Paths;
 use crate::engine::programs::Programs;
 use crate::engine::service::Services;
 use crate::oracle::{self, ORACLES, Question};
+use crate::proof;
 use check::promises::Independence;
 use std::cell::OnceCell;
 use std::time::Duration;
@@ -29,6 +30,8 @@ pub struct Needs {
     oracles_silent: Vec<Failure>,
     /// Why p4est is unavailable.
     pub p4est: Option<String>,
+    /// Why the proven checker is unavailable.
+    pub proof: Option<String>,
     /// Why geometries are missing, one reason each.
     geometries: Vec<String>,
     /// Cases without any check.
@@ -77,6 +80,8 @@ impl Needs {
         let built = || format!("{} is missing (ci/setup compiles it)", p4est.display());
         needs.p4est =
             unless(options.no_p4est, "no-p4est").or_else(|| (!p4est.is_file()).then(built));
+        needs.proof = unless(options.no_proof, "no-proof")
+            .or_else(|| proof::lacks(&programs.paths.proven_checker));
         match unless(options.no_oracles, "no-oracles") {
             // Those that cannot be started are found when they are tried.
             None => ORACLES
@@ -84,7 +89,8 @@ impl Needs {
                 .for_each(|o| drop(oracle::start(o, &needs.services, &programs.paths))),
             lacking => needs.oracles = OnceCell::from(Oracles { lacking, ..Oracles::default() }),
         }
-        let of_definition = [Need::Oracles, Need::P4est].into_iter().filter(|_| unused.is_some());
+        let of_definition =
+            [Need::Oracles, Need::P4est, Need::Proof].into_iter().filter(|_| unused.is_some());
         needs.unused = of_definition.collect();
         if engine.run.parallel.is_none() && options.ranks.is_none() {
             needs.unused.push(Need::Mpi);
@@ -132,6 +138,7 @@ impl Needs {
             (Need::Mpi, self.mpi.clone()),
             (Need::Oracles, oracles),
             (Need::P4est, self.p4est.clone()),
+            (Need::Proof, self.proof.clone()),
             (Need::Geometries, geometries),
             (Need::Checks, unchecked),
         ];

@@ -18,6 +18,8 @@ pub enum Need {
     Oracles,
     /// The p4est program.
     P4est,
+    /// The proven checker of reference/proof.
+    Proof,
     /// The geometries that are downloaded and not kept in the repository.
     Geometries,
     /// At least one check of every case.
@@ -65,6 +67,9 @@ pub struct Options {
     /// Leave out the comparison with p4est
     #[arg(long)]
     pub no_p4est: bool,
+    /// Leave out the proof of the serial mesh
+    #[arg(long)]
+    pub no_proof: bool,
     /// Required components: exit code 3 if one is missing
     #[arg(long, value_delimiter = ',')]
     pub require: Vec<Need>,
@@ -101,7 +106,7 @@ pub fn whole_seconds(text: &str) -> Result<u64, String> {
 }
 
 impl Options {
-    /// A verification by reference and checks only, without MPI, oracles and p4est.
+    /// A verification by reference and checks only, without MPI, oracles, p4est and proof.
     pub fn of_leaves_alone(cases: Vec<String>) -> Self {
         #[derive(Parser)]
         struct Defaults {
@@ -109,7 +114,8 @@ impl Options {
             options: Options,
         }
         let Defaults { options } = Defaults::parse_from(["verify"]);
-        Self { cases, no_mpi: true, no_oracles: true, no_p4est: true, ..options }
+        let no = true;
+        Self { cases, no_mpi: no, no_oracles: no, no_p4est: no, no_proof: no, ..options }
     }
 
     /// Time limit of every single run.

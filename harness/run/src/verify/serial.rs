@@ -1,12 +1,14 @@
 //! The serial meshes, with which all others are compared: base tree and final mesh, of mesher and reference.
 
-use super::case::CaseRun;
+use super::case::{CaseRun, PROOF};
+use super::options::Need;
 use super::outcome::{RUNS, ended_well};
 use super::report::{Check, Outcome, Run};
 use super::run::{Meshed, Program, Request};
-use crate::engine::failure::{CODE_INPUT, End};
+use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::layout::SERIAL;
 use crate::engine::report::RunReport;
+use crate::proof;
 use check::checks::{self, CheckResult, Subject, identical, kept};
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -47,10 +49,11 @@ impl CaseRun<'_> {
             self.add(Check::new("serial", "checks", Outcome::left_out(why)), None);
             return None;
         }
-        let mesh = self.make("serial", Program::Mesher, "serial", false)?.mesh?;
+        let serial = self.make("serial", Program::Mesher, "serial", false)?;
+        let (place, mesh) = (serial.place.join("mesh"), serial.mesh?);
         self.verify_repetition(&timed, &mesh);
         if self.promises().definition {
-            return self.verify_definition(case, mesh);
+            return self.verify_definition(case, mesh, &place);
         }
         self.progress.step("checks");
         let results = self.promised(case, &mesh);
@@ -58,8 +61,8 @@ impl CaseRun<'_> {
         Some(Meshes { mesh, base: None })
     }
 
-    /// Compares a mesh with the base tree and with the reference.
-    fn verify_definition(&mut self, case: &Case, mesh: LeafSet) -> Option<Meshes> {
+    /// Compares a mesh, which is in this directory, with the base tree and with the reference.
+    fn verify_definition(&mut self, case: &Case, mesh: LeafSet, place: &Path) -> Option<Meshes> {
         // The mesh of an engine that cannot stop at the base tree is checked against the reference's base tree.
         let stops = self.programs.engine.description().run.ungraded.is_some();
         let program = if stops { Program::Mesher } else { Program::Reference };
@@ -76,7 +79,32 @@ impl CaseRun<'_> {
         let results = checks::all(&subject);
         self.add_results("serial", None, results);
         self.note_components(&mesh.manifest);
+        self.verify_proof((place, &base.place), mesh.words.len() as u64);
         Some(Meshes { mesh, base: Some(base) })
+    }
+
+    /// Has the proven checker judge the mesh, given its base tree.
+    fn verify_proof(&mut self, places: (&Path, &Path), leaves: u64) {
+        let (subject, name) = PROOF;
+        if let Some(why) = self.needs.proof.clone() {
+            return self.add(Check::new(subject, name, Outcome::left_out(why)), None);
+        }
+        self.progress.step("proof");
+        let (checker, limit) = (&self.programs.paths.proven_checker, self.options.limit());
+        match proof::check(checker, places, leaves, limit) {
+            Ok(proof) => self.add_results(subject, None, vec![CheckResult { name, ..proof }]),
+            Err(failure) if failure.is_interrupt() => {}
+            // The files of another program may lack what the proof needs.
+            Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
+                if !self.options.require.contains(&Need::Proof) =>
+            {
+                self.add(Check::new(subject, name, Outcome::left_out(error)), None);
+            }
+            // Without an answer nothing is proven, and that must not look as if it were.
+            Err(failure) => {
+                self.add(Check::new(subject, name, Outcome::fail(failure.to_string())), None);
+            }
+        }
     }
 
     /// The checks of what the engine promises about any of its meshes, and of the files.

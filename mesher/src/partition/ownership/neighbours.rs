@@ -11,7 +11,9 @@ impl Ownership {
     /// rank's octants that it touches.
     pub fn neighbours(&self) -> Vec<(usize, u64)> {
         let mut found = vec![false; self.ranks];
-        found[self.rank] = true;
+        if let Some(rank) = self.rank {
+            found[rank] = true;
+        }
         let mut neighbours = Vec::new();
         for (l, code) in self.octants() {
             let p = position(code).map(i64::from);

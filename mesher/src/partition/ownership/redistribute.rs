@@ -122,7 +122,7 @@ impl Ownership {
             }
             if placement != Placement::Local {
                 // Such bricks are few: queued as single entries.
-                let others = owners.iter().filter(|&&owner| owner != self.rank);
+                let others = owners.iter().filter(|&&owner| Some(owner) != self.rank);
                 out.single.extend(others.map(|&owner| (owner, entry)));
             }
             if matches!(placement, Placement::Local | Placement::PartiallyReplicated) {
