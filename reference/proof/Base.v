@@ -1,7 +1,7 @@
 (** T0: its leaves tile the root, and its flood reaches what is connected. *)
 From Coq Require Import ZArith List Bool Lia Permutation Relations.
 Import ListNotations.
-From Proof Require Import Statement Checker Octants Sizes Reading Pairs Faces Flood Counts Region.
+From Proof Require Import Statement Checker Check Octants Sizes Reading Pairs Faces Flood Counts Region.
 Open Scope Z_scope.
 
 (** The kernel compares definitions before walks, which it would otherwise unfold twenty levels deep. *)

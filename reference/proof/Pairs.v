@@ -86,20 +86,21 @@ Proof.
 Qed.
 End Walk.
 
+(** Pairs of leaves of two trees at the root. *)
+Lemma walk_all s0 stop (P : leaf -> leaf -> Prop) : (forall h g t u d, (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
+    stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
+    In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> P a b) ->
+  forall t u, sized Cross 19 t -> sized Cross 19 u -> walk stop 40 t u 524288 524288 0 0 0 = true ->
+  forall a b, In a (flat s0 19 0 0 0 t) -> In b (flat s0 19 0 0 0 u) -> P a b.
+Proof.
+  intros R t u St Su H a b A B. apply (walk_right Cross s0 stop P R 40 19 19 t u 0 0 0 0 0 0); try trivial; rewrite ?E_root; try lia.
+Qed.
+
 Section Rules.
 Variable s0 : side.
-Hypothesis not_crossing : s0 <> Crossing.
 Variable t : tree.
 Hypothesis St : sized Cross 19 t.
 Let all := flat s0 19 0 0 0 t.
-
-Lemma walk_all stop (P : leaf -> leaf -> Prop) : (forall h g t u d, (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-    stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-    In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> P a b) ->
-  walk stop 40 t t 524288 524288 0 0 0 = true -> forall a b, In a all -> In b all -> P a b.
-Proof.
-  intros R H a b A B. apply (walk_right Cross s0 stop P R 40 19 19 t t 0 0 0 0 0 0); try trivial; rewrite ?E_root; try lia.
-Qed.
 
 Lemma level_edge a : In a all -> 0 <= level a <= 19 /\ edge a = 2 ^ (19 - level a).
 Proof.
@@ -137,9 +138,7 @@ Proof.
   - apply Z.ltb_lt in H. split; intros; lia.
 Qed.
 
-Hypothesis H : walk (graded_stop n wide) 40 t t 524288 524288 0 0 0 = true.
-Lemma all_apart a b : In a all -> In b all -> apart_enough a b.
-Proof. apply (walk_all _ _ graded_stop_right H). Qed.
+Hypothesis all_apart : forall a b, In a all -> In b all -> apart_enough a b.
 
 Lemma distance_sym a b : distance a b = distance b a.
 Proof.
@@ -172,32 +171,3 @@ Proof.
 Qed.
 End Rules.
 
-(** Leaves near the surface. *)
-Section Surface.
-Variable s0 : side.
-Hypothesis not_crossing : s0 <> Crossing.
-Variable t : tree.
-Hypothesis St : sized Cross 19 t.
-Variables s r : Z.
-Variable touching : bool.
-Definition surface_rule a b := s < edge a -> side_of b = Crossing ->
-  (edge b = s -> r <= distance a b) /\ (touching = false -> 0 < distance a b).
-
-Lemma surface_stop_right h g t' u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t' -> sized Cross g u -> Z.abs d <= 4194304 ->
-  surface_stop s r touching t' (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat s0 h x y z t') -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> surface_rule a b.
-Proof.
-  intros Lh Lg S U _ H x y z x' y' z' a b A B DD. unfold surface_stop in H. intros F C.
-  apply (flat_size Cross) in A; [|exact S]. pose proof B as B'. apply (flat_size Cross) in B'; [|exact U].
-  apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
-  - apply Z.leb_le in H. lia.
-  - exfalso. apply negb_true_iff in H. revert C. refine (flat_has Cross s0 Crossing eq_refl _ g u U H _ _ _ _ B).
-    intros k. destruct k; simpl; congruence.
-  - apply andb_prop in H. destruct H as [H1 H2]. split.
-    + intros Q. apply orb_prop in H2. destruct H2 as [H2|H2]; [apply Z.leb_le in H2 | apply Z.ltb_lt in H2]; lia.
-    + intros ->. apply Z.ltb_lt in H1. lia.
-Qed.
-Lemma all_near : walk (surface_stop s r touching) 40 t t 524288 524288 0 0 0 = true -> forall a b,
-  In a (flat s0 19 0 0 0 t) -> In b (flat s0 19 0 0 0 t) -> surface_rule a b.
-Proof. apply (walk_all s0 t St), surface_stop_right. Qed.
-End Surface.

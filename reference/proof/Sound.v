@@ -1,10 +1,10 @@
 (** The theorem: what the program accepts is as Statement.v says. *)
 From Coq Require Import ZArith List Bool Lia Permutation Relations.
 Import ListNotations.
-From Proof Require Import Statement Checker Octants Sizes Reading Pairs Faces Flood Counts Region Base.
+From Proof Require Import Statement Checker Causes Check Octants Sizes Reading Pairs Faces Flood Counts Region Base Nested Unique Gradation.
 Open Scope Z_scope.
 Strategy expand [check check_inputs check_full check_base check_crossing check_graded].
-Strategy opaque [faces face flood rounds sweeps walk spot mark every overlay fine_tree rim wet look flat deep].
+Strategy opaque [mark_sources served faces face flood rounds sweeps walk spot mark every overlay fine_tree rim wet look flat deep].
 
 Lemma unit_right p : unit p = true -> 0 <= p / 256 < 524288.
 Proof.
@@ -209,39 +209,19 @@ Proof.
   rewrite <- E_root in MG.
   destruct (merge_right Cross (flow c) 19 m (sized_deep _ _ _ SM) d g (le_n 19) SM SD MG) as [SG PG]. specialize (PG 0 0 0).
   rewrite (PM (flow c)), (PD (flow c)) in PG.
+  destruct (merge_right Cross Outside 19 m (sized_deep _ _ _ SM) d g (le_n 19) SM SD MG) as [_ PO]. specialize (PO 0 0 0).
+  rewrite (PM Outside), (PD Outside) in PO.
   assert (fine c (leaves base)) as FN.
   { intros a A S. apply (Permutation_in a (Permutation_sym (PT (flow c)))) in A. rewrite <- E_root in FINE.
     pose proof (fine_right _ (flow c) _ (s0_crossing c) 19 t0 ST FINE 0 0 0 a A S) as Q.
     apply (flat_inside _ 19 t0 (sized_deep _ _ _ ST)) in A. unfold edge, cells in Q.
     destruct (Z_le_dec (surface c) (level a)) as [|N]; [assumption|]. exfalso.
     assert (2 ^ (19 - surface c) < 2 ^ (19 - level a)) by (apply Z.pow_lt_mono_r; lia). lia. }
-  assert (balanced (leaves mesh) (leaves dropped) /\ layers c (leaves mesh) (leaves dropped) /\
-          near_surface c (leaves mesh) (leaves dropped)) as (BAL & LAY & NEAR).
-  { unfold check_graded in H. cbv zeta in H. apply andb_prop in H. destruct H as [H1 H2]. rewrite surface_edge in H2 by lia.
-    assert (forall a, In a (leaves mesh ++ leaves dropped) -> In a (flat (flow c) 19 0 0 0 g)) as IN
-      by (intros a A; apply (Permutation_in a (Permutation_sym PG)); exact A).
-    assert (0 <= below c <= 20) as BB by (unfold below; destruct (keep c); lia).
-    split; [|split].
-    - intros a b A B T. exact (all_balanced (flow c) g SG (layer_cells c) (below c) (conj I3 I4) H1 a b (IN a A) (IN b B) T).
-    - intros l a b A B LT LA LB. pose proof (level_edge (flow c) g SG a (IN a A)) as [LE _].
-      refine (all_layers (flow c) g SG (layer_cells c) (below c) (conj I3 I4) BB H1 l a b (IN a A) (IN b B) _ LA LB).
-      unfold below. destruct LT as [LT | ->]; [destruct (keep c)|]; lia.
-    - intros a b A B S LT.
-      assert (0 <= (layer_cells c - 1) * cells (surface c) <= 4096 * 524288) as NB.
-      { assert (0 <= cells (surface c) <= 524288) by (unfold cells; split; [apply Z.pow_nonneg; lia | change 524288 with (2 ^ 19); apply Z.pow_le_mono_r; lia]). nia. }
-      rewrite (sub_small (layer_cells c)) in H2 by (unfold small; lia). rewrite mul_small in H2 by (unfold small; lia).
-      pose proof (all_near (flow c) (s0_crossing c) g SG _ _ _ H2 a b (IN a A) (IN b B)) as [N1 N2].
-      + pose proof (level_edge (flow c) g SG a (IN a A)) as [LE _]. unfold edge, cells. apply Z.pow_lt_mono_r; lia.
-      + exact S.
-      + split.
-        * intros LB. apply Z.le_ge, N1. unfold edge. rewrite LB. reflexivity.
-        * intros KC T. specialize (N2 KC). unfold touch in T. lia. }
-  clear H FINE SG.
+  clear FINE.
   assert (exists h, h = 19%nat) as (h & H19) by (exists 19%nat; reflexivity). rewrite <- H19 in *.
   pose proof (sized_deep _ _ _ ST) as DT. rename PG into GP.
   assert (Permutation (flat (flow c) h 0 0 0 g) (leaves mesh ++ leaves dropped)) as GP' by exact GP.
-  assert (deep h g) as DG.
-  { rewrite H19 in *. destruct (merge_right Cross (flow c) 19 m (sized_deep _ _ _ SM) d g (le_n 19) SM SD MG) as [SG _]. exact (sized_deep _ _ _ SG). }
+  pose proof (sized_deep _ _ _ SG) as DG.
   assert (has_seeds c = true -> forall p q r, In (p, q, r) (seeds c) -> in_root (p / 256) (q / 256) (r / 256)) as IR.
   { intros HS p q r S. destruct (base_parts c _ CB) as (_ & B & _). rewrite HS in B. apply andb_prop in B. destruct B as [B _].
     unfold seeds_reached in B. rewrite forallb_forall in B. specialize (B (p, q, r) S). cbv beta iota in B.
@@ -250,14 +230,24 @@ Proof.
   pose proof (flooded_right c base h H19 t0 DT (PT (flow c)) DRY IR) as [[DF TF] FF].
   assert (Permutation (flat (flow c) h 0 0 0 (flooded c t0)) (leaves base)) as LP by (rewrite FF; apply PT).
   pose proof (base_tiles c base h H19 t0 DT (PT (flow c)) DRY) as TI.
+  pose proof (linear_right c h H19 _ _ g DG GP') as LI.
+  pose proof (complete_right c _ _ h H19 DF LP CB TF _ _ g DG GP' OV TI) as CO.
+  pose proof (inherits_right c _ _ h H19 DF LP CB TF _ _ g DG GP' OV) as INH.
+  assert (region c (leaves base) (leaves mesh) (leaves dropped)) as RG by (split; [exact TI | split; [exact LI | split; [exact CO | exact INH]]]).
+  assert (Statement.least c (leaves base) (leaves mesh) (leaves dropped) /\ layers c (leaves mesh) (leaves dropped)) as [LEAST LAYERS].
+  { clear GP GP' DG. rewrite H19 in *.
+    assert (forall b, In b (flat (flow c) 19 0 0 0 (flooded c t0)) <-> In b (leaves base)) as LB
+      by (intros b; split; [apply (Permutation_in b LP) | apply (Permutation_in b (Permutation_sym LP))]).
+    assert (forall a, In a (flat Outside 19 0 0 0 g) <-> In a (leaves mesh ++ leaves dropped)) as LG
+      by (intros a; split; [apply (Permutation_in a PO) | apply (Permutation_in a (Permutation_sym PO))]).
+    split; [exact (gradation_least c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV H) |
+            exact (layers_right c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV H)]. }
   split. { apply Forall_app. split; [exact WT|]. apply Forall_app. auto. }
   split; [exact C1|]. split; [exact C2|]. cbv zeta. split; [exact TI|]. split; [exact FN|].
   split; [intros a b C; exact (connected_side c _ _ h H19 DF LP CB a b C)|].
   split; [exact (seeded_right c _ _ h H19 DF LP CB TF)|].
-  split; [exact (linear_right c h H19 _ _ g DG GP')|].
+  split; [exact LI|].
   split; [exact (crossing_right c mesh dropped m d h (sized_deep _ _ _ SM) (sized_deep _ _ _ SD) PM PD CC)|].
-  split; [exact (complete_right c _ _ h H19 DF LP CB TF _ _ g DG GP' OV TI)|].
-  split; [exact (inherits_right c _ _ h H19 DF LP CB TF _ _ g DG GP' OV)|].
   auto.
 Qed.
 Print Assumptions check_sound.

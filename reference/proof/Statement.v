@@ -104,12 +104,27 @@ Definition complete : Prop := forall u v w, in_root u v w ->
   (exists a, In a graded /\ holds a u v w) \/ exists a, In a base /\ deleted a /\ holds a u v w.
 Definition inherits : Prop := forall a, In a graded ->
   exists b, In b base /\ within a b /\ side_of a = side_of b /\ ~ deleted b.
-Definition balanced : Prop := forall a b, In a graded -> In b graded -> touch a b -> Z.abs (level a - level b) <= 1.
+
+(** [6]: an octant in a kept leaf of T0 is split if and only if a rule of gradation splits it. Those that do so before the layer of the
+    level of its children: T0 itself, balance, which its own descendants require too, and the extra layer. *)
+Definition inside (a o : leaf) : Prop := within a o /\ level o < level a.
+Definition split (o : leaf) : Prop := exists a, In a graded /\ inside a o.
+Definition split_early (o : leaf) : Prop := (exists b, In b base /\ inside b o) \/
+  (exists a, In a graded /\ level a >= level o + 2 /\ touch a o) \/
+  keep_crossing c = false /\ layer_cells c < 3 /\ level o < surface c /\ exists b, In b base /\ side_of b = Crossing /\ touch b o.
+(** Leaves that exist before the layer of their level is made. The layer splits octants that are closer than n - 1 cells to them. *)
+Definition source (p : leaf) : Prop :=
+  In p graded /\ exists q, octant q /\ level q = level p - 1 /\ within p q /\ split_early q.
+Definition in_layer (o : leaf) : Prop := exists p, source p /\ level p = level o + 1 /\
+  distance p o < (layer_cells c - 1) * cells (level p).
+Definition least : Prop := forall o b, octant o -> In b base -> ~ deleted b -> within o b -> (split o <-> split_early o \/ in_layer o).
+
+(** [7]: layers are checked. The other two are consequences of [least], see Unique.v. *)
 Definition layers : Prop := forall l a b, In a graded -> In b graded -> l < surface c \/ keep c = Keep_all ->
   level a >= l + 1 -> level b <= l - 1 -> distance a b >= layer_cells c * cells l.
+Definition balanced : Prop := forall a b, In a graded -> In b graded -> touch a b -> Z.abs (level a - level b) <= 1.
 Definition near_surface : Prop := forall a b, In a graded -> In b graded -> side_of b = Crossing -> level a < surface c ->
-  (level b = surface c -> distance a b >= (layer_cells c - 1) * cells (surface c)) /\
-  (keep_crossing c = false -> ~ touch a b).  (** the extra layer *)
+  (level b = surface c -> distance a b >= (layer_cells c - 1) * cells (surface c)) /\ (keep_crossing c = false -> ~ touch a b).
 End Promises.
 
 Definition promised (c : inputs) (base mesh dropped : list part) (of_base of_mesh : manifest) : Prop :=
@@ -117,4 +132,4 @@ Definition promised (c : inputs) (base mesh dropped : list part) (of_base of_mes
   let t := leaves base in let m := leaves mesh in let d := leaves dropped in
   tiles t /\ fine c t /\ one_side t /\ seeded c t /\
   linear (m ++ d) /\ without_crossing c m d /\ complete c t m d /\ inherits c t m d /\
-  balanced m d /\ layers c m d /\ near_surface c m d.
+  least c t m d /\ layers c m d.

@@ -222,6 +222,15 @@ def unsplit_side(m, b):
     m.words[i] &= ~3
 
 
+def needless_split(m, b):
+    """A finest leaf is split where no leaf is coarser: everything but leastness stays right."""
+    words, d = m.words, m.manifest["level_surface"]
+    if m.manifest["keep"] == "all" or m.manifest["keep_crossing"] is False or max(map(level, words)) != d:
+        raise Skip
+    coarser = [w for w in words if level(w) < d]
+    split(words, first(i for i, w in enumerate(words) if level(w) == d and side(w) == CROSSING and all(distance(w, v) for v in coarser)))
+
+
 # Corruptions of files.
 def part_missing(m, b): half(m); m.parts.pop()
 def part_twice(m, b): half(m); m.parts[1] = list(m.parts[0])
@@ -345,25 +354,13 @@ def two_parts(m, b): half(m); half(b)
 def interleaved_parts(m, b): m.parts = [m.words[0::2], m.words[1::2], []]; b.parts = [b.words[1::3], b.words[0::3], b.words[2::3]]
 
 
-def needless_split(m, b):
-    """A finest leaf is split where no leaf is coarser: right but for leastness, which is not proven."""
-    words, d = m.words, m.manifest["level_surface"]
-    if m.manifest["keep"] == "all" or m.manifest["keep_crossing"] is False:
-        raise Skip
-    finest = max(map(level, words))
-    if finest != d:
-        raise Skip
-    coarser = [w for w in words if level(w) < d]
-    split(words, first(i for i, w in enumerate(words) if level(w) == d and side(w) == CROSSING and all(distance(w, v) for v in coarser)))
-
-
 REJECTED = [drop, drop_first, drop_last, duplicate, swap, level_up, level_down, level_31, misalign, other_side, no_side, not_crossing,
             crossing_in_free_space, coarsen_at_finer, coarsen_in_layer, coarsen_at_surface, coarsen_base_leaf, restore_deleted,
-            restore_crossing, unsplit_side, part_missing, part_twice, parts_overlap, part_descends, base_part_missing, base_drop,
+            restore_crossing, needless_split, unsplit_side, part_missing, part_twice, parts_overlap, part_descends, base_part_missing, base_drop,
             base_duplicate, base_side, base_coarse_crossing, all_sides, base_hole_in_wall, thicker_layers, keep_everything, keep_other,
             crossing_dropped, enclosed_otherwise, enclosed_not_deleted, seed_in_wall, seed_elsewhere, seed_outside]
 COUNTS = [count_leaves, count_part, count_levels, count_sides, count_base]
-ACCEPTED = [unchanged, two_parts, interleaved_parts, needless_split]
+ACCEPTED = [unchanged, two_parts, interleaved_parts]
 CASES = ["pipe-small", "cube_seeds_on_faces-small", "cube-small", "box_in_box-small", "boxes_overlapping_keep-small", "fighter-small",
          "duct_layers-small"]
 

@@ -135,7 +135,7 @@ let () =
       let accepts dropped = check inputs (List.map part base_words) (List.map part words) (List.map part dropped) of_base of_mesh in
       let right = if inputs.keep_crossing then accepts [] else
         let leaves = crossing base_words in
-        accepts leaves || accepts (Offer.refined (if inputs.keep = Keep_all then inputs.layer_cells else 0) words leaves) in
+        accepts leaves || accepts (Offer.refined inputs.surface inputs.layer_cells base_words words leaves) in
       Printf.printf "%s: %d leaves, %d of T0, %.2f s\n" (if right then "accepted" else "rejected") of_mesh.total of_base.total
         (Unix.gettimeofday () -. start);
       exit (if right then 0 else 1)

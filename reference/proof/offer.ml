@@ -1,8 +1,7 @@
 (* The crossing leaves that were deleted after gradation. They are not in any file, and the theorem holds for whatever is offered in their
    place, so nothing here is trusted: a wrong offer makes the checker reject.
 
-   Gradation can split a crossing leaf of T0 only where a box finer than the surface is near. So leaves of T0 are split until none is
-   too close to leaves that are finer by two levels or more. *)
+   Gradation can split a crossing leaf of T0 only where a box finer than the surface is near. *)
 
 type words = (int64, Bigarray.int64_elt, Bigarray.c_layout) Bigarray.Array1.t
 
@@ -28,32 +27,38 @@ let first s k =
   let rec search lo hi = if lo >= hi then lo else let i = (lo + hi) / 2 in if key (s.get i) < k then search (i + 1) hi else search lo i in
   search 0 s.count
 
-(* Whether a leaf of a level of at least [wanted] is closer than [reach] to a leaf. *)
-let finer s v wanted reach =
+(* Whether a leaf that is wanted is closer than [reach] to an octant; touching ones are closer than 1. Leaves that are coarser than
+   [wanted_level] are not wanted. *)
+let near sets v reach wanted_level wanted =
   let c = corner v and e = 1 lsl (19 - level v) in
-  let rec any k l x y z =
+  let rec any s k l x y z =
     let f = 1 lsl (19 - l) in
     let near p q = q + f > p - reach && q < p + e + reach in
     near c.(0) x && near c.(1) y && near c.(2) z &&
     let i = first s k in
     i < s.count && key (s.get i) < k + (1 lsl (3 * (19 - l))) &&
-    if s.get i = k lsl 5 lor l then l >= wanted
-    else l < 19 && List.exists (fun j -> any (k + j lsl (3 * (18 - l))) (l + 1)
+    if s.get i = k lsl 5 lor l then l >= wanted_level && wanted (s.get i)
+    else l < 19 && List.exists (fun j -> any s (k + j lsl (3 * (18 - l))) (l + 1)
       (x + (j land 1) * f / 2) (y + (j lsr 1 land 1) * f / 2) (z + (j lsr 2) * f / 2)) [0; 1; 2; 3; 4; 5; 6; 7] in
-  any 0 0 0 0 0
+  List.exists (fun s -> any s 0 0 0 0 0) sets
 
-(* [layers]: n if layers are promised at all levels, and otherwise 0. *)
-let refined layers (mesh : words list) (crossing : words list) : words list =
-  let mesh = List.map of_words mesh in
-  let rec refine a =
-    let all = of_array a :: mesh in
-    let split = Array.map (fun v ->
-      let l = level v in
-      l < 18 && let reach = max 1 (layers * (1 lsl (18 - l))) in List.exists (fun s -> finer s v (l + 2) reach) all) a in
-    if not (Array.mem true split) then a else
-      refine (Array.concat (Array.to_list (Array.mapi (fun i v ->
-        if not split.(i) then [| v |] else
-          Array.init 8 (fun j -> (key v + j lsl (3 * (18 - level v))) lsl 5 lor (level v + 1))) a))) in
-  let all = Array.concat (List.map (fun w -> let s = of_words w in Array.init s.count s.get) crossing) in
-  Array.sort compare all;
-  [to_words (refine all)]
+let children v = List.init 8 (fun j -> (key v + j lsl (3 * (18 - level v))) lsl 5 lor (level v + 1))
+let parent v = let l = level v - 1 in ((key v lsr (3 * (19 - l))) lsl (3 * (19 - l) + 5)) lor l
+
+(* The crossing leaves of T0, split as gradation splits them: for each level that is finer than the surface, the layer around sources, and
+   balance. *)
+let refined surface n (base : words list) (mesh : words list) (crossing : words list) : words list =
+  let base = List.map of_words base and mesh = List.map of_words mesh in
+  let rec refine needs a =
+    if List.exists needs a then refine needs (List.concat_map (fun v -> if needs v then children v else [v]) a) else a in
+  let everyone _ = true in
+  let step a l =
+    let cells = 1 lsl (19 - l) in
+    let all = of_array (Array.of_list a) :: mesh in
+    let split_before q = near base q 0 l everyone || near all q 1 (l + 1) everyone in
+    let source p = level p = l && split_before (parent p) in
+    let a = refine (fun v -> level v < l && near all v ((n - 1) * cells) l source) a in
+    let all = of_array (Array.of_list a) :: mesh in
+    refine (fun v -> level v < l - 1 && near all v 1 l everyone) a in
+  let all = List.concat_map (fun w -> let s = of_words w in List.init s.count s.get) crossing in
+  [to_words (Array.of_list (List.fold_left step (List.sort compare all) (List.init (19 - surface) (fun i -> 19 - i))))]

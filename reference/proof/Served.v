@@ -1,0 +1,119 @@
+(** The walks that decide leastness: [served], and the rules for pairs of marked leaves. *)
+From Coq Require Import ZArith List Bool Lia.
+Import ListNotations.
+From Proof Require Import Statement Checker Causes Octants Sizes Pairs Faces Flood Region Nested Near Sources.
+Open Scope Z_scope.
+
+Lemma same_edge a b : octant a -> octant b -> edge a = edge b -> level a = level b.
+Proof.
+  intros [LA _] [LB _] H. unfold edge in H. destruct (Z.lt_trichotomy (level a) (level b)) as [L|[L|L]]; [exfalso | exact L | exfalso].
+  - pose proof (cells_less (level a) (level b) L). pose proof (cells_pos (level b)). lia.
+  - pose proof (cells_less (level b) (level a) L). pose proof (cells_pos (level a)). lia.
+Qed.
+
+Section Served.
+Variable n : Z.
+Hypothesis Hn : 1 <= n <= 4096.
+Variable V : list leaf.
+Hypothesis octants : forall o, In o V -> octant o.
+
+Definition served_right (o : leaf) : Prop := exists q p, child_of o q /\ In p V /\ side_of p = Crossing /\ level p = level o /\
+  distance p q < (n - 1) * cells (level p).
+
+Lemma all_served : forall h v, deep h v -> sized Cross h v -> forall X Y W x y z near m, octant (cube X Y W h) -> lists Outside V X Y W h x y z near m ->
+  served n v (E h) (E m) x y z near = true -> parent v = true -> forall o, In o (flat Outside h X Y W v) -> side_of o = Outside -> served_right o.
+Proof.
+  by_tree; [discriminate|].
+  intros h v VI D IH S X Y W x y z near m O LI H _ o Q SO.
+  pose proof (cube_bounds _ _ _ _ O) as (EP & BX & BY & BZ). rewrite E_S in EP, BX, BY, BZ.
+  assert (sub n 1 = n - 1) as N1 by (apply sub_small; unfold small; lia).
+  assert (mul (sub n 1) (E h) = (n - 1) * E h) as N2 by (rewrite N1; apply mul_small; unfold small; nia).
+  assert ((exists i j k, late (kid i j k v) = true) -> find_around (has Cross) (E h) (E h) ((n - 1) * E h) (E (Datatypes.S h)) near (E m) x y z = true) as LATE.
+  { intros (i & j & k & LT). destruct v as [|a b k0 k1 k2 k3 k4 k5 k6 k7]; [destruct VI|]. cbn [served] in H. rewrite half in H. cbv zeta in H.
+    apply andb_prop in H. destruct H as [H _]. rewrite N2 in H.
+    match type of H with (if ?b then _ else _) = _ => replace b with true in H; [exact H|] end.
+    symmetry. destruct i, j, k; cbn [kid] in LT; rewrite LT, ?orb_true_r; reflexivity. }
+  assert (forall i j k, parent (kid i j k v) = true -> served n (kid i j k v) (E h) (E (Datatypes.S h)) (off i h) (off j h) (off k h)
+    (descend (may_serve n) (E (Datatypes.S h)) near (E m) x y z) = true) as KIDS.
+  { intros i j k PK. destruct v as [|a b k0 k1 k2 k3 k4 k5 k6 k7]; [destruct VI|]. cbn [served] in H. rewrite half in H. cbv zeta in H.
+    apply andb_prop in H. destruct H as [_ H].
+    match type of H with (if ?b then _ else _) = _ => replace b with true in H end.
+    - split_and. destruct i, j, k; assumption.
+    - symmetry. destruct i, j, k; cbn [kid] in PK; rewrite PK, ?orb_true_r; reflexivity. }
+  clear H. apply in_flat in Q; [|exact VI]. destruct Q as (i & j & k & Q).
+  destruct (parent (kid i j k v)) eqn:PK.
+  - refine (IH i j k _ _ _ _ _ _ _ _ _ _ _ (KIDS i j k PK) PK o Q SO).
+    + inversion S as [|? ? ? ? ? K ?]; subst; [destruct VI|]. apply K.
+    + apply (cube_kid X Y W h O i j k).
+    + apply descend_right; assumption.
+  - destruct (kid i j k v) as [q|] eqn:KV; [|discriminate]. apply flat_cube in Q. destruct Q as (sd & SD & ->). cbn [side_of] in SO. subst sd.
+    assert (late (Cube q) = true) as LT by (destruct q; cbn [side_in] in SD; (discriminate || reflexivity)).
+    assert (E h <= 524288) as HI by lia.
+    destruct (find_around_right Outside V (has Cross) (E h) (E h) ((n - 1) * E h) X Y W (Datatypes.S h) x y z near m HI O LI) as (p & P & k1 & K1 & HC & ED & DI).
+    { apply LATE. exists i, j, k. rewrite KV. exact LT. }
+    exists (cube X Y W (Datatypes.S h)), p. split; [apply (same_cube_child X Y W h i j k); [exact O | repeat split]|]. split; [exact P|].
+    assert (level p = 19 - Z.of_nat h) as LP.
+    { apply (same_edge p (cube (X + off i h) (Y + off j h) (W + off k h) h)); [apply octants; exact P | apply cube_kid; exact O|]. rewrite cube_edge. lia. }
+    split; [destruct k1; cbn [has same] in HC; try discriminate; cbn [side_in] in K1; congruence|]. split; [exact LP|].
+    rewrite distance_comm, LP, E_cells. exact DI.
+Qed.
+End Served.
+
+(** Rules for pairs. *)
+Section Stops.
+Variables n s : Z.
+Hypothesis Hn : 1 <= n <= 4096.
+Hypothesis Hs : 0 <= s.
+
+Definition late_rule a b := side_of a = Outside -> edge b < edge a -> 0 < distance a b.
+Lemma late_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
+  late_stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
+  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> late_rule a b.
+Proof.
+  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SO F. unfold late_stop in H. apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
+  - exfalso. destruct t as [[]|]; try discriminate. apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_of side_in] in *. congruence.
+  - apply (flat_size Cross) in A; [|exact S]. apply (flat_size Cross) in B; [|exact U]. apply Z.leb_le in H. lia.
+  - apply Z.ltb_lt in H. lia.
+Qed.
+
+Definition source_rule a b := side_of b = Crossing -> 2 * edge b <= edge a -> (n - 1) * edge b <= distance a b.
+Lemma source_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
+  source_stop n t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
+  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> source_rule a b.
+Proof.
+  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SC F. unfold source_stop in H.
+  pose proof (proj2 (proj2 (proj2 (flat_inside Outside g u (sized_deep Cross _ _ U) _ _ _ _ B)))) as [PB _].
+  pose proof B as B'. apply (flat_size Cross) in B'; [|exact U]. apply (flat_size Cross) in A; [|exact S].
+  destruct (sized_most Cross h t Lh S) as [M _]. destruct (sized_most Cross g u Lg U) as [M' _].
+  apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
+  - exfalso. apply negb_true_iff in H. revert SC. refine (flat_has Cross Outside Crossing eq_refl _ g u U H _ _ _ _ B).
+    intros k. destruct k; simpl; congruence.
+  - apply Z.leb_le in H. lia.
+  - apply Z.leb_le in H. rewrite (sub_small n) in H by (unfold small; lia).
+    assert (Z.shiftr (most t (E h)) 1 = most t (E h) / 2) as Q by (rewrite Z.shiftr_div_pow2 by lia; reflexivity). rewrite Q in H. clear Q.
+    assert (edge b <= most t (E h) / 2) as G by (apply Z.div_le_lower_bound; lia).
+    assert (most t (E h) / 2 <= 524288) by (apply Z.div_le_upper_bound; lia).
+    assert (edge b <= Z.min (most u (E g)) (most t (E h) / 2)) as G' by (apply Z.min_glb; lia).
+    assert (Z.min (most u (E g)) (most t (E h) / 2) <= 524288) as G'' by lia.
+    set (w := Z.min _ _) in *. rewrite mul_small in H by (unfold small; nia). nia.
+Qed.
+
+Definition extra_rule a b := side_of b = Crossing -> s < edge a \/ s <= edge a /\ side_of a = Outside -> 0 < distance a b.
+Lemma extra_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
+  extra_stop s t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
+  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> extra_rule a b.
+Proof.
+  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SC F. unfold extra_stop in H.
+  pose proof A as A'. apply (flat_size Cross) in A'; [|exact S].
+  apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
+  - exfalso.
+    assert ((exists k, t = Cube k /\ k = Cross /\ E h <= s) \/ most t (E h) < s) as [(k & -> & -> & L)|L].
+    { destruct t as [[]|]; first [left; exists Cross; split; [reflexivity|]; split; [reflexivity|]; apply Z.leb_le; exact H | right; apply Z.ltb_lt; exact H]. }
+    + apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_in side_of] in *. unfold edge in F. cbn [level] in F. rewrite E_cells in F.
+      destruct F as [F | [_ F]]; [lia | congruence].
+    + lia.
+  - exfalso. apply negb_true_iff in H. revert SC. refine (flat_has Cross Outside Crossing eq_refl _ g u U H _ _ _ _ B).
+    intros k. destruct k; simpl; congruence.
+  - apply Z.ltb_lt in H. lia.
+Qed.
+End Stops.

@@ -1,0 +1,148 @@
+(** There is one mesh: two that are least for one T0 have the same leaves. Balance and the cells near crossing leaves are consequences
+    of leastness, too. *)
+From Coq Require Import ZArith List Lia Relations Permutation.
+Import ListNotations.
+From Proof Require Import Statement Nested.
+Open Scope Z_scope.
+
+(** What [promised] has of the kept region. *)
+Definition region (c : inputs) (base mesh dropped : list leaf) : Prop :=
+  tiles base /\ linear (mesh ++ dropped) /\ complete c base mesh dropped /\ inherits c base mesh dropped.
+
+Section Graded.
+Variable c : inputs.
+Variables base mesh dropped : list leaf.
+Let graded := mesh ++ dropped.
+Hypothesis G : region c base mesh dropped.
+
+Lemma base_octant b : In b base -> octant b.
+Proof. destruct G as (([O _] & _) & _). apply O. Qed.
+Lemma base_one a b u v w : In a base -> In b base -> holds a u v w -> holds b u v w -> a = b.
+Proof. destruct G as (([_ F] & _) & _). intros. eapply pairs_disjoint; eassumption. Qed.
+Lemma graded_octant a : In a graded -> octant a.
+Proof. destruct G as (_ & [O _] & _). apply O. Qed.
+Lemma graded_one a b u v w : In a graded -> In b graded -> holds a u v w -> holds b u v w -> a = b.
+Proof. destruct G as (_ & [_ F] & _). intros. eapply pairs_disjoint; eassumption. Qed.
+
+(** A graded leaf is not split. *)
+Lemma not_split a : In a graded -> ~ split mesh dropped a.
+Proof.
+  intros A (p & P & W & L). pose proof (corner_holds p (graded_octant p P)) as C.
+  rewrite (graded_one a p _ _ _ A P (W _ _ _ C) C) in L. lia.
+Qed.
+(** The leaf of T0 in which a graded leaf lies. *)
+Lemma home a : In a graded -> exists b, In b base /\ ~ deleted c base b /\ within a b /\ side_of a = side_of b /\ level b <= level a.
+Proof.
+  intros A. destruct G as (_ & _ & _ & I). destruct (I a A) as (b & B & W & S & N). exists b.
+  split; [exact B|]. split; [exact N|]. split; [exact W|]. split; [exact S|]. apply within_level; [apply graded_octant; exact A | exact W].
+Qed.
+(** The graded leaf at a place in a leaf of T0 that is kept. *)
+Lemma filled_by b u v w : In b base -> ~ deleted c base b -> holds b u v w -> exists a, In a graded /\ holds a u v w /\ within a b /\ side_of a = side_of b.
+Proof.
+  intros B N H. destruct G as (_ & _ & C & _). pose proof (octant_in b u v w (base_octant b B) H) as IR.
+  destruct (C u v w IR) as [(a & A & HA) | (b' & B' & D & H')].
+  - exists a. split; [exact A|]. split; [exact HA|]. destruct (home a A) as (b' & B' & _ & W & S & _).
+    assert (b' = b) as -> by (apply (base_one b' b u v w B' B (W _ _ _ HA) H)). auto.
+  - exfalso. apply N. rewrite <- (base_one b' b u v w B' B H' H). exact D.
+Qed.
+
+(** A parent lies in the leaf of T0, or T0 has the leaf itself. *)
+Lemma parent_home a b q : In a graded -> In b base -> within a b -> octant q -> level q = level a - 1 -> within a q ->
+  within q b \/ level b = level a /\ inside b q.
+Proof.
+  intros A B W O L WQ. pose proof (corner_holds a (graded_octant a A)) as C.
+  pose proof (within_level a b (graded_octant a A) W). destruct (Z_le_dec (level b) (level q)) as [LE|LE].
+  - left. exact (nested b q _ _ _ (base_octant b B) O LE (W _ _ _ C) (WQ _ _ _ C)).
+  - right. split; [lia|]. split; [|lia]. eapply (nested q b _ _ _ O (base_octant b B)); [lia | exact (WQ _ _ _ C) | exact (W _ _ _ C)].
+Qed.
+
+(** An octant of the kept region is a leaf if it is not split and its parent is, or T0 has it. *)
+Lemma is_leaf a b q : octant a -> In b base -> ~ deleted c base b -> within a b -> side_of a = side_of b -> ~ split mesh dropped a ->
+  level b = level a \/ within a q /\ level q = level a - 1 /\ octant q /\ split mesh dropped q -> In a graded.
+Proof.
+  intros O B N W S NS Q. pose proof (corner_holds a O) as C. destruct (filled_by b _ _ _ B N (W _ _ _ C)) as (p & P & HP & WP & SP).
+  pose proof (graded_octant p P) as OP.
+  destruct (Z_lt_dec (level a) (level p)) as [L|L].
+  { exfalso. apply NS. exists p. split; [exact P|]. split; [|exact L]. eapply (nested a p _ _ _ O OP); [lia | exact C | exact HP]. }
+  assert (level p = level a) as E.
+  { destruct Q as [E | (WQ & LQ & OQ & (r & R & WR & LR))].
+    - pose proof (within_level p b OP WP). lia.
+    - destruct (Z.eq_dec (level p) (level a)); [assumption|]. exfalso.
+      assert (within q p) as QP by (eapply (nested p q _ _ _ OP OQ); [lia | exact HP | exact (WQ _ _ _ C)]).
+      pose proof (corner_holds r (graded_octant r R)) as CR.
+      rewrite (graded_one r p _ _ _ R P CR (QP _ _ _ (WR _ _ _ CR))) in LR. lia. }
+  destruct (same_level_cube p a _ _ _ OP O E HP C) as (X & Y & Z').
+  assert (p = a) as <-; [|exact P]. destruct p, a; cbn in *. congruence.
+Qed.
+End Graded.
+
+(** Two meshes of one T0. Splits at a level depend on those at finer levels only. *)
+Section Two.
+Variable c : inputs.
+Variable base : list leaf.
+Definition agree l m d m' d' := forall o b, octant o -> In b base -> ~ deleted c base b -> within o b -> l < level o ->
+  (split m d o <-> split m' d' o).
+
+Lemma carry_leaf m d m' d' l a : region c base m d -> region c base m' d' -> agree l m d m' d' -> In a (m ++ d) ->
+  (forall q, octant q -> level q = level a - 1 -> within a q -> (exists b, In b base /\ ~ deleted c base b /\ within q b) -> split m d q -> split m' d' q) ->
+  l < level a -> In a (m' ++ d').
+Proof.
+  intros G G' A IA SP L. pose proof (graded_octant c base m d G a IA) as O.
+  destruct (home c base m d G a IA) as (b & B & N & W & S & LB).
+  assert (~ split m' d' a) as NS by (intros Q; apply (A a b O B N W L) in Q; exact (not_split c base m d G a IA Q)).
+  destruct (Z.eq_dec (level b) (level a)) as [E|E].
+  - exact (is_leaf c base m' d' G' a b a O B N W S NS (or_introl E)).
+  - pose proof (proj1 (base_octant c base m d G b B)) as LB'. assert (1 <= level a) as L1 by lia.
+    destruct (parent_octant a O L1) as [OQ WQ]. set (q := parent_of a) in *. assert (level q = level a - 1) as LQ by reflexivity.
+    apply (is_leaf c base m' d' G' a b q O B N W S NS). right. split; [exact WQ|]. split; [exact LQ|]. split; [exact OQ|].
+    destruct (parent_home c base m d G a b q IA B W OQ LQ WQ) as [WB | [? _]]; [|lia].
+    apply SP; trivial; [exists b; auto|]. exists a. split; [exact IA|]. split; [exact WQ | lia].
+Qed.
+
+Lemma carry_early m d m' d' o : region c base m d -> region c base m' d' -> agree (level o) m d m' d' ->
+  split_early c base m d o -> split_early c base m' d' o.
+Proof.
+  intros G G' A [T | [(a & IA & L & T) | X]]; [left; exact T | | right; right; exact X].
+  right; left. exists a. split; [|auto]. apply (carry_leaf m d m' d' (level o) a G G' A IA); [|lia].
+  intros q OQ LQ WQ (b & B & N & W) S. apply (A q b OQ B N W); [lia | exact S].
+Qed.
+
+Lemma carry_layer m d m' d' o : region c base m d -> region c base m' d' -> least c base m' d' -> agree (level o) m d m' d' ->
+  in_layer c base m d o -> in_layer c base m' d' o.
+Proof.
+  intros G G' LE A (p & (IP & q & OQ & LQ & WQ & EQ) & LP & D). exists p. split; [|auto].
+  assert (level q = level o) as LO by lia.
+  assert (split_early c base m' d' q) as EQ' by (apply (carry_early m d m' d' q G G'); [rewrite LO; exact A | exact EQ]).
+  split; [|exists q; auto]. apply (carry_leaf m d m' d' (level o) p G G' A IP); [|lia].
+  intros r OR LR WR (b & B & N & W) _.
+  pose proof (corner_holds p (graded_octant c base m d G p IP)) as C.
+  destruct (same_level_cube r q _ _ _ OR OQ ltac:(lia) (WR _ _ _ C) (WQ _ _ _ C)) as (X & Y & Z').
+  assert (within q b) as WB.
+  { intros u v w H. apply W. unfold holds, edge in *. rewrite LR, X, Y, Z'. rewrite LQ in H. exact H. }
+  assert (split m' d' q) as (s & S & [WS LS]) by (apply (LE q b OQ B N WB); left; exact EQ').
+  exists s. split; [exact S|]. split; [|lia].
+  intros u v w H. apply WS in H. unfold holds, edge in *. rewrite LR, X, Y, Z'. rewrite LQ in H. exact H.
+Qed.
+
+Lemma all_agree m d m' d' : region c base m d -> region c base m' d' -> least c base m d -> least c base m' d' -> forall k : nat, agree (19 - Z.of_nat k) m d m' d'.
+Proof.
+  intros G G' LE LE'. induction k as [| k IH]; intros o b O B N W L.
+  - destruct O as (LO & _). lia.
+  - destruct (Z.eq_dec (level o) (19 - Z.of_nat k)) as [E|E]; [|apply (IH o b O B N W); lia].
+    rewrite <- E in IH. assert (agree (level o) m' d' m d) as IH' by (intros p b' ? ? ? ? ?; symmetry; apply (IH p b'); assumption).
+    rewrite (LE o b O B N W), (LE' o b O B N W). split; (intros [H | H]; [left | right]).
+    + exact (carry_early m d m' d' o G G' IH H).
+    + exact (carry_layer m d m' d' o G G' LE' IH H).
+    + exact (carry_early m' d' m d o G' G IH' H).
+    + exact (carry_layer m' d' m d o G' G LE IH' H).
+Qed.
+
+(** Two least meshes of one T0 have the same leaves. *)
+Theorem unique m d m' d' : region c base m d -> region c base m' d' -> least c base m d -> least c base m' d' -> forall a, In a (m ++ d) -> In a (m' ++ d').
+Proof.
+  intros G G' LE LE' a A. apply (carry_leaf m d m' d' (-1) a G G'); trivial.
+  - exact (all_agree m d m' d' G G' LE LE' 20%nat).
+  - intros q OQ LQ WQ (b & B & N & W) S. apply (all_agree m d m' d' G G' LE LE' 20%nat q b OQ B N W); [|exact S]. destruct OQ as [? _]. cbn. lia.
+  - destruct (graded_octant c base m d G a A) as [? _]. lia.
+Qed.
+End Two.
