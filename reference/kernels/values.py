@@ -1,6 +1,7 @@
 """Values of kernels on drawn inputs, as rust.py evaluates the sources. Tests of the crates compare them with the compiled functions.
 
-A line of values.txt is `FILE FUNCTION INPUT... = OUTPUT...`; a number above 64 bits is its two halves, and no output is `None`.
+A line of values.txt is `FILE FUNCTION INPUT... = OUTPUT...`; a u128 is its two halves, an f64 is in quarters, and no output
+is `None`.
 """
 import random
 
@@ -49,9 +50,13 @@ def brick(r, near):
 
 
 def facet_and_brick(r, last=lambda l: l):
-    f = facet(r)
-    corner, l = brick(r, r.choice(f["v"]))
-    return [f, corner, last(l)]
+    """A facet about as large as a brick and near it, often with vertices on the corners of octants."""
+    l = r.randrange(2, 21)
+    h = ROOT >> l
+    step = r.choice([1, h // 2, h])
+    corner = [r.randrange(1 << l - 2) * 4 * h for _ in range(3)]
+    v = [[min(max((c + r.randint(-h, 5 * h)) // step * step, VERTEX[0]), VERTEX[1]) for c in corner] for _ in range(3)]
+    return [Struct(v=[[Number("i32", c) for c in p] for p in v]), [i64(c) for c in corner], last(u32(l))]
 
 
 def box_and_brick(r):
@@ -109,7 +114,7 @@ INPUTS = {
     (FACET, "separated"): lambda r: facet_and_brick(r, lambda l: u32(27 - l.x)),
     (DIGEST, "mix"): lambda r: [u64(r)],
     (DIGEST, "digest_lanes"): lambda r: [[u64(r) for _ in range(r.randrange(4))]],
-    (LATTICE, "meets"): lambda r: [box(r), point(r), i64(1 << r.randrange(28))],
+    (LATTICE, "meets"): lambda r: [b := box(r), r.choice([b["min"], b["max"], point(r)]), i64(1 << r.randrange(28))],
     (LATTICE, "box_mask"): box_and_brick,
     (LATTICE, "nearest"): lambda r: [Number("f64", coordinate(r) / 4), Number("f64", float(r.randint(-8, 8))), Number("f64", 2.0)],
     (LATTICE, "off_centre"): lambda r: [Number("f64", float(coordinate(r)))],
@@ -117,7 +122,7 @@ INPUTS = {
     (RAYS, "meets"): ray,
     (VOTE, "new"): octant,
     (VOTE, "leaf"): lambda r: [Struct({"0": Number("u64", bits(r, 62))})],
-    (CHECK_BASE, "touches"): lambda r: facet_and_brick(r, lambda l: i64(ROOT >> l.x)),
+    (CHECK_BASE, "touches"): lambda r: facet_and_brick(r, lambda l: i64(4 * ROOT >> l.x)),
     (CHECK_SIDES, "ray_that_meets"): ray,
 }
 
@@ -128,7 +133,7 @@ def flat(v):
     if isinstance(v, list):
         return [x for item in v for x in flat(item)]
     if isinstance(v, Number):
-        return [v.x >> 64, v.x % (1 << 64)] if v.type == "u128" else [f"{v.x:.2f}" if v.type == "f64" else v.x]
+        return [v.x >> 64, v.x % (1 << 64)] if v.type == "u128" else [int(4 * v.x) if v.type == "f64" else v.x]
     return [int(v)]
 
 
