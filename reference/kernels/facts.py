@@ -5,7 +5,7 @@ comment is the sentence that is proven. That nothing overflows in these function
 the sources, each of which must make its proof fail.
 """
 import z3
-from rust import MESHER, WIDTHS, Number, Run, Struct, coerced, known, plain, term
+from rust import MESHER, WIDTHS, Number, Run, Struct, coerced, known, limits, plain, term
 
 OCTANT, BRICK, TILE, FACET = "bricks/src/octant.rs", "bricks/src/brick.rs", "bricks/src/dilate/tile.rs", "bricks/src/facet.rs"
 DIGEST, LATTICE, VOXELISE = "bricks/src/digest.rs", "src/input/lattice.rs", "src/refine/voxelise.rs"
@@ -14,7 +14,6 @@ FILES = [OCTANT, BRICK, TILE, FACET, DIGEST, LATTICE, VOXELISE, RAYS, VOTE, CHEC
 
 # What DEFINITION.md states, not what the sources do.
 ROOT = 1 << 27
-LEVELS = range(20)
 VERTEX = (-(1 << 27), 1 << 28)
 AXES = range(3)
 OCTANTS = [[i & 1 | i >> 2 & 2, i >> 1 & 1 | i >> 3 & 2, i >> 2 & 1 | i >> 4 & 2] for i in range(64)]  # positions in a brick, by bit
@@ -131,7 +130,7 @@ class Kernels:
         return self.bounds[x.get_id()]
 
 
-    def largest(self): return max(abs(end) for _, _, x, _ in self.ranges for end in self.interval(x))
+    def largest(self, type="i128"): return max(abs(end) for _, _, x, high in self.ranges if high == limits(type)[1] for end in self.interval(x))
 
     def linear(self, goal):
         """A goal that implies this one, in linear arithmetic: products of unknowns become unknowns, within their intervals."""
@@ -181,6 +180,15 @@ def u32(n): return Number("u32", n)
 def usize(n): return Number("usize", n)
 def i64(n): return Number("i64", n)
 def code_of(k, l): return k.bits("u64", 1 << 3 * l)
+
+
+def octant(k, levels):
+    """Any octant of any level below `levels`."""
+    l, code = k.bits("u32", levels), k.bits("u64")
+    k.given.append(z3.ULT(code.x, z3.BitVecVal(1, 64) << 3 * z3.ZeroExt(32, l.x)))
+    return l, code
+
+
 def maximum(items): m = items[0]; return m if len(items) == 1 else (lambda r: z3.If(m >= r, m, r))(maximum(items[1:]))
 def minimum(items): m = items[0]; return m if len(items) == 1 else (lambda r: z3.If(m <= r, m, r))(minimum(items[1:]))
 
@@ -241,20 +249,18 @@ def corners(k):
 @fact(OCTANT, ("code << (3 * (LEVEL_MAX - l))", "code << (2 * (LEVEL_MAX - l))"))
 def starts(k):
     """`start57` of an octant is the code of the level-19 cell at its minimum corner, and stays below 2^57."""
-    for l in LEVELS:
-        code = code_of(k, l)
-        start = k("start57", u32(l), code)
-        cell = k("position", start)
-        yield z3.And(z3.ULT(start.x, 1 << 57), *[c.x == p.x << 19 - l for c, p in zip(cell, k("position", code))])
+    l, code = octant(k, 20)
+    start = k("start57", l, code)
+    cell = k("position", start)
+    yield z3.And(z3.ULT(start.x, 1 << 57), *[c.x == p.x << 19 - l.x for c, p in zip(cell, k("position", code))])
 
 
 @fact(OCTANT, ("start57(l, code) << 7 | (l as u64) << 2", "start57(l, code) << 6 | (l as u64) << 2"))
 def words(k):
     """A leaf `word` holds start, level and side without overlap, for every level and side."""
-    for l in LEVELS:
-        code, side = code_of(k, l), k.bits("u64", 3)
-        w = k("word", u32(l), code, side, file=OCTANT)
-        yield z3.And(z3.LShR(w.x, 7) == k("start57", u32(l), code).x, z3.LShR(w.x, 2) & 31 == l, w.x & 3 == side.x)
+    (l, code), side = octant(k, 20), k.bits("u64", 3)
+    w = k("word", l, code, side, file=OCTANT)
+    yield z3.And(z3.LShR(w.x, 7) == k("start57", l, code).x, z3.LShR(w.x, 2) & 31 == wide(l, 64), w.x & 3 == side.x)
 
 
 @fact(OCTANT, ("<< 7 | (l as u64) << 2 | side as u64", "<< 7 | (side as u64) << 5 | l as u64"))
@@ -262,8 +268,7 @@ def order(k):
     """Words sort in Morton order: a leaf that starts before another has the lesser word, whatever levels and sides are; of two with one
     start, the coarser."""
     def leaf():
-        l, code, side = k.bits("u32", 20), k.bits("u64"), k.bits("u64", 3)
-        k.given.append(z3.ULT(code.x, z3.BitVecVal(1, 64) << 3 * z3.ZeroExt(32, l.x)))
+        (l, code), side = octant(k, 20), k.bits("u64", 3)
         return l, k("start57", l, code), k("word", l, code, side, file=OCTANT)
     (l, a, v), (m, b, w) = leaf(), leaf()
     yield z3.Implies(z3.ULT(a.x, b.x), z3.ULT(v.x, w.x))
@@ -273,14 +278,13 @@ def order(k):
 @fact(OCTANT, ("filter(|&v| v < 1 << l)", "filter(|&v| v <= 1 << l)"), ("p[axis].checked_sub(1)?", "p[axis].checked_sub(2)?"))
 def neighbours(k):
     """`neighbour` moves one position along one axis, and is none exactly where that leaves the root, at every level."""
-    for l in range(21):
-        for axis in AXES:
-            for up in (False, True):
-                code = code_of(k, l)
-                some, n = k.option("neighbour", u32(l), code, usize(axis), up, file=OCTANT)
-                p, q = k("position", code), k("position", n)
-                yield some == (p[axis].x != ((1 << l) - 1 if up else 0))
-                yield z3.Implies(some, z3.And([q[a].x == p[a].x + ((1 if up else -1) if a == axis else 0) for a in AXES]))
+    for axis in AXES:
+        for up in (False, True):
+            l, code = octant(k, 21)
+            some, n = k.option("neighbour", l, code, usize(axis), up, file=OCTANT)
+            p, q = k("position", code), k("position", n)
+            yield some == (p[axis].x != ((z3.BitVecVal(1, 32) << l.x) - 1 if up else 0))
+            yield z3.Implies(some, z3.And([q[a].x == p[a].x + ((1 if up else -1) if a == axis else 0) for a in AXES]))
 
 
 # Bricks
@@ -370,7 +374,7 @@ def row(k):
 def dilated(w, r): return union(w, lambda i: range(max(0, i - r), min(64, i + r + 1)))
 
 
-@fact(TILE, ("let step = run.min(2 * r + 1 - run);", "let step = run.min(2 * r - run).max(1);"), ("let mut wide = row >> r;", "let mut wide = row >> (r & 15);"))
+@fact(TILE, ("let step = run.min(2 * r + 1 - run);", "let step = run.min(2 * r + 2 - run);"), ("let mut wide = row >> r;", "let mut wide = row >> (r & 15);"))
 def dilate_row(k):
     """`dilate_row` sets each bit within r of a set one, for every r up to 16, and loses none: the margin of 16 bits suffices."""
     for r in range(17):
@@ -511,7 +515,7 @@ def half_plane(k, lanes):
             yield z3.And([has(mask, i) == meets[p[u], p[w]] for i, p in enumerate(OCTANTS)])
 
 
-@fact(FACET, ("let qw = if eu > 0 { h - from[w] }", "let qw = if eu < 0 { h - from[w] }"), ("let c = (eu * qw - ew * qu) >> shift;", "let c = (eu * qw - ew * qu) / h;"),
+@fact(FACET, ("let qw = if eu > 0 { h - from[w] }", "let qw = if eu < 0 { h - from[w] }"), ("let c = (eu * qw - ew * qu) >> shift;", "let c = -((ew * qu - eu * qw) >> shift);"),
       ("let v = ci * (k & 3) as i64 + cj * (k >> 2) as i64 + c;", "let v = cj * (k & 3) as i64 + ci * (k >> 2) as i64 + c;"))
 def half_planes(k):
     """`half_plane` with `edge_lanes`: an octant's projection meets the closed half-plane if and only if some corner of its square does, and
@@ -525,7 +529,7 @@ def half_planes_avx512(k):
     yield from half_plane(k, "edge")
 
 
-@fact(FACET, ("if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() {", "if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() + 1 {"), ("best = (eu, ew, from);", "best = (eu, ew, p[0]);"),
+@fact(FACET, ("if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() {", "if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() + 1 {"), ("best = (eu, ew, from);", "best = (ew, eu, from);"),
       ("let mut best = (0i64, 0i64, p[0]);", "let mut best = (0i64, 1i64, p[0]);"))
 def degenerate(k):
     """The line that `degenerate_mask` tests, of a facet whose projection has no area, contains all three projected vertices; it has no
@@ -578,14 +582,12 @@ def planes_avx512(k):
 
 @fact(RAYS, ("let side = eu * (p[w] - v(i, w)) - ew * (p[u] - v(i, u));", "let side = 32 * (eu * (p[w] - v(i, w)) - ew * (p[u] - v(i, u)));"))
 def rays(k):
-    """The edge functions of `meets` stay below 2^60 and fit i64, and its heights fit i128, for all facets and all points of the root."""
+    """All terms of `meets` in i64, its edge functions among them, are below 2^60, and heights fit i128, for all facets and points of the root."""
     f = k.facet(k.integer)
     p = [k.integer("i64", 0, ROOT) for _ in AXES]
     for axis in AXES:
         k.paths("meets", f, p, usize(axis), file=RAYS)
-    u, w = ([k.integer("i64", -(3 << 27), 3 << 27) for _ in range(2)] for _ in range(2))
-    low, high = k.interval(u[0].x * w[0].x - u[1].x * w[1].x)
-    yield -1 << 60 < low and high < 1 << 60
+    yield k.largest("i64") < 1 << 60
 
 
 
@@ -678,8 +680,7 @@ def containing(k):
 def candidates(k):
     """A `Candidate` holds level and code of any leaf, and sorts by level and then by code."""
     def leaf():
-        l, code = k.bits("u32", 20), k.bits("u64")
-        k.given.append(z3.ULT(code.x, z3.BitVecVal(1, 64) << 3 * z3.ZeroExt(32, l.x)))
+        l, code = octant(k, 20)
         return l, code, k("new", l, code, file=VOTE)
     (l, a, v), (m, b, w) = leaf(), leaf()
     level, code = k("leaf", v, file=VOTE)
