@@ -22,6 +22,9 @@ pub mod partition;
 pub mod record;
 pub mod refine;
 pub mod sides;
+#[cfg(test)]
+#[path = "../bricks/src/values.rs"]
+mod values;
 
 pub use counters::Counters;
 pub use grow::grow;

@@ -244,4 +244,21 @@ mod tests {
         assert_eq!(flood(1 << 63, wall), X[2] | X[3]);
         assert_eq!(flood(X[1], wall), 0);
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        crate::values::compare(
+            "bricks/src/brick.rs",
+            &[
+                ("parents", &|a| vec![parents(a[0] as u64).into()]),
+                ("children", &|a| vec![children(a[0] as u8).into()]),
+                ("to_rows", &|a| vec![to_rows(a[0] as u64).into()]),
+                ("from_rows", &|a| vec![from_rows(a[0] as u64).into()]),
+                ("moved", &|a| vec![moved(a[0] as u64, a[1] as usize, a[2] == 1).into()]),
+                ("across", &|a| vec![across(a[0] as u64, a[1] as usize, a[2] == 1).into()]),
+                ("spread_faces", &|a| vec![spread_faces(a[0] as u64).into()]),
+                ("flood", &|a| vec![flood(a[0] as u64, a[1] as u64).into()]),
+            ],
+        );
+    }
 }

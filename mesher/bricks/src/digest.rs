@@ -156,4 +156,18 @@ mod tests {
         other.merge(d.octants.iter().copied().enumerate());
         assert_eq!(other, d);
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let halves = |d: u128| vec![(d >> 64) as i128, d as u64 as i128];
+        crate::values::compare(
+            "bricks/src/digest.rs",
+            &[
+                ("mix", &|a| halves(mix(a[0] as u64))),
+                ("digest_lanes", &|a| {
+                    halves(digest(&a.iter().map(|w| *w as u64).collect::<Vec<u64>>()))
+                }),
+            ],
+        );
+    }
 }

@@ -348,4 +348,25 @@ mod tests {
         let point = Facet { v: [[h, h, h]; 3] };
         assert_eq!(crossed(&point, [0; 3], 19), 0xff);
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let facet =
+            |a: &[i128]| Facet { v: [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32)) };
+        let corner = |a: &[i128]| [9, 10, 11].map(|i| a[i] as i64);
+        crate::values::compare(
+            "bricks/src/facet.rs",
+            &[
+                ("range", &|a| {
+                    let (low, high) = facet(a).range(a[9] as usize);
+                    vec![low.into(), high.into()]
+                }),
+                ("normal", &|a| facet(a).normal().map(i128::from).to_vec()),
+                ("crossed", &|a| vec![crossed(&facet(a), corner(a), a[12] as Level).into()]),
+                ("separated", &|a| {
+                    vec![kernel::separated(&facet(a), corner(a), a[12] as u32).into()]
+                }),
+            ],
+        );
+    }
 }

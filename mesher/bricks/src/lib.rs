@@ -10,4 +10,6 @@ pub mod facet;
 pub mod kept;
 pub mod octant;
 pub mod tree;
+#[cfg(test)]
+mod values;
 pub mod wide;

@@ -147,4 +147,30 @@ mod tests {
         assert_eq!(path(0, 0), "root");
         assert_eq!(path(3, 0o314), "3.1.4");
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let level = |a: i128| a as Level;
+        let p = |code: u64| position(code).map(i128::from).to_vec();
+        let numbers = |a: Option<u64>| a.map(i128::from).into_iter().collect();
+        crate::values::compare(
+            "bricks/src/octant.rs",
+            &[
+                ("spread", &|a| vec![spread(a[0] as u64).into()]),
+                ("gather", &|a| vec![gather(a[0] as u64).into()]),
+                ("morton", &|a| vec![morton([0, 1, 2].map(|i| a[i] as u32)).into()]),
+                ("position", &|a| p(a[0] as u64)),
+                ("start57", &|a| vec![start57(level(a[0]), a[1] as u64).into()]),
+                ("corner", &|a| corner(level(a[0]), a[1] as u64).map(i128::from).to_vec()),
+                ("edge", &|a| vec![edge(level(a[0])).into()]),
+                ("word", &|a| {
+                    let side = [Side::Outside, Side::Inside, Side::Crossing][a[2] as usize];
+                    vec![word(level(a[0]), a[1] as u64, side).into()]
+                }),
+                ("neighbour", &|a| {
+                    numbers(neighbour(level(a[0]), a[1] as u64, a[2] as usize, a[3] == 1))
+                }),
+            ],
+        );
+    }
 }

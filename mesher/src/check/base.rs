@@ -149,4 +149,13 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let touched = |a: &[i128]| {
+            let v = [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32));
+            vec![touches(&Facet { v }, [9, 10, 11].map(|i| a[i] as i64), a[12] as i64).into()]
+        };
+        crate::values::compare("src/check/base.rs", &[("touches", &touched)]);
+    }
 }

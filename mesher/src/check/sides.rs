@@ -158,4 +158,15 @@ mod tests {
             prop_assert_eq!(odd_rays(&facets, p), u64::from(parities(&facets, &[p])[0]));
         }
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let met = |a: &[i128]| {
+            let v = [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32));
+            let point = [9, 10, 11].map(|i| a[i] as i64);
+            let ray = ray_that_meets(&Facet { v }, point, a[12] as usize);
+            ray.map(|ray| ray as i128).into_iter().collect()
+        };
+        crate::values::compare("src/check/sides.rs", &[("ray_that_meets", &met)]);
+    }
 }

@@ -376,4 +376,23 @@ mod tests {
         let flat = ExtentBox { max: [4, 4, 0], ..b };
         assert!(!flat.meets([0, 0, 0], 4));
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let point = |a: &[i128], i: usize| [i, i + 1, i + 2].map(|i| a[i] as i64);
+        let extent = |a: &[i128]| ExtentBox { min: point(a, 0), max: point(a, 3), level: 0 };
+        // Numbers of f64 are in quarters.
+        let quarters = |a: i128| a as f64 / 4.0;
+        crate::values::compare(
+            "src/input/lattice.rs",
+            &[
+                ("meets", &|a| vec![extent(a).meets(point(a, 6), a[9] as i64).into()]),
+                ("box_mask", &|a| vec![box_mask(&extent(a), point(a, 6), a[9] as Level).into()]),
+                ("nearest", &|a| {
+                    vec![(nearest(quarters(a[0]), quarters(a[1]), quarters(a[2])) * 4.0) as i128]
+                }),
+                ("off_centre", &|a| vec![(off_centre(quarters(a[0])) * 4.0) as i128]),
+            ],
+        );
+    }
 }

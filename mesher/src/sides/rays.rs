@@ -187,4 +187,14 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let met = |a: &[i128]| {
+            let v = [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32));
+            let met = meets(&Facet { v }, &[9, 10, 11].map(|i| a[i] as i64), a[12] as usize);
+            met.map(i128::from).into_iter().collect()
+        };
+        crate::values::compare("src/sides/rays.rs", &[("meets", &met)]);
+    }
 }

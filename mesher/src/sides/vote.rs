@@ -168,3 +168,22 @@ fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
     }
     (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        crate::values::compare(
+            "src/sides/vote.rs",
+            &[
+                ("new", &|a| vec![Candidate::new(a[0] as Level, a[1] as u64).0.into()]),
+                ("leaf", &|a| {
+                    let (level, code) = Candidate(a[0] as u64).leaf();
+                    vec![level.into(), code.into()]
+                }),
+            ],
+        );
+    }
+}

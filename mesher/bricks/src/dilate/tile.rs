@@ -315,4 +315,20 @@ mod tests {
             assert_eq!(half, want, "children {children:#b}");
         }
     }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        crate::values::compare(
+            "bricks/src/dilate/tile.rs",
+            &[
+                ("dilate_row", &|a| vec![dilate_row(a[0] as u64, a[1] as usize).into()]),
+                ("pairs", &|a| vec![pairs(a[0] as u64).into()]),
+                ("transpose", &|a| {
+                    let mut rows = std::array::from_fn(|i| a[i] as u64);
+                    transpose(&mut rows);
+                    rows.map(i128::from).to_vec()
+                }),
+            ],
+        );
+    }
 }

@@ -30,3 +30,12 @@ fn runs_of_every_length_end_before_their_end() {
         }
     }
 }
+
+#[test]
+fn values_are_those_of_the_proofs() {
+    let of = |a: &[i128]| {
+        let v = [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32));
+        ContainingOctant::of(&Facet { v }).map(|octant| octant.0.into()).into_iter().collect()
+    };
+    crate::values::compare("src/refine/voxelise.rs", &[("of", &of)]);
+}
