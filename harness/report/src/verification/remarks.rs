@@ -1,6 +1,7 @@
 //! The lines below the table: failures, omissions and notes.
 
 use bench::order::by_key;
+use run::verify::case::PROOF;
 use run::verify::report::{CaseReport, Check, Outcome, Report};
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.
@@ -20,7 +21,17 @@ pub fn remarks(report: &Report) -> Vec<String> {
         lines.extend(case.kept.iter().map(|place| format!("kept: {name}: {place}")));
         lines.extend(case.repeat_with.iter().map(|command| format!("repeat with: {command}")));
     }
+    lines.extend(proofs(report));
     lines
+}
+
+/// What is proven of the meshes that the proven checker accepted, and what is only tested.
+fn proofs(report: &Report) -> Option<String> {
+    let accepted = |check: &&Check| check.subject == PROOF.0 && check.outcome.holds();
+    let proofs: Vec<&Check> =
+        report.cases.iter().filter_map(|case| case.checks.iter().find(accepted)).collect();
+    let meaning = proofs.first()?.figures.as_deref().unwrap_or_default();
+    Some(format!("proof: {} of {} cases: {meaning}", proofs.len(), report.cases.len()))
 }
 
 /// The checks of a case that did not pass. Those with the same reason share a line, because a fault with one layout of ranks
