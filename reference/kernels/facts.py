@@ -7,10 +7,11 @@ the sources, each of which must make its proof fail.
 import z3
 from rust import MESHER, WIDTHS, Number, Run, Struct, coerced, known, limits, plain, term
 
-OCTANT, BRICK, TILE, FACET = "bricks/src/octant.rs", "bricks/src/brick.rs", "bricks/src/dilate/tile.rs", "bricks/src/facet.rs"
+OCTANT, BRICK, FACET = "bricks/src/octant.rs", "bricks/src/brick.rs", "bricks/src/facet.rs"
+DILATE, TILE = "bricks/src/dilate.rs", "bricks/src/dilate/tile.rs"
 DIGEST, LATTICE, VOXELISE = "bricks/src/digest.rs", "src/input/lattice.rs", "src/refine/voxelise.rs"
 RAYS, VOTE, CHECK_BASE, CHECK_SIDES = "src/sides/rays.rs", "src/sides/vote.rs", "src/check/base.rs", "src/check/sides.rs"
-FILES = [OCTANT, BRICK, TILE, FACET, DIGEST, LATTICE, VOXELISE, RAYS, VOTE, CHECK_BASE, CHECK_SIDES]
+FILES = [OCTANT, BRICK, DILATE, TILE, FACET, DIGEST, LATTICE, VOXELISE, RAYS, VOTE, CHECK_BASE, CHECK_SIDES]
 
 # What DEFINITION.md states, not what the sources do.
 ROOT = 1 << 27
@@ -75,6 +76,24 @@ class Kernels:
                 choices.pop()
             if not choices:
                 return paths
+            choices[-1] = False
+
+    def tiles(self, w, key, r, margin, side, zeros, ones):
+        """The tiles, by path, in which a brick was put and dilated."""
+        choices = []
+        while True:
+            run = Run(self.sources, {"ones": ones}, choices)
+            tile = Struct(radius=usize(r), margin=usize(margin), side=usize(side), rows=list(zeros), spread=list(zeros), layers=u32(0), columns=u32(0), columns_at=[u32(0)] * 32)
+            run.call("put", [tile, Struct(key=Number("u64", key), bits=w)], TILE)
+            if plain(tile["layers"]):
+                run.call("dilate_lanes", [tile], TILE)
+            self.checks += run.checks
+            yield z3.And(run.path), tile
+            choices = run.choices[:run.made]
+            while choices and not choices[-1]:
+                choices.pop()
+            if not choices:
+                return
             choices[-1] = False
 
     def __call__(self, name, *args, **options):
@@ -424,6 +443,25 @@ def bricks_of_rows(k):
     Run(k.sources).call("transpose", [out], TILE)
     for i in range(16):
         yield k("from_rows", out[i]).x == word(bit(m[y + 4 * z], 4 * i + x) for x, y, z in OCTANTS)
+
+
+@fact(TILE, ("for s in (0..=2 * r).filter(|s| *s != r)", "for s in (1..=2 * r).filter(|s| *s != r)"), ("for to in z - r..=z + r {", "for to in z - r..=z {"),
+      ("*row |= (four >> (4 * dy) & 15) << shift;", "*row |= (four >> (4 * dy) & 7) << shift;"), ("out.copy_from_slice(rows);", ""))
+def bricks_dilated(k):
+    """`put` and `dilate_lanes`: the tile then has exactly the octants within r of one of the brick, along all three axes, for all 2^64 bricks
+    at two places of a tile, one with r = 1 and one with r = 2."""
+    def ones(run, bits): return [u32(i) for i in range(64) if plain(bits) >> i & 1]
+    for at, r in (((0, 7, 7), 1), ((7, 0, 3), 2)):
+        margin, side = 8, 48
+        w = k.bits("u64")
+        low = [16 + 4 * at[0], margin + 4 * at[1], margin + 4 * at[2]]
+        def reached(z, y):
+            near = [i for i, p in enumerate(OCTANTS) if max(abs(low[1] + p[1] - y), abs(low[2] + p[2] - z)) <= r]
+            return word(any_bit(bit(w, i) for i in near if abs(low[0] + OCTANTS[i][0] - x) <= r) for x in range(64)) if near else z3.BitVecVal(0, 64)
+        want = [reached(z, y) for z in range(side) for y in range(side)]
+        for path, tile in k.tiles(w, sum((c >> b & 1) << 3 * b + a for a, c in enumerate(at) for b in range(3)), r, margin, side, [Number("u64", 0)] * side ** 2, ones):
+            yield z3.Implies(path, z3.And([term(row, Number("u64", x)) == x for row, x in zip(tile["rows"], want)]))
+
 
 
 # Facets

@@ -14,7 +14,7 @@ MESHER = Path(__file__).resolve().parents[2] / "mesher"
 WIDTHS = {f"{sign}{width}": width for sign in "iu" for width in (8, 16, 32, 64, 128)} | {"usize": 64}
 ALIASES = {"Level": "u32", "Vector": "[i128;3]"}
 
-TOKEN = re.compile(r"""\s+ | //[^\n]* | \#\[[^\]]*\]
+TOKEN = re.compile(r"""\s+ | //[^\n]* | \#\[[^\]]*\] | '\w+
     | (?P<number>0x[\da-fA-F_]+|\d[\d_]*(?:\.\d+)?)(?P<suffix>[iu](?:8|16|32|64|128|size))?
     | "[^"]*" | (?P<name>[A-Za-z_]\w*) | (?P<op><<=|>>=|\.\.=|::|->|=>|==|!=|<=|>=|&&|\|\||<<|>>|\.\.|[-+*/%&|^]=|[-+*/%&|^!<>=?.,;:(){}\[\]])""", re.X)
 LEVELS = [["||"], ["&&"], ["==", "!=", "<", ">", "<=", ">="], ["|"], ["^"], ["&"], ["<<", ">>"], ["+", "-"], ["*", "/", "%"]]
@@ -87,6 +87,8 @@ class Parser:
         if self.peek("(", "["):
             return self.list({"(": ")", "[": "]"}[self.next()[1]], self.pattern)
         kind, text, *_ = self.next()
+        if text == "Range" and self.take("{"):
+            return self.list("}", self.pattern)
         return int(text, 0) if kind == "number" else text
 
     def block(self):
@@ -120,7 +122,7 @@ class Parser:
         if level == -1:
             left = self.expression(0) if not self.peek("..") else ("number", 0, None)
             op = self.take("..", "..=")
-            return ("range", left, self.expression(0), op == "..=") if op else left
+            return ("range", left, self.expression(0) if not self.peek("]") else ("unit",), op == "..=") if op else left
         if level == len(LEVELS):
             return self.unary()
         left = self.expression(level + 1)
@@ -303,6 +305,22 @@ class Range(list):
     def __init__(self, start, end, items): self.start, self.end = start, end; super().__init__(items)
 
 
+class View:
+    """A part of an array, through which it can be changed."""
+
+    def __init__(self, items, start, end): self.items, self.start, self.end = items, start, end
+    def __len__(self): return self.end - self.start
+    def __getitem__(self, i): return self.items[self.start + i]
+    def __setitem__(self, i, value): self.items[self.start + i] = value
+    def __iter__(self): return (Place(self, i) for i in range(len(self)))
+
+
+class Place:
+    """An element of a view. Its value is asked for where its name is used."""
+
+    def __init__(self, view, i): self.view, self.i = view, i
+
+
 class FromFn:
     def __init__(self, f): self.f = f
 
@@ -403,7 +421,7 @@ class Run:
 
     def bind(self, pattern, value, scope):
         if isinstance(pattern, list):
-            for p, v in zip(pattern, value, strict=True):
+            for p, v in zip(pattern, [value.start, value.end] if isinstance(value, Range) else value, strict=True):
                 self.bind(p, v, scope)
         else:
             # Arrays are values.
@@ -456,6 +474,8 @@ class Run:
     def on_range(self, scope, a, b, closed):
         a, b = self.evaluate(a, scope), self.evaluate(b, scope)
         type = next((n.type for n in (a, b) if isinstance(n, Number)), None)
+        if b is None:
+            return Range(a, None, [])
         # A range to loop over is short; of others only the ends are asked for.
         is_short = known(a) and known(b) and plain(b) - plain(a) <= 4096
         return Range(a, b, [Number(type, i) if type else i for i in range(plain(a), plain(b) + closed)] if is_short else [])
@@ -476,7 +496,14 @@ class Run:
 
     def store(self, scope, place, value):
         if place[0] == "path":
-            scope.holding(place[1][0])[place[1][0]] = value
+            holder = scope.holding(place[1][0])
+            old = holder[place[1][0]]
+            if isinstance(old, Place):
+                old.view[old.i] = value
+            else:
+                holder[place[1][0]] = value
+        elif place[0] == "field":
+            self.evaluate(place[1], scope)[place[2]] = value
         elif place[0] == "index":
             self.evaluate(place[1], scope)[plain(self.evaluate(place[2], scope))] = value
         else:
@@ -486,7 +513,7 @@ class Run:
         name, module = names[-1], names[-2] if len(names) > 1 else None
         if module in WIDTHS:
             low, high = limits(module)
-            return {"MAX": Number(module, high), "MIN": Number(module, low), "from": lambda n: self.cast(n, module)}[name]
+            return {"MAX": Number(module, high), "MIN": Number(module, low), "BITS": Number("u32", WIDTHS[module]), "from": lambda n: self.cast(n, module)}[name]
         if name in ("true", "false", "None"):
             return {"true": True, "false": False, "None": None}[name]
         if name == "Some":
@@ -495,9 +522,12 @@ class Run:
             return lambda *args: Struct({str(i): a for i, a in enumerate(args)})
         if name == "from_fn":
             return FromFn
+        if names == ["std", "mem", "take"]:
+            return lambda v: v
         holder = scope.holding(name)
         if holder is not None:
-            return holder[name]
+            value = holder[name]
+            return value.view[value.i] if isinstance(value, Place) else value
         nested = scope.nested(name)
         if nested is not None:
             return lambda *args: self.apply(nested.functions[name], args, nested)
@@ -510,6 +540,8 @@ class Run:
 
     def on_index(self, scope, e, i):
         items, i = self.evaluate(e, scope), self.evaluate(i, scope)
+        if isinstance(i, Range):
+            return View(items, plain(i.start), len(items) if i.end is None else plain(i.end))
         return items(i) if callable(items) else items[plain(i)] if known(i) else self.chosen(items, i)
 
     def chosen(self, items, i):
@@ -648,7 +680,7 @@ class Run:
             return self.call(name, [v, *args], scope.file)
         if v is None:
             return None
-        kind = "list_" if isinstance(v, list) else "bool_" if isinstance(v, (bool, z3.BoolRef)) else "number_"
+        kind = "list_" if isinstance(v, (list, View)) else "bool_" if isinstance(v, (bool, z3.BoolRef)) else "number_"
         return getattr(self, kind + name)(v, *args)
 
     def list_iter(self, v): return v
@@ -669,6 +701,15 @@ class Run:
         return any(each) if all(isinstance(x, bool) for x in each) else z3.Or(each)
 
     def list_into_iter(self, v): return v
+    def list_iter_mut(self, v): return v
+    def list_clone(self, v): return v
+    def list_len(self, v): return Number("usize", len(v))
+    def list_zip(self, v, w): return [[x, y] for x, y in zip(v, w, strict=True)]
+
+    def list_copy_from_slice(self, v, w):
+        for i in range(len(w)):
+            v[i] = w[i]
+
     def list_chunks(self, v, n): return [v[i:i + plain(n)] for i in range(0, len(v), plain(n))]
 
     def list_all(self, v, f):
@@ -728,6 +769,8 @@ class Run:
     def number_rotate_left(self, a, n):
         bits, n = WIDTHS[a.type], plain(n)
         return Number(a.type, wrapped(a.type, a.x << n | a.x >> bits - n) if a.is_known else z3.RotateLeft(a.x, n))
+
+    def number_trailing_zeros(self, a): return Number("u32", (a.x & -a.x).bit_length() - 1 if a.x else WIDTHS[a.type])
 
     def number_leading_zeros(self, a):
         bits = WIDTHS[a.type]
