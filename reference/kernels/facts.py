@@ -671,12 +671,14 @@ def facets_checked(k):
       ("self.min[a].max(corner[a]) < self.max[a].min(corner[a] + h)", "self.min[a].max(corner[a]) <= self.max[a].min(corner[a] + h)"))
 def boxes(k):
     """`box_mask` has an octant if and only if `ExtentBox::meets` holds for it: interiors meet. For all boxes, bricks and levels up to 20."""
-    for l in range(2, 21):
+    for l in range(21):
         h = ROOT >> l
         box = Struct({end: [k.integer("i64", 0, ROOT) for _ in AXES] for end in ("min", "max")})
-        corner = [k.integer("i64", 0, ROOT) for _ in AXES]
+        # The only bricks of levels 0 and 1 have 1 and 8 octants.
+        corner = [k.integer("i64", 0, ROOT) if l > 1 else i64(0) for _ in AXES]
         mask = k("box_mask", box, corner, u32(l), file=LATTICE)
-        yield z3.And([has(mask, i) == k("meets", box, [Number("i64", c.x + h * p[a]) for a, c in enumerate(corner)], i64(h), file=LATTICE) for i, p in enumerate(OCTANTS)])
+        yield z3.And([has(mask, i) == k("meets", box, [Number("i64", c.x + h * p[a]) for a, c in enumerate(corner)], i64(h), file=LATTICE) for i, p in enumerate(OCTANTS[:8 ** l])])
+        yield z3.And([z3.Not(has(mask, i)) for i in range(8 ** l, 64)])
 
 
 @fact(LATTICE, ("(c - ROOT_EDGE as f64 * 0.5).abs()", "(c - ROOT_EDGE as f64 * 0.25).abs()"), ("let limit = ROOT_EDGE as f64 * 1.5;", "let limit = ROOT_EDGE as f64 * 1.6;"))
