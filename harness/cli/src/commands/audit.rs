@@ -136,8 +136,8 @@ fn prove(checker: &Path, mesh: &Path, base: &Path, leaves: u64) -> Result<CheckR
     command.arg(mesh).arg(base);
     let mut proof = CheckResult::new("proof");
     proof.examined = leaves;
-    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers; not proven: which leaves facets cross, boxes, \
-                  rays, and that no split is needless"
+    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers, and that no split is needless or missing; \
+                  not proven: which leaves facets cross, boxes, and rays"
         .to_owned();
     match process::run(&mut command, &Watch::new("the proven checker", LIMIT, place.path())) {
         Ok(_) => {}
