@@ -54,7 +54,9 @@ Fixpoint closer (s : around) (x y z : Z) : around :=
     | Node _ _ _ k0 k1 k2 k3 k4 k5 k6 k7 =>
       let a := sub a x in let b := sub b y in let c := sub c z in
       let a' := add a p in let b' := add b p in let c' := add c p in
-      also k0 a b c (also k1 a' b c (also k2 a b' c (also k3 a' b' c (also k4 a b c' (also k5 a' b c' (also k6 a b' c' (also k7 a' b' c' rest)))))))
+      if useful p u p (far p (add p p) a b c) then
+        also k0 a b c (also k1 a' b c (also k2 a b' c (also k3 a' b' c (also k4 a b c' (also k5 a' b c' (also k6 a b' c' (also k7 a' b' c' rest)))))))
+      else rest
     end
   end.
 (** The list for the children of a cube of edge p, which are displaced from its corner: at the root it is that of the root itself. *)
@@ -114,11 +116,19 @@ Fixpoint served (u : tree) (p q x y z : Z) (near : around) : bool :=
 (** * Pairs of leaves, marked *)
 
 (** A leaf that is no source touches no finer leaf. *)
-Definition late_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
-  (match t with Cube Cross => true | _ => false end) || (most t p <=? least u q) || (0 <? d).
+Definition sources_only (t : tree) : bool :=
+  match t with
+  | Cube Cross => true
+  | Node _ _ _ (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) => true
+  | _ => false
+  end.
 (** A leaf that is coarser than a source is n - 1 cells away from it. *)
 Definition source_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
-  negb (has Cross u) || (most t p <=? least u q) || (mul (sub n 1) (Z.min (most u q) (Z.shiftr (most t p) 1)) <=? d).
+  negb (has Cross u) || (mul (sub n 1) (Z.min (most u q) (Z.shiftr (most t p) 1)) <=? d).
+(** Both, and those of [graded_stop]. All of them concern a leaf and finer ones. *)
+Definition marked_stop (wide : Z) (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
+  if most t p <=? least u q then true else
+  graded_stop n wide t p u q d && ((0 <? d) || sources_only t) && source_stop t p u q d.
 (** A leaf that is coarser than the surface, or as coarse and no source, touches no crossing leaf. *)
 Definition extra_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
   (match t with Cube Cross => p <=? s | _ => most t p <? s end) || negb (has Cross u) || (0 <? d).

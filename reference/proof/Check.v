@@ -49,8 +49,7 @@ Definition extra : bool := negb (keep_crossing c) && (layer_cells c <? 3).
 Definition check_graded (t g : tree) : bool :=
   let n := layer_cells c in let s := Z.shiftr 524288 (surface c) in
   let m := mark_sources s extra t g 524288 524288 0 0 0 (Also g 0 0 0 Nobody) false in
-  walk (fun t p u q d => graded_stop n (Z.shiftr 2097152 below) t p u q d && late_stop t p u q d && source_stop n t p u q d)
-    40 m m 524288 524288 0 0 0 &&
+  walk (marked_stop n (Z.shiftr 2097152 below)) 40 m m 524288 524288 0 0 0 &&
   (if extra then walk (extra_stop s) 40 m g 524288 524288 0 0 0 else true) &&
   served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody).
 

@@ -48,7 +48,7 @@ Proof. unfold extra. rewrite andb_true_iff, negb_true_iff, Z.ltb_lt. reflexivity
 Let m := mark_sources s (extra c) t g 524288 524288 0 0 0 (Also g 0 0 0 Nobody) false.
 Let V := flat Outside 19 0 0 0 m.
 Let n := layer_cells c.
-Lemma parts : walk (fun t p u q d => graded_stop n (Z.shiftr 2097152 (below c)) t p u q d && late_stop t p u q d && source_stop n t p u q d) 40 m m 524288 524288 0 0 0 = true /\
+Lemma parts : walk (marked_stop n (Z.shiftr 2097152 (below c))) 40 m m 524288 524288 0 0 0 = true /\
   (extra c = true -> walk (extra_stop s) 40 m g 524288 524288 0 0 0 = true) /\ served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody) = true.
 Proof.
   unfold check_graded in OK. cbv zeta in OK. rewrite surface_right in OK. apply andb_prop in OK. destruct OK as [A C]. apply andb_prop in A. destruct A as [A B].
@@ -85,14 +85,10 @@ Proof.
   apply flat_cube in O. destruct O as (sd & _ & ->). cbn [level] in L. lia.
 Qed.
 
-Lemma all_pairs a b : In a V -> In b V -> apart_enough n (below c) a b /\ late_rule a b /\ source_rule n a b.
+Lemma all_pairs a b : In a V -> In b V -> marked_rule n (below c) a b.
 Proof.
-  pose proof (proj1 parts) as W. pose proof (proj1 all_marked) as M. revert a b. refine (walk_all Outside _ _ _ m m M M W).
-  intros h g' t' u d Lh Lg S U D H x y z x' y' z' a b A B DD. apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2].
-  split; [|split].
-  - exact (graded_stop_right Outside n (below c) Hn h g' t' u d Lh Lg S U D H1 x y z x' y' z' a b A B DD).
-  - exact (late_stop_right h g' t' u d Lh Lg S U D H2 x y z x' y' z' a b A B DD).
-  - exact (source_stop_right n Hn h g' t' u d Lh Lg S U D H3 x y z x' y' z' a b A B DD).
+  pose proof (proj1 parts) as W. pose proof (proj1 all_marked) as M. revert a b.
+  exact (walk_all Outside _ _ (marked_stop_right n Hn (below c)) m m M M W).
 Qed.
 
 Lemma layers_right : layers c mesh dropped.

@@ -96,7 +96,7 @@ Proof.
   destruct u as [k | m l hs k0 k1 k2 k3 k4 k5 k6 k7]; [exact IH|]. set (u := Node m l hs k0 k1 k2 k3 k4 k5 k6 k7) in *.
   pose proof (cube_bounds _ _ _ _ O) as (EP & BX & BY & BZ). rewrite E_S in EP, BX, BY, BZ.
   cbv zeta. rewrite (sub_small a x), (sub_small b y), (sub_small c z) by (unfold small; lia).
-  rewrite !(add_small _ (E n)) by (unfold small; lia).
+  rewrite !(add_small _ (E n)) by (unfold small; lia). destruct (useful (E n) u (E n) _); [|exact IH].
   assert (forall i j k rest, sits (p + x) (q + y) (r + z) n rest ->
     sits (p + x) (q + y) (r + z) n (also useful (E n) (kid i j k u) (a - x + off i n) (b - y + off j n) (c - z + off k n) rest)) as ST.
   { intros i j k rest' RS. apply also_right; [| | |exact RS];

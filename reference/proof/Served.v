@@ -66,14 +66,15 @@ Hypothesis Hn : 1 <= n <= 4096.
 Hypothesis Hs : 0 <= s.
 
 Definition late_rule a b := side_of a = Outside -> edge b < edge a -> 0 < distance a b.
-Lemma late_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-  late_stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> late_rule a b.
+Lemma sources_only_right h t : sources_only t = true -> forall x y z a, In a (flat Outside h x y z t) -> side_of a = Crossing.
 Proof.
-  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SO F. unfold late_stop in H. apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
-  - exfalso. destruct t as [[]|]; try discriminate. apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_of side_in] in *. congruence.
-  - apply (flat_size Cross) in A; [|exact S]. apply (flat_size Cross) in B; [|exact U]. apply Z.leb_le in H. lia.
-  - apply Z.ltb_lt in H. lia.
+  intros H x y z a A. destruct t as [[]|m l hs k0 k1 k2 k3 k4 k5 k6 k7]; try discriminate.
+  - apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
+  - destruct h as [|h]; [destruct A|]. apply in_flat in A; [|exact I]. destruct A as (i & j & k & A).
+    destruct k0 as [[]|]; try discriminate; destruct k1 as [[]|]; try discriminate; destruct k2 as [[]|]; try discriminate; destruct k3 as [[]|]; try discriminate;
+    destruct k4 as [[]|]; try discriminate; destruct k5 as [[]|]; try discriminate; destruct k6 as [[]|]; try discriminate; destruct k7 as [[]|]; try discriminate.
+    assert (exists x y z, In a (flat Outside h x y z (Cube Cross))) as (x' & y' & z' & B) by (destruct i, j, k; cbn [kid] in A; eauto).
+    apply flat_cube in B. destruct B as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
 Qed.
 
 Definition source_rule a b := side_of b = Crossing -> 2 * edge b <= edge a -> (n - 1) * edge b <= distance a b.
@@ -85,10 +86,9 @@ Proof.
   pose proof (proj2 (proj2 (proj2 (flat_inside Outside g u (sized_deep Cross _ _ U) _ _ _ _ B)))) as [PB _].
   pose proof B as B'. apply (flat_size Cross) in B'; [|exact U]. apply (flat_size Cross) in A; [|exact S].
   destruct (sized_most Cross h t Lh S) as [M _]. destruct (sized_most Cross g u Lg U) as [M' _].
-  apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
+  apply orb_prop in H. destruct H as [H|H].
   - exfalso. apply negb_true_iff in H. revert SC. refine (flat_has Cross Outside Crossing eq_refl _ g u U H _ _ _ _ B).
     intros k. destruct k; simpl; congruence.
-  - apply Z.leb_le in H. lia.
   - apply Z.leb_le in H. rewrite (sub_small n) in H by (unfold small; lia).
     assert (Z.shiftr (most t (E h)) 1 = most t (E h) / 2) as Q by (rewrite Z.shiftr_div_pow2 by lia; reflexivity). rewrite Q in H. clear Q.
     assert (edge b <= most t (E h) / 2) as G by (apply Z.div_le_lower_bound; lia).
@@ -96,6 +96,24 @@ Proof.
     assert (edge b <= Z.min (most u (E g)) (most t (E h) / 2)) as G' by (apply Z.min_glb; lia).
     assert (Z.min (most u (E g)) (most t (E h) / 2) <= 524288) as G'' by lia.
     set (w := Z.min _ _) in *. rewrite mul_small in H by (unfold small; nia). nia.
+Qed.
+
+Variable below : Z.
+Definition marked_rule a b := apart_enough n below a b /\ late_rule a b /\ source_rule a b.
+Lemma marked_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
+  marked_stop n (Z.shiftr 2097152 below) t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
+  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> marked_rule a b.
+Proof.
+  intros Lh Lg S U D H x y z x' y' z' a b A B DD. unfold marked_stop in H.
+  pose proof (proj2 (proj2 (proj2 (flat_inside Outside g u (sized_deep Cross _ _ U) _ _ _ _ B)))) as [PB _].
+  destruct (Z.leb_spec (most t (E h)) (least u (E g))) as [L|_].
+  - pose proof (flat_size Cross Outside h t S _ _ _ _ A). pose proof (flat_size Cross Outside g u U _ _ _ _ B).
+    split; [intros F; lia | split; [intros _ F; lia | intros _ F; lia]].
+  - apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2]. split; [|split].
+    + exact (graded_stop_right Outside n below Hn h g t u d Lh Lg S U D H1 x y z x' y' z' a b A B DD).
+    + intros SO F. apply orb_prop in H2. destruct H2 as [H2|H2]; [apply Z.ltb_lt in H2; lia|].
+      pose proof (sources_only_right h t H2 _ _ _ a A). congruence.
+    + exact (source_stop_right h g t u d Lh Lg S U D H3 x y z x' y' z' a b A B DD).
 Qed.
 
 Definition extra_rule a b := side_of b = Crossing -> s < edge a \/ s <= edge a /\ side_of a = Outside -> 0 < distance a b.

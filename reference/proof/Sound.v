@@ -250,4 +250,8 @@ Proof.
   split; [exact (crossing_right c mesh dropped m d h (sized_deep _ _ _ SM) (sized_deep _ _ _ SD) PM PD CC)|].
   auto.
 Qed.
-Print Assumptions check_sound.
+(** Two accepted meshes of one T0 and one case have the same leaves, in whatever parts. *)
+Corollary accepted_equal c base m d m' d' of_base of_m of_m' :
+  check c base m d of_base of_m = true -> check c base m' d' of_base of_m' = true -> Permutation (leaves m) (leaves m').
+Proof. intros A B. exact (promised_equal c base m d m' d' _ _ _ (check_sound _ _ _ _ _ _ A) (check_sound _ _ _ _ _ _ B)). Qed.
+Print Assumptions accepted_equal.

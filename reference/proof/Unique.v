@@ -146,3 +146,112 @@ Proof.
   - destruct (graded_octant c base m d G a A) as [? _]. lia.
 Qed.
 End Two.
+
+(** * Corollaries for what [promised] has *)
+
+Lemma disjoint_nodup l : linear l -> NoDup l.
+Proof.
+  intros [O F]. induction F as [| a l P F IH]; constructor.
+  - intros I. rewrite Forall_forall in P. pose proof (corner_holds a (O a (or_introl eq_refl))) as C. exact (P a I _ _ _ C C).
+  - apply IH. intros b B. apply O. right. exact B.
+Qed.
+Lemma linear_app l m : linear (l ++ m) -> linear l.
+Proof.
+  intros [O F]. split; [intros a A; apply O, in_or_app; left; exact A|]. clear O. induction l as [| a l IH]; [constructor|].
+  cbn [app] in F. inversion F as [| ? ? P Q]; subst. constructor; [|apply IH; exact Q].
+  rewrite Forall_forall in *. intros b B. apply P, in_or_app. left. exact B.
+Qed.
+Lemma mesh_of_graded c m d : without_crossing c m d -> forall a, In a m <-> In a (m ++ d) /\ (keep_crossing c = false -> side_of a <> Crossing).
+Proof.
+  unfold without_crossing. intros W a. rewrite in_app_iff. destruct (keep_crossing c).
+  - subst d. split; [intros A; split; [left; exact A | discriminate] | intros [[A | []] _]; exact A].
+  - destruct W as [WM WD]. split; [intros A; auto|]. intros [[A | A] N]; [exact A|]. destruct (N eq_refl (WD a A)).
+Qed.
+
+(** Two meshes of one T0 have the same leaves, in however many parts, whatever is offered as [dropped]. *)
+Theorem promised_equal c base m d m' d' of_base of_m of_m' : promised c base m d of_base of_m -> promised c base m' d' of_base of_m' ->
+  Permutation (leaves m) (leaves m').
+Proof.
+  intros (_ & _ & _ & T & _ & _ & _ & L & W & C & I & LE & _) (_ & _ & _ & _ & _ & _ & _ & L' & W' & C' & I' & LE' & _).
+  assert (region c (leaves base) (leaves m) (leaves d)) as G by (split; auto).
+  assert (region c (leaves base) (leaves m') (leaves d')) as G' by (split; auto).
+  apply NoDup_Permutation; [exact (disjoint_nodup _ (linear_app _ _ L)) | exact (disjoint_nodup _ (linear_app _ _ L'))|].
+  intros a. rewrite (mesh_of_graded c _ _ W), (mesh_of_graded c _ _ W').
+  pose proof (unique c (leaves base) _ _ _ _ G G' LE LE' a). pose proof (unique c (leaves base) _ _ _ _ G' G LE' LE a). tauto.
+Qed.
+
+(** Balance. *)
+Theorem least_balanced c base m d : region c base m d -> least c base m d -> balanced m d.
+Proof.
+  intros G LE. assert (forall a b, In a (m ++ d) -> In b (m ++ d) -> touch a b -> level a <= level b + 1) as ONE.
+  { intros a b A B T. destruct (Z_le_dec (level a) (level b + 1)) as [|N]; [assumption|]. exfalso.
+    destruct (home c base m d G b B) as (b0 & B0 & ND & W & _). apply (not_split c base m d G b B).
+    apply (LE b b0 (graded_octant c base m d G b B) B0 ND W). left; right; left. exists a. split; [exact A|]. split; [lia | exact T]. }
+  intros a b A B T. pose proof (ONE a b A B T). unfold touch in T. rewrite distance_comm in T. pose proof (ONE b a B A T). lia.
+Qed.
+
+(** The octant of the level above that of p, in a coarser octant, that is nearest to p. *)
+Lemma axis_nearest p f x e : 0 < f -> (2 * f | e) -> 0 < e -> (f | p) -> (e | x) -> exists y, (2 * f | y) /\ x <= y /\ y + 2 * f <= x + e /\
+  gap p f y (2 * f) = gap p f x e.
+Proof.
+  intros F [k K] P [i I] [j J]. assert (1 <= k) by nia.
+  assert (2 * f * (p / (2 * f)) <= p < 2 * f * (p / (2 * f)) + 2 * f) as D by (pose proof (Z.div_mod p (2 * f)); pose proof (Z.mod_pos_bound p (2 * f)); lia).
+  assert (p + f <= 2 * f * (p / (2 * f)) + 2 * f) as D' by (apply (axis_parent p f F); exists i; exact I).
+  set (q := p / (2 * f)) in *.
+  exists (Z.max x (Z.min (x + e - 2 * f) (2 * f * q))). split; [|].
+  - assert (x = 2 * f * (j * k)) as X by (rewrite J, K; ring). rewrite K, X.
+    replace (2 * f * (j * k) + k * (2 * f) - 2 * f) with (2 * f * (j * k + k - 1)) by ring.
+    apply Z.max_case; [apply Z.divide_factor_l | apply Z.min_case; apply Z.divide_factor_l].
+  - assert (2 * f <= e) by nia. assert (x = 2 * f * (j * k)) as X by (rewrite J, K; ring).
+    assert (x <= 2 * f * q \/ 2 * f * q + 2 * f <= x) as C1.
+    { rewrite X. destruct (Z_le_dec (j * k) q); [left; nia | right; assert (q + 1 <= j * k) by lia; nia]. }
+    assert (2 * f * q + 2 * f <= x + e \/ x + e <= 2 * f * q) as C2.
+    { rewrite X, K. destruct (Z_le_dec (q + 1) (j * k + k)); [left | right; assert (j * k + k <= q) by lia]; nia. }
+    clear K X I J. unfold gap. lia.
+Qed.
+Lemma nearest p a : octant p -> octant a -> level a < level p -> exists o, octant o /\ level o = level p - 1 /\ within o a /\ distance p o = distance p a.
+Proof.
+  intros P A L. pose proof (edge_pos p P) as EP. pose proof (edge_pos a A) as EA.
+  destruct P as (LP & DX & DY & DZ & _). pose proof A as (LA & AX & AY & AZ & IR).
+  assert (2 * edge p = cells (level p - 1)) as E by (unfold edge; rewrite (cells_double (level p - 1)) by lia; do 2 f_equal; lia).
+  assert (2 * edge p | edge a) as D by (rewrite E; apply cells_divide; lia).
+  destruct (axis_nearest _ _ _ _ EP D EA DX AX) as (x & X & X0 & X1 & GX).
+  destruct (axis_nearest _ _ _ _ EP D EA DY AY) as (y & Y & Y0 & Y1 & GY).
+  destruct (axis_nearest _ _ _ _ EP D EA DZ AZ) as (z & Z' & Z0 & Z1 & GZ).
+  exists (Leaf x y z (level p - 1) Outside). set (o := Leaf _ _ _ _ _).
+  assert (edge o = 2 * edge p) as EO by (rewrite E; reflexivity).
+  assert (within o a) as W.
+  { intros u v w (U & V & T). rewrite EO in U, V, T. cbn [cx cy cz o] in U, V, T. unfold holds. clear - U V T X0 X1 Y0 Y1 Z0 Z1.
+    set (e := edge a) in *. set (f := edge p) in *. clearbody e f. lia. }
+  split; [|split; [reflexivity | split; [exact W|]]].
+  - unfold octant. rewrite EO. cbn [cx cy cz level o]. split; [lia|]. do 3 (split; [assumption|]). intros u v w H. apply IR, W, H.
+  - unfold distance. rewrite EO. cbn [cx cy cz o]. rewrite GX, GY, GZ. reflexivity.
+Qed.
+
+(** Cells near crossing leaves. *)
+Theorem least_near_surface c base m d : fine c base -> region c base m d -> least c base m d -> near_surface c m d.
+Proof.
+  intros F G LE a b A B S LA. pose proof (graded_octant c base m d G a A) as OA. pose proof (graded_octant c base m d G b B) as OB.
+  destruct (home c base m d G b B) as (b0 & B0 & N0 & W0 & S0 & L0). pose proof (F b0 B0 ltac:(congruence)) as F0.
+  destruct (home c base m d G a A) as (a0 & A0 & NA & WA & _ & _).
+  assert (level b = surface c -> distance a b >= (layer_cells c - 1) * cells (surface c)) as FIRST.
+  { intros LB. destruct (Z_lt_dec (distance a b) ((layer_cells c - 1) * cells (surface c))) as [DI|]; [exfalso | lia].
+    destruct (nearest b a OB OA ltac:(lia)) as (o & O & LO & WO & DO).
+    assert (within o a0) as WO' by (intros u v w H; apply WA, WO, H).
+    assert (1 <= level b) as L1 by (destruct O; lia). destruct (parent_octant b OB L1) as [OQ WQ].
+    assert (split m d o) as (p & P & WP & LP).
+    { apply (LE o a0 O A0 NA WO'). right. exists b. split; [|split; [lia | rewrite DO, distance_comm, LB; exact DI]].
+      split; [exact B|]. exists (parent_of b). split; [exact OQ|]. split; [reflexivity|]. split; [exact WQ|].
+      left. exists b0. split; [exact B0|].
+      destruct (parent_home c base m d G b b0 (parent_of b) B B0 W0 OQ eq_refl WQ) as [WB | [_ IN]]; [|exact IN]. exfalso.
+      pose proof (within_level _ _ OQ WB). cbn [level parent_of] in *. lia. }
+    pose proof (corner_holds p (graded_octant c base m d G p P)) as C.
+    rewrite (graded_one c base m d G p a _ _ _ P A C (WO _ _ _ (WP _ _ _ C))) in LP.
+    pose proof (within_level o a O WO). lia. }
+  split; [exact FIRST|]. intros KC T.
+  destruct (Z_lt_dec (layer_cells c) 3) as [N3|N3].
+  - apply (not_split c base m d G a A), (LE a a0 OA A0 NA WA). left; right; right. split; [exact KC|]. split; [exact N3|]. split; [exact LA|].
+    exists b0. split; [exact B0|]. split; [congruence|]. apply (touch_within b b0 a OB W0). unfold touch in *. rewrite distance_comm. exact T.
+  - pose proof (least_balanced c base m d G LE a b A B T). destruct (Z.eq_dec (level b) (surface c)) as [LB|NB]; [|lia].
+    specialize (FIRST LB). rewrite T in FIRST. pose proof (cells_pos (surface c)). destruct OB. nia.
+Qed.

@@ -4,9 +4,11 @@
     agree.py CHECK OUT [COUNT [FIRST]]
 
 The theorem says that what the checker accepts is right. This test says that it accepts what is right, too, and that the statement is not
-so strict that nothing satisfies it. COUNT meshes are drawn from the numbers FIRST, FIRST + 1, ... Exit codes: 0 all agree, 1 one does not.
+so strict that nothing satisfies it: right meshes are those of section 6, step by step. It also counts the rejected meshes that violate
+one conjunct of `promised` and no other: the theorem needs each of them. COUNT meshes are drawn from the numbers FIRST, FIRST + 1, ...
+Where layers were too thin, no mesh was least, so none is expected that violates `layers` only. Exit codes: 0 all agree, 1 one does not, or,
+of at least 1000 meshes, none needs some other conjunct.
 """
-import functools
 import random
 import shutil
 import subprocess
@@ -14,37 +16,70 @@ import sys
 from itertools import combinations
 from pathlib import Path
 
-from corrupt import CROSSING, INSIDE, OUTSIDE, LeafSet, word
+from leafset import CROSSING, INSIDE, OUTSIDE, LeafSet, word
 
 DEEPEST = 5  # coordinates are in cells of this level
 ROOT = 1 << DEEPEST
+SIZE = [ROOT >> l for l in range(DEEPEST + 1)]
 
 
 def leaf(x, y, z, l, s): return (x, y, z, l, s)
-def edge(a): return ROOT >> a[3]
+def edge(a): return SIZE[a[3]]
 def children(a): return [leaf(*(a[i] + (edge(a) // 2 if j >> i & 1 else 0) for i in range(3)), a[3] + 1, a[4]) for j in range(8)]
+def cube(a): return a[:4]
+def parent(a): e = 2 * edge(a); return (a[0] // e * e, a[1] // e * e, a[2] // e * e, a[3] - 1)
 
 
-def gaps(a, b):
-    """Along each axis the distance of two leaves, negative if they overlap."""
-    e, f = edge(a), edge(b)
-    return [max(b[i] - a[i] - e, a[i] - b[i] - f) for i in range(3)]
+def gap(a, b):
+    """The greatest distance of two octants along an axis, negative if they overlap."""
+    e, f = SIZE[a[3]], SIZE[b[3]]
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    return max(x - e, -x - f, y - e, -y - f, z - e, -z - f)
 
 
-def distance(a, b): return max(0, *gaps(a, b))
-def disjoint(a, b): return max(gaps(a, b)) >= 0
-def share_face(a, b): g = sorted(gaps(a, b)); return g[2] == 0 and g[1] < 0
+def distance(a, b): return max(0, gap(a, b))
+
+
+def share_face(a, b):
+    """Part of a face: the cubes meet in one plane, and their projections onto it overlap."""
+    e, f = SIZE[a[3]], SIZE[b[3]]
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    return (x == e or x == -f or y == e or y == -f or z == e or z == -f) and (
+        (-f < x < e) + (-f < y < e) + (-f < z < e) == 2 and -f <= x <= e and -f <= y <= e and -f <= z <= e)
+
+
 def within(a, b): return all(b[i] <= a[i] and a[i] + edge(a) <= b[i] + edge(b) for i in range(3))
-def inside(a, o): return within(a, o) and a[3] > o[3]
-def parent(a): e = 2 * edge(a); return (a[0] // e * e, a[1] // e * e, a[2] // e * e, a[3] - 1, OUTSIDE)
 def holds(a, p): return all(a[i] <= p[i] < a[i] + edge(a) for i in range(3))
 def at_boundary(a): return any(a[i] == 0 or a[i] + edge(a) == ROOT for i in range(3))
-def volume(leaves): return sum(edge(a) ** 3 for a in leaves)
+
+
+def ancestors(leaves):
+    """Octants with a leaf strictly inside."""
+    found = set()
+    for a in leaves:
+        while a[3]:
+            a = parent(a)
+            if a in found:
+                break
+            found.add(a)
+    return found
+
+
+def filled(leaves):
+    """Whether no unit cell is in two leaves, and whether each is in one."""
+    cells, disjoint = bytearray(ROOT ** 3), True
+    for x, y, z, l, _ in leaves:
+        e = SIZE[l]
+        for start in range(x + ROOT * y + ROOT ** 2 * z, x + ROOT * y + ROOT ** 2 * (z + e), ROOT ** 2):
+            for row in range(start, start + ROOT * e, ROOT):
+                disjoint = disjoint and cells.find(1, row, row + e) < 0
+                cells[row:row + e] = b"\1" * e
+    return disjoint, cells.find(0) < 0
 
 
 def components(base):
     label = {a: i for i, a in enumerate(base)}
-    pairs = [(a, b) for a, b in combinations(base, 2) if CROSSING not in (a[4], b[4]) and share_face(a, b)]
+    pairs = [(a, b) for a, b in combinations([a for a in base if a[4] != CROSSING], 2) if share_face(a, b)]
     changed = True
     while changed:
         changed = False
@@ -55,8 +90,7 @@ def components(base):
     return label
 
 
-def deleted_leaves(c, base):
-    label = components(base)
+def deleted_leaves(c, base, label):
     far = {label[a] for a in base if a[4] == OUTSIDE and at_boundary(a)}
     def deleted(a):
         if c["keep"] == "outside":
@@ -65,69 +99,72 @@ def deleted_leaves(c, base):
     return [a for a in base if deleted(a)]
 
 
-def violations(c, graded):
-    """Pairs of a finer and a coarser leaf that gradation forbids."""
+def layers(c, graded):
     d, n = c["level_surface"], c["layer_cells_min"]
-    for a, b in combinations(graded, 2):
-        if a[3] < b[3]:
-            a, b = b, a
-        gap = distance(a, b)
-        if gap == 0 and a[3] - b[3] > 1:
-            yield a, b
-        elif any((l < d or c["keep"] == "all") and gap < n * (ROOT >> l) for l in range(b[3] + 1, a[3])):
-            yield a, b
-        elif a[4] == CROSSING and b[3] < d and ((a[3] == d and gap < (n - 1) * (ROOT >> d)) or (not c["keep_crossing"] and gap == 0)):
-            yield a, b
+    for l in range(1, DEEPEST if c["keep"] == "all" else d):
+        fine, coarse = [a for a in graded if a[3] > l], [b for b in graded if b[3] < l]
+        if any(distance(a, b) < n * SIZE[l] for a in fine for b in coarse):
+            return False
+    return True
 
 
 def least(c, base, gone, graded):
     """Every octant in a kept leaf of T0 is split if and only if it has a cause. Octants of the deepest level have neither."""
     d, n = c["level_surface"], c["layer_cells_min"]
+    by_level = [[a for a in graded if a[3] == l] for l in range(DEEPEST + 1)]
     deepest = max((a[3] for a in graded), default=0)
     extra = [b for b in base if b[4] == CROSSING] if not c["keep_crossing"] and n < 3 else []
+    split_in_base, split, early = ancestors(base), ancestors(graded), {}
 
-    @functools.lru_cache(maxsize=None)
-    def early(o):
-        return any(inside(b, o) for b in base) or any(a[3] >= o[3] + 2 and distance(a, o) == 0 for a in graded) or (
-            o[3] < d and any(distance(b, o) == 0 for b in extra))
+    def split_early(o):
+        if o not in early:
+            early[o] = o in split_in_base or any(distance(a, o) == 0 for l in by_level[o[3] + 2:] for a in l) or (
+                o[3] < d and any(distance(b, o) == 0 for b in extra))
+        return early[o]
 
-    sources = [p for p in graded if p[3] > 0 and early(parent(p))]
+    sources = [[p for p in l if p[3] > 0 and split_early(parent(p))] for l in by_level]
 
     def right(o):
-        if o[3] == deepest:
+        if o[3] >= deepest:
             return True
-        caused = early(o) or any(p[3] == o[3] + 1 and distance(p, o) < (n - 1) * edge(p) for p in sources)
-        return any(inside(a, o) for a in graded) == caused and all(map(right, children(o)))
+        caused = split_early(o) or any(distance(p, o) < (n - 1) * edge(p) for p in sources[o[3] + 1])
+        return caused == (o in split) and all(right(cube(k)) for k in children(o + (OUTSIDE,)))
 
-    return all(right(b[:4] + (OUTSIDE,)) for b in base if b not in gone)
+    return all(right(cube(b)) for b in set(base) - set(gone))
 
 
-def promised(c, base, mesh, dropped):
-    label = components(base)
-    if volume(base) != ROOT ** 3 or not all(disjoint(a, b) for a, b in combinations(base, 2)):
-        return False
-    if any(a[4] == CROSSING and a[3] < c["level_surface"] for a in base):
-        return False
-    sides = {}
-    if any(sides.setdefault(label[a], a[4]) != a[4] for a in base):
-        return False
-    if c["seeds"]:
-        flow = INSIDE if c["keep"] == "inside" else OUTSIDE
-        places = [a for p in c["seeds"] for a in base if holds(a, p)]
-        if len(places) < len(c["seeds"]) or any(a[4] == CROSSING for a in places):
-            return False
-        seeded = {label[a] for a in places}
-        if any(a[4] != CROSSING and (a[4] == flow) != (label[a] in seeded) for a in base):
-            return False
-    graded = mesh + dropped
-    gone = deleted_leaves(c, base)
-    if not all(disjoint(a, b) for a, b in combinations(graded + gone, 2)) or volume(graded + gone) != ROOT ** 3:
-        return False
-    if not c["keep_crossing"] and any(a[4] == CROSSING for a in mesh):
-        return False
-    if any(not any(within(a, b) and a[4] == b[4] and b not in gone for b in base) for a in graded):
-        return False
-    return next(violations(c, graded), None) is None and least(c, base, gone, graded)
+def seeded(c, base, label):
+    flow = INSIDE if c["keep"] == "inside" else OUTSIDE
+    places = [[a for a in base if holds(a, p)] for p in c["seeds"]]
+    reached = {label[a] for p in places for a in p}
+    return all(places) and not any(a[4] == CROSSING for p in places for a in p) and all(
+        a[4] == CROSSING or (a[4] == flow) == (label[a] in reached) for a in base)
+
+
+def violated(c, base, mesh, dropped):
+    """The conjuncts of [promised] that are wrong."""
+    label, graded, sides = components(base), mesh + dropped, {}
+    gone = deleted_leaves(c, base, label)
+    homes = {cube(b): b for b in set(base) - set(gone)}
+
+    def inherits(a):
+        b = cube(a)
+        while b not in homes and b[3]:
+            b = parent(b)
+        return b in homes and homes[b][4] == a[4]
+
+    checks = {
+        "tiles": all(filled(base)),
+        "fine": all(a[4] != CROSSING or a[3] >= c["level_surface"] for a in base),
+        "one_side": all(sides.setdefault(label[a], a[4]) == a[4] for a in base),
+        "seeded": not c["seeds"] or seeded(c, base, label),
+        "linear": filled(graded)[0],
+        "without_crossing": c["keep_crossing"] or all(a[4] != CROSSING for a in mesh),
+        "complete": filled(graded + gone)[1],
+        "inherits": all(map(inherits, graded)),
+        "least": least(c, base, gone, graded),
+        "layers": layers(c, graded)}
+    return {name for name, right in checks.items() if not right}
 
 
 def refined(leaves, needs):
@@ -145,74 +182,129 @@ def grade(c, kept):
         kept = refined(kept, lambda a: a[3] < d and any(distance(a, b) == 0 for b in crossing))
     for l in range(max((a[3] for a in kept), default=0), 0, -1):
         sources = [a for a in kept if a[3] == l]
-        kept = refined(kept, lambda a: a[3] < l and any(max(gaps(a, b)) < (n - 1) * edge(b) for b in sources))
+        kept = refined(kept, lambda a: a[3] < l and any(gap(a, b) < (n - 1) * edge(b) for b in sources))
         fine = [a for a in kept if a[3] == l]
         kept = refined(kept, lambda a: a[3] < l - 1 and any(distance(a, b) == 0 for b in fine))
     return kept
 
 
+def flip(leaves, b):
+    """The leaves in b have the other side."""
+    return [a[:4] + (1 - a[4],) if within(a, b) else a for a in leaves]
+
+
 def draw(r):
-    """A case, T0 and a mesh that is often right."""
+    """A case, T0, the mesh in parts and the crossing leaves that are deleted after gradation; half of the time something is wrong."""
     base = [leaf(0, 0, 0, 0, OUTSIDE)]
-    for l in range(3):
-        base = [b for a in base for b in (children(a) if a[3] == l and r.random() < (1, 0.6, 0.12)[l] else [a])]
-    base = [a[:4] + (CROSSING,) if r.random() < 0.35 else a for a in base]
+    chances = r.choice(((1, 0.35, 0.08), (1, 0.25, 0.06, 0.1)))
+    for l, chance in enumerate(chances):
+        base = [b for a in base for b in (children(a) if a[3] == l and r.random() < chance else [a])]
+    walls = r.choice((0.1, 0.35, 0.6))
+    base = [a[:4] + (CROSSING,) if r.random() < walls else a for a in base]
     label = components(base)
     side = {i: r.choice((OUTSIDE, OUTSIDE, INSIDE)) for i in label.values()}
     free = [a for a in base if a[4] != CROSSING]
-    c = {"keep": r.choice(("outside", "outside", "inside", "all")), "keep_crossing": r.random() < 0.7, "layer_cells_min": r.choice((1, 1, 2, 3)),
+    c = {"keep": r.choice(("outside", "outside", "inside", "all")), "keep_crossing": r.random() < 0.6, "layer_cells_min": r.choice((1, 2, 2, 3, 4)),
          "enclosed": r.choice(("delete", "delete", "keep")), "seeds": [], "level_surface": min([a[3] for a in base if a[4] == CROSSING], default=1)}
     if free and r.random() < 0.3:
         c["seeds"] = [a[:3] for a in r.sample(free, r.randint(1, min(3, len(free))))]
         flow = INSIDE if c["keep"] == "inside" else OUTSIDE
-        seeded = {label[a] for a in free if any(holds(a, p) for p in c["seeds"])}
-        side = {i: flow if i in seeded else 1 - flow for i in side}
+        reached = {label[a] for a in free if any(holds(a, p) for p in c["seeds"])}
+        side = {i: flow if i in reached else 1 - flow for i in side}
     base = [a if a[4] == CROSSING else a[:4] + (side[label[a]],) for a in base]
-    gone = set(deleted_leaves(c, base))
+    gone = set(deleted_leaves(c, base, label))
     graded = [a for a in base if a not in gone]
-    if r.random() < 0.8:
+    how, finer = r.random(), [a for a in graded if a[3] < DEEPEST - 1]
+    if how < 0.05 and finer:  # a patch that is needlessly fine, with layers and balance
+        a = r.choice(finer)
+        graded = grade(c, [b for b in graded if b != a] + children(a))
+    elif how < 0.1:  # needlessly thick layers
+        graded = grade(dict(c, layer_cells_min=c["layer_cells_min"] + 1), graded)
+    elif how < 0.95:
         graded = grade(c, graded)
     mesh = [a for a in graded if c["keep_crossing"] or a[4] != CROSSING]
-    if mesh and r.random() < 0.5:
+    parts, base_parts = [mesh], [base]
+    if mesh and r.random() < 0.6:
         i = r.randrange(len(mesh))
-        a = mesh[i]
-        mesh[i:i + 1] = r.choice(([], [a[:4] + ((a[4] + 1) % 3,)], children(a) if a[3] < DEEPEST else [], [a, a], sorted(gone)[:1] + [a]))
-    if r.random() < 0.15:
-        i = r.randrange(len(base))
-        base[i] = base[i][:4] + (r.choice((OUTSIDE, INSIDE, CROSSING)),)
-    return c, base, mesh
+        a, wrong = mesh[i], r.randrange(12)
+        finer = children(a) if a[3] < DEEPEST else []
+        if wrong < 5:
+            mesh[i:i + 1] = ([], [a[:4] + ((a[4] + 1) % 3,)], finer, finer, sorted(gone)[:1] + [a])[wrong]
+        elif wrong == 5:
+            parts.append([a])
+        elif wrong == 6:
+            base_parts.append([r.choice(base)])
+        elif wrong == 7:
+            c["level_surface"] += 1
+        elif wrong == 8 and free:
+            b = r.choice([b for b in base if b[4] != CROSSING])
+            base[:], mesh[:] = flip(base, b), flip(mesh, b)
+        elif wrong == 9 and free:
+            c["seeds"] = c["seeds"] + [r.choice(base)[:3]]
+        elif wrong == 10 and not c["keep_crossing"]:
+            mesh.extend(a for a in base[:9] if a[4] == CROSSING)
+        elif wrong == 11:
+            i = r.randrange(len(base))
+            base[i] = base[i][:4] + (r.choice((OUTSIDE, INSIDE, CROSSING)),)
+    dropped = []
+    if not c["keep_crossing"]:  # no other crossing leaves can be those that gradation leaves
+        gone = set(deleted_leaves(c, base, components(base)))
+        dropped = [a for a in grade(c, [b for b in base if b not in gone]) if a[4] == CROSSING and a not in mesh]
+    return c, base_parts, parts, dropped
 
 
-def leaf_set(c, leaves, tree):
+def leaf_set(c, parts, tree):
     s = object.__new__(LeafSet)
-    words = []
-    for x, y, z, l, side in leaves:
-        key = sum(((x, y, z)[a] >> bit & 1) << 3 * (bit + 19 - DEEPEST) + a for bit in range(DEEPEST) for a in range(3))
-        words.append(word(key, l, side))
-    s.parts = [sorted(words)]
+    s.parts = []
+    for part in parts:
+        keys = [sum((a[i] >> bit & 1) << 3 * (bit + 19 - DEEPEST) + i for bit in range(DEEPEST) for i in range(3)) for a in part]
+        s.parts.append(sorted(word(k, a[3], a[4]) for k, a in zip(keys, part)))
     s.manifest = dict(c, schema="octree-leaf-set/1", tree=tree, root={}, boxes=[], geometry={}, seeds=[[q << 27 - DEEPEST for q in p] for p in c["seeds"]])
     s.count()
     return s
 
 
+def files(r, mesh, base):
+    """What is wrong in files that have the right leaves."""
+    s, wrong = r.choice((mesh, base)), r.randrange(4)
+    if wrong == 0 and len(s.parts[0]) > 1:
+        s.parts[0].reverse()
+        return "words"
+    if wrong == 1:
+        s.manifest["leaves"] += 1
+    elif wrong == 2:
+        levels = s.manifest["leaves_by_level"]
+        levels[r.randrange(20)] += 1
+    else:
+        s.manifest["leaves_by_side"]["inside"] += 1
+    return "counted"
+
+
 def main(check, out, count=200, start=0):
+    count, start = int(count), int(start)
     verdicts = {True: 0, False: 0}
-    for number in range(int(start), int(start) + int(count)):
-        c, base, mesh = draw(random.Random(number))
-        dropped = [] if c["keep_crossing"] else [a for a in base if a[4] == CROSSING]
-        right = promised(c, base, mesh, dropped)
+    alone = dict.fromkeys(("words", "counted", "tiles", "fine", "one_side", "seeded", "linear", "without_crossing", "complete", "inherits", "least", "layers"), 0)
+    for number in range(start, start + count):
+        r = random.Random(number)
+        c, base, mesh, dropped = draw(r)
+        wrong = violated(c, sum(base, []), sum(mesh, []), dropped)
+        mesh, base = leaf_set(c, mesh, "final"), leaf_set(c, base, "base")
+        if not wrong and r.random() < 0.1:
+            wrong = {files(r, mesh, base)}
         shutil.rmtree(out, ignore_errors=True)
-        leaf_set(c, mesh, "final").write(out / "mesh")
-        leaf_set(c, base, "base").write(out / "base")
+        mesh.write(out / "mesh")
+        base.write(out / "base")
         code = subprocess.run([check, out / "mesh", out / "base"], stdout=subprocess.DEVNULL).returncode
-        # Where crossing leaves are deleted, finer ones than those of T0 may have been offered.
-        if code != (0 if right else 1) and not (code == 0 and dropped):
-            print(f"mesh {number} is {'right' if right else 'wrong'}, but the checker's exit code is {code}; it is in {out}")
+        if code != (1 if wrong else 0):
+            print(f"mesh {number} violates {sorted(wrong) or 'nothing'}, but the checker's exit code is {code}; it is in {out}")
             return 1
-        verdicts[right] += 1
+        verdicts[not wrong] += 1
+        if len(wrong) == 1:
+            alone[wrong.pop()] += 1
     shutil.rmtree(out, ignore_errors=True)
-    print(f"{int(count)} random meshes: {verdicts[True]} right ones accepted, {verdicts[False]} wrong ones rejected")
-    return 0 if min(verdicts.values()) * 10 > int(count) else 1
+    print(f"{count} random meshes: {verdicts[True]} right ones accepted, {verdicts[False]} wrong ones rejected")
+    print("rejected meshes that violate one conjunct only: " + ", ".join(f"{name} {n}" for name, n in alone.items()))
+    return 0 if min(verdicts.values()) * 10 > count and (count < 1000 or min(n for name, n in alone.items() if name != "layers")) else 1
 
 
 if __name__ == "__main__":

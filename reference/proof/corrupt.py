@@ -8,23 +8,13 @@ the manifest follow the leaves unless they are what is corrupted: otherwise they
 that does not apply to a case is left out; each is tried on up to three cases, and on one at least. Exit codes: 0 as expected, 1 otherwise.
 """
 import functools
-import json
 import shutil
-import struct
 import subprocess
 import sys
-from array import array
 from bisect import bisect_right
 from pathlib import Path
 
-OUTSIDE, INSIDE, CROSSING = range(3)
-
-
-def key(w): return w >> 7
-def level(w): return w >> 2 & 31
-def side(w): return w & 3
-def word(k, l, s): return k << 7 | l << 2 | s
-def volume(l): return 1 << 3 * (19 - l)
+from leafset import CROSSING, INSIDE, OUTSIDE, LeafSet, key, level, side, volume, word
 
 
 @functools.lru_cache(maxsize=None)
@@ -39,46 +29,6 @@ def distance(v, w):
     """Chebyshev distance of two leaves, in cells of level 19."""
     p, q, e, f = corner(v), corner(w), 1 << 19 - level(v), 1 << 19 - level(w)
     return max(0, *(max(q[a] - p[a] - e, p[a] - q[a] - f) for a in range(3)))
-
-
-class LeafSet:
-    def __init__(self, directory):
-        self.name = directory.name
-        self.manifest = json.loads((directory / "mesh.json").read_text())
-        self.parts = []
-        for part in self.manifest["parts"]:
-            data = (directory / part["file"]).read_bytes()
-            words = array("Q")
-            words.frombytes(data[10 + struct.unpack("<H", data[8:10])[0]:])
-            self.parts.append(list(words))
-
-    def copy(self):
-        other = object.__new__(LeafSet)
-        other.name, other.manifest, other.parts = self.name, dict(self.manifest), [list(part) for part in self.parts]
-        for field in "leaves_by_level", "leaves_by_side", "parts":
-            other.manifest[field] = json.loads(json.dumps(self.manifest[field]))
-        return other
-
-    @property
-    def words(self): return self.parts[0]
-
-    def count(self):
-        """The manifest's counts become those of the leaves."""
-        words = [w for part in self.parts for w in part]
-        m = self.manifest
-        m["leaves"] = len(words)
-        m["leaves_by_level"] = [sum(level(w) == l for w in words) for l in range(20)]
-        m["leaves_by_side"] = {name: sum(side(w) == s for w in words) for s, name in enumerate(("outside", "inside", "crossing"))}
-        m["parts"] = [{"file": f"leaves-{i:05}.npy", "leaves": len(part)} for i, part in enumerate(self.parts)]
-
-    def write(self, directory):
-        directory.mkdir(parents=True)
-        (directory / "mesh.json").write_text(json.dumps(self.manifest))
-        for i, part in enumerate(self.parts):
-            header = "{'descr': '<u8', 'fortran_order': False, 'shape': (%d,), }" % len(part)
-            header += " " * (-(len(header) + 11) % 64) + "\n"
-            (directory / f"leaves-{i:05}.npy").write_bytes(
-                b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + array("Q", part).tobytes())
 
 
 class Skip(Exception):
@@ -231,6 +181,18 @@ def needless_split(m, b):
     split(words, first(i for i, w in enumerate(words) if level(w) == d and side(w) == CROSSING and all(distance(w, v) for v in coarser)))
 
 
+def too_fine(m, variant):
+    """The mesh of a case of which gradation asks more. It has all properties of section 7, and is not least."""
+    other = m.directory.parent / f"{m.name}-{variant}"
+    if not other.exists():
+        raise Skip
+    m.parts = LeafSet(other).parts
+
+
+def needless_patch(m, b): too_fine(m, "patch")
+def needless_layer(m, b): too_fine(m, "thick")
+
+
 # Corruptions of files.
 def part_missing(m, b): half(m); m.parts.pop()
 def part_twice(m, b): half(m); m.parts[1] = list(m.parts[0])
@@ -356,13 +318,14 @@ def interleaved_parts(m, b): m.parts = [m.words[0::2], m.words[1::2], []]; b.par
 
 REJECTED = [drop, drop_first, drop_last, duplicate, swap, level_up, level_down, level_31, misalign, other_side, no_side, not_crossing,
             crossing_in_free_space, coarsen_at_finer, coarsen_in_layer, coarsen_at_surface, coarsen_base_leaf, restore_deleted,
-            restore_crossing, needless_split, unsplit_side, part_missing, part_twice, parts_overlap, part_descends, base_part_missing, base_drop,
+            restore_crossing, needless_split, needless_patch, needless_layer,
+            unsplit_side, part_missing, part_twice, parts_overlap, part_descends, base_part_missing, base_drop,
             base_duplicate, base_side, base_coarse_crossing, all_sides, base_hole_in_wall, thicker_layers, keep_everything, keep_other,
             crossing_dropped, enclosed_otherwise, enclosed_not_deleted, seed_in_wall, seed_elsewhere, seed_outside]
 COUNTS = [count_leaves, count_part, count_levels, count_sides, count_base]
 ACCEPTED = [unchanged, two_parts, interleaved_parts]
 CASES = ["pipe-small", "cube_seeds_on_faces-small", "cube-small", "box_in_box-small", "boxes_overlapping_keep-small", "fighter-small",
-         "duct_layers-small"]
+         "duct_layers-small", "sphere"]
 
 
 def main(check, cases, out):

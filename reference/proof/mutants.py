@@ -3,9 +3,10 @@
 
     mutants.py SOURCE OUT FILE...
 
-SOURCE is reference/proof, OUT a directory for copies, FILE... the names of the proof's files in order. Prints one line per mutant with the
-file whose proof fails. Exit codes: 0 every mutant breaks the proof, 1 one does not, or takes too long.
+SOURCE is reference/proof, OUT a directory for copies in that of the compiled proof, FILE... the names of the proof's files in order. Only
+files that depend on a change are compiled again. Prints one line per mutant with the file whose proof fails. Exit codes: 0 every mutant breaks the proof, 1 one does not, or takes too long.
 """
+import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,6 @@ MUTANTS = {
     "a child is not walked": ("walk n b u p q (sub x p) y z && ", ""),
     "balance of 4:1": ("if w <? mul 4 (least u q)", "if w <? mul 8 (least u q)"),
     "layers of n - 1": ("mul n w <=? mul 2 d else 0 <? d", "mul (sub n 1) w <=? mul 2 d else 0 <? d"),
-    "far from finer crossing leaves only": ("(r <=? d) || (most u q <? s)", "(r <=? d) || (most u q <=? s)"),
     "a face is not checked": ("face k n Y b d && ", ""),
     "components of two sides": ("| _, _ => same a b end", "| _, _ => true end"),
     "seeds open walls": ("  | Cube k' => if same k k' then Cube Reached else t\n  | Node p q r a", "  | Cube _ => Cube Reached\n  | Node p q r a"),
@@ -33,35 +33,55 @@ MUTANTS = {
     "coarse crossing leaves": ("  | Cube k => negb (same Cross k)\n", "  | Cube _ => true\n"),
     "sums that wrap": ("(count p <=? 144115188075855872)", "true"),
     "layers without bound": ("(1 <=? layer_cells c) && (layer_cells c <=? 4096)", "(1 <=? layer_cells c)"),
+    # Leastness.
+    "touching leaves of the next level": ("find_around any_kind 1 (Z.shiftr p 2) 1 p near", "find_around any_kind 1 (Z.shiftr p 1) 1 p near"),
+    "nearly touching leaves": ("find_around any_kind 1 (Z.shiftr p 2) 1 p near", "find_around any_kind 1 (Z.shiftr p 2) 2 p near"),
+    "the extra layer at the surface level": ("(extra && (s <? p) &&", "(extra && (s <=? p) &&"),
+    "the extra layer always": ("negb (keep_crossing c) && (layer_cells c <? 3)", "negb (keep_crossing c)"),
+    "every leaf is a source": ("if early then Cube Cross else Cube Outer", "Cube Cross"),
+    "a far source serves": ("find_around (has Cross) w w (mul (sub n 1) w)", "find_around (has Cross) w w (mul n w)"),
+    "any leaf serves": ("find_around (has Cross) w w", "find_around any_kind w w"),
+    "a coarser source serves": ("find_around (has Cross) w w", "find_around (has Cross) w p"),
+    "a child is not served": ("served b w p w 0 0 near && ", ""),
+    "sources may be near coarser leaves": ("negb (has Cross u) || (mul (sub n 1) (Z.min", "negb (has Cross u) || (mul (sub n 2) (Z.min"),
+    "leaves that are no sources may touch finer ones": ("((0 <? d) || sources_only t)", "true"),
+    "coarse leaves may touch crossing ones": ("Cube Cross => p <=? s |", "Cube Cross => true |"),
+    "sources at a wrong place": ("also k0 a b c (also k1 a' b c", "also k0 a b c (also k1 a b c"),
 }
+FILES = "Checker", "Causes", "Check"  # the program
 
 
 def main(source, out, files):
-    program = (source / "Checker.v").read_text()
+    program = {file: (source / f"{file}.v").read_text() for file in FILES}
     survived = 0
     for name, (old, new) in MUTANTS.items():
-        if old not in program:
+        mutant = {file: text.replace(old, new) for file, text in program.items()}
+        if mutant == program:
             print(f"{name}: the program has no {old!r}")
             survived += 1
             continue
-        mutant = program.replace(old, new)
         if name == "seeds in walls":  # one more parenthesis
-            mutant = mutant.replace("0 0 0 524288 t)) (seeds c).", "0 0 0 524288 t))) (seeds c).")
+            mutant["Check"] = mutant["Check"].replace("0 0 0 524288 t)) (seeds c).", "0 0 0 524288 t))) (seeds c).")
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir(parents=True)
-        verdict = "NOT NOTICED"
+        verdict, changed = "NOT NOTICED", {file for file in FILES if mutant[file] != program[file]}
         for file in files:
-            text = mutant if file == "Checker" else (source / f"{file}.v").read_text()
+            text = mutant[file] if file in FILES else (source / f"{file}.v").read_text()
+            imports = re.search(r"^From Proof Require Import (.*)\.$", text, re.MULTILINE)
+            if file not in changed and not (imports and changed.intersection(imports[1].split())):
+                shutil.copy(out.parent / f"{file}.vo", out)
+                continue
+            changed.add(file)
             (out / f"{file}.v").write_text(text)
             try:
-                run = subprocess.run(["coqc", "-q", "-Q", ".", "Proof", f"{file}.v"], cwd=out, capture_output=True, timeout=300)
+                run = subprocess.run(["coqc", "-q", "-Q", ".", "Proof", f"{file}.v"], cwd=out, capture_output=True, timeout=200)
             except subprocess.TimeoutExpired:
                 verdict = f"NOT DECIDED: {file}.v takes too long"
                 break
             if run.returncode:
-                verdict = f"the proof fails in {file}.v" if file != "Checker" else "NOT A PROGRAM"
+                verdict = f"the proof fails in {file}.v" if file not in FILES else "NOT A PROGRAM"
                 break
-        print(f"{name:36} {verdict}", flush=True)
+        print(f"{name:48} {verdict}", flush=True)
         survived += "NOT" in verdict
     shutil.rmtree(out, ignore_errors=True)
     return 1 if survived else 0

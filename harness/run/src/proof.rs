@@ -32,8 +32,8 @@ pub fn check(
     command.arg(mesh).arg(base);
     let mut proof = CheckResult::new(NAME);
     proof.examined = leaves;
-    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers, and that it is the least such mesh; only tested: \
-                  which leaves facets cross, boxes, and rays"
+    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers, and that no split is needless or missing; \
+                  only tested: which leaves facets cross, boxes, and rays"
         .to_owned();
     match process::run(&mut command, &Watch::new("the proven checker", limit, place.path())) {
         Ok(_) => {}
