@@ -138,6 +138,10 @@ let () =
         accepts leaves || accepts (Offer.refined inputs.surface inputs.layer_cells base_words words leaves) in
       Printf.printf "%s: %d leaves, %d of T0, %.2f s\n" (if right then "accepted" else "rejected") of_mesh.total of_base.total
         (Unix.gettimeofday () -. start);
+      (* The harness repeats this line, so that no report claims what an older checker does not prove. *)
+      if right then print_endline
+        "proven, given T0: octants, completeness, sides of components, balance, layers, and that no split is needless or missing; only tested: \
+         which leaves facets cross, boxes, and rays";
       exit (if right then 0 else 1)
     | _ -> unusable "usage: check MESH BASE"
   with Unusable s -> prerr_endline s; exit 2

@@ -3,6 +3,7 @@
 use crate::engine::failure::{End, Failure};
 use crate::engine::process::{self, Watch};
 use check::checks::CheckResult;
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -16,7 +17,8 @@ pub fn lacks(checker: &Path) -> Option<String> {
         .then(|| format!("{} is missing: ci/prove proves and builds it", checker.display()))
 }
 
-/// What the checker finds of a mesh with so many leaves, given the directory of its base tree T0.
+/// What the checker finds of a mesh with so many leaves, given the directory of its base tree T0. The note on a mesh that is accepted says what
+/// is proven of it, and what is only tested.
 ///
 /// # Errors
 /// If the checker gives no answer within the limit, or cannot read the files.
@@ -32,11 +34,11 @@ pub fn check(
     command.arg(mesh).arg(base);
     let mut proof = CheckResult::new(NAME);
     proof.examined = leaves;
-    proof.note = "proven, given T0: octants, completeness, sides of components, balance, layers, and that no split is needless or missing; \
-                  only tested: which leaves facets cross, boxes, and rays"
-        .to_owned();
     match process::run(&mut command, &Watch::new("the proven checker", limit, place.path())) {
-        Ok(_) => {}
+        Ok(finished) => {
+            let answer = fs::read_to_string(finished.stdout).map_err(unusable)?;
+            proof.note = answer.lines().nth(1).unwrap_or_default().to_owned();
+        }
         Err(failure) if matches!(failure.end, End::Exited { code: 1, .. }) => {
             proof.report("the checker of reference/proof rejects the mesh".to_owned());
         }
