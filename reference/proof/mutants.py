@@ -16,6 +16,7 @@ MUTANTS = {
     "side 3 is crossing": ("else if s =? 2 then Good (Cube Cross) (add i 1) else Bad", "else Good (Cube Cross) (add i 1)"),
     "leaves after the last octant": ("if i =? count p then Some t else None", "Some t"),
     "overlapping parts": ("  | _, _ => None\n  end.\n\nDefinition read", "  | _, _ => Some t\n  end.\n\nDefinition read"),
+    "siblings that differ share memory": ("if same_brood u t then u else t", "u"),
     "counts of different lengths": ("(x =? y) && all_equal a b | _, _ => false end", "(x =? y) && all_equal a b | _, _ => true end"),
     "a child is not walked": ("walk n b u p q (sub x p) y z && ", ""),
     "balance of 4:1": ("if w <? mul 4 (least u q)", "if w <? mul 8 (least u q)"),

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-/// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
+/// Longest time of the proven checker. It takes four seconds for ten million leaves, but who has more may wait.
 const LIMIT: Duration = Duration::from_secs(86_400);
 
 /// `harness audit`.
