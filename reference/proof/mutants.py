@@ -44,7 +44,7 @@ MUTANTS = {
     "any leaf serves": ("find_around (has Cross) w w", "find_around any_kind w w"),
     "a coarser source serves": ("find_around (has Cross) w w", "find_around (has Cross) w p"),
     "a child is not served": ("served b w p w 0 0 near && ", ""),
-    "sources may be near coarser leaves": ("negb (has Cross u) || (mul (sub n 1) (Z.min", "negb (has Cross u) || (mul (sub n 2) (Z.min"),
+    "sources may be near leaves of twice their edge": ("(Z.shiftr (most t p) 1)) <=? d", "(Z.shiftr (most t p) 2)) <=? d"),
     "leaves that are no sources may touch finer ones": ("((0 <? d) || sources_only t)", "true"),
     "coarse leaves may touch crossing ones": ("Cube Cross => p <=? s |", "Cube Cross => true |"),
     "sources at a wrong place": ("also k0 a b c (also k1 a' b c", "also k0 a b c (also k1 a b c"),
