@@ -88,11 +88,11 @@ Fixpoint mark_sources (t u : tree) (p q x y z : Z) (near : around) (early : bool
     let early := parent t || deeper || touched p q x y z near in
     let near := if deeper then descend may_touch p near q x y z else Nobody in
     let z := Z.shiftr p 1 in
-    join Cross z
+    share (join Cross z
       (mark_sources (kid false false false t) a z p 0 0 0 near early) (mark_sources (kid true false false t) b z p z 0 0 near early)
       (mark_sources (kid false true false t) c z p 0 z 0 near early) (mark_sources (kid true true false t) d z p z z 0 near early)
       (mark_sources (kid false false true t) e z p 0 0 z near early) (mark_sources (kid true false true t) f z p z 0 z near early)
-      (mark_sources (kid false true true t) g z p 0 z z near early) (mark_sources (kid true true true t) h z p z z z near early)
+      (mark_sources (kid false true true t) g z p 0 z z near early) (mark_sources (kid true true true t) h z p z z z near early))
   end.
 
 (** A parent whose children are no sources has a source of their level fewer than n - 1 cells away. *)

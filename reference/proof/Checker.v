@@ -51,6 +51,31 @@ Definition join (k : kind) (z : Z) (a b c d e f g h : tree) : tree :=
        (min8 (least a z) (least b z) (least c z) (least d z) (least e z) (least f z) (least g z) (least h z))
        (has k a || has k b || has k c || has k d || has k e || has k f || has k g || has k h) a b c d e f g h.
 
+(** Most parents have eight equal leaves. Those of one edge share their memory. *)
+Definition brood (z : Z) (b : bool) (k : kind) : tree := Node z z b (Cube k) (Cube k) (Cube k) (Cube k) (Cube k) (Cube k) (Cube k) (Cube k).
+Inductive broods := Broods (z : Z) (outer outer' inner inner' cross cross' : tree).
+Definition all_broods : list broods :=
+  map (fun z => Broods z (brood z false Outer) (brood z true Outer) (brood z false Inner) (brood z true Inner) (brood z false Cross) (brood z true Cross))
+    [1; 2; 4; 8; 16; 32; 64; 128; 256; 512; 1024; 2048; 4096; 8192; 16384; 32768; 65536; 131072; 262144].
+Definition same_brood (t u : tree) : bool :=
+  match t, u with
+  | Node p q r (Cube a) (Cube b) (Cube c) (Cube d) (Cube e) (Cube f) (Cube g) (Cube h),
+    Node p' q' r' (Cube a') (Cube b') (Cube c') (Cube d') (Cube e') (Cube f') (Cube g') (Cube h') =>
+    (p =? p') && (q =? q') && (if r then r' else negb r') &&
+    same a a' && same b b' && same c c' && same d d' && same e e' && same f f' && same g g' && same h h'
+  | _, _ => false
+  end.
+Fixpoint share_with (s : list broods) (t : tree) (m : Z) (r : bool) (k : kind) : tree :=
+  match s with
+  | [] => t
+  | Broods z o o' i i' x x' :: s =>
+    if z =? m then
+      let u := match k with Outer => if r then o' else o | Inner => if r then i' else i | Cross => if r then x' else x | _ => t end in
+      if same_brood u t then u else t
+    else share_with s t m r k
+  end.
+Definition share (t : tree) : tree := match t with Node m _ r (Cube k) (Cube _) _ _ _ _ _ _ => share_with all_broods t m r k | _ => t end.
+
 (** * Reading *)
 
 Inductive parsed := Bad | Good (t : tree) (next : Z).
@@ -78,7 +103,7 @@ Fixpoint parse (p : part) (fuel : nat) (l z v k i : Z) : parsed :=
       let k := add k v in match parse p n l z v k i with Bad => Bad | Good f i =>
       let k := add k v in match parse p n l z v k i with Bad => Bad | Good g i =>
       let k := add k v in match parse p n l z v k i with Bad => Bad | Good h i =>
-      Good (join looked_for z a b c d e f g h) i
+      Good (share (join looked_for z a b c d e f g h)) i
       end end end end end end end end
     end
   else Good (Cube Empty) i.

@@ -77,7 +77,7 @@ Proof.
   exact (graded_octant c base mesh dropped G a A).
 Qed.
 Lemma m_parent : parent m = parent g.
-Proof. unfold m. destruct g as [[]|]; reflexivity. Qed.
+Proof. unfold m. destruct g as [[]|]; try reflexivity. cbn [mark_sources]. rewrite share_right. reflexivity. Qed.
 (** Only the root has no parent. *)
 Lemma has_parent o : In o V -> 1 <= level o -> parent m = true.
 Proof.

@@ -132,6 +132,7 @@ Proof.
       let G := fresh "G" in let t := fresh "t" in let j := fresh "j" in
       destruct (parse k0 p h l' (E h) w kk ii) as [| t j] eqn:G; [discriminate|]
     end.
+    rewrite share_right in H.
     injection H as <- <-.
     assert (forall c kk t i j, 0 <= c < 8 -> kk = k + c * w -> 0 <= i <= count p -> parse k0 p h l' (E h) w kk i = Good t j ->
       j <= count p /\ sized k0 h t /\ run i j (k + c * w) (k + (c + 1) * w) /\

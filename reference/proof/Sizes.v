@@ -12,6 +12,25 @@ Lemma add_small a b : small (a + b) -> add a b = a + b. Proof. apply wrap_small.
 Lemma sub_small a b : small (a - b) -> sub a b = a - b. Proof. apply wrap_small. Qed.
 Lemma mul_small a b : small (a * b) -> mul a b = a * b. Proof. apply wrap_small. Qed.
 
+(** Sharing changes nothing. *)
+Lemma same_brood_right t u : same_brood t u = true -> t = u.
+Proof.
+  assert (forall a b, same a b = true -> a = b) as S by (intros [] []; trivial; discriminate).
+  unfold same_brood. intros H. repeat match type of H with match ?x with _ => _ end = _ => destruct x; try discriminate end.
+  repeat match goal with H : _ && _ = true |- _ => apply andb_prop in H; destruct H end.
+  repeat match goal with H : same _ _ = true |- _ => apply S in H end.
+  repeat match goal with H : (_ =? _) = true |- _ => apply Z.eqb_eq in H end. subst.
+  match goal with H : (if ?r then ?r' else negb ?r') = true |- _ => destruct r, r'; try discriminate end; reflexivity.
+Qed.
+Lemma share_right t : share t = t.
+Proof.
+  assert (forall s m r k, share_with s t m r k = t) as S.
+  { induction s as [| [z o o' i i' x x'] s IH]; intros m r k; cbn [share_with]; [reflexivity|]. destruct (z =? m); [|apply IH].
+    cbv zeta. destruct (same_brood _ t) eqn:E; [|reflexivity]. apply same_brood_right in E. exact E. }
+  unfold share. repeat match goal with |- match ?x with _ => _ end = _ => destruct x; trivial end; apply S.
+Qed.
+#[global] Opaque share.
+
 Section Sizes.
 Variable k0 : kind.
 

@@ -86,7 +86,7 @@ Lemma mark_node n t u q x y z near e : inner u -> let e' := parent t || deeper u
   exists k0 k1 k2 k3 k4 k5 k6 k7, v = join Cross (E n) k0 k1 k2 k3 k4 k5 k6 k7.
 Proof.
   intros U e' near' v. destruct u as [|m l hs k0 k1 k2 k3 k4 k5 k6 k7]; [destruct U|].
-  subst v e' near'. cbn [mark_sources]. rewrite half. cbv zeta. split; [exact I|]. split; [|repeat eexists].
+  subst v e' near'. cbn [mark_sources]. rewrite half. cbv zeta. rewrite share_right. split; [exact I|]. split; [|repeat eexists].
   intros i j k. destruct i, j, k; reflexivity.
 Qed.
 

@@ -14,7 +14,7 @@ use run::engine::paths::Paths;
 use run::proof;
 use std::time::Duration;
 
-/// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
+/// Longest time of the proven checker. It takes four seconds for ten million leaves, but who has more may wait.
 const LIMIT: Duration = Duration::from_secs(86_400);
 
 /// `harness audit`.
