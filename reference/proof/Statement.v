@@ -54,7 +54,7 @@ Definition share_face (a b : leaf) : Prop := exists u v w u' v' w',
 Definition at_boundary (a : leaf) : Prop := cx a = 0 \/ cy a = 0 \/ cz a = 0 \/
   cx a + edge a = cells 0 \/ cy a + edge a = cells 0 \/ cz a + edge a = cells 0.
 
-(** * Inputs [1]: D is the level of the surface, n the cells of a layer, a seed three lattice coordinates (256 in a unit cell) *)
+(** * Inputs [1]: D is the level of the surface, n the cells of a layer, a seed three lattice coordinates (256 along a unit cell) *)
 Inductive choice := Keep_outside | Keep_inside | Keep_all.
 Record inputs := Inputs
   { surface : Z; layer_cells : Z; keep : choice; keep_crossing : bool; seeds : list (Z * Z * Z); delete_enclosed : bool }.
@@ -63,7 +63,7 @@ Section Promises.
 Variable c : inputs.
 Variables base mesh dropped : list leaf.  (** T0, the final mesh, and the crossing leaves that were deleted after gradation *)
 Let graded := mesh ++ dropped.
-(** Octants that tile the root. *)
+(** Disjoint octants, and those that fill the root. *)
 Definition linear (s : list leaf) : Prop := (forall a, In a s -> octant a) /\ ForallOrdPairs disjoint s.
 Definition tiles (s : list leaf) : Prop := linear s /\ forall u v w, in_root u v w -> exists a, In a s /\ holds a u v w.
 (** [3, 4]: crossing leaves are fine, components have one side, and seeds determine it. *)
@@ -88,19 +88,19 @@ Definition without_crossing : Prop := if keep_crossing c then dropped = [] else
 Definition complete : Prop := forall u v w, in_root u v w ->
   (exists a, In a graded /\ holds a u v w) \/ exists a, In a base /\ deleted a /\ holds a u v w.
 Definition inherits : Prop := forall a, In a graded -> exists b, In b base /\ within a b /\ side_of a = side_of b /\ ~ deleted b.
-(** [6]: octants in kept leaves of T0 are split if and only if gradation splits them. The first causes are T0 itself, balance, with leaves in o
-    or beside it, and the extra layer. *)
+(** [6]: an octant in a kept leaf of T0 is split if and only if it has a cause. Causes that precede the layer of its children's level are T0
+    itself; balance, with finer leaves in o or beside it; and the extra layer, which makes up for deleted crossing leaves if n < 3. *)
 Definition inside (a o : leaf) : Prop := within a o /\ level o < level a.
 Definition split (o : leaf) : Prop := exists a, In a graded /\ inside a o.
 Definition split_early (o : leaf) : Prop := (exists b, In b base /\ inside b o) \/
   (exists a, In a graded /\ level a >= level o + 2 /\ touch a o) \/
   keep_crossing c = false /\ layer_cells c < 3 /\ level o < surface c /\ exists b, In b base /\ side_of b = Crossing /\ touch b o.
-(** The other cause is a layer: that of leaves which existed when the layer of their level was made, because their parent had a first cause. *)
+(** The other cause is the layer around a source: a leaf that exists before the layer of its level, because its parent is split early. *)
 Definition source (p : leaf) : Prop := In p graded /\ exists q, octant q /\ level q = level p - 1 /\ within p q /\ split_early q.
 Definition in_layer (o : leaf) : Prop := exists p,
   source p /\ level p = level o + 1 /\ distance p o < (layer_cells c - 1) * cells (level p).
 Definition least : Prop := forall o b, octant o -> In b base -> ~ deleted b -> within o b -> (split o <-> split_early o \/ in_layer o).
-(** [7]. Unique.v proves that the last two follow from the others. *)
+(** [7]. [balanced] and [near_surface] are not promised below, because they follow from what is: see Unique.v. *)
 Definition layers : Prop := forall l a b, In a graded -> In b graded -> l < surface c \/ keep c = Keep_all ->
   level a >= l + 1 -> level b <= l - 1 -> distance a b >= layer_cells c * cells l.
 Definition balanced : Prop := forall a b, In a graded -> In b graded -> touch a b -> Z.abs (level a - level b) <= 1.

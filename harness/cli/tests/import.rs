@@ -155,7 +155,8 @@ fn a_proof_is_part_of_an_audit() {
     let (code, printed) = audit();
     assert!(code == 3 && printed.contains("ci/prove"), "{printed}");
     for (ends, expected, says) in [
-        ("exit 0", 0, "proven, given T0"),
+        ("echo accepted; echo proven, given T0", 0, "proven, given T0"),
+        ("exit 0", 2, "ci/prove builds"),
         ("exit 1", 1, "rejects the mesh"),
         ("echo 'no base' >&2; exit 2", 2, "no base"),
         ("kill -9 $$", 2, "signal 9"),

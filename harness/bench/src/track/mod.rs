@@ -21,6 +21,16 @@ use serde::Serialize;
 
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
+/// Words in the names of metrics of which more is better. All others are costs.
+const GAINS: [&str; 8] =
+    ["per_second", "efficiency", "speed_up", "speedup", "throughput", "rate", "hold", "checks"];
+
+/// Whether more of a metric is better; `None` if it is neither better nor worse.
+pub fn is_gain(name: &str) -> Option<bool> {
+    let name = plain(name);
+    let words = |gain: &&str| format!("_{name}_").contains(&format!("_{gain}_"));
+    (!NEUTRAL.contains(&name)).then(|| GAINS.iter().any(words))
+}
 
 /// Number of values by which a step may be located too early or too late, and still is the change that the user accepted.
 const ACCEPTED_WITHIN: usize = 2;
@@ -86,9 +96,9 @@ impl Series {
         }
     }
 
-    /// Whether an increase is worse.
-    pub fn is_cost(&self) -> bool {
-        !NEUTRAL.contains(&plain(&self.name))
+    /// Whether a change is for the worse; `None` if it is neither better nor worse.
+    pub fn is_worse(&self, change: &Change) -> Option<bool> {
+        Some(is_gain(&self.name)? != (change.after > change.before))
     }
 
     /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
@@ -96,7 +106,7 @@ impl Series {
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
         let last = self.changes.last()?;
         let new = self.points.len() - last.at <= recent;
-        (self.is_cost() && new && !last.accepted && last.after > last.before).then_some(last)
+        (new && !last.accepted && self.is_worse(last) == Some(true)).then_some(last)
     }
 }
 
@@ -203,6 +213,16 @@ mod tests {
         assert!(better.worse_recently(10).is_none());
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
+        // Of these, less is worse.
+        for gain in ["cells_per_second", "mpi-2/cells_per_second_per_core [2]", "speed_up", "hold"]
+        {
+            let more = Series { name: format!("uav/{gain}"), ..all[1].clone() };
+            let less = Series { name: more.name.clone(), ..better.clone() };
+            assert!(
+                more.worse_recently(10).is_none() && less.worse_recently(10).is_some(),
+                "{gain}"
+            );
+        }
     }
 
     #[test]

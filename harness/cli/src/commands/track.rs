@@ -98,6 +98,17 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let rules = Rules { alpha: arguments.alpha, effect_min: arguments.effect_min / 100.0 };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
+    if all.is_empty() {
+        return Err(Failure::missing(format!(
+            "{}: no record has a metric, so nothing was compared",
+            arguments.history.display()
+        )));
+    }
+    let last_record = records.len() - 1;
+    let ended = || all.iter().filter(|s| s.points.last().is_none_or(|p| p.0 < last_record));
+    if let Some(first) = ended().next() {
+        println!("not in the last record: {} metrics, such as {}", ended().count(), first.name);
+    }
     print!("{}", summary(&all));
     let none = Record::new(String::new());
     let last = records.last().unwrap_or(&none);
@@ -117,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     )
 }
 
-fn append(arguments: &Arguments) -> Result<(), String> {
+fn append(arguments: &Arguments) -> Result<(), Failure> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
     let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
@@ -128,6 +139,10 @@ fn append(arguments: &Arguments) -> Result<(), String> {
         record.add(&text).map_err(wrong)?;
     }
     record.metrics.extend(arguments.value.iter().cloned());
+    if record.metrics.is_empty() {
+        let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
+        return Err(Failure::missing(why));
+    }
     jsonl::append(&arguments.history, &record)
-        .map_err(|error| format!("{}: {error}", arguments.history.display()))
+        .map_err(|error| Failure::at(&arguments.history, error))
 }

@@ -143,6 +143,15 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert_eq!(accepted.code, 0, "{}", accepted.printed);
     assert!(accepted.printed.contains(", accepted"), "{}", accepted.printed);
     assert_eq!(fixture.harness("track history.jsonl --accept f00").code, 2);
+    // A metric that is measured no more is named, and a history of nothing is not green.
+    git("commit --quiet --allow-empty -m other");
+    let ended = fixture.harness("track history.jsonl --value case/other=1");
+    assert_eq!(ended.code, 0, "{}", ended.printed);
+    let named = "not in the last record: 1 metrics, such as case/words";
+    assert!(ended.printed.contains(named), "{}", ended.printed);
+    fs::write(fixture.path("empty.jsonl"), "").unwrap();
+    let nothing = fixture.harness("track empty.jsonl");
+    assert_eq!(nothing.code, 3, "{}", nothing.printed);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::figure::csv::table;
 use crate::json::pretty;
 use crate::junit::{suite, test, to_text, unsuccessful};
 use bench::track::history::Record;
-use bench::track::{Series, summary, unit};
+use bench::track::{Series, is_gain, summary, unit};
 use quick_junit::NonSuccessKind::Failure;
 use quick_junit::TestCaseStatus;
 use serde_json::{Map, Value, json};
@@ -20,10 +20,11 @@ pub fn bencher(record: &Record) -> String {
     pretty(&Value::Object(cases))
 }
 
-/// The last record for github-action-benchmark, tool `customSmallerIsBetter`: a list of name, unit, value.
+/// The last record for github-action-benchmark, tool `customSmallerIsBetter`: a list of name, unit, value. It has the costs alone.
 pub fn github(record: &Record) -> String {
     let entry = |(name, value): (&String, &f64)| json!({ "name": name, "unit": unit(name), "value": value });
-    pretty(&Value::Array(record.metrics.iter().map(entry).collect()))
+    let costs = record.metrics.iter().filter(|(name, _)| is_gain(name) != Some(true));
+    pretty(&Value::Array(costs.map(entry).collect()))
 }
 
 /// The whole history as CSV, one value per line.
@@ -38,7 +39,7 @@ pub fn csv(records: &[Record]) -> String {
     table(&["commit", "time", "case", "metric", "value"], rows)
 }
 
-/// A test per metric. It fails if the last change point is an increase of a cost among the last `recent` values.
+/// A test per metric. It fails if the last change point is one for the worse among the last `recent` values.
 pub fn junit(all: &[Series], recent: usize) -> String {
     let mut xml = quick_junit::Report::new("harness track");
     let of_series = |series: &Series| {

@@ -22,12 +22,11 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
     };
     let x = |at: usize| series.points[at].0 as f64;
     let mark = |change: &Change| {
-        let (name, style) = match (series.is_cost(), change.accepted, change.after > change.before)
-        {
-            (false, _, _) => ("change", 3),
-            (true, true, _) => ("accepted", 3),
-            (true, false, true) => ("increase", 1),
-            (true, false, false) => ("decrease", 2),
+        let (name, style) = match (series.is_worse(change), change.accepted) {
+            (None, _) => ("change", 3),
+            (Some(_), true) => ("accepted", 3),
+            (Some(true), false) => ("worse", 1),
+            (Some(false), false) => ("better", 2),
         };
         // Between the last commit with the old value and the first with the new one.
         Mark { name: name.to_owned(), x: x(change.at - 1).midpoint(x(change.at)), style }
@@ -124,7 +123,7 @@ mod tests {
         let all = analyse(&records, &Rules::default());
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
         let Body::Points { series, marks } = of_metric(&records, words).body else { panic!() };
-        assert_eq!(marks, [Mark { name: "increase".into(), x: 19.5, style: 1 }]);
+        assert_eq!(marks, [Mark { name: "worse".into(), x: 19.5, style: 1 }]);
         assert!(series[0].notes[20].ends_with("\n<b>"), "{:?}", series[0].notes[20]);
     }
 }

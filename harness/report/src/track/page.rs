@@ -68,12 +68,12 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
             html! { (tick_label(value)) @if series.unit != "count" { " " (series.unit) } }
         };
         let by = change.percent.map_or("new".to_owned(), |by| format!("{by:+.2} %"));
-        let sign = if change.after > change.before { "worse" } else { "better" };
+        let sign = series.is_worse(change).map(|worse| if worse { "worse" } else { "better" });
         vec![
             html! { (series.name) },
             value(change.before),
             value(change.after),
-            html! { span class=[series.is_cost().then_some(sign)] { (by) } },
+            html! { span class=[sign] { (by) } },
             html! { (linked(&change.last_old, link)) ".." (linked(&change.first_new, link)) },
             html! { @if change.accepted { "accepted" } },
             html! { (records[first_new(both)].subject) },
