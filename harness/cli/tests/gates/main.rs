@@ -142,7 +142,7 @@ fn tracked_commits_form_a_history_with_a_change_point() {
         .harness(&format!("track history.jsonl --fail-recent 6 --accept {}", &first_new[..12]));
     assert_eq!(accepted.code, 0, "{}", accepted.printed);
     assert!(accepted.printed.contains(", accepted"), "{}", accepted.printed);
-    assert_eq!(fixture.harness("track history.jsonl --accept f00").code, 2);
+    assert_eq!(fixture.harness("track history.jsonl --accept f00f00f00f00").code, 2);
     // A metric that is measured no more is named, and a history of nothing is not green.
     git("commit --quiet --allow-empty -m other");
     let ended = fixture.harness("track history.jsonl --value case/other=1");
