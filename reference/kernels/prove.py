@@ -10,7 +10,7 @@ from pathlib import Path
 import facts
 import values
 import z3
-from rust import Sources
+from rust import MESHER, Sources
 
 VALUES = Path(__file__).with_name("values.txt")
 TIMEOUT_S = 120
@@ -104,7 +104,7 @@ def compared():
     if VALUES.read_text().splitlines() != list(values.lines(sources)):
         print("values.txt is not of these sources: ci/kernels --values writes it")
         return 1
-    missing = [f for f in sorted({file for file, _ in values.INPUTS}) if not any(f'"{f}"' in test.read_text() for test in (facts.MESHER / f, facts.MESHER / f.replace(".rs", "/tests.rs")) if test.exists())]
+    missing = [f for f in sorted({file for file, _ in values.INPUTS}) if not any(f'"{f}"' in test.read_text() for test in (MESHER / f, MESHER / f.replace(".rs", "/tests.rs")) if test.exists())]
     if missing:
         print(f"no test compares the values of {missing}")
     return len(missing)

@@ -5,8 +5,9 @@ is `None`.
 """
 import random
 
-from facts import (AVX512, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANT, ROOT, TILE, BRICK, RAYS, VERTEX, VOTE, VOXELISE, i64, u32,
-                   usize)
+from facts_geometry import AVX512
+from kernels import (BRICK, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANT, RAYS, ROOT, TILE, VERTEX, VOTE, VOXELISE, i64, u32,
+                     usize)
 from rust import Number, Run, Struct
 
 DRAWS = 16

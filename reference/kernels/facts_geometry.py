@@ -1,0 +1,287 @@
+"""Facts about facets, rays, the lattice, sorted keys and the digest."""
+import z3
+from kernels import (
+    AXES, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANTS, RAYS, ROOT, VERTEX, VOTE, VOXELISE, bit, fact, has, i64, maximum,
+    minimum, no, u32, usize, word)
+from rust import coerced, Number, plain, Struct, term
+
+
+# Facets
+
+
+@fact(FACET, ("let cross = |u: usize, w: usize| d(1, u) * d(2, w) - d(1, w) * d(2, u);", "let cross = |u: usize, w: usize| 64 * (d(1, u) * d(2, w) - d(1, w) * d(2, u));"))
+def normals(k):
+    """`normal` fits i64 for all vertices in [-2^27, 2^28]: components are at most 18 * 2^54, which three times is below 2^60."""
+    n = k("normal", k.facet(k.integer), file=FACET)
+    yield all(k.interval(c.x) == (-18 << 54, 18 << 54) for c in n)
+    yield 3 * (18 << 54) < 1 << 60
+
+
+def function(name, file=FACET): return lambda run: lambda *args: run.call(name, args, file)
+def abs_at_most(n, bound): return z3.And(-bound <= n.x, n.x <= bound)
+
+
+@fact(FACET, ("let first = (lo - corner[axis] - 1) >> shift;", "let first = (lo - corner[axis]) >> shift;"), ("let last = (hi - corner[axis]) >> shift;", "let last = (hi - corner[axis] - 1) >> shift;"),
+      ("let shift = ROOT_BITS - l;\n    let mut wide", "let shift = ROOT_BITS - l - 1;\n    let mut wide"))
+def extents(k):
+    """The coordinate axes of `crossed`: an octant is left out if and only if its closed cube and the facet's extent are disjoint, for all
+    facets, bricks and levels up to 20."""
+    every = {"separated": lambda *_: Number("u64", (1 << 64) - 1)}
+    for l in range(21):
+        h = ROOT >> l
+        extent = [[k.integer("i64", *VERTEX), k.integer("i64", *VERTEX)] for _ in AXES]
+        k.given.append(z3.And([low.x <= high.x for low, high in extent]))
+        corner = [k.integer("i64", 0, ROOT) for _ in AXES]
+        mask = k("crossed", Struct(), corner, u32(l), file=FACET, replaced={**every, "range": lambda run, f, axis: extent[axis]})
+        meets = [[z3.And(extent[a][0].x <= corner[a].x + (i + 1) * h, extent[a][1].x >= corner[a].x + i * h) for i in range(4)] for a in AXES]
+        yield z3.And([has(mask, i) == z3.And([meets[a][p[a]] for a in AXES]) for i, p in enumerate(OCTANTS)])
+
+
+@fact(FACET, ("i64::from(a.max(b).max(c))", "i64::from(a.max(b).min(c))"))
+def ranges(k):
+    """`range` is the least and the greatest coordinate of the facet's vertices along an axis."""
+    f = k.facet(k.signed)
+    for axis in AXES:
+        low, high = k("range", f, usize(axis), file=FACET)
+        c = [z3.SignExt(32, v[axis].x) for v in f["v"]]
+        yield z3.And(*[z3.And(low.x <= x, x <= high.x) for x in c], z3.Or([low.x == x for x in c]), z3.Or([high.x == x for x in c]))
+
+
+@fact(FACET, ("u[k & 3] & w[2 * half + (k >> 2)]", "u[k & 3] & w[half + (k >> 2)]"))
+def columns(k):
+    """`COLUMNS` of an axis, half and byte is the union of the columns of octants over the squares whose bits the byte has, for every byte."""
+    table = k.sources.constant("COLUMNS", FACET)
+    for a in AXES:
+        for half in range(2):
+            yield all(plain(table[a][half][byte]) == sum(1 << i for i in range(64) if square(i, a) // 8 == half and byte >> square(i, a) % 8 & 1)
+                      for byte in range(256))
+
+
+def square(i, a): return OCTANTS[i][(a + 1) % 3] + 4 * OCTANTS[i][(a + 2) % 3]
+
+
+def extruded(half, a):
+    """The same as a function of a byte that is a term."""
+    return lambda byte: Number("u64", word(bit(byte, square(i, a) % 8) if square(i, a) // 8 == half else no(i) for i in range(64)))
+
+
+# The instructions of AVX-512 that the lanes use, by their manual.
+def lanes_where(run, op, a, b):
+    lanes = [run.compared(op, x, y) for x, y in zip(a, b)]
+    return Number("u8", sum(lane << i for i, lane in enumerate(lanes)) if all(isinstance(lane, bool) for lane in lanes) else word(lanes))
+
+
+AVX512 = {
+    "_mm512_set1_epi64": lambda run, v: [v] * 8,
+    "_mm512_setr_epi64": lambda run, *v: [coerced(x, "i64") for x in v],
+    "_mm512_maskz_set1_epi64": lambda run, m, v: [v if plain(m) >> i & 1 else i64(0) for i in range(8)],
+    "_mm512_add_epi64": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
+    "_mm512_cmpge_epi64_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
+    "_mm512_mask_cmple_epi64_mask": lambda run, m, a, b: run.binary("&", m, lanes_where(run, "<=", a, b)),
+}
+SHIFTS = range(7, 28)  # of octants of levels 20 to 0
+
+
+def half_plane(k, lanes):
+    for shift in SHIFTS:
+        h = 1 << shift
+        for a in AXES:
+            u, w = (a + 1) % 3, (a + 2) % 3
+            start = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
+            eu, ew = (k.integer("i64", -(3 << 27), 3 << 27) for _ in range(2))
+            mask = k("half_plane", start, eu, ew, usize(a), u32(shift), function(lanes), file=FACET, replaced={**AVX512, "COLUMNS": [[extruded(half, a) for half in range(2)] for a in AXES]})
+            def edge(i, j): return eu.x * (h * j - start[w].x) - ew.x * (h * i - start[u].x)
+            meets = {(i, j): maximum([edge(i + di, j + dj) for di in range(2) for dj in range(2)]) >= 0 for i in range(4) for j in range(4)}
+            yield z3.And([has(mask, i) == meets[p[u], p[w]] for i, p in enumerate(OCTANTS)])
+
+
+@fact(FACET, ("let qw = if eu > 0 { h - from[w] }", "let qw = if eu < 0 { h - from[w] }"), ("let c = (eu * qw - ew * qu) >> shift;", "let c = -((ew * qu - eu * qw) >> shift);"),
+      ("let v = ci * (k & 3) as i64 + cj * (k >> 2) as i64 + c;", "let v = cj * (k & 3) as i64 + ci * (k >> 2) as i64 + c;"))
+def half_planes(k):
+    """`half_plane` with `edge_lanes`: an octant's projection meets the closed half-plane if and only if some corner of its square does, and
+    all terms fit i64, for all edges, starts, axes and levels up to 20."""
+    yield from half_plane(k, "edge_lanes")
+
+
+@fact(FACET, ("_mm512_set1_epi64(-c - 2 * cj)", "_mm512_set1_epi64(-c - cj)"), ("cj, ci + cj, 2 * ci + cj, 3 * ci + cj)", "cj, ci + cj, 2 * ci + cj, 2 * ci + cj)"))
+def half_planes_avx512(k):
+    """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
+    yield from half_plane(k, "edge")
+
+
+@fact(FACET, ("if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() {", "if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() + 1 {"), ("best = (eu, ew, from);", "best = (ew, eu, from);"),
+      ("let mut best = (0i64, 0i64, p[0]);", "let mut best = (0i64, 1i64, p[0]);"))
+def degenerate(k):
+    """The line that `degenerate_mask` tests, of a facet whose projection has no area, contains all three projected vertices; it has no
+    direction only if they are one point. Both half-planes of the line are tested."""
+    for a in AXES:
+        u, w = (a + 1) % 3, (a + 2) % 3
+        p = [[k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES] for _ in range(3)]
+        def turn(a, b, c): return (b[u].x - a[u].x) * (c[w].x - a[w].x) - (b[w].x - a[w].x) * (c[u].x - a[u].x)
+        collinear = turn(*p) == 0
+        tested = []
+        def half_plane(run, start, eu, ew, *_):
+            tested.append((z3.And(run.path), start, eu, ew))
+            return Number("u64", (1 << 64) - 1)
+        k.paths("degenerate_mask", p, usize(a), u32(8), lambda run: None, file=FACET, replaced={"half_plane": half_plane})
+        for (path, start, eu, ew), (_, other, *back) in zip(tested[::2], tested[1::2]):
+            yield z3.Implies(z3.And(path, collinear), z3.And(
+                *[eu.x * (q[w].x - start[w].x) - ew.x * (q[u].x - start[u].x) == 0 for q in p],
+                z3.Implies(z3.And(eu.x == 0, ew.x == 0), z3.And([z3.And(q[u].x == p[0][u].x, q[w].x == p[0][w].x) for q in p])),
+                back[0].x == -eu.x, back[1].x == -ew.x, start[u].x == other[u].x, start[w].x == other[w].x))
+
+
+def plane(k, lanes):
+    for shift in SHIFTS:
+        h = 1 << shift
+        n = [k.integer("i64", -18 << 54, 18 << 54) for _ in AXES]
+        vertex = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
+        mask = k("plane_mask", [vertex] * 3, n, u32(shift), function(lanes), file=FACET, replaced=AVX512)
+        offset = sum(n[a].x * vertex[a].x for a in AXES)
+        most, least = [sum(h * each([n[a].x, z3.IntVal(0)]) for a in AXES) for each in (maximum, minimum)]
+        def meets(p): at = sum(h * p[a] * n[a].x for a in AXES) - offset; return z3.And(at + most >= 0, at + least <= 0)
+        yield z3.And([has(mask, i) == meets(p) for i, p in enumerate(OCTANTS)])
+
+
+@fact(FACET, ("let bound = 4 * i128::from(up - down) + 4;", "let bound = 3 * i128::from(up - down) - 4;"), ("let ceil = clamp(-((-offset) >> shift));", "let ceil = clamp(offset >> shift);"),
+      ("let bound = 4 * i128::from(up - down) + 4;", "let bound = 16 * i128::from(up - down) + 4;"))
+def planes(k):
+    """`plane_mask` with `plane_lanes`: an octant meets the facet's plane if and only if its corners are not all on one side, for all normals,
+    vertices and levels up to 20. Clamping changes no answer, and all lanes fit i64."""
+    yield from plane(k, "plane_lanes")
+
+
+@fact(FACET, ("let base = 2 * (n[0] * (byte & 1)", "let base = 2 * (n[0] * (byte & 3)"), ("lane(0xf0, n[2])", "lane(0xf8, n[2])"))
+def planes_avx512(k):
+    """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
+    yield from plane(k, "plane")
+
+
+# Rays
+
+
+@fact(RAYS, ("let side = eu * (p[w] - v(i, w)) - ew * (p[u] - v(i, u));", "let side = 32 * (eu * (p[w] - v(i, w)) - ew * (p[u] - v(i, u)));"))
+def rays(k):
+    """All terms of `meets` in i64, its edge functions among them, are below 2^60, and heights fit i128, for all facets and points of the root."""
+    f = k.facet(k.integer)
+    p = [k.integer("i64", 0, ROOT) for _ in AXES]
+    for axis in AXES:
+        k.paths("meets", f, p, usize(axis), file=RAYS)
+    yield k.largest("i64") < 1 << 60
+
+
+
+@fact(RAYS, ("[side, -ew, eu].into_iter().find", "[side, eu, -ew].into_iter().find"), ("[side, -ew, eu].into_iter().find", "[side, ew, eu].into_iter().find"))
+def perturbation(k):
+    """The sign that `meets` takes for an edge is that of the edge function at the point displaced by e = 2^-40 along the next axis and e^2
+    along the one after it; only if all terms are 0 it takes none."""
+    for axis in AXES:
+        f, p = k.facet(k.integer), [k.integer("i64", 0, ROOT) for _ in AXES]
+        u, w = (axis + 1) % 3, (axis + 2) % 3
+        n = k("normal", f, file=FACET)
+        def edge(i):
+            a, b = f["v"][i], f["v"][(i + 1) % 3]
+            eu, ew = b[u].x - a[u].x, b[w].x - a[w].x
+            # In units of e^2.
+            return (eu * (p[w].x - a[w].x) - ew * (p[u].x - a[u].x)) * (1 << 80) - ew * (1 << 40) + eu
+        inside = z3.And([z3.And(edge(i) != 0, (edge(i) > 0) == (n[axis].x > 0)) for i in range(3)])
+        some, _ = k.option("meets", f, p, usize(axis), file=RAYS)
+        yield some == z3.And(n[axis].x != 0, inside)
+
+
+@fact(CHECK_SIDES, ("const ONE: i128 = 1 << 62;", "const ONE: i128 = 1 << 70;"))
+def rays_checked(k):
+    """The second count of rays, `ray_that_meets`: its terms are below 2^122 and fit i128, for all facets and all points of the root."""
+    f, p = k.facet(k.integer), [k.integer("i64", 0, ROOT) for _ in AXES]
+    for axis in AXES:
+        k.paths("ray_that_meets", f, p, usize(axis), file=CHECK_SIDES)
+    yield k.largest() < 1 << 122
+
+
+@fact(CHECK_BASE, ("axis.iter().map(|c| (sign * c).max(0))", "axis.iter().map(|c| (sign * c * c).max(0))"))
+def facets_checked(k):
+    """The second test of facets against octants, `touches`: its terms are below 2^93 and fit i128, for all facets and octants."""
+    f, corner, h = k.facet(k.integer), [k.integer("i64", 0, ROOT) for _ in AXES], k.integer("i64", 1, ROOT)
+    k.paths("touches", f, corner, h, file=CHECK_BASE)
+    yield k.largest() < 1 << 93
+
+
+# The lattice
+
+
+@fact(LATTICE, ("let last = (b.max[axis] - corner[axis] - 1) >> shift;", "let last = (b.max[axis] - corner[axis]) >> shift;"), ("b.min[axis] >= b.max[axis]", "b.min[axis] > b.max[axis]"),
+      ("self.min[a].max(corner[a]) < self.max[a].min(corner[a] + h)", "self.min[a].max(corner[a]) <= self.max[a].min(corner[a] + h)"))
+def boxes(k):
+    """`box_mask` has an octant if and only if `ExtentBox::meets` holds for it: interiors meet. For all boxes, bricks and levels up to 20."""
+    for l in range(21):
+        h = ROOT >> l
+        box = Struct({end: [k.integer("i64", 0, ROOT) for _ in AXES] for end in ("min", "max")})
+        # The only bricks of levels 0 and 1 have 1 and 8 octants.
+        corner = [k.integer("i64", 0, ROOT) if l > 1 else i64(0) for _ in AXES]
+        mask = k("box_mask", box, corner, u32(l), file=LATTICE)
+        yield z3.And([has(mask, i) == k("meets", box, [Number("i64", c.x + h * p[a]) for a, c in enumerate(corner)], i64(h), file=LATTICE) for i, p in enumerate(OCTANTS[:8 ** l])])
+        yield z3.And([z3.Not(has(mask, i)) for i in range(8 ** l, 64)])
+
+
+@fact(LATTICE, ("(c - ROOT_EDGE as f64 * 0.5).abs()", "(c - ROOT_EDGE as f64 * 0.25).abs()"), ("let limit = ROOT_EDGE as f64 * 1.5;", "let limit = ROOT_EDGE as f64 * 1.6;"))
+def nearness(k):
+    """A rounded coordinate is accepted by `off_centre` and its limit if and only if it lies in [-2^27, 2^28], for every f64, infinities and
+    NaN included: so the conversion to i32 is exact."""
+    x = k.float()
+    q = k("nearest", x, Number("f64", 0.0), Number("f64", 1.0), file=LATTICE)
+    limit = k.sources.fragment("let limit = ", LATTICE)
+    near = z3.fpLEQ(k("off_centre", q, file=LATTICE).x, z3.FPVal(limit.x, z3.Float64()))
+    yield near == z3.And(z3.fpGEQ(q.x, z3.FPVal(VERTEX[0], z3.Float64())), z3.fpLEQ(q.x, z3.FPVal(VERTEX[1], z3.Float64())))
+
+
+# Keys of sorted lists
+
+
+@fact(VOXELISE, ("let first = ((lo - 1) >> SHIFT).max(0);", "let first = (lo >> SHIFT).max(0);"), ("u64::from(LEVEL_MAX - drop)", "u64::from(LEVEL_MAX + 1 - drop)"),
+      ("(hi >> SHIFT).min((1 << LEVEL_MAX) - 1)", "(hi >> SHIFT).min((1 << LEVEL_MAX) - 2)"))
+def containing(k):
+    """`ContainingOctant::of` a facet in the root is the smallest octant that contains every closed level-19 cell that the extent meets; its
+    level is at most 19, and its start is that of an octant of that level."""
+    extent = [[k.signed("i64", *VERTEX), k.signed("i64", *VERTEX)] for _ in AXES]
+    k.given.append(z3.And([low.x <= high.x for low, high in extent]))
+    replaced = {"range": lambda run, f, axis: extent[axis], "crossed": lambda run, *_: k.bits("u64")}
+    some, octant = k.option("of", Struct(), file=VOXELISE, replaced=replaced)
+    in_root = z3.And([z3.And(low.x >= 0, high.x <= ROOT) for low, high in extent])
+    level, start = (k(part, octant, file=VOXELISE) for part in ("level", "start"))
+    corner = k("position", start)
+    edge = z3.BitVecVal(1, 64) << z3.ZeroExt(32, 19 - level.x)
+    def contained(c, cell): c = z3.ZeroExt(32, c.x); return z3.And(c <= cell, cell < c + edge)
+    cells = [[z3.If(low.x <= 0, 0, low.x - 1 >> 8), z3.If(high.x >= ROOT, (1 << 19) - 1, high.x >> 8)] for low, high in extent]
+    yield z3.Implies(in_root, z3.And(some, z3.ULE(level.x, 19), *[z3.ZeroExt(32, c.x) & edge - 1 == 0 for c in corner]))
+    yield z3.Implies(in_root, z3.And([contained(c, cell) for c, pair in zip(corner, cells) for cell in pair]))
+    yield z3.Implies(z3.And(in_root, level.x != 19), z3.Or([(low ^ high) & z3.LShR(edge, 1) != 0 for low, high in cells]))
+    yield z3.Implies(z3.And(some, z3.Not(in_root)), z3.And(level.x == 0, start.x == 0))
+
+
+@fact(VOTE, ("Self(u64::from(l) << 57 | code)", "Self(u64::from(l) << 56 | code)"), ("self.0 & ((1 << 57) - 1)", "self.0 & ((1 << 56) - 1)"))
+def candidates(k):
+    """A `Candidate` holds level and code of any leaf, and sorts by level and then by code."""
+    def leaf():
+        l, code = octant(k, 20)
+        return l, code, k("new", l, code, file=VOTE)
+    (l, a, v), (m, b, w) = leaf(), leaf()
+    level, code = k("leaf", v, file=VOTE)
+    yield z3.And(level.x == l.x, code.x == a.x)
+    yield z3.ULT(v["0"].x, w["0"].x) == z3.Or(z3.ULT(l.x, m.x), z3.And(l.x == m.x, z3.ULT(a.x, b.x)))
+
+
+# The digest
+
+
+@fact(DIGEST, ("low += b & 0xffff_ffff;", "low += b & 0xffff_fffe;"), ("u128::from(low_top) << 32", "u128::from(low_top) << 31"), ("words.chunks(1 << 30)", "words.chunks(1 << 33)"))
+def digests(k):
+    """`digest_lanes` of up to three words is the sum of their `mix`, whatever the words; sums of 2^30 parts of 32 bits, as many as it takes at
+    a time, fit u64."""
+    # The product in `finalise` is hard, and does not matter here: any function of a word will do.
+    f = z3.Function("finalise", z3.BitVecSort(64), z3.BitVecSort(64))
+    finalise = {"finalise": lambda run, x: Number("u64", f(x.x))}
+    for count in range(4):
+        w = [k.bits("u64") for _ in range(count)]
+        total = k("digest_lanes", w, file=DIGEST, replaced=finalise)
+        yield term(total, Number("u128", z3.BitVecVal(0, 128))) == sum([k("mix", x, file=DIGEST, replaced=finalise).x for x in w], z3.BitVecVal(0, 128))
+    yield plain(k.sources.fragment("words.chunks(", DIGEST)) * ((1 << 32) - 1) < 1 << 64
