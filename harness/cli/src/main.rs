@@ -37,6 +37,7 @@ fn main() -> ExitCode {
         interrupt::clean();
         exit(BUG);
     };
+    let ended = files::clash().map_or(ended, |why| Err(Failure::input(why)));
     let code = output::finish(ended.unwrap_or_else(print_failure));
     match interrupt::requested() {
         // What other threads of an interrupted command were making.

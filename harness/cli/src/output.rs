@@ -23,8 +23,11 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::output::write_error(format_args!($($text)*)) };
 }
 
-/// Writes to standard output.
+/// Writes to standard output, unless an input could not be read because it is an output: then no answer is true.
 pub fn write(text: Arguments) {
+    if files::clash().is_some() {
+        return;
+    }
     let mut plain = Plain(String::new());
     // Only the text itself can fail.
     let _ = fmt::Write::write_fmt(&mut plain, text);

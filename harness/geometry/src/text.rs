@@ -112,7 +112,10 @@ fn in_cells(cells: Option<f64>) -> String {
 }
 
 fn point(at: &[f64; 3]) -> String {
-    let [x, y, z] = at.map(|c| format!("{:?}", c as f32));
+    let [x, y, z] = at.map(|c| match c as f32 {
+        short if short.is_finite() => format!("{short:?}"),
+        _ => number(c),
+    });
     format!("({x}, {y}, {z})")
 }
 

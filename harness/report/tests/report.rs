@@ -171,6 +171,8 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
     }
     assert!(speedup.contains(",32,11.28"), "{speedup}");
     assert!(place.path().join("figures.tex").is_file());
+    let numbers = std::fs::read_to_string(place.path().join("numbers.tex")).unwrap();
+    assert!(numbers.contains("\\defresult{mesher/uav/strong/"), "{numbers}");
     assert!(written.broken.is_empty(), "{:?}", written.broken);
     let balance =
         std::fs::read_to_string(place.path().join("figures/balance-uav-4M-64.csv")).unwrap();

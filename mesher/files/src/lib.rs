@@ -21,7 +21,9 @@ pub use claim::{Claim, ClaimError};
 pub use draft::{Draft, check_writable, write_atomically};
 pub use memory::{Heap, OUT_OF_MEMORY, ends_with};
 pub use text::{Plain, message};
-pub use uses::{append_log, open, read, read_log, read_text, register_input, register_output};
+pub use uses::{
+    append_log, clash, open, read, read_log, read_text, register_input, register_output,
+};
 
 /// Exit code of a program with a bug: it panicked.
 pub const BUG: i32 = 70;

@@ -8,7 +8,7 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Use {
@@ -20,6 +20,15 @@ enum Use {
 
 /// The uses of files by device and inode, with the path that was given.
 static USES: Mutex<BTreeMap<(u64, u64), (Use, PathBuf)>> = Mutex::new(BTreeMap::new());
+
+/// The first input that was found to be an output.
+static CLASH: OnceLock<String> = OnceLock::new();
+
+/// Why this process has no result, if an input was found to be one of its outputs: whatever the reader made of the error, the
+/// user's command line is wrong, and nothing else.
+pub fn clash() -> Option<&'static str> {
+    CLASH.get().map(String::as_str)
+}
 
 /// Opens a regular file as an input of this run. A pipe could wait for a writer forever, and a device has no end.
 ///
@@ -117,8 +126,9 @@ fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
         let why =
             format!("this run also {verb} it as {}: give the output another name", name.display());
         if role == Use::Input {
-            // Whatever the reader makes of the error, the file is not written.
+            // The file is not written.
             uses.insert(id, (role, path.to_owned()));
+            let _ = CLASH.set(format!("{}: {why}", path.display()));
         }
         return Err(io::Error::new(ErrorKind::InvalidInput, why));
     }
@@ -152,6 +162,7 @@ mod tests {
                 check_writable(&file).unwrap();
                 let error = read(alias).unwrap_err().to_string();
                 assert!(error.contains("also writes it as"), "{error}");
+                assert!(clash().unwrap().contains("also writes it as"));
             }
             // Also if the reader has made something else of its error.
             let error = write_atomically(alias, |_| Ok(())).unwrap_err().to_string();

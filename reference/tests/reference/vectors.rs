@@ -1,8 +1,9 @@
 //! The test vectors that all programs share (`DEFINITION.md`, section 14).
+use crate::support;
 use reference::lattice::{Facet, Input};
 use reference::leaves::{Tally, digest_of_facets, hex};
 use reference::octant::Octant;
-use reference::{BoxSpec, Case, Enclosed, Error, Keep, Root, Side, digest, mix};
+use reference::{BoxSpec, Case, Error, Root, Side, digest, mix};
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {
@@ -30,17 +31,7 @@ fn lattice_point(numbers: &Value) -> [i64; 3] {
 }
 
 fn empty(origin: [f64; 3], edge: f64) -> Case {
-    Case {
-        facets: Vec::new(),
-        root: Root { origin, edge },
-        spacing_min: edge,
-        layer_cells_min: 1,
-        keep: Keep::All,
-        keep_crossing: true,
-        boxes: Vec::new(),
-        seeds: Vec::new(),
-        enclosed: Enclosed::Delete,
-    }
+    Case { root: Root { origin, edge }, spacing_min: edge, ..support::case(&[], 0) }
 }
 
 #[test]

@@ -87,10 +87,11 @@ impl Group {
         self.runs.iter().any(|r| r.oversubscribed)
     }
 
-    /// Returns `projected`, `oversubscribed` or `measured`.
+    /// Returns `projected`, `oversubscribed`, `measured` or `serial`, which is measured without MPI.
     pub fn how(&self) -> &'static str {
         match self.setup.comm {
             Comm::Sim => "projected",
+            Comm::Solo => "serial",
             _ if self.oversubscribed() => "oversubscribed",
             _ => "measured",
         }

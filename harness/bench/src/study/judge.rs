@@ -143,8 +143,9 @@ fn measured(
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
     let why = above_one(&efficiencies).unwrap_or_default();
     // The least trustworthy run counts.
-    let rank =
-        |how: &&str| ["measured", "oversubscribed", "projected"].iter().position(|h| h == how);
+    let rank = |how: &&str| {
+        ["serial", "measured", "oversubscribed", "projected"].iter().position(|h| h == how)
+    };
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     Ok(((row.measure.of)(&sample)?, how, why))
 }

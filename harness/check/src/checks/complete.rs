@@ -34,6 +34,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     // How fine a leaf must be is no matter of the promise of completeness.
     match subject.truth().filter(|_| subject.promises.definition) {
         Some(truth) => {
+            result.examined = subject.examined_with(truth);
             truth.compare(tree, &mut |found| compare(&found, terms, result));
             if let Some(base) = subject.tree_base() {
                 truth.compare(base, &mut |found| {

@@ -3,7 +3,7 @@
 //! Sections 2 and 7 of reference/DEFINITION.md: a leaf is crossing iff a facet crosses the leaf of T0 that contains it. As a
 //! promise of its own, without a T0: a leaf that a facet crosses is crossing, and a crossing leaf is crossed or, if it is
 //! finer than the surface, lies in a crossed octant of the surface's level. There is no band: one facet in one point decides.
-//! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does).
+//! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does, if both are promised).
 
 use super::surface::Crossed;
 use super::truth::Truth;

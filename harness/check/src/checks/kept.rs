@@ -34,6 +34,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 }
 
 fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
+    result.examined = subject.examined_with(truth);
     for component in &truth.components {
         let leaves = component.leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
         let example = leaves.clone().find(|leaf| has_leaves(subject.tree(), leaf));

@@ -42,6 +42,8 @@ pub(crate) use pass::Pass;
 const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
 /// Why what needs facets is not checked.
 const NO_GEOMETRY: &str = "the geometry is unknown without a case";
+/// Why nothing can be wrong.
+const NO_LEAVES: &str = "the mesh has no leaves";
 
 /// A property of meshes.
 #[derive(Clone, Copy, Debug)]
@@ -104,6 +106,9 @@ impl Check {
             true => {}
             false => result.examined = 0,
         }
+        if result.holds() && result.was_run() && result.examined == 0 {
+            result.lacks(NO_LEAVES);
+        }
         result.check_invariants();
         result
     }
@@ -132,5 +137,5 @@ fn several_levels(subject: &Subject) -> Option<String> {
 
 fn some_leaves(subject: &Subject) -> Option<String> {
     let is_empty = subject.tree_with_deleted().root() == contract::tree::Handle::HOLE;
-    is_empty.then(|| "the mesh has no leaves".to_owned())
+    is_empty.then(|| NO_LEAVES.to_owned())
 }

@@ -4,7 +4,8 @@
 //! and seeds or exact rays give the side of each of its components. Places within a band around the geometry are not
 //! judged, because programs differ on the side of a cell that the geometry crosses; neither are places whose six rays
 //! contradict each other or their component, which exist around a body that is not watertight. A leaf that is labelled
-//! crossing is wrong anywhere beyond the band. If the band has no width, every crossed leaf must be labelled so.
+//! crossing is wrong anywhere beyond the band. If the band has no width, every crossed leaf must be labelled so. If it has
+//! none, or `crossing` is promised, crossed leaves are kept or deleted as the case says, without a band.
 
 #[cfg(test)]
 mod tests;
@@ -22,8 +23,8 @@ use contract::word::Side;
 /// Where a place lies relative to the geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Position {
-    /// Within the band, or crossed.
-    Near,
+    /// Within the band; and whether a facet crosses it.
+    Near { crossed: bool },
     /// Farther away, on this side, in a component that is kept or not.
     On(Side, bool),
     /// Farther away, but the rays disagree.
@@ -41,6 +42,8 @@ pub struct Survey<'a> {
     parity: Parity,
     /// Half the width of the band, in cells of the surface level.
     band_cells: f64,
+    /// Whether it is certain which leaves are crossing, in the band too.
+    knows_crossing: bool,
 }
 
 /// The band of `complete` for an engine that promises no sides, in cells of the surface level.
@@ -56,13 +59,15 @@ impl<'a> Survey<'a> {
         else {
             return result.lacks(NO_GEOMETRY);
         };
+        let band_cells = subject.promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells);
         let survey = Self {
             terms: &subject.terms,
             tree: subject.tree(),
             truth,
             facets,
             parity: Parity::new(&case.facets_lattice),
-            band_cells: subject.promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells),
+            band_cells,
+            knows_crossing: subject.promises.crossing || band_cells == 0.0,
         };
         check(&survey, result);
         if result.examined == 0 {
@@ -74,7 +79,7 @@ impl<'a> Survey<'a> {
     /// The position of an octant that no facet crosses.
     fn position(&self, octant: Octant) -> Position {
         let Some(component) = self.truth.component_at(&octant) else {
-            return Position::Near;
+            return Position::Near { crossed: self.band_cells == 0.0 };
         };
         let &Component { side, enclosed, .. } = component;
         let inside = side == Side::Inside;
@@ -95,11 +100,11 @@ impl<'a> Survey<'a> {
                     format!("is in a component that is {side}")
                 }
                 Position::Undecided if kind == CROSSING => "is crossed by no facet".to_owned(),
-                Position::Near if self.band_cells == 0.0 && kind != CROSSING => {
+                Position::Near { .. } if self.band_cells == 0.0 && kind != CROSSING => {
                     "is crossed by a facet".to_owned()
                 }
                 Position::Undecided => return undecided += 1,
-                Position::Near if self.band_cells > 0.0 => return,
+                Position::Near { .. } if self.band_cells > 0.0 => return,
                 _ => return result.examined += 1,
             };
             result.examined += 1;
@@ -113,15 +118,15 @@ impl<'a> Survey<'a> {
         );
     }
 
-    /// Checks that the leaves fill the region to be kept, and nothing else. A hole that the geometry crosses is a finding
-    /// only if the band has no width.
+    /// Checks that the leaves fill the region to be kept, and nothing else.
     pub fn check_complete(&self, result: &mut CheckResult) {
-        let exact = self.band_cells == 0.0 && self.terms.keep_crossing;
         self.visit(&mut |octant, kind, position| {
             let wanted = match position {
                 Position::On(_, kept) => Some(kept),
-                Position::Near => (exact && kind.is_none()).then_some(true),
-                Position::Undecided => None,
+                Position::Near { crossed: true } if self.knows_crossing => {
+                    Some(self.terms.keep_crossing)
+                }
+                Position::Near { .. } | Position::Undecided => None,
             };
             let Some(wanted) = wanted else { return };
             result.examined += 1;
@@ -153,7 +158,9 @@ impl<'a> Survey<'a> {
         }
         let kind = handle.as_leaf();
         if kind.is_some() || handle == Handle::HOLE && octant.level >= surface {
-            return visit(octant, kind, Position::Near);
+            let (low, high) = octant.bounds();
+            let crossed = self.facets.first_meeting(&near, low, high).is_some();
+            return visit(octant, kind, Position::Near { crossed });
         }
         for digit in 0..8 {
             let child = self.tree.child(handle, digit, octant.level);

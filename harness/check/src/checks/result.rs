@@ -1,7 +1,7 @@
 //! The result of a check.
 //!
 //! Invariants: the listed findings are the first ones, and as many as there are, up to a limit; each is one of this check; a
-//! check that had nothing to check has examined nothing and found nothing. `identical` counts leaves and lists one difference.
+//! check that had nothing to check has examined nothing and found nothing; one that holds has examined something. `identical` counts leaves and lists one difference.
 
 use std::fmt;
 
@@ -85,6 +85,10 @@ impl CheckResult {
         assert!(
             findings.iter().all(|finding| finding.check == *name && !finding.detail.is_empty()),
             "{name} has a finding of another check, or without text: {findings:?}"
+        );
+        assert!(
+            nothing_to_check.is_some() || *findings_total > 0 || *examined > 0,
+            "{name} holds, although it examined nothing"
         );
         assert!(
             nothing_to_check.is_none() || *findings_total == 0 && *examined == 0,
@@ -187,11 +191,12 @@ mod tests {
         (0..2 * FINDINGS_LISTED).for_each(|i| correct.report(format!("finding {i}")));
         correct.check_invariants();
         type Fault = fn(&mut CheckResult);
-        let faults: [Fault; 4] = [
+        let faults: [Fault; 5] = [
             |r| r.findings_total = 3,
             |r| drop(r.findings.pop()),
             |r| r.findings[0].check = "balance",
             |r| r.lacks("nothing"),
+            |r| *r = CheckResult::new("sides"),
         ];
         for fault in faults {
             let mut wrong = correct.clone();

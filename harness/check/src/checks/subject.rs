@@ -151,6 +151,14 @@ impl<'a> Subject<'a> {
         self.truth.get_or_init(make).as_ref()
     }
 
+    /// What a check that compares the mesh with T0 examines: its leaves or, if there are none, those of T0.
+    pub(super) fn examined_with(&self, truth: &Truth) -> u64 {
+        match self.pass.tally.leaves {
+            0 => truth.words.len() as u64,
+            leaves => leaves,
+        }
+    }
+
     /// The case's facets, prepared for crossing tests.
     pub(super) fn facets(&self) -> Option<&Facets> {
         let case = self.case?;

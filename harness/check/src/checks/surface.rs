@@ -2,7 +2,7 @@
 //!
 //! Crossed leaves are found from the facets, never from the mesh's own sides. A leaf that is coarser than the surface
 //! level is a finding if a facet reaches deeper into it than a tolerance. The check cannot detect a crossed leaf that is
-//! missing from the mesh; `complete` does.
+//! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::facets::Facets;
 use super::{Check, CheckResult, NO_GEOMETRY, Terms, nothing};

@@ -69,7 +69,7 @@ pub fn settings() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
     fn all_checks_pass_on_meshes_of_the_reference(facets in prop_oneof![soup(), hulls()], text in settings()) {

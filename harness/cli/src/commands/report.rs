@@ -1,10 +1,12 @@
 //! `harness report`: draws figures and a page from records.
 
+use super::values::Input;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::record;
 use clap::Args;
-use contract::failure::EXIT_HOLDS;
-use contract::failure::Failure;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use report::benchmark::numbers::Number;
+use report::benchmark::prose::{self, Checked};
 use report::benchmark::report;
 use std::path::{Path, PathBuf};
 
@@ -16,22 +18,40 @@ pub struct Arguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
+    /// Compare the numbers of this LaTeX text with the record; exit code 1 if one is not there or differs. May be repeated
+    #[arg(long, value_name = "FILE")]
+    pub check: Vec<Input>,
 }
 
 /// Writes the report; returns the exit code.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write`], or if a text cannot be read or has no number.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    write(&arguments.directory, &arguments.record)?;
-    Ok(EXIT_HOLDS)
+    let numbers = write(&arguments.directory, &arguments.record)?;
+    let mut code = EXIT_HOLDS;
+    for path in &arguments.check {
+        let shown = path.display();
+        let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
+        let Checked { compared, findings } = prose::check(&text, &numbers);
+        if compared == 0 {
+            let why = "has no number that the record could have, so nothing was compared";
+            return Err(Failure::missing(format!("{shown} {why}")));
+        }
+        findings.iter().for_each(|finding| println!("{shown}, {finding}"));
+        println!("{shown}: {compared} numbers compared, {} findings", findings.len());
+        if !findings.is_empty() {
+            code = EXIT_FAILED;
+        }
+    }
+    Ok(code)
 }
 
-/// Reads records, writes the report into `directory` and prints a summary.
+/// Reads records, writes the report into `directory` and prints a summary; returns the results.
 ///
 /// # Errors
 /// One sentence, if a record cannot be read, or the report cannot be written.
-pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
+pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String> {
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let mut lines = Vec::new();
     for path in &records {
@@ -62,7 +82,7 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<(), String> {
         println!("PNG and PDF are left out: the harness was built without its feature figures");
     }
     println!("{} figures; the page is {}", written.figures, written.page.display());
-    Ok(())
+    Ok(written.numbers)
 }
 
 fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {

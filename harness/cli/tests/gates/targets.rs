@@ -76,6 +76,26 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     let record = fs::read_to_string(fixture.path("out/r.jsonl")).unwrap();
     assert_eq!(record.matches(r#""kind":"target""#).count(), 2);
     assert_eq!(record.matches(r#""verdict":"met""#).count(), 2);
+    // A text takes its numbers from the record.
+    let check = |text: &str| {
+        fixture.write("paper.tex", text);
+        fixture.harness("report out --record out/r.jsonl --check paper.tex")
+    };
+    assert_eq!(check("No number.").code, 3);
+    let numbers = fs::read_to_string(fixture.path("out/numbers.tex")).unwrap();
+    let key = numbers.split("\\defresult{").nth(2).unwrap().split('}').next().unwrap();
+    let right = check(&format!("It takes \\result{{{key}}}."));
+    assert!(
+        right.code == 0 && right.printed.contains("1 numbers compared, 0 findings"),
+        "{}",
+        right.printed
+    );
+    let wrong = check(&format!("It takes \\result{{{key}}},\nor 98.76543 s."));
+    assert!(
+        wrong.code == 1 && wrong.printed.contains("line 2: 98.76543 is written by hand"),
+        "{}",
+        wrong.printed
+    );
 }
 
 #[test]

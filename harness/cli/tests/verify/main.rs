@@ -108,6 +108,20 @@ fn an_invalid_case_that_the_mesher_accepts_is_a_failure() {
     assert!(outcome.printed.contains("the mesher accepts an invalid case"), "{}", outcome.printed);
 }
 
+/// The mesher accepts the case, which the harness cannot read: the user's mistake, not the mesher's.
+#[test]
+fn a_geometry_that_the_report_would_replace_is_invalid_input() {
+    let fixture = Fixture::new();
+    fixture.write("case.toml", "spacing_min = 1.0\ngeometry = \"body.stl\"\n");
+    fixture.write("body.stl", "solid body");
+    let body = fixture.path("body.stl");
+    let outcome = fixture.verify(&["--no-mpi", "--json", body.to_str().unwrap()]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("give the output another name"), "{}", outcome.printed);
+    assert!(!outcome.printed.contains("accepts"), "{}", outcome.printed);
+    assert_eq!(fixture.read("body.stl"), "solid body");
+}
+
 #[test]
 fn an_unknown_case_is_invalid_input() {
     let fixture = Fixture::new();

@@ -118,7 +118,7 @@ fn quaternion() -> impl Strategy<Value = [f64; 4]> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(8))]
+    #![proptest_config(ProptestConfig::with_cases(5))]
 
     /// Invariants are checked by the answer itself.
     #[test]

@@ -1,11 +1,13 @@
-//! `harness report DIR`: figures, a page and a LaTeX fragment from records.
+//! `harness report DIR`: figures, a page, a LaTeX fragment and macros of the numbers from records.
 
 mod balance;
 mod figures;
 mod groups;
 mod html;
 mod latex;
+pub mod numbers;
 mod paper;
+pub mod prose;
 mod rules;
 mod scaling;
 pub mod tables;
@@ -18,6 +20,7 @@ use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use contract::files::{named, write_atomically};
 use html::Drawn;
+use numbers::{Number, numbers};
 use rules::Broken;
 use std::fs;
 use std::io;
@@ -32,9 +35,11 @@ pub struct Written {
     pub figures: usize,
     /// The rules that are broken.
     pub broken: Vec<Broken>,
+    /// The results in `numbers.tex`.
+    pub numbers: Vec<Number>,
 }
 
-/// Writes figures, page and LaTeX fragment of a record into `directory`.
+/// Writes figures, page, LaTeX fragment and macros of a record into `directory`.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -52,7 +57,9 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let page = directory.join("index.html");
     write(&page, html::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
-    Ok(Written { page, figures: figures.len(), broken })
+    let numbers = numbers(&groups);
+    write(&directory.join("numbers.tex"), numbers::tex(&numbers))?;
+    Ok(Written { page, figures: figures.len(), broken, numbers })
 }
 
 /// Writes a figure in all formats.

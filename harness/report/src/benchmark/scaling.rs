@@ -42,10 +42,9 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    /// The groups of one provenance, by ranks.
-    fn with(&self, kind: Provenance) -> Vec<&Group> {
-        let of_kind = self.all.iter().copied().filter(|g| provenance(g) == kind);
-        let mut found: Vec<&Group> = of_kind.collect();
+    /// The groups whose times were obtained in one way, by ranks.
+    fn with(&self, how: &str) -> Vec<&Group> {
+        let mut found: Vec<&Group> = self.all.iter().copied().filter(|g| g.how() == how).collect();
         found.sort_by_key(|g| g.setup.ranks);
         found
     }
@@ -83,16 +82,17 @@ impl Study<'_> {
     fn speedup(&self) -> Figure {
         let Self { groups, subject, all, .. } = self;
         let mut series = vec![ideal(all, |r| r)];
-        let kinds = [Provenance::Measured, Provenance::Oversubscribed, Provenance::Projected];
-        for (style, kind) in kinds.into_iter().enumerate() {
+        for (style, how) in ["measured", "oversubscribed", "projected", "serial"].iter().enumerate()
+        {
             let speedup = |g: &&Group| {
                 let base = groups.reference(g).time_s.value;
                 point(g.setup.ranks as f64, g.time_s.falling(|time_s| base / time_s))
             };
-            let points: Vec<Point> = self.with(kind).iter().map(speedup).collect();
-            if !points.is_empty() {
-                let name = format!("{}, {}", subject.engine, kind.word());
-                series.push(Series::new(&name, kind, style, points));
+            let of = self.with(how);
+            if let Some(first) = of.first() {
+                let name = format!("{}, {how}", subject.engine);
+                let points: Vec<Point> = of.iter().map(speedup).collect();
+                series.push(Series::new(&name, provenance(first), style, points));
             }
         }
         let cells = all[0].cells();
@@ -131,7 +131,7 @@ impl Study<'_> {
     /// Global efficiency and its factors on simulated ranks.
     fn efficiency(&self) -> Option<Figure> {
         let Self { subject, experiment, .. } = self;
-        let simulated = self.with(Provenance::Projected);
+        let simulated = self.with("projected");
         let last = simulated.last().filter(|_| simulated.len() > 1)?;
         let factors: [(&str, Factor); 5] = [
             ("global", Efficiency::global),
@@ -176,7 +176,7 @@ impl Study<'_> {
     /// Time by phase, summed over ranks: with ideal scaling, all bars are equal.
     fn phases(&self) -> Option<Figure> {
         let Self { groups, subject, experiment, .. } = self;
-        let simulated = self.with(Provenance::Projected);
+        let simulated = self.with("projected");
         let last = &simulated.last()?.typical;
         let weak = *experiment == "weak";
         let time = |g: &Group, name: &str| {

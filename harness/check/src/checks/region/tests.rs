@@ -19,7 +19,8 @@ impl Geometry {
 
     fn survey<'a>(&'a self, tree: &'a Tree, band_cells: f64) -> Survey<'a> {
         let Self { terms, facets, truth, lattice } = self;
-        Survey { terms, tree, truth, facets, parity: Parity::new(lattice), band_cells }
+        let (parity, knows_crossing) = (Parity::new(lattice), band_cells == 0.0);
+        Survey { terms, tree, truth, facets, parity, band_cells, knows_crossing }
     }
 
     fn sides(&self, tree: &Tree, band_cells: f64) -> CheckResult {
@@ -34,6 +35,8 @@ impl Geometry {
         result
     }
 }
+
+const CROSSED: Position = Position::Near { crossed: true };
 
 /// A tetrahedron in a root of edge 8 with leaves of edge 1, without the facets from number `count`.
 fn tetrahedron(count: usize, seeds: &str) -> Case {
@@ -58,7 +61,7 @@ fn a_place_is_near_the_surface_or_in_a_component_that_is_kept_or_not() {
     let (outside, inside) = (Position::On(Side::Outside, false), Position::On(Side::Inside, true));
     // Within the body, far from it, in a leaf that a facet crosses, and in a child of it that none crosses.
     let paths: [&[u8]; 4] = [&[0, 7, 0], &[7, 7], &[0, 0, 7], &[0, 0, 7, 7]];
-    let expected = [inside, outside, Position::Near, Position::Near];
+    let expected = [inside, outside, CROSSED, CROSSED];
     assert_eq!(positions(4, "[]", &paths), expected);
     // Seeds decide, so that rays are not asked, even if the body is open.
     assert_eq!(positions(4, "[[2.5, 2.5, 2.5]]", &paths), expected);
@@ -92,10 +95,12 @@ fn places_within_the_band_are_not_judged() {
             let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
             facets.meeting(&facets.all(), low, high).is_empty()
         };
-        let expected = words.iter().filter(is_beyond).count() as u64;
+        // Without a band, crossed leaves are judged, too.
+        let judged = |word: &&u64| band_cells == 0.0 || is_beyond(word);
+        let expected = words.iter().filter(judged).count() as u64;
         let result = geometry.complete(&tree, band_cells);
         assert_eq!(result.examined, expected, "{band_cells}");
-        assert!((1..512).contains(&expected), "{expected}");
+        assert_eq!((1..512).contains(&expected), band_cells > 0.0, "{expected}");
         let findings = result.findings;
         assert!(!findings.is_empty(), "{band_cells}");
         for detail in findings.iter().map(|finding| &finding.detail) {
@@ -109,7 +114,7 @@ fn places_within_the_band_are_not_judged() {
 fn labelled(space: &Survey) -> Vec<u64> {
     let side = |octant: &Octant| match space.position(*octant) {
         Position::On(side, _) => Some(side),
-        Position::Near => Some(Side::Crossing),
+        Position::Near { .. } => Some(Side::Crossing),
         Position::Undecided => Some(Side::Outside),
     };
     contract::testing::words_with_sides(|o| o.level < 3, side)
@@ -130,7 +135,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
                 let facets = &geometry.facets;
                 facets.meeting(&facets.all(), low, high).is_empty()
             };
-            around.into_iter().find(is_free).map_or(Position::Near, |o| space.position(o))
+            around.into_iter().find(is_free).map_or(CROSSED, |o| space.position(o))
         };
         let count =
             |of: &dyn Fn(Position) -> bool| words.iter().filter(|w| of(position(w))).count() as u64;
@@ -154,7 +159,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         if let Some(at) = at(Position::Undecided).or(Some(far)) {
             spurious[at] = spurious[at] & !3 | Side::Crossing as u64;
         }
-        lost[at(Position::Near).unwrap()] &= !3;
+        lost[at(CROSSED).unwrap()] &= !3;
         for (words, text) in [(spurious, "the crossing leaf"), (lost, "is crossed by a facet")] {
             let result = check(&words);
             assert!(
@@ -166,33 +171,44 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
 }
 
 #[test]
-fn a_hole_that_the_geometry_crosses_is_a_finding_if_the_band_has_no_width() {
+fn crossed_leaves_are_kept_or_deleted_as_the_case_says_unless_the_band_hides_them() {
     for keep_crossing in [true, false] {
         let case = Case { keep_crossing, ..tetrahedron(4, "[]") };
         let (geometry, none) = (Geometry::of(&case), Tree::default());
-        let space = geometry.survey(&none, 0.0);
-        let mut words = labelled(&space);
-        words.retain(|w| w & 3 != Side::Outside as u64);
-        let inside = words.iter().filter(|&w| w & 3 == Side::Inside as u64).count() as u64;
-        let crossing = |w: &u64| w & 3 == Side::Crossing as u64;
-        let lost = words.remove(words.iter().position(crossing).unwrap());
-        let check = |words: &[u64], band_cells| {
-            let result = geometry.complete(&Tree::of_words(words), band_cells);
-            let first = result.findings.first().map(|finding| finding.detail.clone());
-            (first, result.findings_total, result.examined)
+        let is_crossing = |w: &u64| w & 3 == Side::Crossing as u64;
+        let kept = |w: &u64| is_crossing(w) && keep_crossing || w & 3 == Side::Inside as u64;
+        let words = labelled(&geometry.survey(&none, 0.0));
+        let right: Vec<u64> = words.iter().copied().filter(kept).collect();
+        let check = |words: &[u64], band_cells, knows_crossing| {
+            let tree = Tree::of_words(words);
+            let mut result = CheckResult::new("complete");
+            Survey { knows_crossing, ..geometry.survey(&tree, band_cells) }
+                .check_complete(&mut result);
+            result
         };
-        let hole = |w| format!("the mesh has a hole: {}", case.root.describe(&word::octant(w)));
-        let (first, findings, examined) = check(&words, 0.0);
-        assert_eq!((first.is_some(), findings), (keep_crossing, u64::from(keep_crossing)));
-        assert!(!keep_crossing || first == Some(hole(lost)));
-        // The leaves within, the octants without leaves around the body, and the hole.
-        assert!(examined > inside + findings, "{examined}");
-        assert_eq!((check(&words, 0.1).0, check(&words, 0.1).1), (None, 0));
-        let at = words.iter().position(|w| w & 3 == Side::Inside as u64).unwrap();
-        let lost = words.remove(at);
-        let (first, findings, same) = check(&words, 0.0);
-        assert_eq!((findings, same), (1 + u64::from(keep_crossing), examined));
-        assert!(keep_crossing || first == Some(hole(lost)));
+        // All crossed leaves wrong, and one of them.
+        let crossed: Vec<u64> = words.iter().copied().filter(is_crossing).collect();
+        for wrong in [&crossed[..], &crossed[..1]] {
+            let mut words = right.clone();
+            words.retain(|w| !wrong.contains(w));
+            if !keep_crossing {
+                words.extend(wrong);
+                words.sort_unstable();
+            }
+            let what = if keep_crossing { "the mesh has a hole" } else { "a leaf must be deleted" };
+            let octant = case.root.describe(&word::octant(wrong[0]));
+            for band_cells in [0.0, 1.0] {
+                let result = check(&words, band_cells, true);
+                assert_eq!(result.findings_total, wrong.len() as u64, "{result}");
+                assert_eq!(result.findings[0].detail, format!("{what}: {octant}"));
+                assert_eq!(check(&right, band_cells, true).findings_total, 0);
+            }
+            assert_eq!(check(&words, 0.1, false).findings_total, 0);
+        }
+        let inside = right.iter().position(|w| !is_crossing(w)).unwrap();
+        let mut words = right.clone();
+        words.remove(inside);
+        assert_eq!(check(&words, 0.0, true).findings_total, 1);
     }
 }
 

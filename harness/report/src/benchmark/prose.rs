@@ -1,0 +1,163 @@
+//! The numbers of a LaTeX text against a record: `harness report DIR --check paper.tex`.
+//!
+//! A finding is a `\result` of a key that the record does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the
+//! record, or a number of three or more significant digits that is written by hand and that no result rounds to. Numbers in comments,
+//! in arguments of commands that name something, and lengths are not read; years and section numbers have too few digits or no point.
+
+use super::numbers::Number;
+
+/// What a text has.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Checked {
+    /// Numbers that were compared with the record.
+    pub compared: usize,
+    /// What is wrong, with line numbers.
+    pub findings: Vec<String>,
+}
+
+/// Compares the numbers of a text with the results of a record.
+pub fn check(text: &str, numbers: &[Number]) -> Checked {
+    let mut checked = Checked::default();
+    for (line, content) in (1..).zip(text.lines()) {
+        let code = without_comment(content);
+        let mut find = |what: Option<String>| {
+            checked.compared += 1;
+            checked.findings.extend(what.map(|what| format!("line {line}: {what}")));
+        };
+        if let Some(arguments) = code.trim_start().strip_prefix("\\defresult") {
+            find(differs(&groups(arguments), numbers));
+            continue;
+        }
+        for key in uses(code) {
+            let known = numbers.iter().any(|number| number.key == key);
+            find((!known).then(|| format!("the record has no result {key}")));
+        }
+        for literal in literals(code) {
+            let known = numbers.iter().any(|number| rounds_to(number, literal));
+            find(
+                (!known)
+                    .then(|| format!("{literal} is written by hand, and no result rounds to it")),
+            );
+        }
+    }
+    checked
+}
+
+/// The line up to its comment.
+fn without_comment(line: &str) -> &str {
+    let is_start = |&(at, _): &(usize, &str)| !line[..at].ends_with('\\');
+    line.match_indices('%').find(is_start).map_or(line, |(at, _)| &line[..at])
+}
+
+/// The contents of the groups `{...}` at the beginning of a text.
+fn groups(text: &str) -> Vec<&str> {
+    text.split('{').skip(1).filter_map(|group| Some(group.split_once('}')?.0)).collect()
+}
+
+/// What a definition says that the record does not say.
+fn differs(arguments: &[&str], numbers: &[Number]) -> Option<String> {
+    let [key, value, interval, _] = arguments else {
+        return Some("\\defresult needs four arguments".to_owned());
+    };
+    match numbers.iter().find(|number| number.key == *key) {
+        None => Some(format!("the record has no result {key}")),
+        Some(n) if n.value != *value || n.interval != *interval => Some(format!(
+            "{key} is {value} ({interval}) here and {} ({}) in the record",
+            n.value, n.interval
+        )),
+        Some(_) => None,
+    }
+}
+
+/// The keys of the uses of `\result`.
+fn uses(code: &str) -> impl Iterator<Item = &str> {
+    code.split("\\result").skip(1).filter_map(|rest| {
+        let rest = match rest.strip_prefix('[') {
+            Some(option) => option.split_once(']')?.1,
+            None => rest,
+        };
+        Some(rest.strip_prefix('{')?.split_once('}')?.0)
+    })
+}
+
+/// Numbers with a decimal point and three or more significant digits, as they stand in the text.
+fn literals(code: &str) -> impl Iterator<Item = &str> {
+    let not_part = |c: char| !c.is_ascii_digit() && c != '.';
+    let is_start = move |at: usize| code[..at].chars().next_back().is_none_or(not_part);
+    let starts = code.char_indices().filter(move |&(at, c)| c.is_ascii_digit() && is_start(at));
+    starts.filter_map(move |(at, _)| {
+        let end = code[at..].find(not_part).map_or(code.len(), |length| at + length);
+        let literal = code[at..end].trim_end_matches('.');
+        let digits = literal.trim_start_matches(['0', '.']).replace('.', "").len();
+        let is_number = literal.matches('.').count() == 1 && digits >= 3;
+        (is_number && !is_length(&code[end..]) && !is_name(&code[..at])).then_some(literal)
+    })
+}
+
+/// Whether a unit of TeX follows, or a length such as `\textwidth`.
+fn is_length(rest: &str) -> bool {
+    let units = ["pt", "cm", "mm", "in", "em", "ex", "bp", "\\"];
+    units.iter().any(|unit| rest.starts_with(unit))
+}
+
+/// Whether the text ends within an option `[...]`, or within the argument of a command that names a label, a file or a source.
+fn is_name(before: &str) -> bool {
+    if before.rfind('[').is_some_and(|open| !before[open..].contains(']')) {
+        return true;
+    }
+    let Some(open) = before.rfind('{').filter(|&open| !before[open..].contains('}')) else {
+        return false;
+    };
+    let command = &before[..open];
+    let command = if command.ends_with(']') {
+        command.rsplit_once('[').map_or("", |(c, _)| c)
+    } else {
+        command
+    };
+    ["label", "ref", "cite", "input", "result", "includegraphics", "url", "usepackage", "bibitem"]
+        .iter()
+        .any(|name| command.ends_with(name))
+}
+
+/// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
+fn rounds_to(number: &Number, literal: &str) -> bool {
+    let decimals = literal.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let ends = number.interval.split("--");
+    ends.chain([number.value.as_str()]).any(|text| {
+        let value: Result<f64, _> = text.replace(',', "").parse();
+        value.is_ok_and(|value| text == literal || format!("{value:.decimals$}") == literal)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(key: &str, value: &str, interval: &str) -> Number {
+        Number { key: key.into(), value: value.into(), interval: interval.into(), unit: "s" }
+    }
+
+    #[test]
+    fn unknown_keys_old_copies_and_numbers_by_hand_are_found() {
+        let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
+        let findings = |text: &str| check(text, &record).findings;
+        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
+                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\%\n\
+                     \\defresult{a/time}{1.234}{1.10--1.30}{s}";
+        assert_eq!(check(right, &record), Checked { compared: 6, findings: vec![] });
+        for (text, part) in [
+            ("\\result{a/tim}", "line 1: the record has no result a/tim"),
+            ("x\n1.25 s", "line 2: 1.25 is written by hand"),
+            ("\\textbf{12.4}", "12.4 is written by hand"),
+            (
+                "\\defresult{a/time}{1.3}{1.10--1.30}{s}",
+                "a/time is 1.3 (1.10--1.30) here and 1.234",
+            ),
+            ("\\defresult{b}{1.3}{}{}", "no result b"),
+        ] {
+            let found = findings(text);
+            assert!(found.len() == 1 && found[0].contains(part), "{text}: {found:?}");
+        }
+        assert_eq!(check("No number at all.", &record).compared, 0);
+    }
+}
