@@ -1,7 +1,7 @@
 //! Forests for `p8est_load` of p4est 2, which deal.II, t8code and ForestClaw build on.
 //!
 //! The file is that of `p8est_save`: the connectivity of one tree, whose vertices are the corners of the root; the header; and
-//! the quadrants in Morton order. It is described in `contract::import::p4est`, which reads it.
+//! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
 //! data of each quadrant, one byte, is its side or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
@@ -12,7 +12,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use contract::files;
-use contract::import::p4est::{ALIGNMENT, FILLER, FORMAT};
+use contract::import::forest::{ALIGNMENT, FORMAT};
+use contract::import::p4est::FILLER;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};

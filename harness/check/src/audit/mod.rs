@@ -48,7 +48,7 @@ pub struct AuditReport {
     pub checks: Vec<CheckResult>,
     /// Number of leaves.
     pub leaves: u64,
-    /// Number of distinct nodes of their tree.
+    /// Number of distinct nodes of their tree; 0 for a forest, which is audited leaf by leaf.
     pub nodes: u64,
     /// Wall time for reading, merging, counting and building the tree.
     pub time_read_s: f64,
@@ -110,9 +110,11 @@ impl fmt::Display for AuditReport {
         }
         let Self { leaves, nodes, time_read_s, time_wall_s, .. } = self;
         let rate = *leaves as f64 / time_wall_s.max(1e-9) / 1e6;
+        let distinct =
+            if *nodes > 0 { format!(" ({nodes} distinct octants)") } else { String::new() };
         write!(
             f,
-            "{leaves} leaves ({nodes} distinct octants) in {time_wall_s:.2} s, of which reading \
+            "{leaves} leaves{distinct} in {time_wall_s:.2} s, of which reading \
              {time_read_s:.2} s: {rate:.1} M leaves/s"
         )
     }

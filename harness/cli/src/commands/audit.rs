@@ -3,16 +3,18 @@
 use super::import::Source;
 use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
-use check::audit::{AuditOptions, audit_against};
-use check::promises::Promises;
-use clap::Args;
+use check::audit::{AuditOptions, AuditReport, audit_against};
+use check::forest;
+use check::promises::{Promises, Touching};
+use clap::{Args, ValueEnum};
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use contract::files::named;
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::proof;
-use std::time::Duration;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// Longest time of the proven checker. It takes four seconds for ten million leaves, but who has more may wait.
 const LIMIT: Duration = Duration::from_secs(86_400);
@@ -26,7 +28,9 @@ Examples:
   harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
   harness audit mesh --case body.toml --promises p4est a mesh that need not keep the whole definition
-  harness audit mesh.vtu --promises 'balance = \"face\"' nothing but these promises
+  harness audit mesh.vtu --balance faces               nothing but the balance
+  harness audit forest.p8est --balance corners         every tree, and the balance across their faces, edges and corners
+  harness audit mesh.vtu --promises 'complete = true'  nothing but these promises
 
 Exit codes: 0 all checks hold; 1 a check has findings; 2 invalid input; 3 nothing was checked, memory does not suffice, or \
 Python, VTK or the proven checker is missing.")]
@@ -37,6 +41,10 @@ pub struct Arguments {
     /// a table of promises, or the promises themselves, such as 'complete = true, balance = "face"'
     #[arg(long, value_name = "ENGINE|PROMISES")]
     promises: Option<String>,
+    /// Check that leaves that touch in this way differ by at most one level, instead of the definition; in a forest of p4est also across
+    /// the boundaries of trees [default for such a forest: corners]
+    #[arg(long, value_enum, conflicts_with = "promises")]
+    balance: Option<Balance>,
     /// Also prove the mesh right by the checker of reference/proof, given the directory of T0 (mesher --ungraded --out BASE)
     #[arg(long, value_name = "BASE")]
     proved: Option<Input>,
@@ -54,12 +62,49 @@ pub struct Arguments {
     source: Source,
 }
 
+/// In what leaves touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Balance {
+    /// In part of a face
+    Faces,
+    /// In part of a face or an edge
+    Edges,
+    /// In a face, an edge or a corner
+    Corners,
+}
+
+impl Balance {
+    fn touching(self) -> Touching {
+        match self {
+            Self::Faces => Touching::Face,
+            Self::Edges => Touching::Edge,
+            Self::Corners => Touching::Corner,
+        }
+    }
+}
+
 /// Audits, prints and writes; returns the exit code.
 ///
 /// # Errors
 /// If the mesh cannot be read, or the engine does not support the case.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { mesh, promises, proved, require_checks, nodes_max, json, source } = arguments;
+    let Arguments { mesh, promises, balance, proved, require_checks, nodes_max, json, source } =
+        arguments;
+    let start = Instant::now();
+    if promises.is_none()
+        && proved.is_none()
+        && let Some(forest) = source.forest(mesh)?
+        && (balance.is_some() || !forest.is_one_cube())
+    {
+        if forest.connectivity.dimension == 2 && *balance == Some(Balance::Edges) {
+            let why = "quadrants have no edges but their faces: choose --balance faces or corners";
+            return Err(Failure::input(why));
+        }
+        let touching = balance.unwrap_or(Balance::Corners).touching();
+        let report = forest::audit(&forest, touching, start);
+        print(&report, json.as_deref())?;
+        return Ok(verdict(&report, *require_checks));
+    }
     let engine = promises.as_deref().map(promising).transpose()?;
     let case = source.read_case()?;
     if let (Some(engine), Some(case)) = (&engine, &case)
@@ -72,8 +117,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let directory = &opened.dir;
     let default = AuditOptions::default();
     let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
-    let definition = Promises::of_definition();
-    let promises = engine.as_ref().map_or(&definition, |engine| &engine.promises);
+    let otherwise = match balance {
+        Some(balance) => Promises { balance: Some(balance.touching()), ..Promises::default() },
+        None => Promises::of_definition(),
+    };
+    let promises = engine.as_ref().map_or(&otherwise, |engine| &engine.promises);
     let checker = Paths::find().proven_checker;
     if let Some(why) = proved.as_ref().and_then(|_| proof::lacks(&checker)) {
         return Err(Failure::missing(why));
@@ -86,24 +134,35 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             Err(failure) => unproven = Some(Failure::from(failure)),
         }
     }
-    report.check_invariants();
-    println!("{report}");
-    if let Some(path) = json {
-        let written = AuditRecord::of(&report).write(path);
-        written.map_err(|error| named(path, &error))?;
-    }
+    print(&report, json.as_deref())?;
     match unproven {
         Some(failure) if report.holds() => return Err(failure),
         Some(failure) => println!("left out: proof: {}", failure.why),
         None => {}
     }
+    Ok(verdict(&report, *require_checks))
+}
+
+/// Prints the report, and writes it if `json` asks for that.
+fn print(report: &AuditReport, json: Option<&Path>) -> Result<(), Failure> {
+    report.check_invariants();
+    println!("{report}");
+    if let Some(path) = json {
+        let written = AuditRecord::of(report).write(path);
+        written.map_err(|error| named(path, &error))?;
+    }
+    Ok(())
+}
+
+/// The exit code.
+fn verdict(report: &AuditReport, require_checks: bool) -> u8 {
     let not_run = || report.not_run().next().is_some();
-    Ok(match report.holds() {
+    match report.holds() {
         false => EXIT_FAILED,
         true if !report.checked_anything() || report.exceeds_memory() => EXIT_MISSING,
-        true if *require_checks && not_run() => EXIT_MISSING,
+        true if require_checks && not_run() => EXIT_MISSING,
         true => EXIT_HOLDS,
-    })
+    }
 }
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.

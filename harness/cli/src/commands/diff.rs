@@ -2,7 +2,8 @@
 
 use super::import::Source;
 use super::values::Input;
-use check::diff;
+use check::checks::CheckResult;
+use check::{diff, forest};
 use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
@@ -11,7 +12,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Prints the inputs and counts that differ, the first leaf that differs, and the rule of reference/DEFINITION.md that decides \
-which mesh is right.
+which mesh is right. Forests of p4est with many trees, or of quadrants, are compared tree by tree.
 
 Options for reading apply to each mesh that is not a leaf-set directory. Exit codes: 0 the meshes are the same; 1 their leaves \
 or their roots differ; 2 invalid input; 3 Python or VTK is missing.")]
@@ -34,6 +35,14 @@ pub struct Arguments {
 /// If a mesh or the case cannot be read.
 pub fn run(Arguments { a, b, ignore_root, source }: &Arguments) -> Result<u8, Failure> {
     source.refuse_unused(&[a, b])?;
+    if let [Some(a), Some(b)] = [source.forest(a)?, source.forest(b)?]
+        && !(*ignore_root || a.is_one_cube() && b.is_one_cube())
+    {
+        let results = forest::diff(&a, &b);
+        results.iter().for_each(|result| println!("{result}"));
+        let is_same = results.iter().all(CheckResult::holds);
+        return Ok(if is_same { EXIT_HOLDS } else { EXIT_FAILED });
+    }
     let case = source.read_case()?;
     let [of_a, of_b] = [source.open(a, case.as_ref())?, source.open(b, case.as_ref())?];
     let report = diff::diff(&of_a.dir, &of_b.dir, case.as_ref()).map_err(Failure::input)?;

@@ -5,7 +5,8 @@ use clap::Args;
 use contract::case::Case;
 use contract::failure::EXIT_HOLDS;
 use contract::failure::Failure;
-use contract::import::{Format, Position, Request};
+use contract::import::forest::{self, Forest};
+use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
 use contract::manifest::{self, Manifest, Sides};
 use contract::word::{self, KEY_END};
@@ -77,6 +78,19 @@ impl Source {
             return Err(Failure::input(format!("{} {why}", meshes[0].display())));
         }
         Ok(())
+    }
+
+    /// The trees of a file of p4est, unless options ask for one mesh in a root.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn forest(&self, mesh: &Path) -> Result<Option<Forest>, Failure> {
+        let Self { format, root, case, sides, .. } = self;
+        let is_one_mesh = root.is_some() || case.is_some() || sides.is_some();
+        if is_one_mesh || format.or_else(|| guess(mesh).ok()) != Some(Format::P4est) {
+            return Ok(None);
+        }
+        Ok(Some(forest::read(mesh).map_err(|error| error.of_file(mesh))?))
     }
 
     /// Reads the case, if one is given.

@@ -1,6 +1,6 @@
 //! Meshes in the formats of other programs, as leaf sets.
 //!
-//! - [`words`](mod@words), [`p4est`]: the formats that are read here, as cubes. VTK, tables, discretize and OpenFOAM are read in Python,
+//! - [`words`](mod@words), [`p4est`]: the formats that are read here, as cubes; [`forest`]: the files of p4est as they are. VTK, tables, discretize and OpenFOAM are read in Python,
 //!   which the crate `run` starts;
 //! - [`htg`]: the trees that this repository writes in VTKHDF, of any size;
 //! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
@@ -9,6 +9,7 @@
 //! No reader allocates memory for a count before the file has been seen to be long enough for it.
 
 pub mod cells;
+pub mod forest;
 pub mod htg;
 mod leaf_set;
 pub mod p4est;
@@ -42,7 +43,7 @@ pub enum Format {
     Table,
     /// VTK: legacy .vtk, .vtu, .pvtu, .htg, and VTKHDF with a hyper-tree grid or unstructured grid
     Vtk,
-    /// A forest that p4est wrote with p8est_save
+    /// A forest that p4est wrote with p4est_save or p8est_save
     P4est,
     /// A discretize TreeMesh: UBC text, or JSON
     Discretize,
@@ -146,7 +147,7 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") {
         return Some(Format::Vtk);
     }
-    if starts(b"p8est\0\0\0") {
+    if forest::is_head(head) {
         return Some(Format::P4est);
     }
     // Binary data may follow in the same file.
@@ -239,7 +240,7 @@ mod tests {
             (b"! octree\n16 16 16\n0 0 8\n", Some(Format::Discretize)),
             (b"# made by hand\nx,y,z,level\n0,0,0,1\n", Some(Format::Table)),
             (b"0 0 0 1\n", Some(Format::Table)),
-            (b"p4est\0\0\0", None),
+            (b"p4est\0\0\0", Some(Format::P4est)),
             (b"", None),
             (b"solid body\n", None),
         ];

@@ -1,9 +1,13 @@
-//! Forests of p4est. What is accepted becomes a leaf set, and its leaves tile no place twice.
+//! Forests of p4est. What is accepted becomes a leaf set, and its leaves tile no place twice; any forest can be audited, and is
+//! the same as itself.
 
 use crate::Scratch;
-use contract::import::{self, Format, Request, leaf_set};
+use check::checks::CheckResult;
+use check::promises::Touching;
+use contract::import::{self, Format, Request, forest, leaf_set};
 use contract::lattice::Root;
 use contract::word;
+use std::time::Instant;
 
 /// The first byte chooses options.
 pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
@@ -12,6 +16,11 @@ pub(super) fn run(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     // Only a panic is a fault here. Tried for half of the option bytes.
     if options & 16 == 16 {
         let _ = import::guess(path);
+    }
+    if let Ok(forest) = forest::read(path) {
+        let report = check::forest::audit(&forest, Touching::Corner, Instant::now());
+        assert_eq!(report.leaves, forest.leaves.iter().flatten().count() as u64);
+        assert!(check::forest::diff(&forest, &forest).iter().all(CheckResult::holds));
     }
     let request = Request {
         sides: (options & 1 == 1).then(|| "data".to_owned()),

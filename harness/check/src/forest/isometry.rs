@@ -1,0 +1,109 @@
+//! Cubes of one length, their corners and edges, and the isometries that lay them side by side.
+//!
+//! Trees are 2^30 units long, whatever the version of p4est. Faces are numbered -x, x, -y, y, -z, z, corners by the bits of x, y, z, and edges by
+//! their direction and then as corners, as in p4est. A directed edge has its number, or 12 more if it runs downwards.
+
+/// Length of a tree.
+pub const LENGTH: i64 = 1 << 30;
+/// Number of edges of a cube.
+pub const EDGES: usize = 12;
+
+/// A signed permutation of the axes, and a shift.
+#[derive(Clone, Copy, Debug)]
+pub struct Isometry {
+    to: [usize; 3],
+    is_reversed: [bool; 3],
+    shift: [i64; 3],
+}
+
+impl Isometry {
+    /// The minimum corner of the image of a cube; of a point, if `size` is 0.
+    pub fn of_cube(&self, corner: [i64; 3], size: i64) -> [i64; 3] {
+        let mut image = [0; 3];
+        for axis in 0..3 {
+            let along = corner[axis];
+            let turned = if self.is_reversed[axis] { -along - size } else { along };
+            image[self.to[axis]] = self.shift[self.to[axis]] + turned;
+        }
+        image
+    }
+
+    /// The isometry from the tree with the face `low` to the tree with the face `high`, which is not lower: the first corner of `low` becomes
+    /// this corner of `high`.
+    pub fn gluing(dimension: usize, low: usize, high: usize, orientation: usize) -> Self {
+        let (from, onto) = (across(dimension, low / 2), across(dimension, high / 2));
+        let candidate = |swapped: bool| {
+            let mut glued = Self { to: [0, 1, 2], is_reversed: [false; 3], shift: [0; 3] };
+            // The outward normal becomes the inward one.
+            glued.to[low / 2] = high / 2;
+            glued.is_reversed[low / 2] = low % 2 == high % 2;
+            for (i, &axis) in from.iter().enumerate() {
+                let j = if swapped { 1 - i } else { i };
+                glued.to[axis] = onto[j];
+                glued.is_reversed[axis] = orientation >> j & 1 == 1;
+            }
+            let first = glued.of_cube(face_corner(dimension, low, 0), 0);
+            let wanted = face_corner(dimension, high, orientation);
+            glued.shift = [0, 1, 2].map(|axis| wanted[axis] - first[axis]);
+            glued
+        };
+        let straight = candidate(false);
+        if dimension == 2 || straight.is_rotation() { straight } else { candidate(true) }
+    }
+
+    fn is_rotation(&self) -> bool {
+        let exchanged = (0..3).filter(|&axis| self.to[axis] != axis).count();
+        let reversed = self.is_reversed.iter().filter(|&&r| r).count();
+        // Two exchanged axes are a reflection; three are a rotation.
+        (usize::from(exchanged == 2) + reversed) % 2 == 0
+    }
+
+    /// The isometry back.
+    pub fn inverse(&self) -> Self {
+        let mut inverse = Self { to: [0; 3], is_reversed: [false; 3], shift: [0; 3] };
+        for axis in 0..3 {
+            let image = self.to[axis];
+            inverse.to[image] = axis;
+            inverse.is_reversed[image] = self.is_reversed[axis];
+            let shift = self.shift[image];
+            inverse.shift[axis] = if self.is_reversed[axis] { shift } else { -shift };
+        }
+        inverse
+    }
+}
+
+/// The axes other than this one.
+fn across(dimension: usize, axis: usize) -> Vec<usize> {
+    (0..dimension).filter(|&other| other != axis).collect()
+}
+
+/// A corner of a tree as a point.
+pub fn point(corner: usize) -> [i64; 3] {
+    [0, 1, 2].map(|axis| (corner >> axis & 1) as i64 * LENGTH)
+}
+
+/// The corner of a tree that a point is.
+pub fn corner_at(point: [i64; 3]) -> usize {
+    (0..3).filter(|&axis| point[axis] == LENGTH).map(|axis| 1 << axis).sum()
+}
+
+/// A corner of a face, numbered within it.
+fn face_corner(dimension: usize, face: usize, number: usize) -> [i64; 3] {
+    let along = across(dimension, face / 2);
+    let bits = along.iter().enumerate().map(|(i, axis)| (number >> i & 1) << axis);
+    point(bits.sum::<usize>() + ((face & 1) << (face / 2)))
+}
+
+/// The directed edge from a corner to a neighbouring one.
+pub fn edge_between(from: usize, to: usize) -> usize {
+    let axis = (from ^ to).trailing_zeros() as usize;
+    let bits = across(3, axis).into_iter().enumerate().map(|(i, a)| (from >> a & 1) << i);
+    4 * axis + bits.sum::<usize>() + if from > to { EDGES } else { 0 }
+}
+
+/// The corner in which a directed edge begins, or the one in which it ends.
+pub fn edge_end(edge: usize, end: bool) -> usize {
+    let (axis, number) = (edge % EDGES / 4, edge % 4);
+    let bits = across(3, axis).into_iter().enumerate().map(|(i, a)| (number >> i & 1) << a);
+    bits.sum::<usize>() + (usize::from(end != (edge >= EDGES)) << axis)
+}

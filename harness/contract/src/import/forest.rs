@@ -1,0 +1,283 @@
+//! Forests of p4est, in two and three dimensions, as `p4est_save` and `p8est_save` write them, and connectivities by themselves.
+//!
+//! The file is the connectivity (`p4est_connectivity_sink`), zero bytes up to a multiple of 32, a header of 64-bit numbers
+//! (format, sizes, quadrants up to the end of each rank, then of each tree), zero bytes again, and the quadrants: x, y, in three
+//! dimensions z, and level as 32-bit integers, each followed by the user's data. Numbers are those of the machine that wrote the
+//! file, which must be little-endian.
+//!
+//! No memory is allocated for a count before the file has been seen to be long enough for it. Nothing else is checked here: indices
+//! and quadrants are those of the file.
+
+use super::ImportError;
+use crate::files;
+use std::path::Path;
+
+/// `P4EST_ONDISK_FORMAT` and `P8EST_ONDISK_FORMAT`, by the dimension.
+const FORMATS: [(usize, u64); 2] = [(2, 0x0200_0009), (3, FORMAT)];
+/// `P8EST_ONDISK_FORMAT`.
+pub const FORMAT: u64 = 0x0300_0009;
+/// Header and quadrants begin at multiples of this number of bytes.
+pub const ALIGNMENT: usize = 32;
+
+/// Trees and how they are glued, as in the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Connectivity {
+    /// 2 or 3.
+    pub dimension: usize,
+    /// Number of trees.
+    pub trees: usize,
+    /// Coordinates of all vertices.
+    pub vertices: Vec<[f64; 3]>,
+    /// The vertices of each tree, if there are vertices.
+    pub tree_to_vertex: Vec<i32>,
+    /// The tree across each face.
+    pub tree_to_tree: Vec<i32>,
+    /// Its face, plus the number of faces times the orientation.
+    pub tree_to_face: Vec<i8>,
+    /// Edges at which trees meet; in two dimensions none.
+    pub edges: Lists,
+    /// Corners at which trees meet.
+    pub corners: Lists,
+    /// Attributes of all trees.
+    pub attributes: Vec<u8>,
+}
+
+/// Edges or corners at which trees meet: each is a list of places in trees.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lists {
+    /// The list that has a place of a tree, or -1; empty without lists.
+    pub of_tree: Vec<i32>,
+    /// Where each list begins, and the end of the last one.
+    pub offsets: Vec<i32>,
+    /// The trees of all lists.
+    pub trees: Vec<i32>,
+    /// Their edges or corners; 12 is added to an edge that runs in the opposite direction.
+    pub places: Vec<i8>,
+}
+
+/// A leaf, as in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quadrant {
+    /// The minimum corner, in units that depend on the version of p4est; z is 0 in two dimensions.
+    pub corner: [i32; 3],
+    /// The level.
+    pub level: i32,
+    /// The first byte of the user's data, or 0.
+    pub data: u8,
+}
+
+/// A forest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forest {
+    /// The trees.
+    pub connectivity: Connectivity,
+    /// The leaves of each tree; empty if the file is a connectivity alone.
+    pub leaves: Vec<Vec<Quadrant>>,
+    /// Bytes of the user's data per quadrant.
+    pub data_bytes: u64,
+}
+
+impl Forest {
+    /// Whether the mesh is an oct-tree in one root.
+    pub fn is_one_cube(&self) -> bool {
+        let Connectivity { dimension, trees, tree_to_tree, tree_to_face, edges, corners, .. } =
+            &self.connectivity;
+        let is_boundary = (0..).zip(tree_to_face).all(|(face, &to)| face == to);
+        let is_alone = edges.trees.is_empty() && corners.trees.is_empty() && is_boundary;
+        (*dimension, tree_to_tree.as_slice()) == (3, &[0; 6]) && *trees == 1 && is_alone
+    }
+}
+
+/// Whether a file with this head may be a forest.
+pub fn is_head(head: &[u8]) -> bool {
+    head.starts_with(b"p4est\0\0\0") || head.starts_with(b"p8est\0\0\0")
+}
+
+/// Reads a forest or a connectivity.
+///
+/// # Errors
+/// If the file cannot be read or is damaged.
+pub fn read(path: &Path) -> Result<Forest, ImportError> {
+    let bytes = files::read(path)?;
+    let mut input = Input { bytes: &bytes, at: 0 };
+    let (connectivity, format) = connectivity(&mut input)?;
+    let mut forest = Forest { connectivity, leaves: Vec::new(), data_bytes: 0 };
+    if input.at == bytes.len() {
+        return Ok(forest);
+    }
+    input.align()?;
+    let (ends, data_bytes) = forest_header(&mut input, forest.connectivity.trees, format)?;
+    input.align()?;
+    forest.data_bytes = data_bytes;
+    let (dimension, mut begin) = (forest.connectivity.dimension, 0);
+    let own_bytes = 4 * (dimension + 1);
+    for end in ends {
+        let count = end
+            .checked_sub(begin)
+            .ok_or_else(|| damaged("the trees' numbers of quadrants decrease"))?;
+        let stride = own_bytes as u64 + data_bytes;
+        let records = input.items(count, stride)?.chunks_exact(stride as usize);
+        let quadrant = |record: &[u8]| {
+            let number = |i| integer(&record[4 * i..][..4]);
+            let z = if dimension == 3 { number(2) } else { 0 };
+            let data = record.get(own_bytes).copied().unwrap_or(0);
+            Quadrant { corner: [number(0), number(1), z], level: number(dimension), data }
+        };
+        forest.leaves.push(records.map(quadrant).collect());
+        begin = end;
+    }
+    match input.at == bytes.len() {
+        true => Ok(forest),
+        false => Err(damaged(&format!("{} bytes follow its quadrants", bytes.len() - input.at))),
+    }
+}
+
+pub(super) fn damaged(why: &str) -> ImportError {
+    ImportError::content(format!("is not a usable file of p4est, because {why}"))
+}
+
+fn integer(four: &[u8]) -> i32 {
+    i32::from_le_bytes(four.try_into().expect("four bytes"))
+}
+
+/// The bytes of the file, and how many have been read.
+struct Input<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Input<'a> {
+    /// The next `count` items of `size` bytes each.
+    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], ImportError> {
+        let left = &self.bytes[self.at..];
+        match count
+            .checked_mul(size)
+            .and_then(|n| usize::try_from(n).ok())
+            .filter(|&n| n <= left.len())
+        {
+            Some(n) => {
+                self.at += n;
+                Ok(&left[..n])
+            }
+            None => Err(damaged(&format!(
+                "it ends at byte {} within {count} items of {size} bytes",
+                self.bytes.len()
+            ))),
+        }
+    }
+
+    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, ImportError> {
+        let bytes = self.items(count, 8)?;
+        Ok(bytes
+            .chunks_exact(8)
+            .map(|b| u64::from_le_bytes(b.try_into().expect("eight bytes")))
+            .collect())
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u64; N], ImportError> {
+        Ok(self.numbers(N as u64)?.try_into().expect("as many numbers as were read"))
+    }
+
+    /// As many indices for each of `count` items.
+    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, ImportError> {
+        Ok(self.items(count, 4 * each)?.chunks_exact(4).map(integer).collect())
+    }
+
+    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, ImportError> {
+        Ok(self.items(count, each)?.iter().map(|&byte| byte.cast_signed()).collect())
+    }
+
+    /// The lists of `count` edges or corners, but for `of_tree`.
+    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, ImportError> {
+        let offsets = self.indices(count.saturating_add(1), 1)?;
+        let pairs = if count > 0 { pairs } else { 0 };
+        let (trees, places) = (self.indices(pairs, 1)?, self.small(pairs, 1)?);
+        Ok(Lists { of_tree: Vec::new(), offsets, trees, places })
+    }
+
+    /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
+    fn align(&mut self) -> Result<(), ImportError> {
+        let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
+        self.items(padding as u64, 1).map(drop)
+    }
+}
+
+/// The connectivity, and the format of the file.
+fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), ImportError> {
+    let (dimension, expected) = match input.items(8, 1)? {
+        b"p4est\0\0\0" => FORMATS[0],
+        b"p8est\0\0\0" => FORMATS[1],
+        _ => return Err(damaged("it does not begin with p4est or p8est")),
+    };
+    input.items(24, 1)?;
+    let [
+        format,
+        index_bytes,
+        vertices,
+        trees,
+        edges,
+        edge_trees,
+        corners,
+        corner_trees,
+        attribute_bytes,
+        _,
+    ] = input.array::<10>()?;
+    if format.swap_bytes() == expected {
+        return Err(damaged("its bytes are swapped: a big-endian machine wrote it"));
+    }
+    if format != expected || index_bytes != 4 {
+        return Err(damaged(&format!(
+            "its format is {format:#x} with indices of {index_bytes} bytes, and {expected:#x} with 4 is supported"
+        )));
+    }
+    let if_any = |count: u64| if count > 0 { trees } else { 0 };
+    let children = 1 << dimension;
+    let faces = 2 * dimension as u64;
+    let coordinate = |b: &[u8]| f64::from_le_bytes(b.try_into().expect("eight bytes"));
+    let coordinates = input.items(vertices, 24)?.chunks_exact(24);
+    let vertices_read =
+        coordinates.map(|c| [0, 8, 16].map(|at| coordinate(&c[at..at + 8]))).collect();
+    let tree_to_edge = input.indices(if_any(edges), 12)?;
+    let tree_to_vertex = input.indices(if_any(vertices), children)?;
+    let tree_to_corner = input.indices(if_any(corners), children)?;
+    let tree_to_tree = input.indices(trees, faces)?;
+    let tree_to_face = input.small(trees, faces)?;
+    let attributes = input.items(trees, attribute_bytes)?.to_vec();
+    // p4est writes no offsets of edges in two dimensions.
+    let edge_lists =
+        if dimension == 3 { input.lists(edges, edge_trees)? } else { Lists::default() };
+    let corner_lists = input.lists(corners, corner_trees)?;
+    let connectivity = Connectivity {
+        dimension,
+        trees: trees as usize,
+        vertices: vertices_read,
+        tree_to_vertex,
+        tree_to_tree,
+        tree_to_face,
+        edges: Lists { of_tree: tree_to_edge, ..edge_lists },
+        corners: Lists { of_tree: tree_to_corner, ..corner_lists },
+        attributes,
+    };
+    Ok((connectivity, format))
+}
+
+/// Number of quadrants up to the end of each tree, and bytes of user data per quadrant.
+fn forest_header(
+    input: &mut Input,
+    trees: usize,
+    expected: u64,
+) -> Result<(Vec<u64>, u64), ImportError> {
+    let [format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
+    if format != expected || coordinate_bytes != 4 {
+        return Err(damaged("the header of the forest has another format than the connectivity"));
+    }
+    let of_ranks = input.numbers(ranks)?;
+    let of_trees = input.numbers(trees as u64)?;
+    if data_bytes > input.bytes.len() as u64 {
+        return Err(damaged(&format!("it states {data_bytes} bytes of data per quadrant")));
+    }
+    if of_ranks.last() != of_trees.last() {
+        return Err(damaged("ranks and trees have different numbers of quadrants"));
+    }
+    Ok((of_trees, data_bytes))
+}
