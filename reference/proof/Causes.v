@@ -13,13 +13,14 @@ Definition far (p q x y z : Z) : Z := Z.max 0 (Z.max (apart p q x) (Z.max (apart
 Inductive around := Nobody | Also (u : tree) (x y z : Z) (rest : around).
 
 Section Search.
-(** A leaf of a wanted kind, with an edge from [lo] to [hi], fewer than [reach] away from a cube of edge p. *)
-Variable wanted : tree -> bool.
+(** A leaf with an edge from [lo] to [hi], a crossing one if [crossing], fewer than [reach] away from a cube of edge p. *)
+Variable crossing : bool.
 Variables lo hi reach p : Z.
 
+Definition hopeless (u : tree) (q : Z) : bool := (hi <? least u q) || (most u q <? lo) || (crossing && negb (has Cross u)).
 (** One in u, which has edge q and is displaced by (x, y, z). *)
 Fixpoint find (u : tree) (q x y z : Z) : bool :=
-  if (reach <=? far p q x y z) || (hi <? least u q) || (most u q <? lo) || negb (wanted u) then false else
+  if hopeless u q || (reach <=? far p q x y z) then false else
   match u with
   | Cube _ => true
   | Node _ _ _ a b c d e f g h =>
@@ -37,12 +38,17 @@ Fixpoint find_around (s : around) (q x y z : Z) : bool :=
 End Search.
 
 Section Closer.
-(** Whether a subtree of edge q, at a distance d, may have leaves that are sought from cubes in one of edge p. *)
-Variable useful : Z -> tree -> Z -> Z -> bool.
-Variable p : Z.
+(** Whether a subtree may have leaves that are sought from cubes in one of edge p, and from where they are too far away. What is in no
+    list is not found: this decides what is accepted, not what that means. *)
+Variable useful : Z -> tree -> bool.
+Variables p reach : Z.
 
+Definition reaches (q d : Z) : bool := (sub d p <? reach) && (sub (sub 0 d) q <? reach).
 Definition also (u : tree) (x y z : Z) (rest : around) : around :=
-  if parent u && useful p u p (far p p x y z) then Also u x y z rest else rest.
+  match u with
+  | Cube _ => rest
+  | _ => if useful p u then if reaches p x && reaches p y && reaches p z then Also u x y z rest else rest else rest
+  end.
 (** The children, of edge p, of subtrees; a cube of edge p, displaced by (x, y, z), is the new place. *)
 Fixpoint closer (s : around) (x y z : Z) : around :=
   match s with
@@ -52,10 +58,12 @@ Fixpoint closer (s : around) (x y z : Z) : around :=
     match u with
     | Cube _ => rest
     | Node _ _ _ k0 k1 k2 k3 k4 k5 k6 k7 =>
-      let a := sub a x in let b := sub b y in let c := sub c z in
-      let a' := add a p in let b' := add b p in let c' := add c p in
-      if useful p u p (far p (add p p) a b c) then
-        also k0 a b c (also k1 a' b c (also k2 a b' c (also k3 a' b' c (also k4 a b c' (also k5 a' b c' (also k6 a b' c' (also k7 a' b' c' rest)))))))
+      if useful p u then
+        let a := sub a x in let b := sub b y in let c := sub c z in
+        let a' := add a p in let b' := add b p in let c' := add c p in
+        if reaches (add p p) a && reaches (add p p) b && reaches (add p p) c then
+          also k0 a b c (also k1 a' b c (also k2 a b' c (also k3 a' b' c (also k4 a b c' (also k5 a' b c' (also k6 a b' c' (also k7 a' b' c' rest)))))))
+        else rest
       else rest
     end
   end.
@@ -70,44 +78,55 @@ Section Causes.
 Variables n s : Z.
 Variable extra : bool.
 
-Definition any_kind (u : tree) : bool := true.
 (** A cube of edge p touches leaves that are finer than its children, or is split by the extra layer. *)
 Definition touched (p q x y z : Z) (near : around) : bool :=
-  find_around any_kind 1 (Z.shiftr p 2) 1 p near q x y z ||
-  (extra && (s <? p) && find_around (has Cross) 1 524288 1 p near q x y z).
-Definition may_touch (p : Z) (u : tree) (q d : Z) : bool := (d <=? 0) && ((mul 8 (least u q) <=? p) || (extra && has Cross u)).
+  find_around false 1 (Z.shiftr p 2) 1 p near q x y z ||
+  (extra && (s <? p) && find_around true 1 524288 1 p near q x y z).
+Definition may_touch (p : Z) (u : tree) : bool := (mul 8 (least u 0) <=? p) || (extra && has Cross u).
 
+Definition full (u : tree) : bool := match u with Cube Empty => false | _ => true end.
+Definition mark_leaf (u : tree) (early : bool) : tree := match u with Cube Empty => u | _ => if early then Cube Cross else Cube Outer end.
 (** The leaves of u: sources are [Cross], others are [Outer]. t is T0 there, p the edge, and [early] whether the parent was split
     before the layer that its children would make. *)
 Fixpoint mark_sources (t u : tree) (p q x y z : Z) (near : around) (early : bool) : tree :=
   match u with
-  | Cube Empty => u
-  | Cube _ => if early then Cube Cross else Cube Outer
+  | Cube _ => mark_leaf u early
   | Node _ _ _ a b c d e f g h =>
     let deeper := parent a || parent b || parent c || parent d || parent e || parent f || parent g || parent h in
     let early := parent t || deeper || touched p q x y z near in
-    let near := if deeper then descend may_touch p near q x y z else Nobody in
-    let z := Z.shiftr p 1 in
-    share (join Cross z
-      (mark_sources (kid false false false t) a z p 0 0 0 near early) (mark_sources (kid true false false t) b z p z 0 0 near early)
-      (mark_sources (kid false true false t) c z p 0 z 0 near early) (mark_sources (kid true true false t) d z p z z 0 near early)
-      (mark_sources (kid false false true t) e z p 0 0 z near early) (mark_sources (kid true false true t) f z p z 0 z near early)
-      (mark_sources (kid false true true t) g z p 0 z z near early) (mark_sources (kid true true true t) h z p z z z near early))
+    let w := Z.shiftr p 1 in
+    if deeper then
+      let near := descend may_touch p 1 near q x y z in
+      join Cross w
+        (mark_sources (kid false false false t) a w p 0 0 0 near early) (mark_sources (kid true false false t) b w p w 0 0 near early)
+        (mark_sources (kid false true false t) c w p 0 w 0 near early) (mark_sources (kid true true false t) d w p w w 0 near early)
+        (mark_sources (kid false false true t) e w p 0 0 w near early) (mark_sources (kid true false true t) f w p w 0 w near early)
+        (mark_sources (kid false true true t) g w p 0 w w near early) (mark_sources (kid true true true t) h w p w w w near early)
+    else if full a && full b && full c && full d && full e && full f && full g && full h then twig w early (if early then Cross else Outer)
+    else join Cross w (mark_leaf a early) (mark_leaf b early) (mark_leaf c early) (mark_leaf d early)
+                      (mark_leaf e early) (mark_leaf f early) (mark_leaf g early) (mark_leaf h early)
   end.
 
+(** Whether a leaf, or a parent of leaves, has only sources. *)
+Definition sources_only (t : tree) : bool :=
+  match t with
+  | Cube Cross => true
+  | Node _ _ _ (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) => true
+  | _ => false
+  end.
 (** A parent whose children are no sources has a source of their level fewer than n - 1 cells away. *)
 Definition late (t : tree) : bool := match t with Cube Outer | Cube Reached => true | _ => false end.
-Definition may_serve (p : Z) (u : tree) (q d : Z) : bool :=
-  has Cross u && (mul 4 (least u q) <=? p) && (mul 4 d <? mul (sub n 1) p).
+Definition may_serve (p : Z) (u : tree) : bool := has Cross u && (mul 4 (least u 0) <=? p).
 Fixpoint served (u : tree) (p q x y z : Z) (near : around) : bool :=
   match u with
   | Cube _ => true
   | Node _ _ _ a b c d e f g h =>
     let w := Z.shiftr p 1 in
     (if late a || late b || late c || late d || late e || late f || late g || late h
-     then find_around (has Cross) w w (mul (sub n 1) w) p near q x y z else true) &&
-    (if parent a || parent b || parent c || parent d || parent e || parent f || parent g || parent h then
-       let near := descend may_serve p near q x y z in
+     then find_around true w w (mul (sub n 1) w) p near q x y z else true) &&
+    (if sources_only a && sources_only b && sources_only c && sources_only d && sources_only e && sources_only f && sources_only g && sources_only h then true else
+     if parent a || parent b || parent c || parent d || parent e || parent f || parent g || parent h then
+       let near := descend may_serve p (Z.shiftr (add (mul (sub n 1) p) 3) 2) near q x y z in
        served a w p 0 0 0 near && served b w p w 0 0 near && served c w p 0 w 0 near && served d w p w w 0 near &&
        served e w p 0 0 w near && served f w p w 0 w near && served g w p 0 w w near && served h w p w w w near
      else true)
@@ -115,21 +134,15 @@ Fixpoint served (u : tree) (p q x y z : Z) (near : around) : bool :=
 
 (** * Pairs of leaves, marked *)
 
-(** A leaf that is no source touches no finer leaf. *)
-Definition sources_only (t : tree) : bool :=
-  match t with
-  | Cube Cross => true
-  | Node _ _ _ (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) (Cube Cross) => true
-  | _ => false
-  end.
 (** A leaf that is coarser than a source is n - 1 cells away from it. *)
 Definition source_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
   negb (has Cross u) || (mul (sub n 1) (Z.min (most u q) (Z.shiftr (most t p) 1)) <=? d).
-(** Both, and those of [graded_stop]. All of them concern a leaf and finer ones. *)
+Definition marked_skip (t : tree) (p : Z) (u : tree) (q : Z) : bool := most t p <=? least u q.
+(** Both, that a leaf that is no source touches no finer leaf, and the rules of [graded_stop]. All of them concern a leaf and finer ones. *)
 Definition marked_stop (wide : Z) (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
-  if most t p <=? least u q then true else
   graded_stop n wide t p u q d && ((0 <? d) || sources_only t) && source_stop t p u q d.
 (** A leaf that is coarser than the surface, or as coarse and no source, touches no crossing leaf. *)
-Definition extra_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool :=
-  (match t with Cube Cross => p <=? s | _ => most t p <? s end) || negb (has Cross u) || (0 <? d).
+Definition extra_skip (t : tree) (p : Z) (u : tree) (q : Z) : bool :=
+  (match t with Cube Cross => p <=? s | _ => most t p <? s end) || negb (has Cross u).
+Definition extra_stop (t : tree) (p : Z) (u : tree) (q d : Z) : bool := 0 <? d.
 End Causes.

@@ -13,9 +13,9 @@ Definition may_enclose : bool := match keep c with Keep_outside => negb has_seed
 
 Definition mark_seeds (t : tree) : tree :=
   fold_left (fun t '(p, q, r) => mark kind_of_flow 19 (Z.shiftr p 8) (Z.shiftr q 8) (Z.shiftr r 8) 0 0 0 524288 t) (seeds c) t.
-Definition unit (p : Z) : bool := (0 <=? Z.shiftr p 8) && (Z.shiftr p 8 <? 524288).
+Definition in_edge (p : Z) : bool := (0 <=? Z.shiftr p 8) && (Z.shiftr p 8 <? 524288).
 Definition seeds_reached (t : tree) : bool :=
-  forallb (fun '(p, q, r) => unit p && unit q && unit r &&
+  forallb (fun '(p, q, r) => in_edge p && in_edge q && in_edge r &&
                              same Reached (spot 19 (Z.shiftr p 8) (Z.shiftr q 8) (Z.shiftr r 8) 0 0 0 524288 t)) (seeds c).
 
 (** T0 in which the leaves that seeds reach, or the far field, are [Reached]. *)
@@ -45,13 +45,17 @@ Definition fate (far : bool) (k : kind) : kind :=
 
 Definition below : Z := match keep c with Keep_all => 20 | _ => surface c end.
 Definition extra : bool := negb (keep_crossing c) && (layer_cells c <? 3).
-(** The graded mesh g, and T0. *)
-Definition check_graded (t g : tree) : bool :=
+(** Functions of their own, so that extraction makes loops of their own from them. *)
+Definition walk_marked (n wide : Z) (m : tree) : bool := marked_skip m 524288 m 524288 || walk marked_skip (marked_stop n wide) 40 m m 524288 524288 0 0 0.
+Definition walk_extra (s : Z) (m g : tree) : bool := extra_skip s m 524288 g 524288 || walk (extra_skip s) extra_stop 40 m g 524288 524288 0 0 0.
+(** Both, one after the other or at once: the program evaluates them in two processes. *)
+Definition both (a b : unit -> bool) : bool := a tt && b tt.
+(** The graded mesh g, and T0; [rest] is what else there is to check. *)
+Definition check_graded (t g : tree) (rest : unit -> bool) : bool :=
   let n := layer_cells c in let s := Z.shiftr 524288 (surface c) in
   let m := mark_sources s extra t g 524288 524288 0 0 0 (Also g 0 0 0 Nobody) false in
-  walk (marked_stop n (Z.shiftr 2097152 below)) 40 m m 524288 524288 0 0 0 &&
-  (if extra then walk (extra_stop s) 40 m g 524288 524288 0 0 0 else true) &&
-  served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody).
+  both (fun _ => walk_marked n (Z.shiftr 2097152 below) m)
+       (fun _ => (if extra then walk_extra s m g else true) && served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody) && rest tt).
 
 Definition check_crossing (dropped : list part) (m d : tree) : bool :=
   if keep_crossing c then match dropped with [] => true | _ => false end
@@ -62,20 +66,14 @@ Definition check_inputs : bool :=
 
 Definition check (base mesh dropped : list part) (of_base of_mesh : manifest) : bool :=
   if check_inputs then
-    match build kind_of_flow base with None => false | Some t =>
-    if check_counts of_base base t && check_full t then
-      let t := flooded t in
-      if check_base t then
-        match build Cross mesh with None => false | Some m =>
-        if check_counts of_mesh mesh m then
-          match build Cross dropped with None => false | Some d =>
-          if check_crossing dropped m d then
-            match merge Cross m d 524288 with None => false | Some g =>
-            if overlay (fate (negb (every (fun k => negb (same Reached k)) t))) t g then check_graded t g else false
-            end
-          else false end
-        else false end
-      else false
-    else false end
+    match build kind_of_flow base with None => false | Some t0 =>
+    let t := flooded t0 in
+    match build Cross mesh with None => false | Some m =>
+    match build Cross dropped with None => false | Some d =>
+    match merge Cross m d 524288 with None => false | Some g =>
+    check_graded t g (fun _ =>
+      check_counts of_base base t0 && check_full t0 && check_base t && check_counts of_mesh mesh m && check_crossing dropped m d &&
+      overlay (fate (negb (every (fun k => negb (same Reached k)) t))) t g)
+    end end end end
   else false.
 End Check.

@@ -8,6 +8,9 @@ Strategy opaque [walk overlay flat deep mark_sources served].
 Lemma if_true (b x : bool) : b = true -> (if b then x else true) = true -> x = true.
 Proof. intros ->. trivial. Qed.
 
+Lemma rest_right c t g rest : check_graded c t g rest = true -> rest tt = true.
+Proof. unfold check_graded, both. intros H. apply andb_prop in H. destruct H as [_ H]. apply andb_prop in H. apply H. Qed.
+
 Section Graded.
 Variable c : inputs.
 Variables base mesh dropped : list leaf.
@@ -24,7 +27,8 @@ Hypothesis LB : forall b, In b (flat s1 19 0 0 0 t) <-> In b base.
 Hypothesis SG : sized Cross 19 g.
 Hypothesis LG : forall a, In a (flat Outside 19 0 0 0 g) <-> In a graded.
 Hypothesis OV : overlay fate t g = true.
-Hypothesis OK : check_graded c t g = true.
+Variable rest : unit -> bool.
+Hypothesis OK : check_graded c t g rest = true.
 
 Lemma root_octant : octant (cube 0 0 0 19).
 Proof.
@@ -48,10 +52,10 @@ Proof. unfold extra. rewrite andb_true_iff, negb_true_iff, Z.ltb_lt. reflexivity
 Let m := mark_sources s (extra c) t g 524288 524288 0 0 0 (Also g 0 0 0 Nobody) false.
 Let V := flat Outside 19 0 0 0 m.
 Let n := layer_cells c.
-Lemma parts : walk (marked_stop n (Z.shiftr 2097152 (below c))) 40 m m 524288 524288 0 0 0 = true /\
-  (extra c = true -> walk (extra_stop s) 40 m g 524288 524288 0 0 0 = true) /\ served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody) = true.
+Lemma parts : walk_marked n (Z.shiftr 2097152 (below c)) m = true /\ (extra c = true -> walk_extra s m g = true) /\ served n m 524288 524288 0 0 0 (Also m 0 0 0 Nobody) = true.
 Proof.
-  unfold check_graded in OK. cbv zeta in OK. rewrite surface_right in OK. apply andb_prop in OK. destruct OK as [A C]. apply andb_prop in A. destruct A as [A B].
+  unfold check_graded in OK. cbv zeta in OK. rewrite surface_right in OK. unfold both in OK. apply andb_prop in OK. destruct OK as [A B].
+  apply andb_prop in B. destruct B as [B _]. apply andb_prop in B. destruct B as [B C].
   split; [exact A|]. split; [|exact C]. intros X. exact (if_true _ _ X B).
 Qed.
 
@@ -77,7 +81,7 @@ Proof.
   exact (graded_octant c base mesh dropped G a A).
 Qed.
 Lemma m_parent : parent m = parent g.
-Proof. unfold m. destruct g as [[]|]; try reflexivity. cbn [mark_sources]. rewrite share_right. reflexivity. Qed.
+Proof. unfold m. destruct g as [[]|]; try reflexivity. cbn [mark_sources]. destruct (_ || parent _); [reflexivity|]. destruct (_ && _); [rewrite twig_right; reflexivity | reflexivity]. Qed.
 (** Only the root has no parent. *)
 Lemma has_parent o : In o V -> 1 <= level o -> parent m = true.
 Proof.
@@ -88,7 +92,7 @@ Qed.
 Lemma all_pairs a b : In a V -> In b V -> marked_rule n (below c) a b.
 Proof.
   pose proof (proj1 parts) as W. pose proof (proj1 all_marked) as M. revert a b.
-  exact (walk_all Outside _ _ (marked_stop_right n Hn (below c)) m m M M W).
+  exact (walk_all Outside _ _ _ (marked_skip_right n (below c)) (marked_stop_right n Hn (below c)) m m M M W).
 Qed.
 
 Lemma layers_right : layers c mesh dropped.
@@ -106,7 +110,7 @@ Qed.
 Lemma gradation_least : Statement.least c base mesh dropped.
 Proof.
   destruct all_marked as (M & TO & FROM & MARK).
-  apply (least_right c base mesh dropped G Hs V TO FROM).
+  apply (least_right c base mesh dropped Hs G V TO FROM).
   - intros a A L. apply MARK; [|exact A]. rewrite <- m_parent. exact (has_parent a A L).
   - intros a A L SO. refine (all_served n Hn V V_octant 19 m (sized_deep _ _ _ M) M 0 0 0 0 0 0 (Also m 0 0 0 Nobody) 19 root_octant (root_list V m M (fun o O => O)) _ (has_parent a A L) a A SO).
     rewrite E_root. apply parts.
@@ -115,6 +119,6 @@ Proof.
   - intros a b A B. apply (all_pairs a b A B).
   - intros KC N3 a b A B. destruct parts as (_ & P & _). specialize (P (proj2 extra_right (conj KC N3))). apply LG in B.
     assert (0 <= s) as S0 by (unfold s, cells; apply Z.pow_nonneg; lia).
-    exact (walk_all Outside _ _ (extra_stop_right s) m g M SG P a b A B).
+    exact (walk_all Outside _ _ _ (extra_skip_right s) (extra_stop_right s) m g M SG P a b A B).
 Qed.
 End Graded.

@@ -56,10 +56,9 @@ Section Least.
 Variable c : inputs.
 Variables base mesh dropped : list leaf.
 Let graded := mesh ++ dropped.
-Hypothesis G : region c base mesh dropped.
-Hypothesis Hn : 1 <= layer_cells c <= 4096.
-Hypothesis Hs : 0 <= surface c <= 19.
 Let s := cells (surface c).
+Hypothesis Hs : 0 <= surface c <= 19.
+Hypothesis G : region c base mesh dropped.
 
 (** The marked leaves. *)
 Variable V : list leaf.

@@ -43,26 +43,27 @@ Variable s0 : side.
 Variable L : list leaf.
 
 Section Find.
-Variable wanted : tree -> bool.
+Variable crossing : bool.
 Variables lo hi reach : Z.
 Hypothesis Hhi : hi <= 524288.
-Definition found (a o : leaf) : Prop := exists k, side_in s0 k = Some (side_of o) /\ wanted (Cube k) = true /\ lo <= edge o <= hi /\ distance a o < reach.
+Definition found (a o : leaf) : Prop := (crossing = true -> side_of o = Crossing) /\ lo <= edge o <= hi /\ distance a o < reach.
 
 Lemma find_right a : octant a -> forall h u, sized Cross h u -> forall x y z, octant (cube x y z h) ->
-  find wanted lo hi reach (edge a) u (E h) (x - cx a) (y - cy a) (z - cz a) = true -> exists o, In o (flat s0 h x y z u) /\ found a o.
+  find crossing lo hi reach (edge a) u (E h) (x - cx a) (y - cy a) (z - cz a) = true -> exists o, In o (flat s0 h x y z u) /\ found a o.
 Proof.
   intros A h u S. induction S as [h k | n u T M LE K IH B]; intros x y z O H.
-  - cbn [find] in H. destruct (_ || _) eqn:C in H; [discriminate|]. clear H.
-    apply orb_false_iff in C. destruct C as [C C4]. apply orb_false_iff in C. destruct C as [C C3]. apply orb_false_iff in C. destruct C as [C1 C2].
-    apply Z.leb_gt in C1. apply Z.ltb_ge in C2, C3. apply negb_false_iff in C4.
+  - cbn [find] in H. destruct (_ || _) eqn:C in H; [discriminate|]. clear H. unfold hopeless in C.
+    apply orb_false_iff in C. destruct C as [C C1]. apply orb_false_iff in C. destruct C as [C C4]. apply orb_false_iff in C. destruct C as [C2 C3].
+    apply Z.leb_gt in C1. apply Z.ltb_ge in C2, C3.
     assert (exists s, side_in s0 k = Some s) as [s K].
     { destruct k; try (eexists; reflexivity). cbn [least] in C2. unfold none in C2. lia. }
-    exists (Leaf x y z (19 - Z.of_nat h) s). split; [apply flat_cube; exists s; auto|]. exists k. split; [exact K|]. split; [exact C4|].
+    exists (Leaf x y z (19 - Z.of_nat h) s). split; [apply flat_cube; exists s; auto|]. split.
+    { intros W. rewrite W in C4. cbn [has andb] in C4. apply negb_false_iff in C4. destruct k; try discriminate. cbn [side_in] in K. cbn [side_of]. congruence. }
     assert (least (Cube k) (E h) = E h /\ most (Cube k) (E h) = E h) as [L1 L2] by (destruct k; cbn [side_in] in K; try discriminate; split; reflexivity).
     rewrite L1, L2 in *. unfold edge. cbn [level]. rewrite E_cells. split; [lia|].
     change (distance a (Leaf x y z (19 - Z.of_nat h) s)) with (distance a (cube x y z h)). rewrite <- far_distance by assumption.
     rewrite cube_edge. exact C1.
-  - assert (exists i j k, find wanted lo hi reach (edge a) (kid i j k u) (E n) (x + off i n - cx a) (y + off j n - cy a) (z + off k n - cz a) = true) as (i & j & k & F).
+  - assert (exists i j k, find crossing lo hi reach (edge a) (kid i j k u) (E n) (x + off i n - cx a) (y + off j n - cy a) (z + off k n - cz a) = true) as (i & j & k & F).
     { pose proof (cube_bounds x y z (S n) O) as (P & X & Y & Z'). rewrite E_S in P, X, Y, Z'. pose proof (octant_bounds a A) as ([? ?] & [? ?] & [? ?]). pose proof (edge_pos a A).
       destruct u as [| p q r a0 b c d e f g h']; [destruct T|]. cbn [find] in H. destruct (_ || _) eqn:C in H; [discriminate|]. clear C.
       cbv zeta in H. rewrite half in H.
@@ -84,21 +85,23 @@ Inductive sits (p q r : Z) (h : nat) : around -> Prop :=
   | sits_also u x y z rest : octant (cube (x + p) (y + q) (z + r) h) -> sized Cross h u ->
       (forall o, In o (flat s0 h (x + p) (y + q) (z + r) u) -> In o L) -> sits p q r h rest -> sits p q r h (Also u x y z rest).
 
-Lemma also_right useful p q r n u x y z rest : octant (cube (x + p) (y + q) (z + r) n) -> sized Cross n u ->
-  (forall o, In o (flat s0 n (x + p) (y + q) (z + r) u) -> In o L) -> sits p q r n rest -> sits p q r n (also useful (E n) u x y z rest).
-Proof. intros O S I R. unfold also. destruct (_ && _); [constructor; assumption | exact R]. Qed.
+Lemma also_right useful reach p q r n u x y z rest : octant (cube (x + p) (y + q) (z + r) n) -> sized Cross n u ->
+  (forall o, In o (flat s0 n (x + p) (y + q) (z + r) u) -> In o L) -> sits p q r n rest -> sits p q r n (also useful (E n) reach u x y z rest).
+Proof.
+  intros O S I R. unfold also. destruct u; [exact R|]. destruct (useful _ _); [|exact R]. destruct (_ && _); [constructor; assumption | exact R].
+Qed.
 
 Definition in_range p := 0 <= p <= 524288.
-Lemma closer_right useful p q r x y z n : in_range p -> in_range q -> in_range r -> in_range (p + x) -> in_range (q + y) -> in_range (r + z) ->
-  forall s, sits p q r (S n) s -> sits (p + x) (q + y) (r + z) n (closer useful (E n) s x y z).
+Lemma closer_right useful reach p q r x y z n : in_range p -> in_range q -> in_range r -> in_range (p + x) -> in_range (q + y) -> in_range (r + z) ->
+  forall s, sits p q r (S n) s -> sits (p + x) (q + y) (r + z) n (closer useful (E n) reach s x y z).
 Proof.
   unfold in_range. intros P Q R X Y Z' s S. induction S as [| u a b c rest O U I _ IH]; cbn [closer]; [constructor|].
   destruct u as [k | m l hs k0 k1 k2 k3 k4 k5 k6 k7]; [exact IH|]. set (u := Node m l hs k0 k1 k2 k3 k4 k5 k6 k7) in *.
   pose proof (cube_bounds _ _ _ _ O) as (EP & BX & BY & BZ). rewrite E_S in EP, BX, BY, BZ.
-  cbv zeta. rewrite (sub_small a x), (sub_small b y), (sub_small c z) by (unfold small; lia).
-  rewrite !(add_small _ (E n)) by (unfold small; lia). destruct (useful (E n) u (E n) _); [|exact IH].
+  cbv zeta. destruct (useful (E n) u); [|exact IH]. rewrite (sub_small a x), (sub_small b y), (sub_small c z) by (unfold small; lia).
+  rewrite !(add_small _ (E n)) by (unfold small; lia). destruct (_ && _); [|exact IH].
   assert (forall i j k rest, sits (p + x) (q + y) (r + z) n rest ->
-    sits (p + x) (q + y) (r + z) n (also useful (E n) (kid i j k u) (a - x + off i n) (b - y + off j n) (c - z + off k n) rest)) as ST.
+    sits (p + x) (q + y) (r + z) n (also useful (E n) reach (kid i j k u) (a - x + off i n) (b - y + off j n) (c - z + off k n) rest)) as ST.
   { intros i j k rest' RS. apply also_right; [| | |exact RS];
     replace (a - x + off i n + (p + x)) with (a + p + off i n) by ring; replace (b - y + off j n + (q + y)) with (b + q + off j n) by ring;
     replace (c - z + off k n + (r + z)) with (c + r + off k n) by ring.
@@ -115,8 +118,8 @@ Definition lists (X Y W : Z) (h : nat) (x y z : Z) (s : around) (m : nat) : Prop
   sits (X - x) (Y - y) (W - z) m s /\ in_range (X - x) /\ in_range (Y - y) /\ in_range (W - z) /\
   (m = S h \/ m = h /\ x = 0 /\ y = 0 /\ z = 0).
 
-Lemma find_around_right wanted lo hi reach X Y W h x y z s m : hi <= 524288 -> octant (cube X Y W h) -> lists X Y W h x y z s m ->
-  find_around wanted lo hi reach (E h) s (E m) x y z = true -> exists o, In o L /\ found wanted lo hi reach (cube X Y W h) o.
+Lemma find_around_right crossing lo hi reach X Y W h x y z s m : hi <= 524288 -> octant (cube X Y W h) -> lists X Y W h x y z s m ->
+  find_around crossing lo hi reach (E h) s (E m) x y z = true -> exists o, In o L /\ found crossing lo hi reach (cube X Y W h) o.
 Proof.
   intros HI O (S & RX & RY & RZ & _). pose proof (cube_bounds _ _ _ _ O) as (_ & BX & BY & BZ). unfold in_range in *.
   induction S as [| u a b c rest C U I _ IH]; cbn [find_around]; [discriminate|]. intros H. apply orb_prop in H. destruct H as [H|H]; [|exact (IH H)].
@@ -124,11 +127,11 @@ Proof.
   rewrite (sub_small a x), (sub_small b y), (sub_small c z) in H by (unfold small; pose proof (E_pos h); lia).
   replace (a - x) with (a + (X - x) - X) in H by ring. replace (b - y) with (b + (Y - y) - Y) in H by ring. replace (c - z) with (c + (W - z) - W) in H by ring.
   rewrite <- (cube_edge X Y W h) in H.
-  destruct (find_right wanted lo hi reach HI (cube X Y W h) O m u U _ _ _ C H) as (o & F & Q). exists o. split; [apply I; exact F | exact Q].
+  destruct (find_right crossing lo hi reach HI (cube X Y W h) O m u U _ _ _ C H) as (o & F & Q). exists o. split; [apply I; exact F | exact Q].
 Qed.
 
-Lemma descend_right useful X Y W n x y z s m : octant (cube X Y W (S n)) -> lists X Y W (S n) x y z s m -> forall i j k,
-  lists (X + off i n) (Y + off j n) (W + off k n) n (off i n) (off j n) (off k n) (descend useful (E (S n)) s (E m) x y z) (S n).
+Lemma descend_right useful reach X Y W n x y z s m : octant (cube X Y W (S n)) -> lists X Y W (S n) x y z s m -> forall i j k,
+  lists (X + off i n) (Y + off j n) (W + off k n) n (off i n) (off j n) (off k n) (descend useful (E (S n)) reach s (E m) x y z) (S n).
 Proof.
   intros O (S & RX & RY & RZ & C) i j k. pose proof (cube_bounds _ _ _ _ O) as (EP & BX & BY & BZ).
   unfold lists. replace (X + off i n - off i n) with X by ring. replace (Y + off j n - off j n) with Y by ring.

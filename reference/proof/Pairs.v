@@ -9,11 +9,16 @@ Ltac split_and := repeat match goal with H : _ && _ = true |- _ => apply andb_pr
 Section Walk.
 Variable k0 : kind.
 Variable s0 : side.
+Variable skip : tree -> Z -> tree -> Z -> bool.
 Variable stop : tree -> Z -> tree -> Z -> Z -> bool.
 Variable P : leaf -> leaf -> Prop.
-Hypothesis stop_right : forall h g t u d, (h <= 19)%nat -> (g <= 19)%nat -> sized k0 h t -> sized k0 g u -> Z.abs d <= 4194304 ->
+Definition skip_is_right := forall h g t u, (h <= 19)%nat -> (g <= 19)%nat -> sized k0 h t -> sized k0 g u -> skip t (E h) u (E g) = true ->
+  forall x y z x' y' z' a b, In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> P a b.
+Definition stop_is_right := forall h g t u d, (h <= 19)%nat -> (g <= 19)%nat -> sized k0 h t -> sized k0 g u -> Z.abs d <= 4194304 ->
   stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
   In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> P a b.
+Hypothesis skip_right : skip_is_right.
+Hypothesis stop_right : stop_is_right.
 
 Lemma apart_small p q d : 0 <= p -> 0 <= q -> Z.abs d + p + q <= 2097152 ->
   apart p q d = Z.max (d - p) (- d - q) /\ Z.abs (apart p q d) <= 4194304.
@@ -44,26 +49,28 @@ Proof.
 Qed.
 
 (** A node is split into its children. *)
+Definition pass n t u p q x y z := skip t p u q || walk skip stop n t u p q x y z.
 Definition split_left n t u p q x y z := forall i j k,
-  walk stop n (kid i j k t) u p q (if i then sub x p else x) (if j then sub y p else y) (if k then sub z p else z) = true.
+  pass n (kid i j k t) u p q (if i then sub x p else x) (if j then sub y p else y) (if k then sub z p else z) = true.
 Definition split_right n t u p q x y z := forall i j k,
-  walk stop n t (kid i j k u) p q (if i then add x q else x) (if j then add y q else y) (if k then add z q else z) = true.
-Lemma walk_step n t u p q x y z : walk stop (S n) t u p q x y z = true ->
+  pass n t (kid i j k u) p q (if i then add x q else x) (if j then add y q else y) (if k then add z q else z) = true.
+Lemma walk_step n t u p q x y z : walk skip stop (S n) t u p q x y z = true ->
   stop t p u q (Z.max (apart p q x) (Z.max (apart p q y) (apart p q z))) = true \/
   (inner t /\ split_left n t u (Z.shiftr p 1) q x y z) \/ (inner u /\ split_right n t u p (Z.shiftr q 1) x y z).
 Proof.
   intros H. cbn [walk] in H. destruct (stop _ _ _ _ _); [left; reflexivity|]. right.
   destruct t as [|? ? ? a b c d e f g h]; (destruct u as [|? ? ? a' b' c' d' e' f' g' h']; [try discriminate|]);
-    [right | left | destruct (q <=? p); [left | right]]; (split; [exact I|]); cbv zeta in H; split_and;
+    [right | left | destruct (q <? p); [left | right]]; (split; [exact I|]); cbv zeta in H; split_and;
     intros i1 i2 i3; destruct i1, i2, i3; assumption.
 Qed.
 
 Lemma walk_right : forall fuel h g t u x y z x' y' z', (h <= 19)%nat -> (g <= 19)%nat -> sized k0 h t -> sized k0 g u ->
   Z.abs (x' - x) + E h + E g <= 2097152 -> Z.abs (y' - y) + E h + E g <= 2097152 -> Z.abs (z' - z) + E h + E g <= 2097152 ->
-  walk stop fuel t u (E h) (E g) (x' - x) (y' - y) (z' - z) = true -> forall a b,
+  pass fuel t u (E h) (E g) (x' - x) (y' - y) (z' - z) = true -> forall a b,
   In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> P a b.
 Proof.
-  induction fuel as [| fuel IH]; intros h g t u x y z x' y' z' Lh Lg St Su X Y Z' H a b A B.
+  induction fuel as [| fuel IH]; intros h g t u x y z x' y' z' Lh Lg St Su X Y Z' H a b A B;
+    (apply orb_prop in H; destruct H as [H|H]; [exact (skip_right h g t u Lh Lg St Su H _ _ _ _ _ _ a b A B)|]).
   - cbn [walk] in H. destruct (stop _ _ _ _ _) eqn:T; [|discriminate]. exact (stopped _ _ _ _ _ _ _ _ _ _ _ _ Lh Lg St Su X Y Z' T A B).
   - pose proof (E_pos h). pose proof (E_pos g). apply walk_step in H. destruct H as [T | [[I S] | [I S]]].
     + exact (stopped _ _ _ _ _ _ _ _ _ _ _ _ Lh Lg St Su X Y Z' T A B).
@@ -87,13 +94,11 @@ Qed.
 End Walk.
 
 (** Pairs of leaves of two trees at the root. *)
-Lemma walk_all s0 stop (P : leaf -> leaf -> Prop) : (forall h g t u d, (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-    stop t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-    In a (flat s0 h x y z t) -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> P a b) ->
-  forall t u, sized Cross 19 t -> sized Cross 19 u -> walk stop 40 t u 524288 524288 0 0 0 = true ->
+Lemma walk_all s0 skip stop (P : leaf -> leaf -> Prop) : skip_is_right Cross s0 skip P -> stop_is_right Cross s0 stop P ->
+  forall t u, sized Cross 19 t -> sized Cross 19 u -> skip t 524288 u 524288 || walk skip stop 40 t u 524288 524288 0 0 0 = true ->
   forall a b, In a (flat s0 19 0 0 0 t) -> In b (flat s0 19 0 0 0 u) -> P a b.
 Proof.
-  intros R t u St Su H a b A B. apply (walk_right Cross s0 stop P R 40 19 19 t u 0 0 0 0 0 0); try trivial; rewrite ?E_root; try lia.
+  intros K R t u St Su H a b A B. apply (walk_right Cross s0 skip stop P K R 40 19 19 t u 0 0 0 0 0 0); try trivial; rewrite ?E_root; try lia.
 Qed.
 
 Section Rules.
@@ -122,11 +127,9 @@ Hypothesis Hb : 0 <= below <= 20.
 Let wide := Z.shiftr 2097152 below.
 Definition apart_enough a b := 4 * edge b <= edge a -> (wide <= edge a -> n * edge a <= 2 * distance a b) /\ 0 < distance a b.
 
-Lemma graded_stop_right h g t' u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t' -> sized Cross g u -> Z.abs d <= 4194304 ->
-  graded_stop n wide t' (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat s0 h x y z t') -> In b (flat s0 g x' y' z' u) -> d <= distance a b -> apart_enough a b.
+Lemma graded_stop_right : stop_is_right Cross s0 (graded_stop n wide) apart_enough.
 Proof.
-  intros Lh Lg S U D H x y z x' y' z' a b A B DD. unfold graded_stop in H. cbv zeta in H.
+  intros h g t' u d Lh Lg S U D H x y z x' y' z' a b A B DD. unfold graded_stop in H. cbv zeta in H.
   pose proof (proj2 (proj2 (proj2 (flat_inside s0 h t' (sized_deep Cross _ _ S) _ _ _ _ A)))) as [PA _].
   apply (flat_size Cross) in A; [|exact S]. apply (flat_size Cross) in B; [|exact U].
   destruct (sized_most Cross h t' Lh S) as [M _]. destruct (sized_most Cross g u Lg U) as [_ L]. unfold none in L.

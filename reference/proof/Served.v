@@ -11,6 +11,17 @@ Proof.
   - pose proof (cells_less (level b) (level a) L). pose proof (cells_pos (level a)). lia.
 Qed.
 
+Lemma sources_only_right h t : sources_only t = true -> forall x y z a, In a (flat Outside h x y z t) -> side_of a = Crossing.
+Proof.
+  intros H x y z a A. destruct t as [[]|m l hs k0 k1 k2 k3 k4 k5 k6 k7]; try discriminate.
+  - apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
+  - destruct h as [|h]; [destruct A|]. apply in_flat in A; [|exact I]. destruct A as (i & j & k & A).
+    destruct k0 as [[]|]; try discriminate; destruct k1 as [[]|]; try discriminate; destruct k2 as [[]|]; try discriminate; destruct k3 as [[]|]; try discriminate;
+    destruct k4 as [[]|]; try discriminate; destruct k5 as [[]|]; try discriminate; destruct k6 as [[]|]; try discriminate; destruct k7 as [[]|]; try discriminate.
+    assert (exists x y z, In a (flat Outside h x y z (Cube Cross))) as (x' & y' & z' & B) by (destruct i, j, k; cbn [kid] in A; eauto).
+    apply flat_cube in B. destruct B as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
+Qed.
+
 Section Served.
 Variable n : Z.
 Hypothesis Hn : 1 <= n <= 4096.
@@ -28,33 +39,36 @@ Proof.
   pose proof (cube_bounds _ _ _ _ O) as (EP & BX & BY & BZ). rewrite E_S in EP, BX, BY, BZ.
   assert (sub n 1 = n - 1) as N1 by (apply sub_small; unfold small; lia).
   assert (mul (sub n 1) (E h) = (n - 1) * E h) as N2 by (rewrite N1; apply mul_small; unfold small; nia).
-  assert ((exists i j k, late (kid i j k v) = true) -> find_around (has Cross) (E h) (E h) ((n - 1) * E h) (E (Datatypes.S h)) near (E m) x y z = true) as LATE.
+  assert ((exists i j k, late (kid i j k v) = true) -> find_around true (E h) (E h) ((n - 1) * E h) (E (Datatypes.S h)) near (E m) x y z = true) as LATE.
   { intros (i & j & k & LT). destruct v as [|a b k0 k1 k2 k3 k4 k5 k6 k7]; [destruct VI|]. cbn [served] in H. rewrite half in H. cbv zeta in H.
     apply andb_prop in H. destruct H as [H _]. rewrite N2 in H.
     match type of H with (if ?b then _ else _) = _ => replace b with true in H; [exact H|] end.
     symmetry. destruct i, j, k; cbn [kid] in LT; rewrite LT, ?orb_true_r; reflexivity. }
-  assert (forall i j k, parent (kid i j k v) = true -> served n (kid i j k v) (E h) (E (Datatypes.S h)) (off i h) (off j h) (off k h)
-    (descend (may_serve n) (E (Datatypes.S h)) near (E m) x y z) = true) as KIDS.
+  assert (forall i j k, parent (kid i j k v) = true -> sources_only (kid i j k v) = true \/ served n (kid i j k v) (E h) (E (Datatypes.S h)) (off i h) (off j h) (off k h)
+    (descend may_serve (E (Datatypes.S h)) (Z.shiftr (add (mul (sub n 1) (E (Datatypes.S h))) 3) 2) near (E m) x y z) = true) as KIDS.
   { intros i j k PK. destruct v as [|a b k0 k1 k2 k3 k4 k5 k6 k7]; [destruct VI|]. cbn [served] in H. rewrite half in H. cbv zeta in H.
     apply andb_prop in H. destruct H as [_ H].
-    match type of H with (if ?b then _ else _) = _ => replace b with true in H end.
+    match type of H with (if ?b then _ else _) = _ => destruct b eqn:SO' end.
+    { left. split_and. destruct i, j, k; assumption. }
+    right. match type of H with (if ?b then _ else _) = _ => replace b with true in H end.
     - split_and. destruct i, j, k; assumption.
     - symmetry. destruct i, j, k; cbn [kid] in PK; rewrite PK, ?orb_true_r; reflexivity. }
   clear H. apply in_flat in Q; [|exact VI]. destruct Q as (i & j & k & Q).
   destruct (parent (kid i j k v)) eqn:PK.
-  - refine (IH i j k _ _ _ _ _ _ _ _ _ _ _ (KIDS i j k PK) PK o Q SO).
+  - destruct (KIDS i j k PK) as [ON|KS]; [pose proof (sources_only_right h _ ON _ _ _ o Q); congruence|].
+    refine (IH i j k _ _ _ _ _ _ _ _ _ _ _ KS PK o Q SO).
     + inversion S as [|? ? ? ? ? K ?]; subst; [destruct VI|]. apply K.
     + apply (cube_kid X Y W h O i j k).
     + apply descend_right; assumption.
   - destruct (kid i j k v) as [q|] eqn:KV; [|discriminate]. apply flat_cube in Q. destruct Q as (sd & SD & ->). cbn [side_of] in SO. subst sd.
     assert (late (Cube q) = true) as LT by (destruct q; cbn [side_in] in SD; (discriminate || reflexivity)).
     assert (E h <= 524288) as HI by lia.
-    destruct (find_around_right Outside V (has Cross) (E h) (E h) ((n - 1) * E h) X Y W (Datatypes.S h) x y z near m HI O LI) as (p & P & k1 & K1 & HC & ED & DI).
+    destruct (find_around_right Outside V true (E h) (E h) ((n - 1) * E h) X Y W (Datatypes.S h) x y z near m HI O LI) as (p & P & HC & ED & DI).
     { apply LATE. exists i, j, k. rewrite KV. exact LT. }
     exists (cube X Y W (Datatypes.S h)), p. split; [apply (same_cube_child X Y W h i j k); [exact O | repeat split]|]. split; [exact P|].
     assert (level p = 19 - Z.of_nat h) as LP.
     { apply (same_edge p (cube (X + off i h) (Y + off j h) (W + off k h) h)); [apply octants; exact P | apply cube_kid; exact O|]. rewrite cube_edge. lia. }
-    split; [destruct k1; cbn [has same] in HC; try discriminate; cbn [side_in] in K1; congruence|]. split; [exact LP|].
+    split; [exact (HC eq_refl)|]. split; [exact LP|].
     rewrite distance_comm, LP, E_cells. exact DI.
 Qed.
 End Served.
@@ -66,23 +80,10 @@ Hypothesis Hn : 1 <= n <= 4096.
 Hypothesis Hs : 0 <= s.
 
 Definition late_rule a b := side_of a = Outside -> edge b < edge a -> 0 < distance a b.
-Lemma sources_only_right h t : sources_only t = true -> forall x y z a, In a (flat Outside h x y z t) -> side_of a = Crossing.
-Proof.
-  intros H x y z a A. destruct t as [[]|m l hs k0 k1 k2 k3 k4 k5 k6 k7]; try discriminate.
-  - apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
-  - destruct h as [|h]; [destruct A|]. apply in_flat in A; [|exact I]. destruct A as (i & j & k & A).
-    destruct k0 as [[]|]; try discriminate; destruct k1 as [[]|]; try discriminate; destruct k2 as [[]|]; try discriminate; destruct k3 as [[]|]; try discriminate;
-    destruct k4 as [[]|]; try discriminate; destruct k5 as [[]|]; try discriminate; destruct k6 as [[]|]; try discriminate; destruct k7 as [[]|]; try discriminate.
-    assert (exists x y z, In a (flat Outside h x y z (Cube Cross))) as (x' & y' & z' & B) by (destruct i, j, k; cbn [kid] in A; eauto).
-    apply flat_cube in B. destruct B as (sd & SD & ->). cbn [side_in side_of] in *. congruence.
-Qed.
-
 Definition source_rule a b := side_of b = Crossing -> 2 * edge b <= edge a -> (n - 1) * edge b <= distance a b.
-Lemma source_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-  source_stop n t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> source_rule a b.
+Lemma source_stop_right : stop_is_right Cross Outside (source_stop n) source_rule.
 Proof.
-  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SC F. unfold source_stop in H.
+  intros h g t u d Lh Lg S U _ H x y z x' y' z' a b A B DD SC F. unfold source_stop in H.
   pose proof (proj2 (proj2 (proj2 (flat_inside Outside g u (sized_deep Cross _ _ U) _ _ _ _ B)))) as [PB _].
   pose proof B as B'. apply (flat_size Cross) in B'; [|exact U]. apply (flat_size Cross) in A; [|exact S].
   destruct (sized_most Cross h t Lh S) as [M _]. destruct (sized_most Cross g u Lg U) as [M' _].
@@ -100,38 +101,36 @@ Qed.
 
 Variable below : Z.
 Definition marked_rule a b := apart_enough n below a b /\ late_rule a b /\ source_rule a b.
-Lemma marked_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-  marked_stop n (Z.shiftr 2097152 below) t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> marked_rule a b.
+Lemma marked_skip_right : skip_is_right Cross Outside marked_skip marked_rule.
 Proof.
-  intros Lh Lg S U D H x y z x' y' z' a b A B DD. unfold marked_stop in H.
+  intros h g t u _ _ S U L x y z x' y' z' a b A B. apply Z.leb_le in L.
   pose proof (proj2 (proj2 (proj2 (flat_inside Outside g u (sized_deep Cross _ _ U) _ _ _ _ B)))) as [PB _].
-  destruct (Z.leb_spec (most t (E h)) (least u (E g))) as [L|_].
-  - pose proof (flat_size Cross Outside h t S _ _ _ _ A). pose proof (flat_size Cross Outside g u U _ _ _ _ B).
-    split; [intros F; lia | split; [intros _ F; lia | intros _ F; lia]].
-  - apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2]. split; [|split].
-    + exact (graded_stop_right Outside n below Hn h g t u d Lh Lg S U D H1 x y z x' y' z' a b A B DD).
-    + intros SO F. apply orb_prop in H2. destruct H2 as [H2|H2]; [apply Z.ltb_lt in H2; lia|].
-      pose proof (sources_only_right h t H2 _ _ _ a A). congruence.
-    + exact (source_stop_right h g t u d Lh Lg S U D H3 x y z x' y' z' a b A B DD).
+  pose proof (flat_size Cross Outside h t S _ _ _ _ A). pose proof (flat_size Cross Outside g u U _ _ _ _ B).
+  split; [intros F; lia | split; [intros _ F; lia | intros _ F; lia]].
+Qed.
+Lemma marked_stop_right : stop_is_right Cross Outside (marked_stop n (Z.shiftr 2097152 below)) marked_rule.
+Proof.
+  intros h g t u d Lh Lg S U D H x y z x' y' z' a b A B DD. unfold marked_stop in H.
+  apply andb_prop in H. destruct H as [H H3]. apply andb_prop in H. destruct H as [H1 H2]. split; [|split].
+  - exact (graded_stop_right Outside n below Hn h g t u d Lh Lg S U D H1 x y z x' y' z' a b A B DD).
+  - intros SO F. apply orb_prop in H2. destruct H2 as [H2|H2]; [apply Z.ltb_lt in H2; lia|].
+    pose proof (sources_only_right h t H2 _ _ _ a A). congruence.
+  - exact (source_stop_right h g t u d Lh Lg S U D H3 x y z x' y' z' a b A B DD).
 Qed.
 
 Definition extra_rule a b := side_of b = Crossing -> s < edge a \/ s <= edge a /\ side_of a = Outside -> 0 < distance a b.
-Lemma extra_stop_right h g t u d : (h <= 19)%nat -> (g <= 19)%nat -> sized Cross h t -> sized Cross g u -> Z.abs d <= 4194304 ->
-  extra_stop s t (E h) u (E g) d = true -> forall x y z x' y' z' a b,
-  In a (flat Outside h x y z t) -> In b (flat Outside g x' y' z' u) -> d <= distance a b -> extra_rule a b.
+Lemma extra_skip_right : skip_is_right Cross Outside (extra_skip s) extra_rule.
 Proof.
-  intros Lh Lg S U _ H x y z x' y' z' a b A B DD SC F. unfold extra_stop in H.
-  pose proof A as A'. apply (flat_size Cross) in A'; [|exact S].
-  apply orb_prop in H. destruct H as [H|H]; [apply orb_prop in H; destruct H as [H|H]|].
-  - exfalso.
-    assert ((exists k, t = Cube k /\ k = Cross /\ E h <= s) \/ most t (E h) < s) as [(k & -> & -> & L)|L].
+  intros h g t u Lh Lg S U H x y z x' y' z' a b A B SC F. exfalso. unfold extra_skip in H.
+  pose proof A as A'. apply (flat_size Cross) in A'; [|exact S]. apply orb_prop in H. destruct H as [H|H].
+  - assert ((exists k, t = Cube k /\ k = Cross /\ E h <= s) \/ most t (E h) < s) as [(k & -> & -> & L)|L].
     { destruct t as [[]|]; first [left; exists Cross; split; [reflexivity|]; split; [reflexivity|]; apply Z.leb_le; exact H | right; apply Z.ltb_lt; exact H]. }
     + apply flat_cube in A. destruct A as (sd & SD & ->). cbn [side_in side_of] in *. unfold edge in F. cbn [level] in F. rewrite E_cells in F.
       destruct F as [F | [_ F]]; [lia | congruence].
     + lia.
-  - exfalso. apply negb_true_iff in H. revert SC. refine (flat_has Cross Outside Crossing eq_refl _ g u U H _ _ _ _ B).
+  - apply negb_true_iff in H. revert SC. refine (flat_has Cross Outside Crossing eq_refl _ g u U H _ _ _ _ B).
     intros k. destruct k; simpl; congruence.
-  - apply Z.ltb_lt in H. lia.
 Qed.
+Lemma extra_stop_right : stop_is_right Cross Outside extra_stop extra_rule.
+Proof. intros h g t u d _ _ _ _ _ H x y z x' y' z' a b _ _ DD _ _. apply Z.ltb_lt in H. lia. Qed.
 End Stops.

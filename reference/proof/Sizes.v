@@ -29,7 +29,18 @@ Proof.
     cbv zeta. destruct (same_brood _ t) eqn:E; [|reflexivity]. apply same_brood_right in E. exact E. }
   unfold share. repeat match goal with |- match ?x with _ => _ end = _ => destruct x; trivial end; apply S.
 Qed.
-#[global] Opaque share.
+Lemma twig_right z b k : twig z b k = brood z b k.
+Proof.
+  assert (Forall (fun '(Broods z o o' i i' x x') => o = brood z false Outer /\ o' = brood z true Outer /\ i = brood z false Inner /\ i' = brood z true Inner /\
+    x = brood z false Cross /\ x' = brood z true Cross) all_broods) as A by (repeat constructor).
+  unfold twig. induction A as [| [z' o o' i i' x x'] s (-> & -> & -> & -> & -> & ->) _ IH]; cbn [twig_of]; [reflexivity|].
+  destruct (Z.eqb_spec z' z) as [->|]; [|exact IH]. destruct k, b; reflexivity.
+Qed.
+Lemma join_twig k0 z k : k <> Empty -> let c := Cube k in join k0 z c c c c c c c c = brood z (same k0 k) k.
+Proof.
+  intros N c. unfold join, brood, max8, min8, c. destruct k; [congruence|..]; cbn [most least has]; rewrite !Z.max_id, !Z.min_id, !orb_diag; reflexivity.
+Qed.
+#[global] Opaque share twig.
 
 Section Sizes.
 Variable k0 : kind.

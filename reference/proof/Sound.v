@@ -6,9 +6,9 @@ Open Scope Z_scope.
 Strategy expand [check check_inputs check_full check_base check_crossing check_graded].
 Strategy opaque [mark_sources served faces face flood rounds sweeps walk spot mark every overlay fine_tree rim wet look flat deep].
 
-Lemma unit_right p : unit p = true -> 0 <= p / 256 < 524288.
+Lemma in_edge_right p : in_edge p = true -> 0 <= p / 256 < 524288.
 Proof.
-  unfold unit. rewrite Z.shiftr_div_pow2 by lia. change (2 ^ 8) with 256. intros H. apply andb_prop in H. rewrite Z.leb_le, Z.ltb_lt in H. exact H.
+  unfold in_edge. rewrite Z.shiftr_div_pow2 by lia. change (2 ^ 8) with 256. intros H. apply andb_prop in H. rewrite Z.leb_le, Z.ltb_lt in H. exact H.
 Qed.
 
 Section Accepted.
@@ -36,7 +36,7 @@ Proof.
   intros HS S. destruct base_parts as (_ & B & _). rewrite HS in B. apply andb_prop in B. destruct B as [B _].
   unfold seeds_reached in B. rewrite forallb_forall in B. specialize (B (p, q, r) S). cbv beta iota in B.
   apply andb_prop in B. destruct B as [B SP]. apply andb_prop in B. destruct B as [B U3]. apply andb_prop in B. destruct B as [U1 U2].
-  apply unit_right in U1, U2, U3. apply same_eq in SP.
+  apply in_edge_right in U1, U2, U3. apply same_eq in SP.
   assert (forall m, Z.shiftr m 8 = m / 256) as SH by (intros; rewrite Z.shiftr_div_pow2 by lia; reflexivity). rewrite !SH in SP.
   assert (in_root (p / 256) (q / 256) (r / 256)) as IR by (unfold in_root; replace (cells 0) with 524288 by reflexivity; auto).
   split; [exact IR|].
@@ -188,18 +188,16 @@ Theorem check_sound c base mesh dropped of_base of_mesh :
 Proof.
   unfold check. intros H.
   destruct (check_inputs c) eqn:CI; [|discriminate].
-  destruct (build (kind_of_flow c) base) as [t0|] eqn:BT; [|discriminate].
-  destruct (check_counts of_base base t0 && check_full c t0) eqn:C1; [|discriminate]. cbv zeta in H.
-  destruct (check_base c (flooded c t0)) eqn:CB; [|discriminate].
+  destruct (build (kind_of_flow c) base) as [t0|] eqn:BT; [|discriminate]. cbv zeta in H.
   destruct (build Cross mesh) as [m|] eqn:BM; [|discriminate].
-  destruct (check_counts of_mesh mesh m) eqn:C2; [|discriminate].
   destruct (build Cross dropped) as [d|] eqn:BD; [|discriminate].
-  destruct (check_crossing c dropped m d) eqn:CC; [|discriminate].
   destruct (merge Cross m d 524288) as [g|] eqn:MG; [|discriminate].
-  destruct (overlay _ _ g) eqn:OV; [|discriminate].
+  pose proof (rest_right _ _ _ _ H) as REST. cbv beta in REST. apply andb_prop in REST. destruct REST as [REST OV].
+  apply andb_prop in REST. destruct REST as [REST CC]. apply andb_prop in REST. destruct REST as [REST C2].
+  apply andb_prop in REST. destruct REST as [REST CB]. apply andb_prop in REST. destruct REST as [C1 CF].
   unfold check_inputs in CI. apply andb_prop in CI. destruct CI as [CI I4]. apply andb_prop in CI. destruct CI as [CI I3].
   apply andb_prop in CI. destruct CI as [I1 I2]. rewrite Z.leb_le in I1, I2, I3, I4.
-  apply andb_prop in C1. destruct C1 as [C1 CF]. unfold check_full in CF. apply andb_prop in CF. destruct CF as [DRY FINE].
+  unfold check_full in CF. apply andb_prop in CF. destruct CF as [DRY FINE].
   rewrite surface_edge in FINE by lia.
   assert (forall k parts t, build k parts = Some t -> forall s, Permutation (flat s 19 0 0 0 t) (leaves parts)) as PB
     by (intros k parts t B s; apply (build_right k s) in B; apply B).
@@ -226,7 +224,7 @@ Proof.
   { intros HS p q r S. destruct (base_parts c _ CB) as (_ & B & _). rewrite HS in B. apply andb_prop in B. destruct B as [B _].
     unfold seeds_reached in B. rewrite forallb_forall in B. specialize (B (p, q, r) S). cbv beta iota in B.
     apply andb_prop in B. destruct B as [B _]. apply andb_prop in B. destruct B as [B U3]. apply andb_prop in B. destruct B as [U1 U2].
-    apply unit_right in U1, U2, U3. unfold in_root. replace (cells 0) with 524288 by reflexivity. auto. }
+    apply in_edge_right in U1, U2, U3. unfold in_root. replace (cells 0) with 524288 by reflexivity. auto. }
   pose proof (flooded_right c base h H19 t0 DT (PT (flow c)) DRY IR) as [[DF TF] FF].
   assert (Permutation (flat (flow c) h 0 0 0 (flooded c t0)) (leaves base)) as LP by (rewrite FF; apply PT).
   pose proof (base_tiles c base h H19 t0 DT (PT (flow c)) DRY) as TI.
@@ -240,8 +238,8 @@ Proof.
       by (intros b; split; [apply (Permutation_in b LP) | apply (Permutation_in b (Permutation_sym LP))]).
     assert (forall a, In a (flat Outside 19 0 0 0 g) <-> In a (leaves mesh ++ leaves dropped)) as LG
       by (intros a; split; [apply (Permutation_in a PO) | apply (Permutation_in a (Permutation_sym PO))]).
-    split; [exact (gradation_least c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV H) |
-            exact (layers_right c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV H)]. }
+    split; [exact (gradation_least c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV _ H) |
+            exact (layers_right c _ _ _ RG (conj I3 I4) (conj I1 I2) _ g (flow c) (fate c _) (fate_empty c _) DF LB SG LG OV _ H)]. }
   split. { apply Forall_app. split; [exact WT|]. apply Forall_app. auto. }
   split; [exact C1|]. split; [exact C2|]. cbv zeta. split; [exact TI|]. split; [exact FN|].
   split; [intros a b C; exact (connected_side c _ _ h H19 DF LP CB a b C)|].

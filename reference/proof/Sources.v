@@ -49,18 +49,18 @@ Proof.
   destruct H as [H|H].
   - assert (Z.shiftr (E (S n)) 2 = E (S n) / 4) as Q by (rewrite Z.shiftr_div_pow2 by lia; reflexivity). rewrite Q in H.
     assert (E (S n) / 4 <= E (S n)) by (apply Z.div_le_upper_bound; pose proof (E_pos (S n)); lia).
-    destruct (find_around_right Outside graded any_kind 1 (E (S n) / 4) 1 X Y W (S n) x y z near m ltac:(lia) O LI H) as (o & I & k & K & _ & B & D).
+    destruct (find_around_right Outside graded false 1 (E (S n) / 4) 1 X Y W (S n) x y z near m ltac:(lia) O LI H) as (o & I & _ & B & D).
     right; left. exists o. split; [exact I|]. pose proof (distance_nonneg (cube X Y W (S n)) o). split.
     + apply Z.le_ge, coarser_level; [apply graded_octants; exact I | exact O|]. rewrite cube_edge.
       pose proof (Z.mul_div_le (E (S n)) 4). lia.
     + unfold touch. rewrite distance_comm. lia.
   - apply andb_prop in H. destruct H as [H F]. apply andb_prop in H. destruct H as [X1 X2]. apply Z.ltb_lt in X2.
-    destruct (find_around_right Outside graded (has Cross) 1 524288 1 X Y W (S n) x y z near m ltac:(lia) O LI F) as (o & I & k & K & HC & B & D).
+    destruct (find_around_right Outside graded true 1 524288 1 X Y W (S n) x y z near m ltac:(lia) O LI F) as (o & I & HC & B & D).
     destruct (He X1) as [K1 K2]. right; right. split; [exact K1|]. split; [exact K2|]. pose proof (distance_nonneg (cube X Y W (S n)) o). split.
     + cbn [level cube]. destruct Hs as [S1 S2]. destruct (Z_lt_dec (19 - Z.of_nat (S n)) (surface c)) as [|N]; [assumption|]. exfalso.
       pose proof (cells_antitone (surface c) (19 - Z.of_nat (S n)) ltac:(lia)). rewrite E_cells in *. lia.
     + destruct (home o I) as (b & Hb & Wb & Sb). exists b. split; [exact Hb|]. split.
-      * rewrite <- Sb. destruct k; cbn [has same] in HC; try discriminate. cbn [side_in] in K. congruence.
+      * rewrite <- Sb. exact (HC eq_refl).
       * apply (touch_within o b); [apply graded_octants; exact I | exact Wb|]. unfold touch. rewrite distance_comm. lia.
 Qed.
 
@@ -80,14 +80,27 @@ Lemma mark_cube k t p q x y z near e : mark_sources s extra t (Cube k) p q x y z
   match k with Empty => Cube Empty | _ => if e then Cube Cross else Cube Outer end.
 Proof. destruct k; reflexivity. Qed.
 Lemma mark_node n t u q x y z near e : inner u -> let e' := parent t || deeper u || touched s extra (E (S n)) q x y z near in
-  let near' := if deeper u then descend (may_touch extra) (E (S n)) near q x y z else Nobody in
+  let near' := if deeper u then descend (may_touch extra) (E (S n)) 1 near q x y z else Nobody in
   let v := mark_sources s extra t u (E (S n)) q x y z near e in inner v /\
   (forall i j k, kid i j k v = mark_sources s extra (kid i j k t) (kid i j k u) (E n) (E (S n)) (off i n) (off j n) (off k n) near' e') /\
   exists k0 k1 k2 k3 k4 k5 k6 k7, v = join Cross (E n) k0 k1 k2 k3 k4 k5 k6 k7.
 Proof.
   intros U e' near' v. destruct u as [|m l hs k0 k1 k2 k3 k4 k5 k6 k7]; [destruct U|].
-  subst v e' near'. cbn [mark_sources]. rewrite half. cbv zeta. rewrite share_right. split; [exact I|]. split; [|repeat eexists].
-  intros i j k. destruct i, j, k; reflexivity.
+  subst v e' near'. cbn [mark_sources]. rewrite half. cbv zeta.
+  set (u := Node m l hs k0 k1 k2 k3 k4 k5 k6 k7) in *.
+  change (parent k0 || parent k1 || parent k2 || parent k3 || parent k4 || parent k5 || parent k6 || parent k7) with (deeper u).
+  destruct (deeper u) eqn:DP.
+  - split; [exact I|]. split; [|repeat eexists]. intros i j k. destruct i, j, k; reflexivity.
+  - set (e' := parent t || false || touched s extra (E (S n)) q x y z near).
+    match goal with |- context [if ?f then twig ?w _ ?k else ?j] => replace (if f then twig w e' k else j) with j end.
+    + split; [exact I|]. split; [|repeat eexists]. intros i j k. destruct (not_deeper u DP i j k) as [r R].
+      rewrite R, mark_cube. destruct i, j, k; cbn [u kid] in R |- *; rewrite R; destruct r; reflexivity.
+    + destruct (_ && _) eqn:F; [|reflexivity]. rewrite twig_right. split_and.
+      assert (forall i j k, full (kid i j k u) = true -> mark_leaf (kid i j k u) e' = Cube (if e' then Cross else Outer)) as M.
+      { intros i j k FK. destruct (not_deeper u DP i j k) as [r R]. rewrite R in *. destruct r, e'; try discriminate; reflexivity. }
+      pose proof (M false false false) as M0. pose proof (M true false false) as M1. pose proof (M false true false) as M2. pose proof (M true true false) as M3.
+      pose proof (M false false true) as M4. pose proof (M true false true) as M5. pose proof (M false true true) as M6. pose proof (M true true true) as M7.
+      cbn [u kid] in *. rewrite M0, M1, M2, M3, M4, M5, M6, M7 by assumption. rewrite join_twig by (destruct e'; discriminate). destruct e'; reflexivity.
 Qed.
 
 Lemma some_leaf k : k <> Empty -> forall h u X Y W, deep h u -> filled k u = true -> exists o, In o (flat Outside h X Y W u).
@@ -160,7 +173,7 @@ Proof.
   - intros n u U Du IH S t X Y W x y z near m e O Dt OV LI IU IT IB v.
     destruct (mark_node n t u (E m) x y z near e U) as (V & KV & k0 & k1 & k2 & k3 & k4 & k5 & k6 & k7 & J). fold v in V, KV, J.
     set (e' := parent t || deeper u || touched s extra (E (Datatypes.S n)) (E m) x y z near) in *.
-    set (near' := if deeper u then descend (may_touch extra) (E (Datatypes.S n)) near (E m) x y z else Nobody) in *.
+    set (near' := if deeper u then descend (may_touch extra) (E (Datatypes.S n)) 1 near (E m) x y z else Nobody) in *.
     assert (n <= 18)%nat as N18 by (destruct O as [L _]; cbn [level cube] in L; lia).
     assert (forall i j k, overlay fate (kid i j k t) (kid i j k u) = true) as OVK.
     { intros i j k. destruct t as [k9|] eqn:T.

@@ -125,7 +125,7 @@ let crossing (base : words list) : words list =
 
 let () =
   (* Trees live to the end, so there is little garbage to collect. *)
-  Gc.set { (Gc.get ()) with Gc.minor_heap_size = 1 lsl 20; space_overhead = 200 };
+  Gc.set { (Gc.get ()) with Gc.minor_heap_size = 1 lsl 20; space_overhead = 1000 };
   try match Sys.argv with
     | [| _; mesh; base |] ->
       let start = Unix.gettimeofday () in
