@@ -64,16 +64,21 @@ Definition check_crossing (dropped : list part) (m d : tree) : bool :=
 Definition check_inputs : bool :=
   (0 <=? surface c) && (surface c <=? 19) && (1 <=? layer_cells c) && (layer_cells c <=? 4096).
 
+(** What is checked early need not be kept in memory. *)
 Definition check (base mesh dropped : list part) (of_base of_mesh : manifest) : bool :=
   if check_inputs then
-    match build kind_of_flow base with None => false | Some t0 =>
-    let t := flooded t0 in
-    match build Cross mesh with None => false | Some m =>
-    match build Cross dropped with None => false | Some d =>
-    match merge Cross m d 524288 with None => false | Some g =>
-    check_graded t g (fun _ =>
-      check_counts of_base base t0 && check_full t0 && check_base t && check_counts of_mesh mesh m && check_crossing dropped m d &&
-      overlay (fate (negb (every (fun k => negb (same Reached k)) t))) t g)
-    end end end end
+    match build kind_of_flow base with None => false | Some t =>
+    if check_counts of_base base t && check_full t then
+      let t := flooded t in
+      match build Cross mesh with None => false | Some m =>
+      if check_counts of_mesh mesh m then
+        match build Cross dropped with None => false | Some d =>
+        if check_crossing dropped m d then
+          match merge Cross m d 524288 with None => false | Some g =>
+          check_graded t g (fun _ => check_base t && overlay (fate (negb (every (fun k => negb (same Reached k)) t))) t g)
+          end
+        else false end
+      else false end
+    else false end
   else false.
 End Check.

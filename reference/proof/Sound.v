@@ -188,16 +188,17 @@ Theorem check_sound c base mesh dropped of_base of_mesh :
 Proof.
   unfold check. intros H.
   destruct (check_inputs c) eqn:CI; [|discriminate].
-  destruct (build (kind_of_flow c) base) as [t0|] eqn:BT; [|discriminate]. cbv zeta in H.
+  destruct (build (kind_of_flow c) base) as [t0|] eqn:BT; [|discriminate].
+  destruct (check_counts of_base base t0 && check_full c t0) eqn:C1; [|discriminate]. cbv zeta in H.
   destruct (build Cross mesh) as [m|] eqn:BM; [|discriminate].
+  destruct (check_counts of_mesh mesh m) eqn:C2; [|discriminate].
   destruct (build Cross dropped) as [d|] eqn:BD; [|discriminate].
+  destruct (check_crossing c dropped m d) eqn:CC; [|discriminate].
   destruct (merge Cross m d 524288) as [g|] eqn:MG; [|discriminate].
-  pose proof (rest_right _ _ _ _ H) as REST. cbv beta in REST. apply andb_prop in REST. destruct REST as [REST OV].
-  apply andb_prop in REST. destruct REST as [REST CC]. apply andb_prop in REST. destruct REST as [REST C2].
-  apply andb_prop in REST. destruct REST as [REST CB]. apply andb_prop in REST. destruct REST as [C1 CF].
+  pose proof (rest_right _ _ _ _ H) as REST. cbv beta in REST. apply andb_prop in REST. destruct REST as [CB OV].
   unfold check_inputs in CI. apply andb_prop in CI. destruct CI as [CI I4]. apply andb_prop in CI. destruct CI as [CI I3].
   apply andb_prop in CI. destruct CI as [I1 I2]. rewrite Z.leb_le in I1, I2, I3, I4.
-  unfold check_full in CF. apply andb_prop in CF. destruct CF as [DRY FINE].
+  apply andb_prop in C1. destruct C1 as [C1 CF]. unfold check_full in CF. apply andb_prop in CF. destruct CF as [DRY FINE].
   rewrite surface_edge in FINE by lia.
   assert (forall k parts t, build k parts = Some t -> forall s, Permutation (flat s 19 0 0 0 t) (leaves parts)) as PB
     by (intros k parts t B s; apply (build_right k s) in B; apply B).
