@@ -27,7 +27,13 @@ fn session() -> Line {
     };
     let command = vec!["harness".into(), "bench".into()];
     let lacks = [("other".to_owned(), vec!["MPI".to_owned()])].into();
-    line(Entry::Session(Box::new(Session { command, machine, load_average: 0.0, lacks })))
+    line(Entry::Session(Box::new(Session {
+        command,
+        machine,
+        nodes: String::new(),
+        load_average: 0.0,
+        lacks,
+    })))
 }
 
 /// Six repetitions of a run with nearly the same load on every rank.

@@ -63,6 +63,9 @@ pub struct Session {
     pub command: Vec<String>,
     /// The machine.
     pub machine: Machine,
+    /// Names of the machines on which ranks run: those of Slurm's job, else of this one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub nodes: String,
     /// Load average at the beginning: a high value means that other work may have disturbed the runs.
     pub load_average: f64,
     /// By program: what it does not do or promise.

@@ -50,6 +50,12 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
+/// Returns the names of the machines on which ranks run: those of Slurm's job, else of this one.
+pub fn nodes() -> String {
+    let own = || fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    std::env::var("SLURM_JOB_NODELIST").unwrap_or_else(|_| own().trim().to_owned())
+}
+
 /// Returns the number of runnable processes, averaged over the last minute; 0 if the system does not report it.
 pub fn load_average() -> f64 {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();

@@ -55,7 +55,7 @@ pub struct TimeRules {
     pub rounds_min: usize,
     /// Maximum number of rounds.
     pub rounds_max: usize,
-    /// Time for one case, in seconds.
+    /// Time for one case, in seconds; what looks like a change is measured twice.
     pub budget_s: f64,
     /// Greatest rate of false discoveries among all quantities of all cases; the probability of a false alarm per run.
     pub alpha: f64,
@@ -72,7 +72,7 @@ impl Default for TimeRules {
             rounds_max: 60,
             budget_s: 20.0,
             alpha: 0.001,
-            effect_min: 3.0,
+            effect_min: 1.0,
             effect_wanted: 10.0,
         }
     }

@@ -3,6 +3,9 @@
 //!
 //! The CPU time and the wall time of the whole process are compared, seen from outside. Those of all cases are tested together:
 //! [`adjusted`] controls the rate of false discoveries. Which phase a change is in, counters and instructions show.
+//!
+//! A change is measured once more with fresh runs, and is one only if both measurements agree. They are independent, so each is tested
+//! at the square root of `alpha`: that finds smaller changes than one measurement at `alpha`, and few gates measure twice.
 
 use super::Bench;
 use super::measures::LayerName;
@@ -35,6 +38,8 @@ struct Quantity {
     rounds: Vec<Round>,
     /// The comparison of its rounds; its p-value is adjusted for all quantities of all cases.
     found: Comparison,
+    /// The effect that a first measurement found, if this is the second.
+    first: Option<f64>,
 }
 
 /// Compares the times of candidate and baseline.
@@ -51,34 +56,53 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     let rules = &bench.rules.time;
-    let mut measured: Vec<Quantity> = Vec::new();
-    'all: for case in bench.cases_of(LayerName::Time) {
+    let mut measured: Vec<(&Selected, Ranks, [Quantity; 2])> = Vec::new();
+    for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
-            match rounds(bench, baseline, case, ranks) {
-                Ok(times) => measured.extend(times),
-                Err(failure) if failure.is_interrupt() => break 'all,
-                Err(why) => {
-                    let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
-                    let why = why.to_string();
-                    layer.findings.push(GateFinding::noted(name, &metric, Verdict::Missing, why));
-                }
+            match rounds(bench, baseline, case, ranks, false) {
+                Ok(times) => measured.push((case, ranks, times)),
+                Err(why) => layer.findings.extend(failed(case, ranks, &why)),
             }
         }
     }
     // All quantities of all cases are tested together.
-    let p_values: Vec<f64> = measured.iter().map(|quantity| quantity.found.p).collect();
-    for (quantity, p) in measured.iter_mut().zip(adjusted(&p_values)) {
-        quantity.found.p = p;
+    let all = || measured.iter().flat_map(|(.., times)| times);
+    let p_values = adjusted(&all().map(|quantity| quantity.found.p).collect::<Vec<f64>>());
+    let all = measured.iter_mut().flat_map(|(.., times)| times);
+    all.zip(p_values).for_each(|(quantity, p)| quantity.found.p = p);
+    for (case, ranks, times) in measured {
+        let is_change = |quantity: &Quantity| quantity.is_change(rules);
+        if !times.iter().any(is_change) {
+            layer.findings.extend(times.iter().map(|quantity| quantity.finding(rules)));
+            continue;
+        }
+        match rounds(bench, baseline, case, ranks, true) {
+            Ok(again) => {
+                layer.findings.extend(times.into_iter().zip(again).map(|(first, again)| {
+                    let last = if is_change(&first) { again.confirming(&first) } else { first };
+                    last.finding(rules)
+                }))
+            }
+            Err(why) => layer.findings.extend(failed(case, ranks, &why)),
+        }
     }
-    layer.findings.extend(measured.iter().map(|quantity| quantity.finding(rules)));
 }
 
-/// Runs all rounds of a case.
+/// The finding about runs that failed; none if the user interrupted them.
+fn failed(case: &Selected, ranks: Ranks, why: &Failure) -> Option<GateFinding> {
+    let metric = format!("{}time", prefix(ranks));
+    let missing =
+        || GateFinding::noted(&case.rule.name, &metric, Verdict::Missing, why.to_string());
+    (!why.is_interrupt()).then(missing)
+}
+
+/// Runs all rounds of a case: of the first measurement, or of the second.
 fn rounds(
     bench: &Bench,
     baseline: &Engine,
     case: &Selected,
     ranks: Ranks,
+    again: bool,
 ) -> Result<[Quantity; 2], Failure> {
     let path = bench.prepare(baseline, case, "time")?;
     let engines = [baseline, baseline, &bench.candidate];
@@ -89,7 +113,8 @@ fn rounds(
     let budget_s = bench.options.budget.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
-    let mut random = Random(bench.options.seed);
+    let seed = bench.options.seed.wrapping_add(u64::from(again));
+    let mut random = Random(seed);
     let (mut cpu, mut wall) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let mut order = [0, 1, 2];
@@ -105,8 +130,8 @@ fn rounds(
     }
     Ok([(CPU, cpu), (WALL, wall)].map(|(name, rounds): (&str, Vec<Round>)| {
         let (case, metric) = (case.rule.name.clone(), format!("{}{name}", prefix(ranks)));
-        let found = compare(&rounds, rules.alpha, bench.options.seed);
-        Quantity { case, metric, rounds, found }
+        let found = compare(&rounds, rules.alpha.sqrt(), seed);
+        Quantity { case, metric, rounds, found, first: None }
     }))
 }
 
@@ -120,9 +145,6 @@ fn size(effect: f64) -> f64 {
     if effect < 0.0 { 1.0 / (1.0 + effect) - 1.0 } else { effect }
 }
 
-/// An effect with a p-value below this is not reported as unchanged.
-const SUSPICIOUS: f64 = 0.01;
-
 impl Quantity {
     /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
     /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
@@ -132,31 +154,50 @@ impl Quantity {
         [baseline, baseline * (1.0 + self.found.effect)]
     }
 
+    /// Returns this measurement as the second one. Its p-value becomes that of both: two are at most x with probability x squared.
+    fn confirming(mut self, first: &Self) -> Self {
+        self.found.p = self.found.p.max(first.found.p).powi(2);
+        Self { first: Some(first.found.effect), ..self }
+    }
+
+    fn is_change(&self, rules: &TimeRules) -> bool {
+        matches!(self.verdict(rules), Verdict::Regression | Verdict::Improvement)
+    }
+
     fn finding(&self, rules: &TimeRules) -> GateFinding {
         let Comparison { low, high, p, floor, visible, .. } = self.found;
         let visible = visible.max(rules.effect_min / 100.0);
         let [low, high, floor, visible] = [low, high, floor, visible].map(|ratio| ratio * 100.0);
-        let note = format!(
+        let mut note = format!(
             "{} rounds; 99 % interval {low:+.1} to {high:+.1} %, p = {p:.5} among all times; noise floor {floor:.1} %, minimum \
              detectable effect {visible:.1} %",
             self.rounds.len()
         );
         let verdict = self.verdict(rules);
+        if let Some(first) = self.first {
+            let answer = if self.is_change(rules) { "confirms" } else { "does not confirm" };
+            let first = first * 100.0;
+            note.push_str(&format!(
+                "; a second measurement, which {answer} {first:+.1} % in the first"
+            ));
+        }
         GateFinding::of_values(&self.case, &self.metric, verdict, self.times(), note)
     }
 
-    /// A change is significant, and larger than both the noise floor and the effects of code alignment (`effect_min`). "Unchanged"
-    /// requires that an effect of `effect_wanted` would have been detected, lies outside the interval, and that no suspicious effect was
-    /// seen.
+    /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), and of the same
+    /// sign in both measurements. "Unchanged" requires that an effect of `effect_wanted` would have been detected, lies outside the
+    /// interval, and that no significant effect was seen.
     fn verdict(&self, rules: &TimeRules) -> Verdict {
         let found = &self.found;
         let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
-        if found.p <= rules.alpha && size(found.effect) > found.floor.max(least) {
+        let level = if self.first.is_some() { rules.alpha } else { rules.alpha.sqrt() };
+        let is_significant = found.p <= level && size(found.effect) > least;
+        let is_confirmed = self.first.is_none_or(|first| (first > 0.0) == (found.effect > 0.0));
+        if is_significant && size(found.effect) > found.floor && is_confirmed {
             return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
         }
-        let suspicious = found.p <= SUSPICIOUS && size(found.effect) > least;
         let within = size(found.low) <= wanted && size(found.high) <= wanted;
-        match found.visible <= wanted && within && !suspicious {
+        match found.visible <= wanted && within && !is_significant {
             true => Verdict::Unchanged,
             false => Verdict::Inconclusive,
         }
@@ -179,18 +220,26 @@ mod tests {
             low: 0.06,
             high: 0.1,
         };
-        let of = |found: Comparison| {
+        let quantity = |found: Comparison| {
             let (case, metric) = ("c".to_owned(), CPU.to_owned());
-            Quantity { case, metric, rounds: Vec::new(), found }.verdict(&rules)
+            Quantity { case, metric, rounds: Vec::new(), found, first: None }
         };
+        let of = |found: Comparison| quantity(found).verdict(&rules);
         assert_eq!(of(found), Verdict::Regression);
         assert_eq!(of(Comparison { effect: -0.08, ..found }), Verdict::Improvement);
-        assert_eq!(of(Comparison { p: 0.02, ..found }), Verdict::Unchanged);
-        assert_eq!(of(Comparison { p: 0.005, ..found }), Verdict::Inconclusive);
-        assert_eq!(of(Comparison { p: 0.02, high: 0.11, ..found }), Verdict::Inconclusive);
-        assert_eq!(of(Comparison { effect: 0.02, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { p: 0.3, ..found }), Verdict::Unchanged);
+        assert_eq!(of(Comparison { floor: 0.081, ..found }), Verdict::Inconclusive);
+        assert_eq!(of(Comparison { p: 0.3, high: 0.11, ..found }), Verdict::Inconclusive);
+        assert_eq!(of(Comparison { effect: 0.009, ..found }), Verdict::Unchanged);
         assert_eq!(of(Comparison { floor: 0.09, visible: 0.12, ..found }), Verdict::Inconclusive);
+        let twice = |again| quantity(again).confirming(&quantity(found)).verdict(&rules);
+        assert_eq!(twice(found), Verdict::Regression);
+        assert_eq!(twice(Comparison { p: 0.04, ..found }), Verdict::Unchanged);
+        assert_eq!(twice(Comparison { effect: 0.0, p: 1.0, ..found }), Verdict::Unchanged);
+        assert_eq!(twice(Comparison { effect: -0.08, ..found }), Verdict::Inconclusive);
+        assert_eq!(twice(Comparison { floor: 0.09, ..found }), Verdict::Inconclusive);
     }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
         /// Of rounds of which half are disturbed, the means of both programs may have the other order than the effect.
@@ -198,7 +247,7 @@ mod tests {
         fn the_times_have_the_ratio_of_the_effect(rounds in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
             let found = compare(&rounds, 0.01, 1);
             let (case, metric, effect) = ("c".to_owned(), CPU.to_owned(), found.effect);
-            let times = Quantity { case, metric, rounds, found }.times();
+            let times = Quantity { case, metric, rounds, found, first: None }.times();
             prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);
         }
     }

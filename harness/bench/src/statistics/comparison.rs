@@ -34,8 +34,8 @@ const EXCEEDANCES_MAX: usize = 100;
 /// sqrt((1 + 1/2) / 2).
 const SCALE_BASELINE_DIFFERENCE: f64 = 0.866_025_403_784_438_6;
 
-/// The 90 % quantile of the standard normal distribution.
-const NORMAL_QUANTILE_90: f64 = 1.2816;
+/// The 95 % quantile of the standard normal distribution: two measurements both find what each finds in 95 of 100 cases in 90.
+const NORMAL_QUANTILE_95: f64 = 1.6449;
 
 /// Natural logarithms of the times of one round: baseline, baseline again, candidate.
 pub type Round = [f64; 3];
@@ -49,7 +49,7 @@ pub struct Comparison {
     pub p: f64,
     /// Noise floor: the effect that noise alone exceeds with probability `alpha`, from the baseline runs.
     pub floor: f64,
-    /// Minimum detectable effect: one this large is detected with a probability of 90 %.
+    /// Minimum detectable effect: one this large is detected twice with a probability of 90 %.
     pub visible: f64,
     /// Lower limit of the 99 % bootstrap percentile interval of the effect.
     pub low: f64,
@@ -92,7 +92,7 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         effect: relative(effect),
         p: (1 + as_large) as f64 / (1 + drawn) as f64,
         floor: relative(floor),
-        visible: relative(floor + NORMAL_QUANTILE_90 * deviation(&bootstrap_effects)),
+        visible: relative(floor + NORMAL_QUANTILE_95 * deviation(&bootstrap_effects)),
         low: relative(quantile(&bootstrap_effects, 0.005)),
         high: relative(quantile(&bootstrap_effects, 0.995)),
     }

@@ -277,7 +277,8 @@ mod tests {
         let session = |name: &str, cpu: &str| {
             let machine = Machine { cpu: cpu.into(), ..Machine::default() };
             let (command, lacks) = (Vec::new(), Default::default());
-            let session = Session { command, machine, load_average: 0.0, lacks };
+            let session =
+                Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
             Line { session: name.into(), ..line(Entry::Session(Box::new(session))) }
         };
         let of = |name: &str, run: Line| Line { session: name.into(), ..run };

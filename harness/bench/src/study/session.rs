@@ -124,6 +124,7 @@ impl Session<'_> {
         let opening = Opening {
             command: std::env::args().collect(),
             machine: machine::describe(&self.plan.runner.launcher.program(), repository),
+            nodes: machine::nodes(),
             load_average: machine::load_average(),
             lacks: self.plan.study.engines().into_iter().map(lacks).collect(),
         };

@@ -66,7 +66,13 @@ mod tests {
             commit: commit.into(),
         };
         let (command, lacks) = (vec![], Default::default());
-        line(Entry::Session(Box::new(Session { command, machine, load_average, lacks })))
+        line(Entry::Session(Box::new(Session {
+            command,
+            machine,
+            nodes: String::new(),
+            load_average,
+            lacks,
+        })))
     }
 
     fn rules(lines: &[Line]) -> Vec<usize> {

@@ -208,6 +208,7 @@ mod tests {
         let session = Session {
             command: Vec::new(),
             machine: Machine::default(),
+            nodes: String::new(),
             load_average: 0.0,
             lacks: lacks.into(),
         };

@@ -70,7 +70,9 @@ impl Launcher {
     /// directory would not exist, or if this machine has no `/dev/shm`; OpenMPI then uses its own default.
     pub fn shared_memory(&self) -> Option<SharedMemory> {
         let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
-        let local = is_mpirun && self.words[1..] == ["-n", RANKS];
+        // In a job of Slurm, mpirun starts ranks on all of its nodes.
+        let nodes = std::env::var("SLURM_JOB_NUM_NODES").unwrap_or_else(|_| "1".to_owned());
+        let local = is_mpirun && self.words[1..] == ["-n", RANKS] && nodes == "1";
         let directory = || tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok();
         let made = local.then(directory).flatten()?;
         interrupt::note_directory(made.path());
@@ -97,6 +99,8 @@ pub fn set_environment(command: &mut Command) {
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        // In a job of Slurm, several jobs of ranks share the allocation; without this, each would wait for the one before it.
+        .env("SLURM_OVERLAP", "1")
         // On a shared machine, other work may occupy the cores that ranks would be bound to.
         .env("OMPI_MCA_hwloc_base_binding_policy", "none");
 }

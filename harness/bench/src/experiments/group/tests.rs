@@ -15,7 +15,7 @@ fn free() -> Line {
 fn of_machine(session: &str, cpu: &str) -> Line {
     let machine = Machine { cpu: cpu.into(), ..Machine::default() };
     let (command, lacks) = (Vec::new(), BTreeMap::new());
-    let entry = Session { command, machine, load_average: 0.0, lacks };
+    let entry = Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
     Line { session: session.into(), ..line(Entry::Session(Box::new(entry))) }
 }
 
