@@ -11,7 +11,7 @@ use files::{Claim, ClaimError, Draft};
 use ranks::{Comm, agree};
 use serde::Serialize;
 use std::fmt::Display;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// File name of the manifest.
@@ -31,6 +31,14 @@ pub struct Output {
     pub tree: bool,
     /// Whether the tree has the rank that owns each cell.
     pub cell_ranks: bool,
+}
+
+/// A rank on another machine than rank 0, if the directory lies on a disk of that one alone.
+fn not_shared(path: &Path, rank: usize) -> Error {
+    let path = path.display();
+    Error::output(format!(
+        "{path}: rank {rank} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share"
+    ))
 }
 
 /// File name of a rank's part.
@@ -82,7 +90,10 @@ impl OutDir {
         let mine = [0, comm.rank()].into_iter().flat_map(names);
         let claim = match created {
             Some(claim) => Ok(claim),
-            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| output(path, e)),
+            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| match e.kind() {
+                ErrorKind::NotFound => not_shared(path, comm.rank()),
+                _ => output(path, e),
+            }),
         };
         Ok(Self { output: files.clone(), path: path.clone(), claim: agree(comm, claim)? })
     }

@@ -43,7 +43,7 @@ const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
 /// Why what needs facets is not checked.
 const NO_GEOMETRY: &str = "the geometry is unknown without a case";
 /// Why nothing can be wrong.
-const NO_LEAVES: &str = "the mesh has no leaves";
+pub(crate) const NO_LEAVES: &str = "the mesh has no leaves";
 
 /// A property of meshes.
 #[derive(Clone, Copy, Debug)]
@@ -106,9 +106,7 @@ impl Check {
             true => {}
             false => result.examined = 0,
         }
-        if result.holds() && result.was_run() && result.examined == 0 {
-            result.lacks(NO_LEAVES);
-        }
+        result.needs_objects(NO_LEAVES);
         result.check_invariants();
         result
     }

@@ -65,6 +65,13 @@ impl CheckResult {
         self.nothing_to_check = Some(why.to_owned());
     }
 
+    /// States that there was nothing to check, if nothing was examined and found.
+    pub fn needs_objects(&mut self, why: &str) {
+        if self.holds() && self.was_run() && self.examined == 0 {
+            self.lacks(why);
+        }
+    }
+
     /// Adds the findings of another result.
     pub fn append(&mut self, other: &Self) {
         let room = FINDINGS_LISTED - self.findings.len();

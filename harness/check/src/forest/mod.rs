@@ -14,7 +14,7 @@ mod topology;
 mod tests;
 
 use crate::audit::AuditReport;
-use crate::checks::CheckResult;
+use crate::checks::{CheckResult, NO_LEAVES};
 use crate::promises::Touching;
 use contract::import::forest::{Forest, Quadrant};
 use isometry::LENGTH;
@@ -231,7 +231,8 @@ pub fn audit(forest: &Forest, touching: Touching, start: Instant) -> AuditReport
             false => {}
         }
     }
-    let checks = vec![connectivity, valid, linear, complete, balance];
+    let mut checks = vec![connectivity, valid, linear, complete, balance];
+    checks.iter_mut().for_each(|result| result.needs_objects(NO_LEAVES));
     let time_wall_s = start.elapsed().as_secs_f64();
     let report = AuditReport { checks, leaves, nodes: 0, time_read_s, time_wall_s };
     report.check_invariants();
@@ -270,5 +271,7 @@ pub fn diff(a: &Forest, b: &Forest) -> [CheckResult; 2] {
             leaves.report_with(|| format!("A has {}, B has {}", name(of_a), name(of_b)));
         }
     }
-    [connectivity, leaves]
+    let mut results = [connectivity, leaves];
+    results.iter_mut().for_each(|result| result.needs_objects(NO_LEAVES));
+    results
 }

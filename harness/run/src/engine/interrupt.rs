@@ -16,6 +16,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{LazyLock, Mutex, MutexGuard, Once, OnceLock};
 use std::thread::{self, sleep};
@@ -110,16 +111,16 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Notes a child process that leads a session.
-pub(super) fn note_child(id: u32) {
-    leftovers().children.push(id);
-}
-
-/// Notes a child process that leads a session and stays while others come and go.
-pub(super) fn note_service(id: u32) {
+/// Starts a child process that leads a session, and that may stay while others come and go. It is noted under the same lock, so that a run
+/// that ends on another thread does not take it for a process that was adopted.
+pub(super) fn spawn(command: &mut Command, stays: bool) -> io::Result<Child> {
     let mut leftovers = leftovers();
-    leftovers.children.push(id);
-    leftovers.services.push(id);
+    let child = command.spawn()?;
+    leftovers.children.push(child.id());
+    if stays {
+        leftovers.services.push(child.id());
+    }
+    Ok(child)
 }
 
 /// Forgets a child process that has ended, and ends its descendants that have left its session.

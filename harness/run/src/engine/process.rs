@@ -102,8 +102,7 @@ fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child, [O
     command.stdin(Stdio::null()).stdout(outputs[0].stdio()?).stderr(outputs[1].stdio()?);
     lead_session(command);
     let start = Instant::now();
-    let child = command.spawn()?;
-    interrupt::note_child(child.id());
+    let child = interrupt::spawn(command, false)?;
     Ok((start, child, outputs))
 }
 
@@ -269,6 +268,17 @@ mod tests {
         let finished = shell("echo yes", &watch).unwrap();
         assert_eq!(fs::read_to_string(&finished.stdout).unwrap(), "yes\n");
         assert_eq!(finished.peak_rss_bytes, None);
+    }
+
+    /// A run that has just been started is not one that another run has left behind.
+    #[test]
+    fn runs_on_several_threads_do_not_end_each_other() {
+        let runs = || {
+            let logs = tempfile::tempdir().unwrap();
+            let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+            (0..20).for_each(|_| _ = shell("exit 0", &watch).unwrap());
+        };
+        std::thread::scope(|scope| (0..8).for_each(|_| _ = scope.spawn(runs)));
     }
 
     #[test]

@@ -127,8 +127,7 @@ impl Service {
         drop(place);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors.stdio()?);
         process::lead_session(command);
-        let mut child = command.spawn()?;
-        interrupt::note_service(child.id());
+        let mut child = interrupt::spawn(command, true)?;
         let requests = child.stdin.take();
         let answers = child.stdout.take().expect("it is a pipe");
         let sent = Instant::now();
