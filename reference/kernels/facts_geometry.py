@@ -2,7 +2,7 @@
 import z3
 from kernels import (
     AXES, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANTS, RAYS, ROOT, VERTEX, VOTE, VOXELISE, bit, fact, has, i64, maximum,
-    minimum, no, u32, usize, word)
+    minimum, no, octant, u32, usize, word)
 from rust import coerced, Number, plain, Struct, term
 
 
