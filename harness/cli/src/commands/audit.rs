@@ -16,7 +16,7 @@ use run::proof;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest time of the proven checker. It takes four seconds for ten million leaves, but who has more may wait.
+/// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
 const LIMIT: Duration = Duration::from_secs(86_400);
 
 /// `harness audit`.
