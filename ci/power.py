@@ -1,4 +1,4 @@
-"""What ci/power computes: the line of a gate, the operating curve, and steps behind drifts, each beside public detectors.
+"""What ci/power computes: the line of a gate, the operating curve, and steps hidden by drifts, each beside public detectors.
 
 The detectors, with the rules of their documentation; each is given all times of the first measurement of the gate:
 
@@ -144,7 +144,7 @@ def steps_of(harness, place, values):
 
 
 def track(harness, place, trials):
-    """Prints how often a step behind a drift is found within two commits, and how many steps are found where none is."""
+    """Prints how often a step hidden by a drift is found within two commits, and how many steps are found where none is."""
     print("| history of 120 commits, noise of 1 % | detector | found | steps found elsewhere, in how many histories |")
     print("|---|---|---|---|")
     for drift, step in [(0, 0), (20, 0), (20, 3), (20, 5), (-20, 5), (-5, 5)]:

@@ -15,7 +15,7 @@ pub mod tables;
 use crate::figure::check::check_invariants;
 #[cfg(feature = "figures")]
 use crate::figure::raster;
-use crate::figure::{Figure, csv, name_apart, svg, tex};
+use crate::figure::{Figure, csv, file_name, name_apart, svg, tex};
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use contract::files::{named, write_atomically};
@@ -47,7 +47,8 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let groups = Groups::of(lines);
     let figures = figures::figures(&groups);
     let mut figures: Vec<Figure> = figures.into_iter().map(Figure::without_zeros).collect();
-    name_apart(&mut figures);
+    figures.iter_mut().for_each(|figure| figure.id = file_name(&figure.id));
+    name_apart(figures.iter_mut().map(|figure| &mut figure.id));
     check_invariants(&figures);
     let place = directory.join("figures");
     fs::create_dir_all(&place)?;

@@ -4,11 +4,10 @@
 //! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. The same
 //! setup with another partition or n has a number at its end: `speedup-2`.
 
-use crate::figure::file_name;
+use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::statistics::Median;
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// A result, as it is printed.
@@ -26,14 +25,8 @@ pub struct Number {
 
 /// All results of a record.
 pub fn numbers(groups: &Groups) -> Vec<Number> {
-    let mut taken = BTreeSet::new();
     let mut all: Vec<Number> = groups.all.iter().flat_map(|group| of(groups, group)).collect();
-    for number in &mut all {
-        let plain = number.key.clone();
-        let names = std::iter::once(plain.clone()).chain((2..).map(|n| format!("{plain}-{n}")));
-        let mut free = names.filter(|name| taken.insert(name.clone()));
-        number.key = free.next().expect("there are always more numbers");
-    }
+    name_apart(all.iter_mut().map(|number| &mut number.key));
     all
 }
 
@@ -56,10 +49,12 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
         let Median { value, low, high, count, .. } = median.filter(|m| m.value.is_finite())?;
+        let name_of = || format!("{setup}/{name}");
+        assert!(low <= value && value <= high, "{}: {value} is not in its interval", name_of());
         let several = count > 1;
         let interval =
             if several { format!("{}--{}", digits(low), digits(high)) } else { String::new() };
-        Some(Number { key: format!("{setup}/{name}"), value: digits(value), interval, unit })
+        Some(Number { key: name_of(), value: digits(value), interval, unit })
     };
     let cells = Number {
         key: format!("{setup}/cells"),
@@ -100,6 +95,7 @@ mod tests {
     use super::*;
     use bench::experiments::entry::{Comm, Entry};
     use bench::testing::{line, run};
+    use std::collections::BTreeSet;
 
     #[test]
     fn every_result_has_a_key_of_its_own() {

@@ -75,7 +75,7 @@ fn check_ideal(figure: &Figure, series: &[Series]) {
 #[cfg(test)]
 mod tests {
     use super::super::samples::{figure, series};
-    use super::super::{Bars, name_apart};
+    use super::super::{Bars, file_name, name_apart};
     use super::*;
     use proptest::prelude::*;
 
@@ -140,8 +140,8 @@ mod tests {
         #[test]
         fn names_are_plain_and_differ(names in proptest::collection::vec("[a ./\"é<&-]{0,3}", 1..12)) {
             let mut all: Vec<Figure> =
-                names.iter().map(|name| Figure { id: format!("phases-{name}"), ..bars() }).collect();
-            name_apart(&mut all);
+                names.iter().map(|name| Figure { id: file_name(&format!("phases-{name}")), ..bars() }).collect();
+            name_apart(all.iter_mut().map(|figure| &mut figure.id));
             check_invariants(&all);
         }
     }

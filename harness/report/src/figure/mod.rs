@@ -209,8 +209,8 @@ impl Figure {
     }
 }
 
-/// The text as a part of a file's name, of an address and of a label: other characters than ASCII letters, digits, `.`, `-` and
-/// `_` become `-`.
+/// The text as a part of a file's name, of an address and of a label: characters other than `a` to `z`, `A` to `Z`, digits, `.`, `-`
+/// and `_` become `-`.
 pub fn file_name(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     text.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()
@@ -235,14 +235,15 @@ impl Figure {
     }
 }
 
-/// Makes the names of figures plain, and different from each other: the second of a name ends in `-2`.
-pub fn name_apart(figures: &mut [Figure]) {
+/// Makes names different from each other: the second of a name ends in `-2`.
+pub fn name_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut taken = BTreeSet::new();
-    for figure in figures {
-        let plain = file_name(&figure.id);
-        let names = std::iter::once(plain.clone()).chain((2..).map(|n| format!("{plain}-{n}")));
-        let mut free = names.filter(|name| taken.insert(name.clone()));
-        figure.id = free.next().expect("there are always more numbers");
+    for name in names {
+        let plain = name.clone();
+        let numbered = (2..).map(|n| format!("{plain}-{n}"));
+        let mut free = std::iter::once(plain.clone()).chain(numbered);
+        *name =
+            free.find(|name| taken.insert(name.clone())).expect("there are always more numbers");
     }
 }
 

@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(finished.peak_rss_bytes, None);
     }
 
-    /// A run that has just been started is not one that another run has left behind.
+    /// A run that has just been started is not taken for one that another run has left running.
     #[test]
     fn runs_on_several_threads_do_not_end_each_other() {
         let runs = || {
