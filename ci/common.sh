@@ -43,6 +43,16 @@ build_programs() {
     esac
 }
 
+# build_static PACKAGE...: programs without MPI that need no library, so they run on every Linux of this processor, whatever its age.
+# Sets `programs` to where they are.
+build_static() {
+    local host
+    host="$(rustc -vV | sed -n 's/^host: //p')"
+    # With --target, the flag does not reach macros and build scripts, which are libraries that the compiler loads.
+    RUSTFLAGS="-C target-feature=+crt-static" cargo build --quiet --locked --profile "$profile" --target "$host" "${@/#/--package=}"
+    programs="$target/$host/$(basename "$programs")"
+}
+
 # fail CODE MESSAGE...: prints one sentence and exits with CODE: 2 for invalid input, 3 if something is missing.
 fail() {
     local code="$1"
