@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::cgns;
 use crate::foam;
 use crate::htg;
 use crate::mesh::Mesh;
@@ -45,6 +46,11 @@ pub const FORMATS: &[Format] = &[
         ending: "/polyMesh",
         purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",
         write: foam::write,
+    },
+    Format {
+        ending: ".cgns",
+        purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
+        write: cgns::write,
     },
     Format {
         ending: ".vtkhdf",

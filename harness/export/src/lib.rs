@@ -4,10 +4,11 @@
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
-//! - [`foam`]: meshes for OpenFOAM;
+//! - [`foam`]: meshes for OpenFOAM, and [`cgns`] made of them;
 
 #![deny(missing_docs)]
 
+pub mod cgns;
 pub mod foam;
 pub mod format;
 pub mod htg;

@@ -1,6 +1,7 @@
 //! What every export is given besides mesh and selection, and what it returns.
 
 use std::num::NonZero;
+use std::path::Path;
 
 use contract::case::Case;
 
@@ -16,6 +17,8 @@ pub struct Options<'a> {
     pub watch: &'a dyn Watch,
     /// What only meshes for OpenFOAM need.
     pub foam: Foam<'a>,
+    /// Makes a CGNS file of a polyMesh: the directory and the file.
+    pub cgns: fn(&Path, &Path) -> Result<(), Failure>,
 }
 
 /// Options of meshes for OpenFOAM.

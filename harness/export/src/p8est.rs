@@ -207,7 +207,7 @@ fn pad(bytes: &mut Vec<u8>) {
 mod tests {
     use super::*;
     use crate::options::Foam;
-    use crate::testing::{Unwatched, stored};
+    use crate::testing::{Unwatched, no_cgns, stored};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
     use contract::testing::{random_words, words_of};
@@ -219,7 +219,12 @@ mod tests {
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
 
     fn options() -> Options<'static> {
-        Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam: Foam::default() }
+        Options {
+            jobs: NonZero::<usize>::MIN,
+            watch: &Unwatched,
+            foam: Foam::default(),
+            cgns: no_cgns,
+        }
     }
 
     fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {

@@ -1,10 +1,12 @@
 //! Meshes on disk, for tests.
 
 use crate::mesh::Mesh;
+use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
 use contract::watch::Watch;
+use std::path::Path;
 use tempfile::TempDir;
 
 /// The unit cube.
@@ -17,6 +19,11 @@ impl Watch for Unwatched {
     fn is_interrupted(&self) -> bool {
         false
     }
+}
+
+/// A conversion to CGNS that is not expected.
+pub fn no_cgns(_: &Path, _: &Path) -> Result<(), Failure> {
+    unreachable!("no other format asks for it")
 }
 
 /// A mesh of these parts in a directory, which lasts as long as the first value.

@@ -9,10 +9,16 @@ use contract::failure::Failure;
 use export::format::{self, FORMATS};
 use export::mesh::Mesh;
 use export::options::{Options, Summary};
+use run::engine::paths::Paths;
+use run::engine::python;
 use run::progress::Progress;
 use std::num::NonZero;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
+use std::time::Duration;
+
+/// The script reads all of a mesh into memory, which limits its size long before its time.
+const CGNS_LIMIT: Duration = Duration::from_secs(24 * 3600);
 
 /// `harness export`.
 #[derive(Args, Debug)]
@@ -77,10 +83,18 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
     let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
-    let options = Options { jobs, watch: &progress, foam: foam.options(case.as_ref()) };
+    let foam = foam.options(case.as_ref());
+    let options = Options { jobs, watch: &progress, foam, cgns };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.finish();
     written
+}
+
+/// Makes a CGNS file of a polyMesh.
+fn cgns(directory: &Path, file: &Path) -> Result<(), Failure> {
+    let place = directory.parent().expect("the directory is in a temporary one");
+    python::run("CGNS", "export_cgns.py", [directory, file], &Paths::find(), CGNS_LIMIT, place)?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -37,8 +37,13 @@ impl FoamArguments {
             ("--processors", processors.is_some()),
             ("--case", case.is_some()),
         ];
-        if let Some((name, _)) = given.iter().find(|(_, is_given)| *is_given)
-            && ending != "/polyMesh"
+        let has_effect = |name: &str| match ending {
+            "/polyMesh" => true,
+            ".cgns" => ["--regions", "--case"].contains(&name),
+            _ => false,
+        };
+        if let Some((name, _)) =
+            given.iter().find(|(name, is_given)| *is_given && !has_effect(name))
         {
             return Err(Failure::input(format!(
                 "{name} has no effect on {ending}: omit it, or write CASE/constant/polyMesh"
