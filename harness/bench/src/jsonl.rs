@@ -39,7 +39,7 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> io::Result<Vec<Line<T>>> {
 /// Appends a line. Creates the file and its directory if necessary.
 ///
 /// # Errors
-/// If the line cannot be written.
+/// If the line cannot be written, or if the file has other content than such lines, which is left as it was.
 pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
     if let Some(directory) = path.parent() {
         fs::create_dir_all(directory)?;
@@ -51,6 +51,13 @@ pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
     let bytes = fs::read(path)?;
     let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
     let mut length = bytes.len() as u64;
+    // A crash may leave zeros where the last line was to be.
+    let is_ours = bytes.is_empty() || bytes[0] == b'{';
+    if !is_ours || !matches!(last.first(), None | Some(b'{' | 0)) {
+        let why =
+            "it does not consist of JSON lines, so nothing is appended to it: give another file";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+    }
     if serde_json::from_slice::<IgnoredAny>(last).is_ok() {
         text.insert(0, '\n');
     } else if !last.is_empty() {
@@ -61,4 +68,24 @@ pub fn append(path: &Path, line: &impl Serialize) -> io::Result<()> {
         // Nobody else has appended since, because of the lock.
         let _ = file.set_len(length);
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_something_else_stays_as_it_is() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("file");
+        for content in ["solid a\nendsolid", "key = 1\n", "\0\0\n\0", "{}\n[a]\nnote", "a"] {
+            fs::write(&path, content).unwrap();
+            let error = append(&path, &1).unwrap_err().to_string();
+            assert!(error.contains("does not consist of JSON lines"), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), content);
+        }
+        fs::write(&path, "{}\n{\"a\":\0\0").unwrap();
+        append(&path, &1).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "{}\n1\n");
+    }
 }

@@ -22,7 +22,8 @@ pub use draft::{Draft, check_writable, write_atomically};
 pub use memory::{Heap, OUT_OF_MEMORY, ends_with};
 pub use text::{Plain, message};
 pub use uses::{
-    append_log, clash, open, read, read_log, read_text, register_input, register_output,
+    append_log, clash, name_output, open, read, read_log, read_text, register_input,
+    register_output,
 };
 
 /// Exit code of a program with a bug: it panicked.

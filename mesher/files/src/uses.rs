@@ -1,6 +1,6 @@
-//! What this process reads and writes. No output replaces an input.
+//! What this process reads and writes. No output replaces an input, or another output.
 //!
-//! Invariant: a regular file, known by its device and inode, has one of these uses, whichever comes first.
+//! Invariants: no option names an output that another option names, or a directory with it; a regular file, known by its device and inode, has one of these uses, whichever comes first.
 //! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
 
 use std::collections::BTreeMap;
@@ -101,9 +101,43 @@ pub fn register_output(path: &Path) -> io::Result<()> {
     fs::metadata(path).map_or(Ok(()), |found| register(path, &found, Use::Output))
 }
 
+/// Files, and directories with all that is in them, that options name as outputs.
+static OUTPUTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Notes that an option names this file or directory as an output. Once per option.
+///
+/// # Errors
+/// If another option names it, a directory that contains it, or something in it.
+pub fn name_output(path: &Path) -> io::Result<()> {
+    let place = match fs::canonicalize(path) {
+        // Streams and devices take the output of several options.
+        Ok(found) if !found.is_file() && !found.is_dir() => return Ok(()),
+        Ok(found) => found,
+        Err(_) => {
+            let absolute = std::path::absolute(path)?;
+            let (directory, name) = (absolute.parent(), absolute.file_name());
+            // Whoever writes finds out that the directory is missing.
+            let Ok(directory) = fs::canonicalize(directory.unwrap_or(&absolute)) else {
+                return Ok(());
+            };
+            name.map_or(directory.clone(), |name| directory.join(name))
+        }
+    };
+    let mut outputs = OUTPUTS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let clashes = |other: &&PathBuf| place.starts_with(other) || other.starts_with(&place);
+    if let Some(other) = outputs.iter().find(clashes) {
+        let why =
+            format!("this run also writes {}: give one of them another name", other.display());
+        return Err(io::Error::new(ErrorKind::InvalidInput, why));
+    }
+    outputs.push(place);
+    Ok(())
+}
+
 /// Forgets all files: another run begins.
 pub fn forget() {
     USES.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clear();
+    OUTPUTS.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clear();
 }
 
 fn register(path: &Path, file: &Metadata, role: Use) -> io::Result<()> {
@@ -172,6 +206,33 @@ mod tests {
             );
             assert_eq!(fs::read(&file).unwrap(), b"body");
         }
+    }
+
+    #[test]
+    fn no_output_is_another_output_or_in_its_directory() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        fs::create_dir(at("mesh")).unwrap();
+        fs::create_dir(at("other")).unwrap();
+        std::os::unix::fs::symlink(at("mesh"), at("link")).unwrap();
+        name_output(&at("mesh")).unwrap();
+        name_output(&at("run.json")).unwrap();
+        for clash in [
+            "mesh",
+            "link",
+            "mesh/mesh.json",
+            "link/mesh.json",
+            "run.json",
+            "mesh/../run.json",
+            ".",
+        ] {
+            let error = name_output(&at(clash)).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::InvalidInput, "{clash}: {error}");
+        }
+        for free in ["other", "mesh.json", "meshes", "run.json2", "/dev/null", "/dev/null"] {
+            name_output(&at(free)).unwrap();
+        }
+        name_output(&at("missing/run.json")).unwrap();
     }
 
     #[test]

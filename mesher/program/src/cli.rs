@@ -31,7 +31,7 @@ pub struct Args {
     input: PathBuf,
     /// Write the mesh to this directory, which must be empty or not exist; default: write nothing
     #[arg(short, long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Files to write, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "words", requires = "out")]
     write: Vec<Files>,

@@ -300,6 +300,14 @@ fn registered(source: &Source) -> Result<(), Error> {
     files::register_input(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
 }
 
+/// Finds out that two options name one output, or one in the directory of another.
+fn named_apart(args: &Args) -> Result<(), Error> {
+    let outputs = [&args.out, &args.json, &args.status];
+    outputs.into_iter().flatten().try_for_each(|path| {
+        files::name_output(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
+    })
+}
+
 fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Error> {
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
@@ -307,6 +315,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         agree(comm, json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
     };
+    agree(comm, if comm.rank() == 0 { named_apart(args) } else { Ok(()) })?;
     on_json("choose another --json", &check_writable)?;
     let case = case(args, comm)?;
     agree(comm, registered(&case.source))?;

@@ -235,7 +235,11 @@ impl GateReport {
                     ));
                 }
             }
-            let mut missing = layer.findings.iter().filter(|f| f.verdict == Verdict::Missing);
+            let is_missing = |f: &&GateFinding| {
+                f.verdict == Verdict::Missing
+                    || self.require_layers && f.verdict == Verdict::LeftOut
+            };
+            let mut missing = layer.findings.iter().filter(is_missing);
             if let Some(GateFinding { case, metric, note, .. }) = missing.next() {
                 return End::Incomplete(format!("{} of {case}: {metric}: {note}", layer.name));
             }

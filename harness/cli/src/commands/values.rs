@@ -33,7 +33,7 @@ impl<const WRITTEN: bool> ValueParserFactory for Place<WRITTEN> {
     type Parser = ValueParser;
 
     fn value_parser() -> ValueParser {
-        let check = if WRITTEN { files::check_writable } else { files::register_input };
+        let check = if WRITTEN { writable } else { files::register_input };
         PathBufValueParser::new().try_map(move |path| check(&path).map(|()| Self(path))).into()
     }
 }
@@ -47,8 +47,12 @@ pub fn with_extension(
             let endings = extensions.join(" or .");
             return Err(io::Error::other(format!("the file name must end in .{endings}")));
         }
-        files::check_writable(&path).map(|()| Place(path))
+        writable(&path).map(|()| Place(path))
     })
+}
+
+fn writable(path: &Path) -> io::Result<()> {
+    files::name_output(path).and_then(|()| files::check_writable(path))
 }
 
 /// Parses a number of cells, such as `1e9`.
