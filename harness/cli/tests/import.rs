@@ -57,6 +57,23 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
 }
 
 #[test]
+fn unknown_sides_do_not_become_known() {
+    let place = tempfile::tempdir().unwrap();
+    let [mesh, tree, forest, again] = ["mesh", "mesh.vtkhdf", "mesh.p8est", "again"]
+        .map(|name| place.path().join(name).to_str().unwrap().to_owned());
+    assert_eq!(result(&["import", &sample("unitcube.p8est"), "--out", &mesh]).0, 0);
+    for arguments in [&["export", &mesh, &tree][..], &["near-body", &mesh]] {
+        let (code, _, error) = result(arguments);
+        assert!(code == 2 && error.contains("sides of this mesh are unknown"), "{error}");
+    }
+    assert_eq!(result(&["export", &mesh, &forest]).0, 0);
+    let (code, _, error) = result(&["import", &forest, "--sides", "data", "--out", &again]);
+    assert_eq!(code, 2, "{error}");
+    assert_eq!(result(&["import", &forest, "--out", &again]).0, 0);
+    assert_eq!(digest(Path::new(&mesh)), digest(Path::new(&again)));
+}
+
+#[test]
 fn foreign_meshes_are_audited_without_a_manifest() {
     let (code, output, error) = result(&["audit", &sample("unitcube.p8est")]);
     assert_eq!((code, error.as_str()), (0, ""), "{output}");

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use contract::case::Case;
 use contract::htg::TreeFile;
 use contract::lattice::Root;
+use contract::manifest::Sides;
 use contract::mesh::{self, Order};
 use contract::npy::PartFile;
 use contract::word;
@@ -60,6 +61,19 @@ impl Mesh {
             "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
             case.name
         )))
+    }
+
+    /// Makes sure that the sides of the leaves are known.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn require_sides(&self) -> Result<(), Failure> {
+        match self.manifest.sides {
+            Sides::Known => Ok(()),
+            Sides::Unknown => Err(Failure::input(
+                "the sides of this mesh are unknown, and this output consists of them; .vtu and polyMesh leave them out",
+            )),
+        }
     }
 
     /// Whether the rank of each leaf is known: a tree may have been written without ranks.

@@ -4,7 +4,7 @@
 //! the quadrants in Morton order. It is described in `contract::import::forest`, which reads it.
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
-//! data of each quadrant, one byte, is its side or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
+//! data of each quadrant, one byte, is its side, [`NO_SIDE`] or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
 //! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
 //! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
 
@@ -15,6 +15,7 @@ use contract::files;
 use contract::import::forest::{ALIGNMENT, FORMAT};
 use contract::import::p4est::FILLER;
 use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::manifest::Sides;
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
@@ -27,6 +28,8 @@ use contract::failure::Failure;
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
+/// Data of a leaf whose side is unknown.
+const NO_SIDE: u8 = 4;
 /// Bytes of a quadrant: x, y, z, level, and one byte of data.
 const RECORD_BYTES: usize = 17;
 /// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
@@ -103,6 +106,7 @@ fn quadrants(
     options: &Options<'_>,
     visit: &mut impl FnMut(Quadrant) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
+    let has_sides = mesh.manifest.sides == Sides::Known;
     let (mut next, mut part_last) = (0, 0);
     mesh.visit(selection, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
@@ -113,7 +117,7 @@ fn quadrants(
         let key = word::key_of(octant.corner);
         fill(next, key, &mut |octant| visit(Quadrant { octant, data: FILLER, part }))?;
         (next, part_last) = (key + word::span(octant.level), part);
-        visit(Quadrant { octant, data: side as u8, part })
+        visit(Quadrant { octant, data: if has_sides { side as u8 } else { NO_SIDE }, part })
     })?;
     fill(next, KEY_END, &mut |octant| visit(Quadrant { octant, data: FILLER, part: part_last }))
 }

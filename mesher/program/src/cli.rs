@@ -60,7 +60,7 @@ pub struct Args {
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,
     /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
-    #[arg(long)]
+    #[arg(long, conflicts_with = "plan")]
     pub check: bool,
     /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
     #[arg(long, conflicts_with = "weight_exposed")]

@@ -2,12 +2,14 @@
 //!
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
 //!
-//! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`.
+//! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
+//! numbers of different geometries under one case name: the second is the case `CASE [2]`.
 //!
 //! A record with `accepted` states that the user has accepted the values from that commit on.
 //!
 //! A record: `{"schema": "octree-track/1", "commit": "full name", "time": "2026-01-31T12:00:00Z" (of the commit),
-//! "subject": "first line of its message", "machine": "its processor, ...", "metrics": {"CASE/METRIC": number}, "accepted": true (absent
+//! "subject": "first line of its message", "machine": "its processor, ...", "geometries": {"CASE": "digest of its facets"},
+//! "metrics": {"CASE/METRIC": number}, "accepted": true (absent
 //! if false)}`.
 
 use super::unit;
@@ -43,6 +45,9 @@ pub struct Record {
     /// The machine; empty if it is unknown, as in old records.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub machine: String,
+    /// Digests of the facets by case; old records have none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub geometries: BTreeMap<String, String>,
     /// Numbers by `CASE/METRIC`.
     pub metrics: BTreeMap<String, f64>,
     /// Whether the changes at this commit are accepted.
@@ -86,7 +91,15 @@ impl Record {
         }
         self.machine.clone_from(&measures.machine);
         for (case, measures) in &measures.cases {
-            let CaseMeasures { exact, memory, counted, .. } = measures;
+            let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
+            if let Some(digest) = geometry {
+                let before = self.geometries.insert(case.clone(), digest.clone());
+                if before.is_some_and(|before| before != *digest) {
+                    return Err(format!(
+                        "its {case} has other facets than that of the values before it: append it by a command of its own"
+                    ));
+                }
+            }
             for (metric, value) in exact.iter().chain(memory).chain(counted) {
                 self.metrics.insert(format!("{case}/{metric}"), *value as f64);
             }
@@ -144,7 +157,7 @@ fn is_of_machine(name: &str) -> bool {
 fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let mut index: HashMap<String, usize> = HashMap::new();
-    let mut machines = Origins::default();
+    let (mut machines, mut geometries) = (Origins::default(), Origins::default());
     for Line { number, is_finished, content } in lines {
         let wrong = |why: String| format!("line {number}: {why}");
         let mut record = match content {
@@ -159,9 +172,22 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
         let suffix = machines.suffix("", &record.machine);
-        let named = |(name, value): (String, f64)| match is_of_machine(&name) {
-            true => (name + &suffix, value),
-            false => (name, value),
+        let suffixes = record
+            .geometries
+            .iter()
+            .map(|(case, digest)| (case.clone(), geometries.suffix(case, digest)));
+        let suffixes: Vec<(String, String)> = suffixes.collect();
+        let named = |(mut name, value): (String, f64)| {
+            if is_of_machine(&name) {
+                name += &suffix;
+            }
+            let of_case = |(case, _): &&(String, String)| {
+                name.strip_prefix(case.as_str()).is_some_and(|rest| rest.starts_with('/'))
+            };
+            if let Some((case, geometry)) = suffixes.iter().find(of_case) {
+                name.insert_str(case.len(), geometry);
+            }
+            (name, value)
         };
         record.metrics = record.metrics.into_iter().map(named).collect();
         match index.get(&record.commit) {
@@ -175,7 +201,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             }
         }
     }
-    history.warnings.extend(machines.described());
+    history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
     Ok(history)
 }
 
@@ -227,6 +253,30 @@ mod tests {
         }
         let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];
         assert_eq!(read(&path).unwrap().records, expected);
+    }
+
+    #[test]
+    fn other_facets_under_the_name_of_a_case_are_another_series() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for (commit, digest) in [("a", ""), ("b", "x"), ("c", "y"), ("d", "x")] {
+            let geometries = [("c".to_owned(), digest.to_owned())].into_iter();
+            let geometries = geometries.filter(|(_, digest)| !digest.is_empty()).collect();
+            let metrics = [("c/cells", 1.0), ("c2/cells", 2.0), ("c/seconds", 3.0)];
+            let of_machine = Record { machine: commit.into(), ..record(commit, &metrics) };
+            append(&path, &Record { geometries, ..of_machine }).unwrap();
+        }
+        let history = read(&path).unwrap();
+        let names: Vec<Vec<&str>> = history
+            .records
+            .iter()
+            .map(|r| r.metrics.keys().map(String::as_str).collect())
+            .collect();
+        assert_eq!(names[0], ["c/cells", "c/seconds", "c2/cells"]);
+        assert_eq!(names[1], ["c/cells", "c/seconds [2]", "c2/cells"]);
+        assert_eq!(names[2], ["c [2]/cells", "c [2]/seconds [3]", "c2/cells"]);
+        assert_eq!(names[3], ["c/cells", "c/seconds [4]", "c2/cells"]);
+        assert!(history.warnings.iter().any(|why| why.contains("c [1]: x; [2]: y")));
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! The manifest agrees with the files and with the case.
 //!
 //! Section 8 of reference/DEFINITION.md: counts, digests, inputs and, if the mesh equals the reference, the
-//! components. The check cannot detect wrong leaves, or two sets of leaves with equal digests. `sides` checks the
+//! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. `sides` checks the
 //! ambiguous components and `kept` the numbers of components.
 
 use std::fmt::Debug;
 
 use super::{Check, CheckResult, Pass, Subject, Terms, always, nothing};
-use contract::manifest::{BySide, Components, Geometry, Manifest, Sides, Tree};
+use contract::lattice::Root;
+use contract::manifest::{BySide, Components, Geometry, Leak, Manifest, Sides, Tree};
 
 pub(super) const CHECK: Check = Check { name: "manifest", wanted: always, needs: nothing, run };
 
@@ -15,6 +16,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     result.examined = 0;
     of_leaves("", subject.manifest, &subject.pass, result);
     of_inputs("", subject.manifest, &subject.inputs, result);
+    of_leaks(subject.manifest, result);
     if let Some((base, pass)) = &subject.base {
         // A mesh with an engine's T0 beside it is a final one.
         same("", "tree", &subject.manifest.tree, &Tree::Final, result);
@@ -68,6 +70,22 @@ fn of_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResul
         );
     }
     same("", "components_ambiguous.count", &a.count, &b.count, result);
+    if let (Some(claimed), Some(found)) = (&mesh.leaks, &reference.leaks) {
+        same("", "leaks", claimed, found, result);
+    }
+}
+
+/// A leak opens between a coarser spacing and a finer one, and has a volume and a point in the root.
+fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
+    let Root { origin, edge } = manifest.root;
+    for leak in manifest.leaks.iter().flatten() {
+        let Leak { spacing_coarse, spacing_fine, volume, point } = *leak;
+        let is_inside = |a: usize| (0.0..=edge).contains(&(point[a] - origin[a]));
+        let opens = 0.0 < spacing_fine && spacing_fine < spacing_coarse;
+        if !opens || !(volume > 0.0 && volume <= edge.powi(3)) || !(0..3).all(is_inside) {
+            result.report(format!("leaks: {leak:?} is not possible in {:?}", manifest.root));
+        }
+    }
 }
 
 /// The inputs in the manifest are those of the case.

@@ -51,6 +51,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
     let mesh = Mesh::open(&arguments.mesh)?;
+    mesh.require_sides()?;
     let case = arguments.case.as_deref().map(read_case).transpose()?;
     case.iter().try_for_each(|case| mesh.require_case(case))?;
     let selection = arguments.selection.of(&mesh)?;

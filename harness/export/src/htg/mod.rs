@@ -30,13 +30,14 @@ const REPORT: u64 = 1 << 16;
 /// Writes the file. With more than one rank, cells have it as `rank`.
 ///
 /// # Errors
-/// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
+/// If the sides of the mesh are unknown, no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
 pub fn write(
     mesh: &Mesh,
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, Failure> {
+    mesh.require_sides()?;
     let mut nodes = vec![1u64];
     let counted = families(mesh, selection, 0, options, &mut |family| {
         let level = usize::from(family.level);
