@@ -82,7 +82,8 @@ fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
         let Leak { spacing_coarse, spacing_fine, volume, point } = *leak;
         let is_inside = |a: usize| (0.0..=edge).contains(&(point[a] - origin[a]));
         let opens = 0.0 < spacing_fine && spacing_fine < spacing_coarse;
-        if !opens || !(volume > 0.0 && volume <= edge.powi(3)) || !(0..3).all(is_inside) {
+        let is_region = 0.0 < volume && volume <= edge.powi(3) && (0..3).all(is_inside);
+        if !(opens && is_region) {
             result.report(format!("leaks: {leak:?} is not possible in {:?}", manifest.root));
         }
     }
