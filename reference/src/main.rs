@@ -6,7 +6,7 @@ use reference::{Error, Geometry, Leak, Mesh, base_tree, case_file, leaves, mesh}
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -84,12 +84,12 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let start = Instant::now();
     // Meshing may take an hour: refuse an unusable directory before it starts.
-    let at = |path: &Path| move |source| Error::Write { path: path.to_owned(), source };
     for path in [&arguments.out, &arguments.json].into_iter().flatten() {
-        files::name_output(path).map_err(at(path))?;
+        files::name_output(path).map_err(|source| Error::Write { path: path.clone(), source })?;
     }
     if let Some(path) = &arguments.json {
-        files::check_writable(path).map_err(at(path))?;
+        files::check_writable(path)
+            .map_err(|source| Error::Write { path: path.clone(), source })?;
     }
     let claim = arguments.out.as_deref().map(write::claim).transpose()?;
     interrupt::stop_at(format_args!("start"));
