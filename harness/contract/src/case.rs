@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use crate::failure::Unusable;
 use crate::files;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ use serde::Deserialize;
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
 use crate::seed::BaseTree;
-use crate::stl::{self, StlError};
+use crate::stl;
 
 pub use geometries::Facet;
 
@@ -44,35 +45,6 @@ pub struct Case {
     pub seeds_lattice: Vec<[i64; 3]>,
     /// The treatment of outside components that the far field does not reach.
     pub enclosed: Enclosed,
-}
-
-/// Why a case cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CaseError {
-    /// The case file cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The case file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
-    /// The file is not TOML, or not a valid case.
-    #[error("{path}: {why}")]
-    Content {
-        /// The case file.
-        path: PathBuf,
-        /// The cause, in one sentence.
-        why: String,
-    },
-    /// The body cannot be read.
-    #[error("{path} {source}")]
-    Stl {
-        /// The geometry file.
-        path: PathBuf,
-        /// The cause.
-        source: StlError,
-    },
 }
 
 /// The case file, key by key.
@@ -121,10 +93,9 @@ impl Case {
     ///
     /// # Errors
     /// If a file cannot be read, or if the case is invalid.
-    pub fn read(path: &Path) -> Result<Self, CaseError> {
-        let text = files::read_text(path)
-            .map_err(|source| CaseError::Io { path: path.to_owned(), source })?;
-        let wrong = |why: String| CaseError::Content { path: path.to_owned(), why };
+    pub fn read(path: &Path) -> Result<Self, Unusable> {
+        let text = files::read_text(path).map_err(|error| Unusable::at(path, error))?;
+        let wrong = |why: String| Unusable::at(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
         let facets = facets(path, &file)?;
@@ -230,17 +201,16 @@ fn beside(case: &Path, path: &Path) -> PathBuf {
 }
 
 /// The body, read from a file or generated.
-fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, CaseError> {
-    let wrong = |why: String| CaseError::Content { path: case.to_owned(), why };
+fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, Unusable> {
     match (&file.geometry, &file.generator) {
         (Some(stl), None) => {
             let path = beside(case, stl);
-            stl::read(&path)
-                .map(|body| body.facets)
-                .map_err(|source| CaseError::Stl { path, source })
+            let body = stl::read(&path)
+                .map_err(|why| Unusable::because(format!("{} {why}", path.display())))?;
+            Ok(body.facets)
         }
-        (None, Some(generator)) => generator.facets().map_err(|e| wrong(e.to_string())),
-        _ => Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
+        (None, Some(generator)) => generator.facets().map_err(|error| Unusable::at(case, error)),
+        _ => Err(Unusable::at(case, "give exactly one of `geometry` and `[generator]`")),
     }
 }
 

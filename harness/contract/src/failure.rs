@@ -1,9 +1,6 @@
 //! Why a command has no result: the exit code and the one sentence that `harness` prints.
 
-use crate::case::CaseError;
 use crate::files::named;
-use crate::import::ImportError;
-use crate::leafset::ReadError;
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
 use std::path::Path;
@@ -78,6 +75,35 @@ impl Display for Failure {
     }
 }
 
+/// Why a file or directory cannot be used: one sentence, or the predicate of one whose subject is the file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Unusable(String);
+
+impl Unusable {
+    /// For a reason.
+    pub fn because(why: impl Into<String>) -> Self {
+        Self(why.into())
+    }
+
+    /// For a reason, with the path before it.
+    pub fn at(path: &Path, why: impl Display) -> Self {
+        Self(format!("{}: {why}", path.display()))
+    }
+
+    /// The error with the path of the file before it.
+    #[must_use]
+    pub fn of_file(self, path: &Path) -> Self {
+        Self::at(path, self)
+    }
+}
+
+impl From<io::Error> for Unusable {
+    fn from(error: io::Error) -> Self {
+        Self(format!("cannot be read: {error}"))
+    }
+}
+
 /// Errors that are always those of the input.
 macro_rules! inputs {
     ($($error:ty),*) => {$(
@@ -89,7 +115,7 @@ macro_rules! inputs {
     )*};
 }
 
-inputs!(String, CaseError, ImportError, ReadError);
+inputs!(String, Unusable);
 
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {

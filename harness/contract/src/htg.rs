@@ -20,7 +20,8 @@ use bytes::Bytes;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use vtkhdf::format::{Chunked, ReadError};
+use vtkhdf::format::Chunked;
+pub use vtkhdf::format::ReadError as TreeError;
 use vtkhdf::read::TreeReader;
 use vtkhdf::tree::Shape;
 
@@ -50,35 +51,14 @@ pub struct TreeFile {
     masked: Bits,
 }
 
-/// Why a file is not a usable hyper-tree grid: the predicate of a sentence whose subject is the file.
-#[derive(Debug, thiserror::Error)]
-pub enum TreeError {
-    /// The file is damaged, or has what only VTK reads.
-    #[error(transparent)]
-    File(#[from] ReadError),
-    /// It is not a hyper-tree grid of this mesh.
-    #[error("is not a hyper-tree grid of this mesh: {0}")]
-    Layout(String),
-    /// Its nodes are no tree.
-    #[error("is damaged: {0}")]
-    Nodes(String),
-}
-
-impl TreeError {
-    /// Whether the file may be valid, and VTK may read it.
-    pub fn is_of_another_layout(&self) -> bool {
-        matches!(self, Self::File(ReadError::Unknown(_)) | Self::Layout(_))
-    }
-}
-
 type Result<T> = std::result::Result<T, TreeError>;
 
 fn layout<T>(why: impl Into<String>) -> Result<T> {
-    Err(TreeError::Layout(why.into()))
+    Err(TreeError::Unknown(why.into()))
 }
 
 fn nodes<T>(why: impl Into<String>) -> Result<T> {
-    Err(TreeError::Nodes(why.into()))
+    Err(TreeError::Damaged(why.into()))
 }
 
 impl TreeFile {

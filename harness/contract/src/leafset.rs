@@ -9,11 +9,13 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::digest::Digest;
-pub use crate::directory::{ReadError, open_tree, read_manifest};
+use crate::directory::{of_part, open_part};
+pub use crate::directory::{of_tree, open_tree, read_manifest};
+use crate::failure::Unusable;
 use crate::files::named;
 use crate::manifest::{self, Manifest, Part, Tally};
 use crate::mesh::Mesh;
-use crate::npy::{self, PartFile};
+use crate::npy;
 use ::files::Claim;
 
 /// A mesh in memory.
@@ -31,11 +33,11 @@ pub struct LeafSet {
 ///
 /// # Errors
 /// If the directory is not a leaf set.
-pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
+pub fn read(dir: &Path) -> Result<LeafSet, Unusable> {
     let mesh = Mesh::open(dir)?;
     let mut parts = Vec::new();
     for part in &mesh.parts {
-        parts.push(part.read_all().map_err(|error| ReadError::part(part, error))?);
+        parts.push(part.read_all().map_err(|error| of_part(part, error))?);
     }
     if mesh.tree_file.is_some() {
         let mut words = Vec::new();
@@ -49,8 +51,8 @@ pub fn read(dir: &Path) -> Result<LeafSet, ReadError> {
 ///
 /// # Errors
 /// If the directory or an array cannot be read, or if there is none.
-pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, ReadError> {
-    let io = |source| ReadError::Io { path: dir.to_owned(), source };
+pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, Unusable> {
+    let io = |error| Unusable::at(dir, error);
     let mut names = Vec::new();
     for entry in fs::read_dir(dir).map_err(io)? {
         let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
@@ -61,9 +63,8 @@ pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, ReadError> {
     }
     names.sort_unstable();
     let read = |name: String| {
-        let path = dir.join(&name);
-        let part = PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?;
-        part.read_all().map(|words| (name, words)).map_err(|error| ReadError::part(&part, error))
+        let part = open_part(&dir.join(&name))?;
+        part.read_all().map(|words| (name, words)).map_err(|error| of_part(&part, error))
     };
     names.into_iter().map(read).collect()
 }
@@ -148,7 +149,8 @@ mod tests {
         let parts = [("a.npy".to_owned(), vec![8, 9]), ("b.npy".to_owned(), vec![7])];
         assert_eq!(read_parts(dir.path()).unwrap(), parts);
         fs::write(dir.path().join("d.npy"), "").unwrap();
-        assert!(matches!(read_parts(dir.path()), Err(ReadError::Part { .. })));
+        let why = read_parts(dir.path()).unwrap_err().to_string();
+        assert!(why.contains("d.npy: the part has no npy header"), "{why}");
     }
 
     #[test]
@@ -189,13 +191,12 @@ mod tests {
                 .contains("absent.npy: the part cannot be read")
         );
         fs::write(dir.path().join("mesh.json"), "{}").unwrap();
-        assert!(matches!(read_manifest(dir.path()), Err(ReadError::Manifest { .. })));
-        assert!(matches!(
-            read_manifest(&dir.path().join("mesh.json")),
-            Err(ReadError::NotADirectory(_))
-        ));
-        fs::remove_file(dir.path().join("mesh.json")).unwrap();
-        assert!(matches!(read_manifest(dir.path()), Err(ReadError::Io { .. })));
+        let why = |path: &Path| read_manifest(path).unwrap_err().to_string();
+        assert!(why(dir.path()).contains("mesh.json: not a leaf-set manifest: missing field"));
+        let file = dir.path().join("mesh.json");
+        assert!(why(&file).contains("mesh.json is a file: give the directory of a mesh"));
+        fs::remove_file(file).unwrap();
+        assert!(why(dir.path()).contains("mesh.json: No such file"));
     }
 
     #[test]

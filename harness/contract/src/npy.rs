@@ -5,6 +5,8 @@ use std::io::{BufWriter, Read, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+use crate::failure::Unusable;
+
 /// Longer than any header that the programs write, so that one read suffices.
 const HEADER_BYTES_MAX: u64 = 1 << 16;
 
@@ -17,56 +19,35 @@ pub struct PartFile {
     len: u64,
 }
 
-/// Why a file is not a part file: the predicate of a sentence whose subject is the file.
-#[derive(Debug, thiserror::Error)]
-pub enum NpyError {
-    /// The file cannot be read.
-    #[error("cannot be read: {0}")]
-    Io(#[from] std::io::Error),
-    /// The file does not begin with an npy header.
-    #[error("has no npy header: {0}")]
-    Header(std::io::Error),
-    /// The words are big-endian.
-    #[error("has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'")]
-    Swapped,
-    /// The array does not consist of words.
-    #[error("has type {0}, not '<u8'")]
-    Type(String),
-    /// The array is not one-dimensional.
-    #[error("has shape {0:?}, but must have one dimension")]
-    Shape(Vec<u64>),
-    /// The header and the size of the file contradict each other.
-    #[error("has {found} bytes, but its header implies {expected} ({leaves} leaves)")]
-    Length {
-        /// Bytes in the file.
-        found: u64,
-        /// Bytes that the header implies.
-        expected: u128,
-        /// Leaves that the header announces.
-        leaves: u64,
-    },
-}
-
 impl PartFile {
     /// Opens a part file and checks its type, its shape and its length.
     ///
     /// # Errors
     /// If the file cannot be read, or is not a part file.
-    pub fn open(path: &Path) -> Result<Self, NpyError> {
+    pub fn open(path: &Path) -> Result<Self, Unusable> {
         let file = ::files::open(path)?;
         let mut head = Vec::new();
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head)?;
-        let (header, offset) = read_header(&head).map_err(NpyError::Header)?;
-        match header.descr.as_str() {
+        let wrong = |why: String| Err(Unusable::because(why));
+        let (Header { descr, shape }, offset) = read_header(&head)
+            .map_err(|why| Unusable::because(format!("has no npy header: {why}")))?;
+        match descr.as_str() {
             "<u8" => {}
-            ">u8" => return Err(NpyError::Swapped),
-            _ => return Err(NpyError::Type(header.descr)),
+            ">u8" => {
+                let why =
+                    "has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'";
+                return wrong(why.to_owned());
+            }
+            _ => return wrong(format!("has type {descr}, not '<u8'")),
         }
-        let [len] = header.shape[..] else { return Err(NpyError::Shape(header.shape)) };
+        let [len] = shape[..] else {
+            return wrong(format!("has shape {shape:?}, but must have one dimension"));
+        };
         let found = file.metadata()?.len();
         let expected = u128::from(offset) + 8 * u128::from(len);
         if u128::from(found) != expected {
-            return Err(NpyError::Length { found, expected, leaves: len });
+            let implied = format!("its header implies {expected} ({len} leaves)");
+            return wrong(format!("has {found} bytes, but {implied}"));
         }
         Ok(Self { path: path.to_owned(), file, offset, len })
     }
@@ -236,23 +217,30 @@ mod tests {
             let file = file_of(&[&header(descr, shape)[..], &data[..bytes]].concat());
             PartFile::open(file.path()).unwrap_err()
         };
-        assert!(matches!(refused("<i8", "(2,)", 16), NpyError::Type(_)));
-        assert!(matches!(refused(">u8", "(2,)", 16), NpyError::Swapped));
-        assert!(matches!(refused("<u4", "(4,)", 16), NpyError::Type(_)));
-        assert!(matches!(refused("<u8", "(1, 2)", 16), NpyError::Shape(_)));
-        assert!(matches!(refused("<u8", "()", 8), NpyError::Shape(_)));
-        assert!(matches!(refused("<u8", "(2,)", 15), NpyError::Length { .. }));
-        assert!(matches!(refused("<u8", "(1,)", 16), NpyError::Length { .. }));
-        assert!(matches!(refused("<u8", "(4294967296, 4294967296)", 16), NpyError::Shape(_)));
+        for (descr, shape, bytes, why) in [
+            ("<i8", "(2,)", 16, "has type <i8"),
+            (">u8", "(2,)", 16, "bytes are swapped"),
+            ("<u4", "(4,)", 16, "has type <u4"),
+            ("<u8", "(1, 2)", 16, "has shape [1, 2]"),
+            ("<u8", "()", 8, "has shape []"),
+            ("<u8", "(2,)", 15, "its header implies 144 (2 leaves)"),
+            ("<u8", "(1,)", 16, "its header implies 136 (1 leaves)"),
+            ("<u8", "(4294967296, 4294967296)", 16, "has shape [4294967296, 4294967296]"),
+        ] {
+            let found = refused(descr, shape, bytes).to_string();
+            assert!(found.contains(why), "{found}");
+        }
         let headless = file_of(b"not an array");
-        assert!(matches!(PartFile::open(headless.path()), Err(NpyError::Header(_))));
+        let why = PartFile::open(headless.path()).unwrap_err().to_string();
+        assert!(why.starts_with("has no npy header: "), "{why}");
     }
 
     #[test]
     fn a_header_longer_than_the_file_or_without_a_shape_is_refused() {
-        let refused = |bytes: &[u8]| match PartFile::open(file_of(bytes).path()) {
-            Err(NpyError::Header(why)) => why.to_string(),
-            other => panic!("{other:?}"),
+        let refused = |bytes: &[u8]| {
+            let why = PartFile::open(file_of(bytes).path()).unwrap_err().to_string();
+            assert!(why.starts_with("has no npy header: "), "{why}");
+            why
         };
         for length in [u32::MAX, 1 << 30, 200] {
             let long = [&b"\x93NUMPY\x02\x00"[..], &length.to_le_bytes(), &[b' '; 100]].concat();

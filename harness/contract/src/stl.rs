@@ -6,18 +6,8 @@ use std::path::Path;
 use geometries::Facet;
 use serde::Serialize;
 
+use crate::failure::Unusable;
 use crate::files;
-
-/// Why a body cannot be read: the predicate of a sentence whose subject is the file.
-#[derive(Debug, thiserror::Error)]
-pub enum StlError {
-    /// The file cannot be read.
-    #[error("cannot be read: {0}")]
-    Io(#[from] std::io::Error),
-    /// The file has neither the length of a binary STL file nor the syntax of an ASCII one.
-    #[error("is not an STL file: {0}")]
-    Format(String),
-}
 
 /// A solid of an STL file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -43,7 +33,7 @@ pub struct Body {
 ///
 /// # Errors
 /// If the file cannot be read, or is not an STL file.
-pub fn read(path: &Path) -> Result<Body, StlError> {
+pub fn read(path: &Path) -> Result<Body, Unusable> {
     parse(&files::read(path)?)
 }
 
@@ -51,7 +41,7 @@ pub fn read(path: &Path) -> Result<Body, StlError> {
 ///
 /// # Errors
 /// If they are not an STL file.
-pub fn parse(bytes: &[u8]) -> Result<Body, StlError> {
+pub fn parse(bytes: &[u8]) -> Result<Body, Unusable> {
     if bytes.is_empty() {
         return Err(wrong("it is empty"));
     }
@@ -93,7 +83,7 @@ fn length(facets: u32) -> u64 {
 }
 
 /// Bytes that are neither text nor a binary file: probably a binary file that is truncated.
-fn damaged(bytes: &[u8]) -> StlError {
+fn damaged(bytes: &[u8]) -> Unusable {
     let found = bytes.len();
     match facet_count(bytes) {
         Some(count) => wrong(&format!(
@@ -121,7 +111,7 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
 }
 
 /// The solids of an ASCII file (reference/DEFINITION.md, section 10).
-fn ascii(bytes: &[u8]) -> Result<Body, StlError> {
+fn ascii(bytes: &[u8]) -> Result<Body, Unusable> {
     if bytes.contains(&0) {
         return Err(damaged(bytes));
     }
@@ -178,7 +168,7 @@ fn starts_facet<'a>(words: &(impl Iterator<Item = Word<'a>> + Clone), line: usiz
 }
 
 /// A facet after its first word. Its normal is ignored.
-fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, StlError> {
+fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Unusable> {
     expect(words, "normal")?;
     if words.take(3).count() < 3 {
         return Err(unexpected("a normal", None));
@@ -201,7 +191,7 @@ fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, StlErr
 }
 
 /// Takes this word; returns its line.
-fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, StlError> {
+fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, Unusable> {
     match words.next() {
         Some((word, line)) if is(word, wanted) => Ok(line),
         other => Err(unexpected(wanted, other)),
@@ -212,7 +202,7 @@ fn is(word: &[u8], wanted: &str) -> bool {
     word.eq_ignore_ascii_case(wanted.as_bytes())
 }
 
-fn unexpected(wanted: &str, found: Option<Word>) -> StlError {
+fn unexpected(wanted: &str, found: Option<Word>) -> Unusable {
     match found {
         Some((word, _)) => {
             let shown = String::from_utf8_lossy(&word[..word.len().min(40)]);
@@ -222,8 +212,8 @@ fn unexpected(wanted: &str, found: Option<Word>) -> StlError {
     }
 }
 
-fn wrong(why: &str) -> StlError {
-    StlError::Format(why.to_owned())
+fn wrong(why: &str) -> Unusable {
+    Unusable::because(format!("is not an STL file: {why}"))
 }
 
 #[cfg(test)]
@@ -234,7 +224,7 @@ mod tests {
                          vertex 0 1 -2.5e-1\nendloop\nendfacet\n";
     const EXPECTED: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
 
-    fn of(bytes: &[u8]) -> Result<Vec<Facet>, StlError> {
+    fn of(bytes: &[u8]) -> Result<Vec<Facet>, Unusable> {
         parse(bytes).map(|body| body.facets)
     }
 

@@ -6,10 +6,10 @@ use crate::engine::paths::Paths;
 use crate::engine::python;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::failure::Failure;
+use contract::failure::{Failure, Unusable};
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
-use contract::import::{self, Format, ImportError, Request};
+use contract::import::{self, Format, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::Manifest;
@@ -83,7 +83,7 @@ pub fn import(
     paths: &Paths,
     limit: Duration,
 ) -> Result<Imported, Failure> {
-    let input = |error: ImportError| Failure::from(error.of_file(path));
+    let input = |error: Unusable| Failure::from(error.of_file(path));
     let root = request.root.or(case.map(|case| case.root));
     let format = format.map_or_else(|| import::guess(path), Ok).map_err(input)?;
     if format == Format::Vtk {
@@ -153,7 +153,7 @@ fn read_in_python(
     paths: &Paths,
     limit: Duration,
 ) -> Result<Cells, Failure> {
-    let place = tempfile::tempdir().map_err(|error| Failure::from(ImportError::from(error)))?;
+    let place = tempfile::tempdir().map_err(|error| Failure::from(Unusable::from(error)))?;
     let table = place.path().join("cells");
     let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
     let arguments = [path.as_os_str(), table.as_os_str(), asked.as_ref()];
@@ -163,12 +163,12 @@ fn read_in_python(
     let stated: Stated = stated
         .and_then(|text| serde_json::from_slice(&text).ok())
         .ok_or_else(|| Failure::input("was read, but the script reported no root"))?;
-    let bytes = fs::read(&table).map_err(|error| Failure::from(ImportError::from(error)))?;
+    let bytes = fs::read(&table).map_err(|error| Failure::from(Unusable::from(error)))?;
     Ok(cells(&bytes, stated)?)
 }
 
 /// The cells of rows of numbers: corner, edge, and level and side if they are known.
-fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, ImportError> {
+fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Unusable> {
     let Stated { root, has_levels, has_sides, digest } = stated;
     let (numbers, _) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();

@@ -20,7 +20,7 @@ use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::leafset::{self, ReadError};
+use contract::leafset;
 use contract::manifest::Manifest;
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::octant::LEVEL_MAX;
@@ -173,7 +173,7 @@ fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
             run.iter().for_each(|&word| digest.add(word));
             true
         });
-        read.map_err(|error| ReadError::tree(&tree, error))
+        read.map_err(|why| leafset::of_tree(&tree, &why))
     });
     match read {
         Err(error) => result.report(error.to_string()),

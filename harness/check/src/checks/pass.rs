@@ -2,8 +2,9 @@
 
 use super::{CheckResult, linear};
 use contract::digest::{Digest, mix};
+use contract::failure::Unusable;
 use contract::lattice::Root;
-use contract::leafset::{LeafSet, ReadError};
+use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tally, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::tree::{Builder, Tree};
@@ -24,7 +25,7 @@ impl Pass {
     ///
     /// # Errors
     /// If a part or the tree cannot be read.
-    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, ReadError> {
+    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, Unusable> {
         let mut state = State::new(&mesh.manifest, "", nodes_max);
         mesh.stream(&mut |part, run| {
             state.count(part, run);

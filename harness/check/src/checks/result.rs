@@ -6,7 +6,7 @@
 use std::fmt;
 
 use super::Outcome;
-use contract::leafset::ReadError;
+use contract::failure::Unusable;
 
 /// Findings that are listed in full; further ones are counted only, so that a check takes five lines.
 pub const FINDINGS_LISTED: usize = 4;
@@ -54,7 +54,7 @@ impl CheckResult {
     }
 
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
-    pub fn unreadable(error: &ReadError) -> Self {
+    pub fn unreadable(error: &Unusable) -> Self {
         let mut result = Self::new(FILES);
         result.report(error.to_string());
         result

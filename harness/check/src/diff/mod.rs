@@ -18,7 +18,7 @@ use std::path::Path;
 use crate::checks::Terms;
 use crate::why::{self, Body};
 use contract::case::Case;
-use contract::leafset::ReadError;
+use contract::failure::Unusable;
 use contract::manifest::{Sides, Tally};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
@@ -99,7 +99,7 @@ impl fmt::Display for DiffReport {
 ///
 /// # Errors
 /// If a directory cannot be read.
-pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadError> {
+pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Unusable> {
     let mut meshes = [("A", Mesh::open(a)?), ("B", Mesh::open(b)?)];
     let unknown = meshes.iter().find(|(_, mesh)| mesh.manifest.sides == Sides::Unknown);
     let without_sides = unknown.map(|(name, _)| *name);
@@ -131,7 +131,7 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, ReadE
 
 /// Replaces the counts and digests in a manifest by those of the leaves, of whose words only the bits of `mask` count. Returns
 /// whether the manifest contradicts the whole words.
-fn recount(mesh: &mut Mesh, mask: u64) -> Result<bool, ReadError> {
+fn recount(mesh: &mut Mesh, mask: u64) -> Result<bool, Unusable> {
     let (mut whole, mut masked) = (Tally::default(), Tally::default());
     mesh.visit(&mut |words| {
         words.iter().for_each(|&word| whole.add(word));
@@ -159,13 +159,8 @@ fn level_3(index: u64) -> Octant {
 type Differing = (Option<u64>, Option<u64>);
 
 /// The first words that differ in an octant, in the bits of `mask`.
-fn first_difference(
-    a: &Mesh,
-    b: &Mesh,
-    octant: &Octant,
-    mask: u64,
-) -> Result<Differing, ReadError> {
-    let words = |mesh: &Mesh| -> Result<Vec<u64>, ReadError> {
+fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Differing, Unusable> {
+    let words = |mesh: &Mesh| -> Result<Vec<u64>, Unusable> {
         Ok(mesh.octant(octant)?.into_iter().map(|word| word & mask).collect())
     };
     let (a, b) = (words(a)?, words(b)?);
@@ -174,7 +169,7 @@ fn first_difference(
 }
 
 /// The rule that decides which mesh is right, or why none does.
-fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> Result<String, ReadError> {
+fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> Result<String, Unusable> {
     let undecided = |why: &str| Ok(why.to_owned());
     if a.manifest.tree != b.manifest.tree {
         return undecided("none: one is a base tree, the other a final mesh");
@@ -187,13 +182,10 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> Result<St
         Ok(body) => (body, String::new()),
         Err(why) => (None, format!("without the case, because {why}: ")),
     };
-    let trees = match (a.tree(), b.tree()) {
-        (Err(ReadError::TooLarge(_)), _) | (_, Err(ReadError::TooLarge(_))) => {
-            return undecided("unknown: the meshes are too large to be held in memory");
-        }
-        (of_a, of_b) => [of_a?, of_b?],
+    let (Some(of_a), Some(of_b)) = (a.small_tree()?, b.small_tree()?) else {
+        return undecided("unknown: the meshes are too large to be held in memory");
     };
-    let [a, b] = [(a, &trees[0]), (b, &trees[1])]
+    let [a, b] = [(a, &of_a), (b, &of_b)]
         .map(|(mesh, tree)| why::Mesh::of(&mesh.manifest, tree, body.as_ref()).distrusting());
     Ok(caveat + &rule::Dispute { a, b, terms }.rule(x, y))
 }

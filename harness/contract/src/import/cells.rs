@@ -5,8 +5,9 @@
 //! edge, and no two cells overlap. Cells may leave parts of the root empty, and neighbours may differ by any
 //! number of levels.
 
-use super::{ImportError, TOLERANCE};
+use super::TOLERANCE;
 use crate::digest::Digest;
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word::{self, Leaf, Side};
@@ -49,7 +50,7 @@ impl Cells {
     ///
     /// # Errors
     /// If a cell is not a leaf of an oct-tree with this root, or overlaps another.
-    pub fn words(&self, root: &Root) -> Result<Vec<u64>, ImportError> {
+    pub fn words(&self, root: &Root) -> Result<Vec<u64>, Unusable> {
         let mut words = self.words_in_order(root)?;
         self.agree_with_levels(&words)?;
         words.sort_unstable();
@@ -61,7 +62,7 @@ impl Cells {
         }
     }
 
-    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, ImportError> {
+    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, Unusable> {
         let word = |i: usize| {
             let octant = octant(self.corners[i], self.edges[i], root)
                 .map_err(|why| self.misfit(i, root, &why))?;
@@ -72,12 +73,12 @@ impl Cells {
     }
 
     /// The levels of the words differ from those of the file by one constant.
-    fn agree_with_levels(&self, words: &[u64]) -> Result<(), ImportError> {
+    fn agree_with_levels(&self, words: &[u64]) -> Result<(), Unusable> {
         let Some(levels) = &self.levels else { return Ok(()) };
         let offset = |i: usize| i64::from(word::level(words[i])).wrapping_sub(levels[i]);
         match (1..words.len()).find(|&i| offset(i) != offset(0)) {
             None => Ok(()),
-            Some(i) => Err(ImportError::content(format!(
+            Some(i) => Err(Unusable::because(format!(
                 "cell {i} has level {} and edge {}, but cell 0 has level {} and edge {}: levels and edges contradict each \
                  other",
                 levels[i], self.edges[i], levels[0], self.edges[0]
@@ -85,20 +86,20 @@ impl Cells {
         }
     }
 
-    fn misfit(&self, i: usize, root: &Root, why: &str) -> ImportError {
+    fn misfit(&self, i: usize, root: &Root, why: &str) -> Unusable {
         let (corner, edge, Root { origin, edge: root }) = (self.corners[i], self.edges[i], root);
-        ImportError::content(format!(
+        Unusable::because(format!(
             "cell {i} (corner {corner:?}, edge {edge}) {why}, where the root has the corner {origin:?} and the edge {root}: \
              correct the mesh, or the root with --root X,Y,Z,EDGE"
         ))
     }
 
     /// The error for two words that overlap; `words` are those of the cells in the order of the file.
-    fn overlap(&self, words: &[u64], pair: &[u64]) -> ImportError {
+    fn overlap(&self, words: &[u64], pair: &[u64]) -> Unusable {
         let at =
             |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
         let both: Vec<_> = (0..words.len()).filter(|&i| pair.contains(&words[i])).map(at).collect();
-        ImportError::content(format!("{} overlaps {}: remove one of them", both[1], both[0]))
+        Unusable::because(format!("{} overlaps {}: remove one of them", both[1], both[0]))
     }
 }
 

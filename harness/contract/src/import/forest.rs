@@ -8,7 +8,7 @@
 //! No memory is allocated for a count before the file has been seen to be long enough for it. Nothing else is checked here: indices
 //! and quadrants are those of the file.
 
-use super::ImportError;
+use crate::failure::Unusable;
 use crate::files;
 use std::path::Path;
 
@@ -97,7 +97,7 @@ pub fn is_head(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// If the file cannot be read or is damaged.
-pub fn read(path: &Path) -> Result<Forest, ImportError> {
+pub fn read(path: &Path) -> Result<Forest, Unusable> {
     let bytes = files::read(path)?;
     let mut input = Input { bytes: &bytes, at: 0 };
     let (connectivity, format) = connectivity(&mut input)?;
@@ -132,8 +132,8 @@ pub fn read(path: &Path) -> Result<Forest, ImportError> {
     }
 }
 
-pub(super) fn damaged(why: &str) -> ImportError {
-    ImportError::content(format!("is not a usable file of p4est, because {why}"))
+pub(super) fn damaged(why: &str) -> Unusable {
+    Unusable::because(format!("is not a usable file of p4est, because {why}"))
 }
 
 fn integer(four: &[u8]) -> i32 {
@@ -148,7 +148,7 @@ struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// The next `count` items of `size` bytes each.
-    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], ImportError> {
+    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], Unusable> {
         let left = &self.bytes[self.at..];
         match count
             .checked_mul(size)
@@ -166,7 +166,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, ImportError> {
+    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, Unusable> {
         let bytes = self.items(count, 8)?;
         Ok(bytes
             .chunks_exact(8)
@@ -174,21 +174,21 @@ impl<'a> Input<'a> {
             .collect())
     }
 
-    fn array<const N: usize>(&mut self) -> Result<[u64; N], ImportError> {
+    fn array<const N: usize>(&mut self) -> Result<[u64; N], Unusable> {
         Ok(self.numbers(N as u64)?.try_into().expect("as many numbers as were read"))
     }
 
     /// As many indices for each of `count` items.
-    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, ImportError> {
+    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, Unusable> {
         Ok(self.items(count, 4 * each)?.chunks_exact(4).map(integer).collect())
     }
 
-    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, ImportError> {
+    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, Unusable> {
         Ok(self.items(count, each)?.iter().map(|&byte| byte.cast_signed()).collect())
     }
 
     /// The lists of `count` edges or corners, but for `of_tree`.
-    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, ImportError> {
+    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Unusable> {
         let offsets = self.indices(count.saturating_add(1), 1)?;
         let pairs = if count > 0 { pairs } else { 0 };
         let (trees, places) = (self.indices(pairs, 1)?, self.small(pairs, 1)?);
@@ -196,14 +196,14 @@ impl<'a> Input<'a> {
     }
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
-    fn align(&mut self) -> Result<(), ImportError> {
+    fn align(&mut self) -> Result<(), Unusable> {
         let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
         self.items(padding as u64, 1).map(drop)
     }
 }
 
 /// The connectivity, and the format of the file.
-fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), ImportError> {
+fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Unusable> {
     let (dimension, expected) = match input.items(8, 1)? {
         b"p4est\0\0\0" => FORMATS[0],
         b"p8est\0\0\0" => FORMATS[1],
@@ -266,7 +266,7 @@ fn forest_header(
     input: &mut Input,
     trees: usize,
     expected: u64,
-) -> Result<(Vec<u64>, u64), ImportError> {
+) -> Result<(Vec<u64>, u64), Unusable> {
     let [format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
     if format != expected || coordinate_bytes != 4 {
         return Err(damaged("the header of the forest has another format than the connectivity"));

@@ -1,9 +1,9 @@
 //! Hyper-tree grids as this repository writes them, of any size: leaves are never in memory all at once. VTK reads other
 //! hyper-tree grids.
 
-use super::ImportError;
 use crate::case::Case;
 use crate::digest::Digest;
+use crate::failure::Unusable;
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset;
@@ -38,16 +38,16 @@ impl ImportedTree {
         root: Option<Root>,
         case: Option<&Case>,
         program: String,
-    ) -> Result<Option<Self>, ImportError> {
-        let content = |error: TreeError| ImportError::content(error.to_string());
+    ) -> Result<Option<Self>, Unusable> {
+        let content = |error: TreeError| Unusable::because(error.to_string());
         // Another array is VTK's to find.
         if sides.is_some_and(|sides| sides != SIDE) {
             return Ok(None);
         }
         let tree = match TreeFile::open(path, true) {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
-            Err(error) if !error.is_of_another_layout() => return Err(content(error)),
-            _ => return Ok(None),
+            Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
+            Err(error) => return Err(content(error)),
         };
         let mut tally = Tally::default();
         tree.words(&mut |run| {

@@ -1,9 +1,10 @@
 //! Imported cells as a leaf set with its manifest.
 
 use super::cells::Cells;
-use super::{ImportError, TOLERANCE, root};
+use super::{TOLERANCE, root};
 use crate::case::Case;
 use crate::digest::Digest;
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Sides, Tally, Tree};
@@ -21,11 +22,11 @@ pub fn leaf_set(
     given: Option<Root>,
     case: Option<&Case>,
     program: String,
-) -> Result<LeafSet, ImportError> {
+) -> Result<LeafSet, Unusable> {
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
     let root = stated.map_or_else(|| root::derive(cells), Ok)?;
     if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
-        return Err(ImportError::content(format!(
+        return Err(Unusable::because(format!(
             "has a root that is not a cube: corner {:?}, edge {}",
             root.origin, root.edge
         )));
@@ -33,7 +34,7 @@ pub fn leaf_set(
     let words = cells.words(&root)?;
     let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);
     if !cells.digest.is_none_or(is_of_digest) {
-        return Err(ImportError::content("has other leaves than its digest states: it is damaged"));
+        return Err(Unusable::because("has other leaves than its digest states: it is damaged"));
     }
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };

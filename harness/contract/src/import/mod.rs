@@ -18,6 +18,7 @@ pub mod root;
 mod testing;
 pub mod words;
 
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
@@ -75,45 +76,21 @@ pub struct Request {
     pub position: Position,
 }
 
-/// Why a file was not imported, in one sentence.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ImportError(String);
-
-impl ImportError {
-    /// The file has content that is not a mesh, or not one that fits.
-    pub fn content(why: impl Into<String>) -> Self {
-        Self(why.into())
-    }
-
-    /// The error with the path of the file before it.
-    #[must_use]
-    pub fn of_file(self, path: &Path) -> Self {
-        Self(format!("{}: {}", path.display(), self.0))
-    }
-}
-
-impl From<io::Error> for ImportError {
-    fn from(error: io::Error) -> Self {
-        Self(format!("cannot be read: {error}"))
-    }
-}
-
 /// The format of a file or directory, from its content.
 ///
 /// # Errors
 /// If it cannot be read, or has none of the formats. Parts of a leaf set without a manifest must be requested by their
 /// format: a program that writes manifests did not finish such a directory.
-pub fn guess(path: &Path) -> Result<Format, ImportError> {
+pub fn guess(path: &Path) -> Result<Format, Unusable> {
     let is_directory = fs::metadata(path)?.is_dir();
     if path.join(manifest::FILE).is_file() {
-        return Err(ImportError::content(format!(
+        return Err(Unusable::because(format!(
             "is a complete leaf set, with its manifest {}: use it as it is",
             manifest::FILE
         )));
     }
     if is_directory && path.join(manifest::part_name(0)).is_file() {
-        return Err(ImportError::content(format!(
+        return Err(Unusable::because(format!(
             "has parts and no {}, so the program that wrote them may not have finished: if it writes none, choose \
              --format leaf-words",
             manifest::FILE
@@ -124,7 +101,7 @@ pub fn guess(path: &Path) -> Result<Format, ImportError> {
         false => of_content(&head(path)?),
     };
     format.ok_or_else(|| {
-        ImportError::content("its format was not recognised: choose one with --format (see --help)")
+        Unusable::because("its format was not recognised: choose one with --format (see --help)")
     })
 }
 
@@ -198,11 +175,11 @@ fn incomplete(head: &[u8]) -> usize {
 ///
 /// # Errors
 /// If the file cannot be read, or is not of this format.
-pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, ImportError> {
+pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Unusable> {
     match format {
         Format::LeafWords => words::read(path, request),
         Format::P4est => p4est::read(path, request),
-        _ => Err(ImportError::content("is read in Python")),
+        _ => Err(Unusable::because("is read in Python")),
     }
 }
 
@@ -210,10 +187,10 @@ pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Imp
 ///
 /// # Errors
 /// If there is none.
-pub fn side(code: f64, cell: usize) -> Result<Side, ImportError> {
+pub fn side(code: f64, cell: usize) -> Result<Side, Unusable> {
     let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
     known.ok_or_else(|| {
-        ImportError::content(format!(
+        Unusable::because(format!(
             "cell {cell} has the side {code}, and the sides are 0 (outside), 1 (inside) and 2 (crossing)"
         ))
     })

@@ -8,7 +8,8 @@
 
 use super::cells::Cells;
 use super::forest::{self, Connectivity, Quadrant, damaged};
-use super::{ImportError, Request, root, side};
+use super::{Request, root, side};
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use crate::word;
@@ -25,11 +26,11 @@ pub const FILLER: u8 = 3;
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
+pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
     let forest = forest::read(path)?;
     if forest.connectivity.dimension == 2 {
         let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
-        return Err(ImportError::content(why));
+        return Err(Unusable::because(why));
     }
     if forest.leaves.is_empty() {
         return Err(damaged("it is a connectivity without leaves"));
@@ -54,11 +55,11 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
 }
 
 /// Whether the sides are to be read from the quadrants' data.
-fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, ImportError> {
+fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, Unusable> {
     match (request.sides.as_deref(), data_bytes) {
         (None, _) => Ok(false),
         (Some(SIDES), 1) => Ok(true),
-        (Some(name), _) => Err(ImportError::content(format!(
+        (Some(name), _) => Err(Unusable::because(format!(
             "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides {SIDES} \
              if the quadrants have one byte of data, their side"
         ))),
@@ -66,7 +67,7 @@ fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, ImportErr
 }
 
 /// The trees as cells.
-fn placed_trees(connectivity: &Connectivity) -> Result<Cells, ImportError> {
+fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Unusable> {
     let Connectivity { vertices, tree_to_vertex, attributes, .. } = connectivity;
     match (vertices.len(), connectivity.trees) {
         (0, 1) => Ok(Cells { corners: vec![[0.0; 3]], edges: vec![1.0], ..Cells::default() }),
@@ -85,7 +86,7 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells, ImportError> {
 }
 
 /// The cubes of the trees, from the coordinates of all vertices and the eight vertices of each tree.
-fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, ImportError> {
+fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Unusable> {
     let vertex = |&index: &i32| coordinates.get(usize::try_from(index).ok()?);
     let mut trees = Cells::default();
     for (tree, indices) in tree_to_vertex.chunks_exact(8).enumerate() {
@@ -110,7 +111,7 @@ fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Impo
 }
 
 /// Adds the quadrants of a tree.
-fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), ImportError> {
+fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Unusable> {
     let Some(&Quadrant { corner: [x, y, z], level, .. }) = quadrants.last() else {
         return Err(damaged("a tree has no quadrants"));
     };
@@ -123,7 +124,7 @@ fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<()
     let mut next = 0;
     for &Quadrant { corner: [x, y, z], level, data } in quadrants {
         if level > i32::from(LEVEL_MAX) {
-            return Err(ImportError::content(format!(
+            return Err(Unusable::because(format!(
                 "has a quadrant of level {level} at [{x}, {y}, {z}], and the levels of a mesh are 0 to {LEVEL_MAX}"
             )));
         }

@@ -1,7 +1,7 @@
 //! The root cube of cells whose file states none: the least cube in which they can be leaves of one oct-tree.
 
-use super::ImportError;
 use super::cells::Cells;
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::octant::LEVEL_MAX;
 
@@ -11,9 +11,9 @@ use crate::octant::LEVEL_MAX;
 ///
 /// # Errors
 /// If there are no cells, if a number is not finite, or if the cells need more levels than exist.
-pub fn derive(cells: &Cells) -> Result<Root, ImportError> {
+pub fn derive(cells: &Cells) -> Result<Root, Unusable> {
     let unusable = |why: &str| {
-        ImportError::content(format!(
+        Unusable::because(format!(
             "the root cannot be derived from the cells, because {why}: give it with --root X,Y,Z,EDGE"
         ))
     };
@@ -30,7 +30,7 @@ pub fn derive(cells: &Cells) -> Result<Root, ImportError> {
         return Err(unusable("a coordinate is not finite, or an edge is not positive"));
     }
     if depth > f64::from(LEVEL_MAX) {
-        return Err(ImportError::content(format!(
+        return Err(Unusable::because(format!(
             "has cells of {} levels, with edges from {finest} to {}, and the levels of a mesh are 0 to {LEVEL_MAX}",
             depth + 1.0,
             cells.edges[coarsest]

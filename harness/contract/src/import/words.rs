@@ -1,7 +1,8 @@
 //! Bare leaf words: one array, or the parts of a directory without a manifest.
 
+use super::Request;
 use super::cells::Cells;
-use super::{ImportError, Request};
+use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::leafset::read_parts;
 use crate::manifest;
@@ -20,8 +21,8 @@ const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 ///
 /// # Errors
 /// If a part cannot be read, or a word is not a leaf.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, ImportError> {
-    let content = |why: String| ImportError::content(why);
+pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
+    let content = |why: String| Unusable::because(why);
     if let Some(name) = request.sides.as_deref().filter(|name| *name != SIDES) {
         return Err(content(format!(
             "leaf words have no array {name}: request their sides with --sides {SIDES}"

@@ -3,7 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::directory::ReadError;
+use crate::directory::of_part;
+use crate::failure::Unusable;
 use crate::npy::PartFile;
 
 /// Words per read: large enough for streaming, small enough for thousands of parts.
@@ -21,12 +22,12 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Refills an exhausted buffer; false at the end of the part.
-    fn fill(&mut self) -> Result<bool, ReadError> {
+    fn fill(&mut self) -> Result<bool, Unusable> {
         if self.position == self.words.len() {
             let left = self.file.len() - self.next;
             self.words.resize(usize::try_from(left).unwrap_or(usize::MAX).min(CHUNK), 0);
             let read = self.file.read_at(self.next, &mut self.words);
-            read.map_err(|error| ReadError::part(self.file, error))?;
+            read.map_err(|error| of_part(self.file, error))?;
             (self.next, self.position) = (self.next + self.words.len() as u64, 0);
         }
         Ok(!self.words.is_empty())
@@ -42,7 +43,7 @@ impl Reader<'_> {
 pub(super) fn merge(
     parts: &[PartFile],
     run: &mut dyn FnMut(usize, &[u64]) -> bool,
-) -> Result<(), ReadError> {
+) -> Result<(), Unusable> {
     let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
     let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
     let mut heads = BinaryHeap::new();

@@ -8,7 +8,8 @@ mod merge;
 use std::path::{Path, PathBuf};
 
 pub use crate::directory::NODES_MAX;
-use crate::directory::{self, ReadError};
+use crate::directory::{self, of_tree};
+use crate::failure::Unusable;
 use crate::htg::TreeFile;
 use crate::manifest::Manifest;
 use crate::npy::PartFile;
@@ -33,7 +34,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If the directory is not a leaf set.
-    pub fn open(dir: &Path) -> Result<Self, ReadError> {
+    pub fn open(dir: &Path) -> Result<Self, Unusable> {
         let manifest = directory::read_manifest(dir)?;
         let tree_file = match manifest.parts.is_empty() {
             true => directory::open_tree(dir, &manifest)?,
@@ -42,7 +43,7 @@ impl Mesh {
         let mut parts = Vec::new();
         for part in &manifest.parts {
             let path = dir.join(&part.file);
-            parts.push(PartFile::open(&path).map_err(|source| ReadError::Part { path, source })?);
+            parts.push(directory::open_part(&path)?);
         }
         if tree_file.is_none() {
             directory::refuse_extra_parts(dir, &manifest)?;
@@ -68,11 +69,9 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the tree is damaged.
-    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), ReadError> {
+    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Unusable> {
         match &self.tree_file {
-            Some(tree) => {
-                tree.words(&mut |words| run(0, words)).map_err(|error| ReadError::tree(tree, error))
-            }
+            Some(tree) => tree.words(&mut |words| run(0, words)).map_err(|why| of_tree(tree, &why)),
             None => merge::merge(&self.parts, run),
         }
     }
@@ -81,11 +80,11 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::stream`].
-    pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), ReadError> {
+    pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), Unusable> {
         match &self.tree_file {
             Some(tree) => tree
                 .words_and_ranks(&mut |words, ranks| run(0, words, ranks))
-                .map_err(|error| ReadError::tree(tree, error)),
+                .map_err(|why| of_tree(tree, &why)),
             None => merge::merge(&self.parts, &mut |part, words| run(part, words, &[])),
         }
     }
@@ -94,7 +93,7 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the words are not those of a linear oct-tree.
-    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), ReadError> {
+    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), Unusable> {
         let mut order = Order::default();
         let mut fault = None;
         self.stream(&mut |_, words| {
@@ -111,24 +110,32 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
-    pub fn tree(&self) -> Result<Tree, ReadError> {
+    pub fn tree(&self) -> Result<Tree, Unusable> {
+        let why = format!(
+            "more than {NODES_MAX} distinct octants, which is the limit: use a part of the mesh"
+        );
+        self.small_tree()?.ok_or_else(|| Unusable::at(&self.dir, why))
+    }
+
+    /// The same; `None` if it has too many.
+    ///
+    /// # Errors
+    /// As [`Mesh::visit`].
+    pub fn small_tree(&self) -> Result<Option<Tree>, Unusable> {
         let mut builder = Builder::default();
         self.visit(&mut |words| {
             if builder.nodes() <= NODES_MAX {
                 words.iter().for_each(|&w| builder.push(w).expect("a visit is linear"));
             }
         })?;
-        match builder.nodes() <= NODES_MAX {
-            true => Ok(builder.finish()),
-            false => Err(ReadError::TooLarge(self.dir.clone())),
-        }
+        Ok((builder.nodes() <= NODES_MAX).then(|| builder.finish()))
     }
 
     /// The sorted words of the leaves in an octant, found among all.
     ///
     /// # Errors
     /// As [`Mesh::visit`].
-    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, ReadError> {
+    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, Unusable> {
         let start = word::key_of(octant.corner);
         let keys = start..start + word::span(octant.level);
         let mut found = Vec::new();
@@ -138,8 +145,9 @@ impl Mesh {
     }
 
     /// The error of words that are not a linear oct-tree.
-    pub fn not_linear(&self, why: String) -> ReadError {
-        ReadError::NotLinear { path: self.dir.clone(), why }
+    pub fn not_linear(&self, why: String) -> Unusable {
+        let why = format!("not a linear oct-tree, because {why}: run harness audit on it");
+        Unusable::at(&self.dir, why)
     }
 }
 
@@ -216,7 +224,7 @@ mod tests {
             }
             let (_dir, mesh) = opened(&leaf_set(parts));
             for error in [mesh.visit(&mut |_| {}).unwrap_err(), mesh.tree().unwrap_err()] {
-                prop_assert!(matches!(&error, ReadError::NotLinear { .. }), "{}", error);
+                prop_assert!(error.to_string().contains("not a linear oct-tree"), "{}", error);
                 prop_assert!(error.to_string().ends_with("run harness audit on it"), "{}", error);
             }
         }

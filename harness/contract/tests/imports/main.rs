@@ -3,9 +3,10 @@
 mod damage;
 mod trees;
 
+use contract::failure::Unusable;
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
-use contract::import::{self, ImportError, Request, leaf_set};
+use contract::import::{self, Request, leaf_set};
 use contract::lattice::Root;
 use contract::leafset::{self, LeafSet};
 use contract::npy;
@@ -26,7 +27,7 @@ fn root([x, y, z, edge]: [f64; 4]) -> Root {
     Root { origin: [x, y, z], edge }
 }
 
-fn imported(path: &Path, request: &Request) -> Result<LeafSet, ImportError> {
+fn imported(path: &Path, request: &Request) -> Result<LeafSet, Unusable> {
     let cells = import::read(path, import::guess(path)?, request)?;
     leaf_set(&cells, request.root, None, "test".to_owned())
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn tree(path: &Path) -> Result<Option<ImportedTree>, ImportError> {
+fn tree(path: &Path) -> Result<Option<ImportedTree>, Unusable> {
     ImportedTree::open(path, None, None, None, "test".to_owned())
 }
 
