@@ -51,8 +51,10 @@ fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
     let level = input.level_surface - k;
     let cut = |b: &LatticeBox| LatticeBox { level: b.level.min(level), ..*b };
     let boxes = input.boxes.iter().map(cut).collect();
-    let by_rays = Input { level_surface: level, boxes, seeds: Vec::new(), ..input.clone() };
-    let Ok((coarse, components)) = base(&by_rays) else {
+    let seeded = Input { level_surface: level, boxes, ..input.clone() };
+    let by_rays = Input { seeds: Vec::new(), ..seeded.clone() };
+    // If a seed lies in a crossing leaf of T0/k, rays decide.
+    let Ok((coarse, components)) = base(&seeded).or_else(|_| base(&by_rays)) else {
         unreachable!("only seeds can be unusable");
     };
     let leaked = |coarse: Side, fine: Side| match (coarse, fine) {

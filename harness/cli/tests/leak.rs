@@ -4,7 +4,7 @@ use contract::case::Case;
 use contract::testing::{base_tree, leaf_set};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 
@@ -117,6 +117,7 @@ fn invalid_input_is_refused_in_one_sentence() {
         assert!(code == 2 && text.contains(why), "{code}: {text}");
     };
     refused(&[], "give a start with --from X,Y,Z");
+    refused(&["--to", "0,0,0"], "the case has no seeds: give a start with --from X,Y,Z");
     refused(&["--from", "0,0"], "give three numbers");
     refused(&["--from", "0,0,-2"], "the nearest centre of a free leaf is");
     refused(&["--from", "0,0,90"], "outside the root");
@@ -162,8 +163,52 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
     assert!(code == 1 && text.matches("LEAK: ").count() == 2, "{code}: {text}");
     assert!(text.contains("from      (0.5, 0.5, 0.5)"), "{text}");
     assert!(files.iter().skip(1).step_by(2).all(|file| fixture.path(file).exists()));
+    // One that is closed at four times the spacing, too, is examined once; what is closed only there is another one.
+    let coarser = |at: &str| leak.replace("2.0", "4.0").replace("[0.5, 0.5, 0.5]", at);
+    let (part, other) = (coarser("[1.0, 1.0, 1.0]"), coarser("[5.0, 5.0, 5.0]"));
+    with(&format!(r#""leaks": [{leak}, {part}, {other}]"#));
+    let (code, text) = fixture.leak(&[]);
+    assert!(code == 1 && text.matches("from  ").count() == 2, "{code}: {text}");
+    assert!(text.contains("(0.5, 0.5, 0.5)") && text.contains("(5, 5, 5)"), "{text}");
     // The scripted mesher gives no leaf an inside: nothing was closed, so nothing was examined.
     with(r#""leaks": []"#);
     let (code, text) = fixture.leak(&[]);
     assert!(code == 2 && text.contains("nothing to examine"), "{code}: {text}");
+}
+
+/// What the mesher advises finds the opening: of the box with a hole in its lid, whose regions seeds tell apart.
+#[test]
+fn the_command_of_a_warning_finds_the_opening() {
+    let mesher = Path::new(env!("CARGO_BIN_EXE_harness")).with_file_name("mesher");
+    if !mesher.is_file() {
+        eprintln!("skipped: the mesher was not built");
+        return;
+    }
+    let fixture = Fixture::new();
+    let (in_box, far) = ("[0.1, 0.1, 0.1]", "[5.0, 5.0, 5.0]");
+    for (keep, seeds) in [
+        ("inside", in_box.to_owned()),
+        ("outside", in_box.to_owned()),
+        ("outside", far.to_owned()),
+        ("all", far.to_owned()),
+    ] {
+        let text = format!(
+            "geometry = \"box.stl\"\nspacing_min = 0.5\nkeep = \"{keep}\"\nseeds = [{seeds}]\n{ROOT}"
+        );
+        fs::write(fixture.path("case.toml"), text).unwrap();
+        let mut command = Command::new(&mesher);
+        let output = command.arg("case.toml").current_dir(fixture.0.path()).output().unwrap();
+        let warnings = String::from_utf8(output.stderr).unwrap();
+        let advice = warnings.split('`').find(|part| part.starts_with("harness leak "));
+        let advice = advice.unwrap_or_else(|| panic!("{keep}, {seeds}: {warnings}"));
+        let arguments: Vec<&str> = advice.split(' ').skip(3).collect();
+        for arguments in [&arguments[..], &[]] {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+            command.args(["leak", "case.toml", "--mesher"]).arg(&mesher).args(arguments);
+            let output = command.current_dir(fixture.0.path()).output().unwrap();
+            let text = String::from_utf8_lossy(&output.stdout);
+            let is_found = output.status.code() == Some(1) && text.matches("LEAK: ").count() == 1;
+            assert!(is_found, "{keep}, {seeds}, {arguments:?}: {output:?}");
+        }
+    }
 }

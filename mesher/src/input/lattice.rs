@@ -242,6 +242,11 @@ pub struct Seed {
 }
 
 impl Seed {
+    /// A lattice point.
+    pub fn at(lattice: [i64; 3], root: &Root) -> Self {
+        Self { given: root.locate(lattice), lattice }
+    }
+
     /// Whether the point lies in the root, whose upper faces do not belong to it.
     pub fn is_in_root(&self) -> bool {
         self.lattice.iter().all(|c| (0..ROOT_EDGE).contains(c))

@@ -3,7 +3,7 @@
 //! T0/k is T0 cut k levels above the surface level. Its octants are crossed if one of their children in T0 is, so a leaf of T0/k that
 //! is not crossed lies in one component of T0, and a component of T0/k does, too. One that is inside by its rays although it lies in an outside
 //! component of T0 has leaked; if the inside is kept, also one that is outside and lies in an inside component. Where there are seeds,
-//! it has leaked only into the flow, and if no seed lies in it. Only one side of T0 matters for each of these, so the other one is a
+//! it has leaked if it has none, although it lies in the flow of T0. Only one side of T0 matters for each of these, so the other one is a
 //! wall, like crossing leaves.
 //!
 //! Invariants of [`Leaks`]:
@@ -15,7 +15,7 @@
 use super::global::Label;
 use super::vote::{self, Candidate};
 use super::{Components, seeds};
-use crate::input::lattice::{Keep, Rules};
+use crate::input::lattice::{Keep, Rules, Seed};
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
@@ -44,6 +44,8 @@ pub struct Leak {
     pub first: Candidate,
     /// Whether the region is inside at the spacing of the mesh.
     pub is_inside: bool,
+    /// Whether it lies in a region that is still closed at a finer one of the spacings.
+    pub is_part: bool,
 }
 
 /// All leaks. The same on all ranks.
@@ -140,8 +142,16 @@ pub fn find(
                 if k > 1 || !skips || leaks.len() > before {
                     let level = rules.level_surface - k;
                     let coarse = region.tree(tree, level, ownership, comm);
-                    let of_level =
-                        of_tree(&coarse, level, region.is_inside, ownership, facets, rules, comm);
+                    let coarser = &mut leaks[before..];
+                    let of_level = of_tree(
+                        &coarse,
+                        (level, region.is_inside),
+                        coarser,
+                        ownership,
+                        facets,
+                        rules,
+                        comm,
+                    );
                     leaks.extend(of_level);
                 }
             }
@@ -161,11 +171,11 @@ fn crossing_leaves(tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn
     comm.all_gather(&[mine]).words().iter().sum()
 }
 
-/// The components of T0/k without seeds whose side by rays is not that of their region.
+/// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not. Marks the `coarser` leaks that they contain.
 fn of_tree(
     tree: &Tree,
-    level: Level,
-    is_inside: bool,
+    (level, is_inside): (Level, bool),
+    coarser: &mut [Leak],
     ownership: &Ownership,
     facets: &[Facet],
     rules: &Rules,
@@ -173,18 +183,32 @@ fn of_tree(
 ) -> Vec<Leak> {
     let components = Components::new(tree, ownership, comm);
     let label = |c| components.label(c);
-    let found = seeds::find(rules, tree, &components.nodes, ownership, label, comm);
-    let seeded: HashSet<Label> = found.into_values().flatten().collect();
-    let verdict = vote::decide(&components.all, &components.candidates, facets, comm);
-    let leaked =
+    let find = |seeds: &[_]| seeds::find(seeds, tree, &components.nodes, ownership, label, comm);
+    let found = find(&rules.seeds);
+    let seeded: HashSet<Label> = found.values().copied().flatten().collect();
+    // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
+    let verdict = if found.is_empty() || found.values().any(Option::is_none) {
+        vote::decide(&components.all, &components.candidates, facets, comm)
+    } else {
+        seeds::decide(&components.all, seeded.clone(), rules.keep)
+    };
+    let has_leaked =
         |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
-    let leaked: Vec<_> = components.all.iter().filter(|(label, _)| leaked(label)).collect();
+    let leaked: Vec<_> = components.all.iter().filter(|(label, _)| has_leaked(label)).collect();
     if leaked.is_empty() {
         return Vec::new();
     }
+    let places: Vec<_> =
+        coarser.iter().map(|leak| Seed::at(leak.first.centroid(), &rules.root)).collect();
+    for (number, label) in find(&places) {
+        coarser[number as usize].is_part = label.is_some_and(|label| has_leaked(&label));
+    }
     let volumes = components.volumes(tree, ownership, comm);
     let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
-    let leak = |&&(label, first): &&_| Leak { level, volume: volume(label), first, is_inside };
+    let leak = |&&(label, first): &&_| {
+        let volume = volume(label);
+        Leak { level, volume, first, is_inside, is_part: false }
+    };
     leaked.iter().map(leak).collect()
 }
 
@@ -247,7 +271,7 @@ mod tests {
     /// A leak between level 2 and the surface level, 3: two octants of level 2.
     fn leak() -> Leak {
         let volume = 2 << (3 * (LEVEL_MAX - 2));
-        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false }
+        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false, is_part: false }
     }
 
     fn check(leaks: &[Leak]) {

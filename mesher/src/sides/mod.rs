@@ -179,7 +179,7 @@ pub fn decide(
         vote::decide(&components.all, &components.candidates, facets, comm)
     } else {
         let label = |c| components.label(c);
-        let found = seeds::find(rules, tree, &components.nodes, ownership, label, comm);
+        let found = seeds::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
         let flow = seeds::flow(&found, rules, tree, ownership, comm)?;
         seeds::decide(&components.all, flow, rules.keep)
     };

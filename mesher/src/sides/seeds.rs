@@ -17,10 +17,10 @@ use std::collections::{HashMap, HashSet};
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
 const CROSSING: Label = Label::MAX;
 
-/// The seeds in the root by number, each with the component that it lies in; none in a crossing leaf. `label` returns the label of a local component.
+/// Those of some seeds that lie in the root, by number, each with the component that it lies in; none in a crossing leaf. `label` returns the label of a local component.
 /// Collective; the same on all ranks.
 pub fn find(
-    rules: &Rules,
+    seeds: &[Seed],
     tree: &Tree,
     nodes: &Nodes,
     ownership: &Ownership,
@@ -28,7 +28,7 @@ pub fn find(
     comm: &dyn Comm,
 ) -> HashMap<u64, Option<Label>> {
     let mut mine = Vec::new();
-    for (number, seed) in (0..).zip(&rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
+    for (number, seed) in (0..).zip(seeds).filter(|(_, seed)| seed.is_in_root()) {
         let (l, code) = leaf_at(tree, seed);
         let (key, bit) = (code >> 6, code & 63);
         if !ownership.owns(l, key) {

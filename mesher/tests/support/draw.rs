@@ -85,6 +85,18 @@ pub fn slit(width: f32, at: f32, keep: Keep, seeds: Vec<[f64; 3]>) -> Small {
     }
 }
 
+/// A box with a partition across it, which has a slit from `at` in the direction y; cells of edge 2 at the surface, as in [`slit`].
+pub fn rooms(width: f32, at: f32, keep: Keep, seeds: Vec<[f64; 3]>) -> Small {
+    let (lo, hi, x) = ([9.0, 11.0, 10.0], [49.0, 35.0, 31.0], 29.0);
+    let mut facets = cuboid(lo, hi);
+    for [y0, y1] in [[lo[1], at], [at + width, hi[1]]] {
+        let p = |y, z| [x, y, z];
+        facets.push([p(y0, lo[2]), p(y1, lo[2]), p(y1, hi[2])]);
+        facets.push([p(y0, lo[2]), p(y1, hi[2]), p(y0, hi[2])]);
+    }
+    Small { facets, ..slit(width, at, keep, seeds) }
+}
+
 fn tetrahedron(v: [[f32; 3]; 4]) -> Vec<Facet> {
     vec![[v[0], v[1], v[2]], [v[0], v[3], v[1]], [v[0], v[2], v[3]], [v[1], v[3], v[2]]]
 }

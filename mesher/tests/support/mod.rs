@@ -20,7 +20,7 @@ pub mod symmetry;
 
 // Each test uses some of these.
 #[allow(unused_imports)]
-pub use draw::{closed, config, cuboid, leaky_on_rays, run, slit, small, soup, thin};
+pub use draw::{closed, config, cuboid, leaky_on_rays, rooms, run, slit, small, soup, thin};
 
 pub type Facet = [[f32; 3]; 3];
 

@@ -8,7 +8,7 @@ use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use contract::files::{Content, named, write_together};
 use contract::leafset::LeafSet;
-use contract::manifest::Keep;
+use contract::manifest::{Keep, Leak};
 use contract::watch::Watch;
 use export::polydata;
 use geometry::leak::Leaks;
@@ -34,7 +34,7 @@ of the largest ball centred there that no facet enters; the narrowest place is r
 largest ball that passes it, at most 5 % apart.
 
 Without --from, every region is examined that is inside at a coarser spacing and outside at the case's, as the mesher \
-reports it.
+reports it. With --to alone, the path starts at the first seed of the case that reaches the end.
 
 Examples:
   harness leak car.toml                                  where does the body leak?
@@ -51,9 +51,9 @@ pub struct Arguments {
     /// Start of the path [default: a point of every region that leaked between a coarser spacing and the case's]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     from: Option<Point>,
-    /// End of the path: a point, or `far` for the root's boundary
-    #[arg(long, value_name = "X,Y,Z|far", default_value = "far", value_parser = target, allow_hyphen_values = true, requires = "from")]
-    to: Target,
+    /// End of the path: a point, or `far` for the root's boundary [default: far, or a seed from what leaked into the flow of seeds]
+    #[arg(long, value_name = "X,Y,Z|far", value_parser = target, allow_hyphen_values = true)]
+    to: Option<Target>,
     /// Require that no spacing joins the two places: exit code 1 unless the facets are proven to be a closed surface between them
     #[arg(long)]
     closed: bool,
@@ -86,26 +86,42 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
     let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}", None);
-    let (mut first, ends) = match arguments.from {
-        Some(Point(from)) => (None, vec![(from, arguments.to)]),
-        None => {
+    let (mut first, leaked) = match (arguments.from, arguments.to) {
+        (None, None) => {
             progress.step("meshing the base tree of the case");
             let tree = trees.with_seeds(case.level_surface)?;
-            let ends = leaked(&case, &tree)?;
-            (Some(tree.words), ends)
+            let leaked = leaked(&case, &tree)?;
+            (Some(tree.words), leaked)
         }
+        _ => (None, Vec::new()),
     };
-    let make = |level| match first.take() {
+    let make = |level| match first.take_if(|_| level == case.level_surface) {
         Some(words) => Ok(words),
         None => Ok(trees.at(level)?.words),
     };
     let mut leaks = Leaks::new(&case, make, arguments.leaves_max, &progress)?;
+    let ends = match (arguments.from, arguments.to) {
+        (Some(Point(from)), to) => vec![(from, to.unwrap_or(Target::Far))],
+        (None, Some(to)) => {
+            let seed = leaks.seed(to)?.ok_or_else(|| format!("the case has no seeds: {START}"))?;
+            vec![(seed, to)]
+        }
+        (None, None) => {
+            let mut ends = Vec::new();
+            for from in leaks.regions(&leaked)? {
+                // Seeds lie in the flow, into which the region leaked.
+                let seed = leaks.seed(Target::Point(from))?;
+                ends.push((from, seed.map_or(Target::Far, Target::Point)));
+            }
+            ends
+        }
+    };
     let answers = leaks.answers(&ends)?;
     progress.finish();
     write(arguments, &answers)?;
     if ends.is_empty() {
         println!(
-            "no leak: every region that is inside at 2 and 4 times the spacing of {} is inside at this spacing too",
+            "no leak: the mesher finds no region of {} that is closed at 2 or 4 times its spacing and open at it",
             case.name
         );
     }
@@ -118,22 +134,23 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(if all_hold { EXIT_HOLDS } else { EXIT_FAILED })
 }
 
-/// The ends of the paths for the regions that leaked between coarser spacings and the case's, as the mesher reports them.
-fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<([f64; 3], Target)>, String> {
-    let give = "give a start with --from X,Y,Z, in the space that should be closed";
-    let leaks = tree.manifest.leaks.as_ref();
-    let leaks = leaks.ok_or_else(|| format!("the program does not report leaks: {give}"))?;
+/// What to do where there is no start.
+const START: &str = "give a start with --from X,Y,Z, in the space that should be closed";
+
+/// What leaked between coarser spacings and the case's, as the mesher reports it.
+fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
+    let leaks = tree.manifest.leaks.clone();
+    let leaks = leaks.ok_or_else(|| format!("the program does not report leaks: {START}"))?;
     let sides = tree.manifest.leaves_by_side;
     // Seeds lie in the flow, and what they do not reach has the other side.
-    let (is_flow_inside, seed) = (case.keep == Keep::Inside, case.seeds.first());
-    let closed = if seed.is_some() && is_flow_inside { sides.outside } else { sides.inside };
+    let is_flow_inside = case.keep == Keep::Inside && !case.seeds.is_empty();
+    let closed = if is_flow_inside { sides.outside } else { sides.inside };
     if leaks.is_empty() && closed == 0 {
         return Err(format!(
-            "the facets enclose no leaf at this spacing, so there is nothing to examine: {give}"
+            "the facets enclose no leaf at this spacing, so there is nothing to examine: {START}"
         ));
     }
-    let to = seed.filter(|_| is_flow_inside).map_or(Target::Far, |&seed| Target::Point(seed));
-    Ok(leaks.iter().map(|leak| (leak.point, to)).collect())
+    Ok(leaks)
 }
 
 /// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.

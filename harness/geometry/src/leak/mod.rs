@@ -2,7 +2,7 @@
 //! close or open?
 //!
 //! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
-//! - [`ends`]: the ends of the path; [`surface`]: whether the facets form a closed surface between them;
+//! - [`regions`]: where paths start and end if the user does not say; [`ends`]: the ends of the path; [`surface`]: whether the facets form a closed surface between them;
 //! - [`report`]: the answer as data; [`invariants`]: what it satisfies; [`text`]: the answer for a terminal.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
@@ -12,6 +12,7 @@
 pub mod ends;
 mod invariants;
 mod passage;
+mod regions;
 pub mod report;
 mod space;
 mod surface;

@@ -2,7 +2,7 @@
 
 use crate::process::{Workspace, read_json, run};
 use crate::support::schedules::write;
-use crate::support::{Small, slit};
+use crate::support::{Small, rooms, slit};
 use mesher::input::lattice::Keep;
 use serde_json::{Value, json};
 
@@ -35,8 +35,7 @@ fn leaks_are_warnings_or_errors() {
             (warnings.len(), &leaks[0]["spacing_coarse"], &leaks[0]["spacing_fine"]),
             (1, &json!(4.0), &json!(2.0))
         );
-        let [x, y, z] = [0, 1, 2]
-            .map(|a| leaks[leaks.as_array().expect("a list").len() - 1]["point"][a].to_string());
+        let [x, y, z] = [0, 1, 2].map(|a| leaks[0]["point"][a].to_string());
         let command = format!("`harness leak case.toml --from {x},{y},{z}`")
             .replace(".0,", ",")
             .replace(".0`", "`");
@@ -59,4 +58,35 @@ fn leaks_are_warnings_or_errors() {
         sheet.facets.truncate(2);
         assert_eq!(meshed(&sheet, comm), (vec![], json!([])));
     }
+}
+
+/// Each region is described at the finest spacing that closes it.
+#[test]
+fn the_warning_names_every_region_once_with_the_narrowest_range_of_spacings() {
+    let two = rooms(6.0, 20.0, Keep::Inside, vec![[20.0; 3]]);
+    let (warnings, leaks) = meshed(&two, "--comm=solo");
+    assert_eq!(leaks.as_array().expect("a list").len(), 2);
+    let is_said = |what: &str| assert!(warnings[0].contains(what), "{what} in {warnings:?}");
+    is_said("the geometry leaks: a region with a volume of 5.1200e3, ");
+    is_said(
+        "deleted at a spacing of 4, became kept at 2: close what `harness leak case.toml --to ",
+    );
+
+    // A wider slit in another box: at twice the spacing it is open.
+    let mut both = slit(6.0, 20.0, Keep::Outside, vec![]);
+    let wide = slit(11.0, 16.0, Keep::Outside, vec![]).facets;
+    both.facets.extend(wide.into_iter().map(|f| f.map(|[x, y, z]| [x + 28.0, y, z])));
+    let (warnings, leaks) = meshed(&both, "--comm=sim:3");
+    assert_eq!(leaks.as_array().expect("a list").len(), 3);
+    let volume: f64 = [0, 1, 2].iter().filter_map(|&i| leaks[i]["volume"].as_f64()).sum();
+    // The first box, at four times the spacing.
+    let part = &leaks[1];
+    assert!(part["point"][0].as_f64().expect("a number") < 33.0, "{leaks}");
+    let volume = volume - part["volume"].as_f64().expect("a number");
+    let said = format!("the geometry leaks: 2 regions with a volume of {volume:.4e}, ");
+    assert!(warnings[0].starts_with(&said), "{said} in {warnings:?}");
+    assert!(
+        warnings[0].contains("inside at spacings of 4 and 8, became outside at 2"),
+        "{warnings:?}"
+    );
 }

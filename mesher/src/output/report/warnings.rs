@@ -28,24 +28,33 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
 
 /// The warning of a geometry that leaks.
 pub fn of_leaks(mesh: &Mesh) -> Option<String> {
+    // Each region counts once, with the finest spacing that closes it: there it has the most of its volume.
     let leaks = LeakEntry::of(mesh);
-    let case = &mesh.case_name;
-    // What is closed at the coarsest spacing has the most of the volume.
-    let Some(coarse) = leaks.last().map(|leak| leak.spacing_coarse) else {
+    let regions = || leaks.iter().zip(&mesh.leaks.0).filter(|(_, of)| !of.is_part);
+    let Some((largest, of)) = regions().max_by_key(|(_, of)| of.volume) else {
         return mesh.bounds_nothing.then(|| bounds_nothing(mesh));
     };
-    let of_coarse =
-        leaks.iter().zip(&mesh.leaks.0).filter(|(leak, _)| leak.spacing_coarse == coarse);
     let (count, volume) =
-        of_coarse.clone().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
-    let (largest, of) = of_coarse.max_by_key(|(_, of)| of.volume)?;
-    let ([x, y, z], fine) = (largest.point, largest.spacing_fine);
-    let regions = if count == 1 { "a region".to_owned() } else { format!("{count} regions") };
-    let (before, after) = if of.is_inside { ("outside", "inside") } else { ("inside", "outside") };
+        regions().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
+    let number = if count == 1 { "a region".to_owned() } else { format!("{count} regions") };
+    // They are in the order of their spacings.
+    let mut spacings: Vec<f64> = regions().map(|(leak, _)| leak.spacing_coarse).collect();
+    spacings.dedup();
+    let coarse = match spacings[..] {
+        [finer, coarser] => format!("spacings of {finer} and {coarser}"),
+        _ => format!("a spacing of {}", spacings[0]),
+    };
+    let (case, [x, y, z], fine) = (&mesh.case_name, largest.point, largest.spacing_fine);
+    let has_seeds = !mesh.rules.seeds.is_empty();
+    let (before, after) = match of.is_inside {
+        _ if has_seeds && mesh.rules.keep != Keep::All => ("deleted", "kept"),
+        true => ("outside", "inside"),
+        false => ("inside", "outside"),
+    };
     // A search starts in the flow if that is known.
-    let end = if mesh.rules.seeds.is_empty() { "from" } else { "to" };
+    let end = if has_seeds { "to" } else { "from" };
     Some(format!(
-        "the geometry leaks: {regions} with a volume of {volume:.4e}, the largest at ({x}, {y}, {z}), {before} at a spacing of {coarse}, \
+        "the geometry leaks: {number} with a volume of {volume:.4e}, the largest at ({x}, {y}, {z}), {before} at {coarse}, \
          became {after} at {fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
     ))
 }
