@@ -313,10 +313,10 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
     let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
         let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
-        agree(comm, json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e))))
+        json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e)))
     };
-    agree(comm, if comm.rank() == 0 { named_apart(args) } else { Ok(()) })?;
-    on_json("choose another --json", &check_writable)?;
+    let apart = if comm.rank() == 0 { named_apart(args) } else { Ok(()) };
+    agree(comm, apart.and_then(|()| on_json("choose another --json", &check_writable)))?;
     let case = case(args, comm)?;
     agree(comm, registered(&case.source))?;
     agreement::on_geometry(&case.source, comm)?;
@@ -343,7 +343,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     };
     let finish = |done: Done, advice: &str, json: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         interrupt::stop_at(format_args!("report:{}", comm.rank()));
-        on_json(advice, &|path| write_atomically(path, json)).map(|()| done)
+        agree(comm, on_json(advice, &|path| write_atomically(path, json))).map(|()| done)
     };
     let advice = "free disk space";
     if args.plan {
