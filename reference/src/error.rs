@@ -163,10 +163,11 @@ fn remedy(nearest: Option<[f64; 3]>) -> String {
 }
 
 impl Error {
-    /// The exit code of the program: 4 if output could not be written, 71 if the mesh does not fit into memory, otherwise 2.
+    /// The exit code of the program: 4 if output could not be written (2 if it would replace an input or another output), 71 if the mesh does not fit into memory, otherwise 2.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
+            Error::Write { source, .. } if source.kind() == io::ErrorKind::InvalidInput => 2,
             Error::Write { .. } => 4,
             Error::TooManyCells { .. } => 71,
             _ => 2,

@@ -74,8 +74,9 @@ impl Fixture {
 
 /// Before that, a signal ends a process without exit code.
 fn wait_until_signals_are_handled(run: &Child) {
-    // SIGHUP, SIGINT, SIGUSR1, SIGUSR2, SIGALRM, SIGTERM
-    let all = [1, 2, 10, 12, 14, 15].into_iter().fold(0, |all, number| all | 1_u64 << (number - 1));
+    // SIGHUP, SIGINT, SIGUSR1, SIGUSR2, SIGALRM, SIGTERM, SIGIO
+    let all =
+        [1, 2, 10, 12, 14, 15, 29].into_iter().fold(0, |all, number| all | 1_u64 << (number - 1));
     let handled = || {
         let status = fs::read_to_string(format!("/proc/{}/status", run.id())).unwrap();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
@@ -88,7 +89,8 @@ fn wait_until_signals_are_handled(run: &Child) {
 
 #[test]
 fn a_command_that_computes_ends_at_once() {
-    for signals in [&["INT"][..], &["USR1"], &["ALRM"], &["INT", "INT"], &["TERM", "USR2"]] {
+    for signals in [&["INT"][..], &["USR1"], &["ALRM"], &["IO"], &["INT", "INT"], &["TERM", "USR2"]]
+    {
         let fixture = Fixture::new();
         let run = fixture.start(&["geometry", "case.toml"]);
         wait_until_signals_are_handled(&run);

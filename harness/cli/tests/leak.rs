@@ -176,7 +176,7 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
     assert!(code == 2 && text.contains("nothing to examine"), "{code}: {text}");
 }
 
-/// What the mesher advises finds the opening: of the box with a hole in its lid, whose regions seeds tell apart.
+/// What the mesher advises finds the opening of the box with a hole in its lid, for every kind of seed.
 #[test]
 fn the_command_of_a_warning_finds_the_opening() {
     let mesher = Path::new(env!("CARGO_BIN_EXE_harness")).with_file_name("mesher");

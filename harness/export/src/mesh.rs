@@ -71,7 +71,7 @@ impl Mesh {
         match self.manifest.sides {
             Sides::Known => Ok(()),
             Sides::Unknown => Err(Failure::input(
-                "the sides of this mesh are unknown, and this output consists of them; .vtu and polyMesh leave them out",
+                "the sides of this mesh are unknown, and this needs them: only .vtu, .pvtu and polyMesh can be written without",
             )),
         }
     }

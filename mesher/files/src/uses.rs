@@ -1,6 +1,9 @@
 //! What this process reads and writes. No output replaces an input, or another output.
 //!
-//! Invariants: no option names an output that another option names, or a directory with it; a regular file, known by its device and inode, has one of these uses, whichever comes first.
+//! Invariants:
+//! - no option names an output that another option names, or a directory that contains it;
+//! - a regular file, known by its device and inode, has one of these uses, whichever comes first.
+//!
 //! Programs register their outputs before they begin to work, so the clash is found when the input is opened.
 
 use std::collections::BTreeMap;
@@ -109,20 +112,18 @@ static OUTPUTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// # Errors
 /// If another option names it, a directory that contains it, or something in it.
 pub fn name_output(path: &Path) -> io::Result<()> {
-    let place = match fs::canonicalize(path) {
-        // Streams and devices take the output of several options.
-        Ok(found) if !found.is_file() && !found.is_dir() => return Ok(()),
-        Ok(found) => found,
-        Err(_) => {
-            let absolute = std::path::absolute(path)?;
-            let (directory, name) = (absolute.parent(), absolute.file_name());
-            // Whoever writes finds out that the directory is missing.
-            let Ok(directory) = fs::canonicalize(directory.unwrap_or(&absolute)) else {
-                return Ok(());
-            };
-            name.map_or(directory.clone(), |name| directory.join(name))
-        }
-    };
+    // Streams and devices take the output of several options.
+    if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Ok(());
+    }
+    let absolute = std::path::absolute(path)?;
+    // What does not exist yet may be in a directory that has several names.
+    let place = absolute.ancestors().find_map(|above| {
+        let mut place = fs::canonicalize(above).ok()?;
+        place.extend(absolute.strip_prefix(above).ok()?);
+        Some(place)
+    });
+    let place = place.unwrap_or_else(|| absolute.clone());
     let mut outputs = OUTPUTS.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let clashes = |other: &&PathBuf| place.starts_with(other) || other.starts_with(&place);
     if let Some(other) = outputs.iter().find(clashes) {
@@ -232,7 +233,8 @@ mod tests {
         for free in ["other", "mesh.json", "meshes", "run.json2", "/dev/null", "/dev/null"] {
             name_output(&at(free)).unwrap();
         }
-        name_output(&at("missing/run.json")).unwrap();
+        name_output(&at("missing/mesh")).unwrap();
+        assert!(name_output(&at("missing/mesh/run.json")).is_err());
     }
 
     #[test]

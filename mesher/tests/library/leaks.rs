@@ -39,7 +39,7 @@ fn slits_leak_into_the_spacing_that_they_are_wider_than() {
     assert_eq!((&leaks[..3], &leaks[5..8]), (&[0; 3][..], &[15; 3][..]), "{leaks:?}");
 }
 
-/// Both rooms are inside by most of their rays; seeds tell them apart.
+/// Both rooms are inside by most of their rays; only seeds distinguish them.
 #[test]
 fn a_room_without_a_seed_leaks_into_the_one_with_a_seed() {
     const IN_ROOM: [f64; 3] = [20.0, 20.0, 20.0];

@@ -65,6 +65,17 @@ fn words(directory: &Path) -> Vec<u64> {
 }
 
 #[test]
+fn outputs_that_replace_each_other_are_refused() {
+    let directory = directory_with_case(CASE);
+    for json in ["new/mesh", "new/mesh/mesh.json"] {
+        let arguments = ["case.toml", "--out", "new/mesh", "--json", json];
+        let message = assert_fails(directory.path(), &arguments, 2);
+        assert!(message.contains("this run also writes"), "{message}");
+        assert!(!directory.path().join("new").exists());
+    }
+}
+
+#[test]
 fn a_run_writes_a_leaf_set_and_a_record() {
     let directory = directory_with_case(CASE);
     let path = directory.path();

@@ -3,8 +3,9 @@
 use crate::no_false_alarms::{hulls, settings, soup};
 use crate::support;
 use check::checks::{self, CheckResult, Subject, Terms, components};
+use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::Manifest;
+use contract::manifest::{Leak, Manifest};
 use contract::word;
 use proptest::prelude::*;
 use std::collections::HashSet;
@@ -45,6 +46,38 @@ proptest! {
             prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without the case: {text}");
             prop_assert!(reported(&Subject::new(&correct.case, &mesh)), "{text}");
         }
+    }
+}
+
+#[test]
+fn leaks_that_are_impossible_or_differ_from_those_of_the_reference_are_reported() {
+    let text = include_str!("../../../selftest-cases/enclosed.toml");
+    let correct = support::selftest_case("enclosed", text);
+    let Root { origin, edge } = correct.mesh.manifest.root;
+    let leak = Leak { spacing_coarse: 0.2, spacing_fine: 0.1, volume: 0.01 * edge, point: origin };
+    let with = |leaks: Option<Vec<Leak>>| -> LeafSet {
+        let mut mesh = correct.mesh.clone();
+        mesh.manifest.leaks = leaks;
+        mesh
+    };
+    let found = |leaks, reference| {
+        let (mesh, reference) = (with(leaks), with(reference));
+        let subject = Subject::new(&correct.case, &mesh).with_reference(&reference);
+        check(&subject, "manifest").findings_total
+    };
+    assert_eq!(found(Some(vec![leak]), Some(vec![leak])), 0);
+    assert_eq!(found(None, Some(vec![leak])), 0, "a program need not look for leaks");
+    assert_eq!(found(Some(vec![]), Some(vec![leak])), 1);
+    assert_eq!(found(Some(vec![leak; 2]), Some(vec![leak])), 1);
+    for impossible in [
+        Leak { spacing_coarse: 0.1, ..leak },
+        Leak { spacing_fine: -0.1, ..leak },
+        Leak { volume: 0.0, ..leak },
+        Leak { volume: 1.01 * edge.powi(3), ..leak },
+        Leak { volume: f64::NAN, ..leak },
+        Leak { point: origin.map(|c| c - edge), ..leak },
+    ] {
+        assert_eq!(found(Some(vec![impossible]), None), 1, "{impossible:?}");
     }
 }
 

@@ -123,6 +123,16 @@ fn a_geometry_that_the_report_would_replace_is_invalid_input() {
 }
 
 #[test]
+fn two_reports_in_one_file_are_invalid_input() {
+    let fixture = Fixture::new();
+    let file = fixture.path("report");
+    let file = file.to_str().unwrap();
+    let outcome = fixture.verify(&["--no-mpi", "--json", file, "--junit", file]);
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("this run also writes"), "{}", outcome.printed);
+}
+
+#[test]
 fn an_unknown_case_is_invalid_input() {
     let fixture = Fixture::new();
     fixture.catalogue_with_absent_geometry();

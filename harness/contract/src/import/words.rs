@@ -50,8 +50,13 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
             // Side bits must be valid only if they are used.
             if let Some(why) = word::fault(if with_sides { word } else { word & !3 }) {
                 let cell = cells.len();
+                let part = if part.is_empty() { part } else { part + ": " };
+                let swapped = match word::fault(word.swap_bytes()) {
+                    None => "; with its bytes swapped it would be a leaf",
+                    Some(_) => "",
+                };
                 return Err(content(format!(
-                    "{part} cell {cell} is the word {word:#018x}, in which {why}"
+                    "{part}cell {cell} is the word {word:#018x}, in which {why}{swapped}"
                 )));
             }
             let octant = word::octant(word);

@@ -13,7 +13,6 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use contract::files;
-use contract::manifest::Sides;
 use vtkhdf::tree::{Shape, TreeWriter};
 
 use crate::mesh::Mesh;
@@ -80,14 +79,13 @@ fn families(
     options: &Options<'_>,
     take: &mut dyn FnMut(Family) -> Result<(), Failure>,
 ) -> Result<Written, Failure> {
-    let with_sides = mesh.manifest.sides == Sides::Known;
     let (mut open, mut written) = (Open::default(), Written::default());
     mesh.visit(selection, &|| options.check(), &mut |leaf| {
         if written.cells.is_multiple_of(REPORT) {
             options.watch.progress(written.cells.min(total), total.max(1));
         }
         written.add(&leaf.octant, true);
-        open.push(&leaf, with_sides, take)
+        open.push(&leaf, take)
     })?;
     open.finish(take)?;
     Ok(written)

@@ -37,7 +37,6 @@ impl Open {
     pub(super) fn push(
         &mut self,
         leaf: &Leaf,
-        with_sides: bool,
         take: &mut dyn FnMut(Family) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let (key, level) = (word::key_of(leaf.octant.corner), leaf.octant.level);
@@ -60,9 +59,9 @@ impl Open {
         let digit = digit(key, level);
         siblings.deleted &= !(1 << digit);
         match leaf.side {
-            Side::Crossing if with_sides => siblings.crossing |= 1 << digit,
-            Side::Inside if with_sides => siblings.inside |= 1 << digit,
-            _ => {}
+            Side::Crossing => siblings.crossing |= 1 << digit,
+            Side::Inside => siblings.inside |= 1 << digit,
+            Side::Outside => {}
         }
         parts[digit] = leaf.rank as i32;
         Ok(())

@@ -113,6 +113,21 @@ fn full_and_read_only_disks_are_refused() {
 }
 
 #[test]
+fn outputs_of_a_run_do_not_replace_each_other() {
+    let workspace = Workspace::new();
+    workspace.write("body.stl", tetrahedron());
+    for (one, other) in [
+        (["--out", "mesh"], ["--json", "mesh/mesh.json"]),
+        (["--out", "mesh"], ["--json", "mesh"]),
+        (["--out", "mesh"], ["--status", "mesh"]),
+        (["--status", "status"], ["--json", "status/rank-00000.txt"]),
+    ] {
+        let arguments = [&["body.stl", "--spacing-min=0.5"][..], &one, &other].concat();
+        refused(&workspace, &arguments, INPUT, &[other[1], "this run also writes", "another name"]);
+    }
+}
+
+#[test]
 fn a_second_run_into_a_directory_is_refused_and_changes_nothing() {
     for comm in COMMS {
         let workspace = Workspace::new();
