@@ -11,7 +11,10 @@ use contract::case::Facet;
 use contract::{files, npy};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::{self, ScopedJoinHandle};
 use std::time::Duration;
 
 /// The oracles, in the order in which they run.
@@ -61,27 +64,34 @@ impl Question {
         paths: &Paths,
         limit: Duration,
     ) -> Vec<(&'o str, Result<Answer, Failure>)> {
-        let sides = |oracle: &str| self.place.join(format!("{oracle}.npy"));
-        let started = oracles.iter().map(|&oracle| {
-            let started = start(oracle, services, paths);
-            let files = [&self.points, &self.body, &sides(oracle)];
-            services.send(oracle, &files.map(|file| file.to_string_lossy().into_owned()));
-            (oracle, started)
-        });
-        let started: Vec<_> = started.collect();
-        let answered = started.into_iter().map(|(oracle, started)| {
-            let watch = Watch::new(oracle, limit, &self.place);
-            let answer = started
-                .and_then(|()| services.wait(oracle, &watch))
-                .map_err(python::explained)
-                .and_then(|_| {
-                    let unusable = |why| Failure::new(oracle, End::Unusable(why));
-                    let inside = read_sides(&sides(oracle), self.count).map_err(unusable)?;
-                    Ok(Answer { name: oracle.to_owned(), inside })
-                });
-            (oracle, answer)
-        });
-        answered.collect()
+        thread::scope(|scope| {
+            let asked = oracles.iter().map(|&oracle| {
+                (oracle, scope.spawn(|| self.ask_one(oracle, services, paths, limit)))
+            });
+            let asked: Vec<_> = asked.collect();
+            let answer = |asked: ScopedJoinHandle<_>| {
+                asked.join().unwrap_or_else(|panic| resume_unwind(panic))
+            };
+            asked.into_iter().map(|(oracle, asked)| (oracle, answer(asked))).collect()
+        })
+    }
+
+    fn ask_one(
+        &self,
+        oracle: &str,
+        services: &Services,
+        paths: &Paths,
+        limit: Duration,
+    ) -> Result<Answer, Failure> {
+        let sides = self.place.join(format!("{oracle}.npy"));
+        let files = [&self.points, &self.body, &sides];
+        let words = files.map(|file| file.to_string_lossy().into_owned());
+        let watch = Watch::new(oracle, limit, &self.place);
+        let command = command(oracle, paths)?;
+        services.request(oracle, || (command, None), &words, &watch).map_err(python::explained)?;
+        let inside = read_sides(&sides, self.count);
+        let unusable = |why| Failure::new(oracle, End::Unusable(why));
+        Ok(Answer { name: oracle.to_owned(), inside: inside.map_err(unusable)? })
     }
 }
 
@@ -90,8 +100,12 @@ impl Question {
 /// # Errors
 /// [`End::Missing`] if Python is missing.
 pub fn start(oracle: &str, services: &Services, paths: &Paths) -> Result<(), Failure> {
-    let command = python::command(oracle, &format!("{oracle}_sides.py"), paths)?;
+    let command = command(oracle, paths)?;
     services.start(oracle, || (command, None))
+}
+
+fn command(oracle: &str, paths: &Paths) -> Result<Command, Failure> {
+    python::command(oracle, &format!("{oracle}_sides.py"), paths)
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {

@@ -10,7 +10,7 @@ use super::paths::{Paths, on_path};
 use super::placeholders::{LAUNCHER, Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
-use super::service::Services;
+use super::service::{self, Services};
 use super::written;
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
@@ -249,14 +249,14 @@ impl Engine {
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
-        if let Some(services) = options.services
-            && let Some(name) = self.start_ranks(count, services)?
-        {
+        let _alone = options.services.map(Services::ranks);
+        let serving = options.services.and_then(|services| Some((services, self.serves()?)));
+        if let Some((services, serve)) = serving {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
-            services.send(&name, &words);
-            let time_wall_s = services.wait(&name, &watch)?;
+            let (name, start) = (self.name_of_ranks(count), || self.ranks(count, serve));
+            let time_wall_s = services.request(&name, start, &words, &watch)?;
             let stdout = watch.log("stdout");
             // The CPU time of a request is not measured.
             return Ok(Finished {
@@ -272,28 +272,31 @@ impl Engine {
         process::run(command, &watch)
     }
 
-    /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none; returns their name.
-    ///
-    /// # Errors
-    /// If they cannot be started.
-    pub fn start_ranks(
-        &self,
-        count: usize,
-        services: &Services,
-    ) -> Result<Option<String>, Failure> {
+    /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none. What fails is found by
+    /// the first run.
+    pub fn start_ranks(&self, count: usize, services: &Services) {
+        if let Some(serve) = self.serves() {
+            let _ = services.start(&self.name_of_ranks(count), || self.ranks(count, serve));
+        }
+    }
+
+    /// The arguments with which ranks stay, if they can.
+    fn serves(&self) -> Option<&[String]> {
         let templates = &self.description.run;
         // The environment may depend on the run.
-        let serve = templates.serve.as_ref().filter(|_| templates.environment.is_empty());
-        let Some(serve) = serve else { return Ok(None) };
-        let name = format!("{} on {count} ranks", self.program.display());
-        services.start(&name, || {
-            let mut command = self.launcher.command(count, &self.program);
-            command.args(serve);
-            let shared = self.launcher.shared_memory();
-            shared.iter().for_each(|shared| shared.add_to(&mut command));
-            (command, shared)
-        })?;
-        Ok(Some(name))
+        templates.serve.as_deref().filter(|_| templates.environment.is_empty())
+    }
+
+    fn name_of_ranks(&self, count: usize) -> String {
+        format!("{} on {count} ranks", self.program.display())
+    }
+
+    fn ranks(&self, count: usize, serve: &[String]) -> service::Start {
+        let mut command = self.launcher.command(count, &self.program);
+        command.args(serve);
+        let shared = self.launcher.shared_memory();
+        shared.iter().for_each(|shared| shared.add_to(&mut command));
+        (command, shared)
     }
 
     fn failure(&self, end: End) -> Failure {

@@ -12,11 +12,11 @@ use super::output::Output;
 use super::process::{self, Watch, end_child, kill_session};
 use super::reap::try_reap;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -32,9 +32,19 @@ const PAUSE: Timespec = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
 /// How a service is started: its command, and the directory of its shared memory.
 pub type Start = (Command, Option<SharedMemory>);
 
-/// Services by name. All end with it.
+/// Services by name, for several threads: each service runs one request at a time. All end with it.
 #[derive(Debug, Default)]
-pub struct Services(RefCell<BTreeMap<String, Service>>);
+pub struct Services {
+    /// `None` for one that has not been started, or has ended.
+    by_name: Mutex<BTreeMap<String, Arc<Mutex<Option<Service>>>>>,
+    /// Held by a run on MPI: ranks that wait for each other spin, and would take the cores from those of another run.
+    ranks: Mutex<()>,
+}
+
+/// What a thread that panicked has left behind is as good as before: the panic ends the program.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 #[derive(Debug)]
 struct Service {
@@ -55,40 +65,25 @@ impl Services {
     /// # Errors
     /// [`End::Missing`] if it cannot be started; another end if it has failed since the last answer.
     pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), Failure> {
-        let mut services = self.0.borrow_mut();
-        if let Some(service) = services.get(name)
-            && let Ok(Some((status, _))) = try_reap(&service.child)
-        {
-            let end = process::judge(status, || service.error());
-            services.remove(name);
-            // A program that has ended well between two requests is started again.
-            end.map_or(Ok(()), |end| Err(Failure::new(name, end)))?;
-        }
-        if !services.contains_key(name) {
-            let (mut command, shared) = start();
-            let service = Service::start(&mut command, shared).map_err(|error| {
-                let program = command.get_program().to_string_lossy();
-                Failure::new(name, End::Missing(format!("cannot be started: {program}: {error}")))
-            })?;
-            services.insert(name.to_owned(), service);
-        }
-        Ok(())
+        Self::started(&mut lock(&self.slot(name)), name, start).map(drop)
     }
 
-    /// Sends a request to a service that was started.
-    pub fn send(&self, name: &str, words: &[String]) {
-        if let Some(service) = self.0.borrow_mut().get_mut(name) {
-            service.send(words);
-        }
-    }
-
-    /// Waits for the answer. The watch's limit counts from the request. Returns the wall time, in seconds.
+    /// Sends a request to the service, which is started unless it runs, and waits for the answer. The watch's limit counts from the
+    /// request. Returns the wall time, in seconds.
     ///
     /// # Errors
-    /// If the answer is not 0, or the service ends or hangs; it then has to be started again.
-    pub fn wait(&self, name: &str, watch: &Watch) -> Result<f64, Failure> {
-        let mut services = self.0.borrow_mut();
-        let service = services.get_mut(name).expect("the service was started");
+    /// If it cannot be started, the answer is not 0, or the service ends or hangs.
+    pub fn request(
+        &self,
+        name: &str,
+        start: impl FnOnce() -> Start,
+        words: &[String],
+        watch: &Watch,
+    ) -> Result<f64, Failure> {
+        let slot = self.slot(name);
+        let mut slot = lock(&slot);
+        let service = Self::started(&mut slot, name, start)?;
+        service.send(words);
         let answer = service.wait(watch);
         let time_s = service.sent.elapsed().as_secs_f64();
         // A launcher may pass on the error after the answer.
@@ -105,17 +100,52 @@ impl Services {
         let _ = fs::write(watch.log("stderr"), &error);
         if answer.is_err() {
             let _ = end_child(&service.child);
-            services.remove(name);
+            *slot = None;
         }
         let exited = |code| End::Exited { code, error: process::last_lines(&error) };
         Err(Failure::new(watch.name, answer.map_or_else(|end| end, exited)))
+    }
+
+    /// Waits until no other thread runs ranks on MPI, and keeps them from it.
+    pub fn ranks(&self) -> MutexGuard<'_, ()> {
+        lock(&self.ranks)
+    }
+
+    fn slot(&self, name: &str) -> Arc<Mutex<Option<Service>>> {
+        lock(&self.by_name).entry(name.to_owned()).or_default().clone()
+    }
+
+    fn started<'a>(
+        slot: &'a mut Option<Service>,
+        name: &str,
+        start: impl FnOnce() -> Start,
+    ) -> Result<&'a mut Service, Failure> {
+        if let Some(service) = slot
+            && let Ok(Some((status, _))) = try_reap(&service.child)
+        {
+            let end = process::judge(status, || service.error());
+            *slot = None;
+            // A program that has ended well between two requests is started again.
+            end.map_or(Ok(()), |end| Err(Failure::new(name, end)))?;
+        }
+        if slot.is_none() {
+            let (mut command, shared) = start();
+            let started = Service::start(&mut command, shared).map_err(|error| {
+                let program = command.get_program().to_string_lossy();
+                Failure::new(name, End::Missing(format!("cannot be started: {program}: {error}")))
+            })?;
+            *slot = Some(started);
+        }
+        Ok(slot.as_mut().expect("it has just been started"))
     }
 }
 
 impl Drop for Services {
     fn drop(&mut self) {
         // All end at the same time.
-        self.0.borrow_mut().values_mut().for_each(|service| drop(service.requests.take()));
+        for slot in lock(&self.by_name).values() {
+            lock(slot).iter_mut().for_each(|service| drop(service.requests.take()));
+        }
     }
 }
 
@@ -213,5 +243,39 @@ impl Drop for Service {
         }
         kill_session(self.child.id());
         interrupt::forget_child(self.child.id());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::thread;
+
+    /// Writes 0 for every word but `die`, at which it ends.
+    const SCRIPT: &str = r#"while read -r line; do case "$line" in *die*) exit 7 ;; *wrong*) echo 5 ;; *) echo 0 ;; esac; done"#;
+
+    #[test]
+    fn requests_of_several_threads_get_their_own_answers() {
+        let place = tempfile::tempdir().unwrap();
+        let services = Services::default();
+        let start = || {
+            let mut command = Command::new("sh");
+            command.args(["-c", SCRIPT]);
+            (command, None)
+        };
+        let ask = &|word: &str| {
+            let watch = Watch::new("sh", Duration::from_secs(60), place.path());
+            let answer = services.request("sh", start, &[word.to_owned()], &watch);
+            match answer.map_err(|failure| failure.end) {
+                Ok(_) => 0,
+                Err(End::Exited { code, .. }) => code,
+                Err(other) => panic!("{word}: {other:?}"),
+            }
+        };
+        thread::scope(|scope| {
+            for (word, code) in [("good", 0), ("die", 7), ("wrong", 5), ("good", 0)] {
+                scope.spawn(move || (0..25).for_each(|_| assert_eq!(ask(word), code, "{word}")));
+            }
+        });
     }
 }

@@ -9,7 +9,7 @@ use crate::engine::service::Services;
 use crate::oracle::{self, ORACLES, Question};
 use crate::proof;
 use check::promises::Independence;
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 /// Prerequisites, each with the reason if it is missing, and the programs that stay for the whole verification.
@@ -25,17 +25,24 @@ pub struct Needs {
     /// Programs that stay.
     pub services: Services,
     /// The oracles, once they were tried: their packages are imported while the first case is meshed.
-    oracles: OnceCell<Oracles>,
-    /// Oracles that gave no answer on a case.
-    oracles_silent: Vec<Failure>,
+    oracles: OnceLock<Oracles>,
     /// Why p4est is unavailable.
     pub p4est: Option<String>,
     /// Why the proven checker is unavailable.
     pub proof: Option<String>,
-    /// Why geometries are missing, one reason each.
-    geometries: Vec<String>,
+}
+
+/// What the cases lacked.
+#[derive(Debug)]
+pub struct Found<'a> {
+    /// Number of cases.
+    pub cases: usize,
     /// Cases without any check.
-    unchecked: Vec<String>,
+    pub unchecked: Vec<&'a str>,
+    /// Number of cases without their geometry.
+    pub geometries_absent: usize,
+    /// Oracles that gave no answer on a case.
+    pub oracles_silent: Vec<Failure>,
 }
 
 /// The oracles of this machine.
@@ -67,9 +74,9 @@ impl Needs {
             ..Self::default()
         };
         if needs.mpi.is_none() {
-            // All start at the same time, while the first case is meshed serially. What fails is found by the first run.
+            // All start at the same time, while the first case is meshed serially.
             let counts = options.rank_counts(engine).into_iter();
-            counts.for_each(|ranks| drop(programs.engine.start_ranks(ranks, &needs.services)));
+            counts.for_each(|ranks| programs.engine.start_ranks(ranks, &needs.services));
         }
         let unused = (!engine.promises.definition)
             .then(|| format!("{} does not promise the definition", engine.name));
@@ -87,7 +94,7 @@ impl Needs {
             None => ORACLES
                 .iter()
                 .for_each(|o| drop(oracle::start(o, &needs.services, &programs.paths))),
-            lacking => needs.oracles = OnceCell::from(Oracles { lacking, ..Oracles::default() }),
+            lacking => needs.oracles = OnceLock::from(Oracles { lacking, ..Oracles::default() }),
         }
         let of_definition =
             [Need::Oracles, Need::P4est, Need::Proof].into_iter().filter(|_| unused.is_some());
@@ -104,36 +111,21 @@ impl Needs {
         self.oracles.get_or_init(|| probe_oracles(&self.services, paths, limit))
     }
 
-    /// Records oracles that gave no answer on a case: a required vote needs all of them.
-    pub fn note_silent_oracles(&mut self, failures: Vec<Failure>) {
-        self.oracles_silent.extend(failures);
-    }
-
-    /// Records that no check of a case was run.
-    pub fn note_unchecked(&mut self, case: &str) {
-        self.unchecked.push(case.to_owned());
-    }
-
-    /// Records that the geometry of a case is missing.
-    pub fn note_absent_geometry(&mut self, why: &str) {
-        self.geometries.push(why.to_owned());
-    }
-
     /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.
-    pub fn missing(&self, options: &Options, paths: &Paths, cases: usize) -> Vec<Missing> {
+    pub fn missing(&self, options: &Options, paths: &Paths, found: &Found) -> Vec<Missing> {
         let oracles = self.oracles(options, paths);
-        // The vote needs all oracles, so one that is missing counts as all.
+        // The vote needs all oracles, so one that is missing, or gave no answer on a case, counts as all.
         let one =
-            || oracles.missing.iter().chain(&self.oracles_silent).next().map(Failure::to_string);
+            || oracles.missing.iter().chain(&found.oracles_silent).next().map(Failure::to_string);
         let oracles = oracles.lacking.clone().or_else(one);
-        let geometries = match self.geometries.len() {
+        let geometries = match found.geometries_absent {
             0 => None,
             count => Some(format!(
                 "{count} geometries are missing (ci/setup --geometries fetches those that can be fetched)"
             )),
         };
-        let unchecked = (!self.unchecked.is_empty())
-            .then(|| format!("no check was run on {}", self.unchecked.join(", ")));
+        let unchecked = (!found.unchecked.is_empty())
+            .then(|| format!("no check was run on {}", found.unchecked.join(", ")));
         let all = [
             (Need::Mpi, self.mpi.clone()),
             (Need::Oracles, oracles),
@@ -142,7 +134,7 @@ impl Needs {
             (Need::Geometries, geometries),
             (Need::Checks, unchecked),
         ];
-        let nothing = self.unchecked.len() == cases || !options.cases.is_empty();
+        let nothing = found.unchecked.len() == found.cases || !options.cases.is_empty();
         let missing = all.into_iter().filter_map(|(need, why)| {
             let required = match need {
                 _ if options.require.contains(&need) => true,

@@ -9,6 +9,7 @@ use contract::failure::Failure;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::TempDir;
 
 /// The file that marks the directory of a case.
@@ -19,7 +20,7 @@ const MARKER: &str = "made-by-harness-verify";
 pub struct Workplace {
     root: PathBuf,
     temporary: Option<TempDir>,
-    kept: bool,
+    kept: AtomicBool,
 }
 
 impl Workplace {
@@ -34,11 +35,12 @@ impl Workplace {
         if let Some(out) = &options.out {
             fs::create_dir_all(out).map_err(wrong)?;
             let root = fs::canonicalize(out).map_err(wrong)?;
-            return Ok(Self { root, temporary: None, kept: false });
+            return Ok(Self { root, temporary: None, kept: AtomicBool::new(false) });
         }
         let temporary =
             tempfile::Builder::new().prefix("harness-verify-").tempdir().map_err(wrong)?;
-        Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary), kept: false })
+        let root = temporary.path().to_owned();
+        Ok(Self { root, temporary: Some(temporary), kept: AtomicBool::new(false) })
     }
 
     /// Makes the directory of a case, and replaces one that an earlier verification left.
@@ -62,9 +64,9 @@ impl Workplace {
     }
 
     /// Removes the directory of a case, or keeps and returns it.
-    pub fn leave(&mut self, place: &Path, keep: bool) -> Option<PathBuf> {
+    pub fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
         if keep {
-            self.kept = true;
+            self.kept.store(true, Ordering::Relaxed);
             interrupt::forget_directory(place);
             return Some(place.to_owned());
         }
@@ -76,7 +78,7 @@ impl Workplace {
     /// Closes it. A temporary directory is kept only for the cases that were kept in it.
     pub fn close(self, remove_all: bool) {
         if let Some(temporary) = self.temporary
-            && self.kept
+            && self.kept.into_inner()
             && !remove_all
         {
             let _ = temporary.keep();
@@ -92,7 +94,7 @@ mod tests {
     #[test]
     fn a_temporary_directory_is_kept_only_if_a_case_is_kept() {
         for keep in [false, true] {
-            let mut workplace = Workplace::new(&options()).unwrap();
+            let workplace = Workplace::new(&options()).unwrap();
             let root = workplace.root.clone();
             let place = workplace.enter("cube").unwrap();
             assert_eq!(workplace.leave(&place, keep).is_some(), keep);
@@ -106,7 +108,7 @@ mod tests {
     fn an_interrupt_removes_the_results_of_the_case_under_way_but_not_those_that_are_kept() {
         let out = tempfile::tempdir().unwrap();
         let options = Options { out: Some(out.path().to_owned()), ..options() };
-        let mut workplace = Workplace::new(&options).unwrap();
+        let workplace = Workplace::new(&options).unwrap();
         let [failed, under_way] = ["failed", "under-way"].map(|case| {
             let place = workplace.enter(case).unwrap();
             assert!(interrupt::has_directory(&place));
