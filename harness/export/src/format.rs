@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::cgns;
 use crate::foam;
 use crate::htg;
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
+use crate::scripted;
 use crate::selection::Selection;
 use crate::{p8est, vtu};
 use contract::failure::Failure;
@@ -50,7 +50,12 @@ pub const FORMATS: &[Format] = &[
     Format {
         ending: ".cgns",
         purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
-        write: cgns::write,
+        write: scripted::cgns,
+    },
+    Format {
+        ending: ".mfem",
+        purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
+        write: scripted::mfem,
     },
     Format {
         ending: ".vtkhdf",

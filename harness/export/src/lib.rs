@@ -4,11 +4,10 @@
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK, in one file or several;
-//! - [`foam`]: meshes for OpenFOAM, and [`cgns`] made of them;
+//! - [`foam`]: meshes for OpenFOAM; [`scripted`]: CGNS and MFEM, made of other formats by scripts;
 
 #![deny(missing_docs)]
 
-pub mod cgns;
 pub mod foam;
 pub mod format;
 pub mod htg;
@@ -18,6 +17,7 @@ pub mod near_body;
 pub mod options;
 pub mod p8est;
 pub mod polydata;
+pub mod scripted;
 pub mod selection;
 #[cfg(test)]
 mod testing;

@@ -17,8 +17,8 @@ pub struct Options<'a> {
     pub watch: &'a dyn Watch,
     /// What only meshes for OpenFOAM need.
     pub foam: Foam<'a>,
-    /// Makes a CGNS file of a polyMesh: the directory and the file.
-    pub cgns: fn(&Path, &Path) -> Result<(), Failure>,
+    /// Runs the script that makes a file of this format: its source and the file.
+    pub script: fn(&str, &Path, &Path) -> Result<(), Failure>,
 }
 
 /// Options of meshes for OpenFOAM.

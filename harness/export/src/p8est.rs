@@ -211,7 +211,7 @@ fn pad(bytes: &mut Vec<u8>) {
 mod tests {
     use super::*;
     use crate::options::Foam;
-    use crate::testing::{Unwatched, no_cgns, stored};
+    use crate::testing::{Unwatched, no_script, stored};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
     use contract::testing::{random_words, words_of};
@@ -227,7 +227,7 @@ mod tests {
             jobs: NonZero::<usize>::MIN,
             watch: &Unwatched,
             foam: Foam::default(),
-            cgns: no_cgns,
+            script: no_script,
         }
     }
 

@@ -21,8 +21,8 @@ impl Watch for Unwatched {
     }
 }
 
-/// A conversion to CGNS that is not expected.
-pub fn no_cgns(_: &Path, _: &Path) -> Result<(), Failure> {
+/// A script that is not expected.
+pub fn no_script(_: &str, _: &Path, _: &Path) -> Result<(), Failure> {
     unreachable!("no other format asks for it")
 }
 

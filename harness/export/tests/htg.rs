@@ -46,9 +46,9 @@ fn on_disk(parts: Vec<Vec<u64>>) -> (TempDir, Mesh) {
 fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("mesh.vtkhdf");
-    let cgns = |_: &Path, _: &Path| unreachable!("this is no CGNS file");
+    let script = |_: &str, _: &Path, _: &Path| unreachable!("no script makes this format");
     let (jobs, foam) = (NonZero::<usize>::MIN, Foam::default());
-    let options = Options { jobs, watch: &Quiet, foam, cgns };
+    let options = Options { jobs, watch: &Quiet, foam, script };
     match export::htg::write(mesh, selection, &path, &options) {
         Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),

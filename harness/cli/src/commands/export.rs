@@ -18,7 +18,7 @@ use std::thread::available_parallelism;
 use std::time::Duration;
 
 /// The script reads all of a mesh into memory, which limits its size long before its time.
-const CGNS_LIMIT: Duration = Duration::from_secs(24 * 3600);
+const SCRIPT_LIMIT: Duration = Duration::from_secs(24 * 3600);
 
 /// `harness export`.
 #[derive(Args, Debug)]
@@ -84,16 +84,17 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
     let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
     let foam = foam.options(case.as_ref());
-    let options = Options { jobs, watch: &progress, foam, cgns };
+    let options = Options { jobs, watch: &progress, foam, script };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.finish();
     written
 }
 
-/// Makes a CGNS file of a polyMesh.
-fn cgns(directory: &Path, file: &Path) -> Result<(), Failure> {
-    let place = directory.parent().expect("the directory is in a temporary one");
-    python::run("CGNS", "export_cgns.py", [directory, file], &Paths::find(), CGNS_LIMIT, place)?;
+/// Makes a file of a format of what the format is made of, in a temporary directory.
+fn script(format: &str, source: &Path, file: &Path) -> Result<(), Failure> {
+    let place = source.parent().expect("the source is in a temporary directory");
+    let (name, script) = (format.to_uppercase(), format!("export_{format}.py"));
+    python::run(&name, &script, [source, file], &Paths::find(), SCRIPT_LIMIT, place)?;
     Ok(())
 }
 

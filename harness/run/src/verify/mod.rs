@@ -66,8 +66,8 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
     let verification = Verification {
         options,
         programs,
-        needs: Needs::probe(options, programs),
         workplace: Workplace::new(options)?,
+        needs: Needs::probe(options, programs),
         progress: Progress::new(
             "{spinner} {pos}/{len} [{elapsed}] {prefix}: {wide_msg}",
             Some(selected.len()),

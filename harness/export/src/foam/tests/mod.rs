@@ -21,7 +21,7 @@ use super::squares::{Square, squares};
 use super::*;
 use crate::mesh::Mesh as OnDisk;
 use crate::options::{Foam, Label};
-use crate::testing::{Unwatched, no_cgns};
+use crate::testing::{Unwatched, no_script};
 
 /// Faces with their points, and the cells on both sides of each.
 #[derive(Debug, Default)]
@@ -34,7 +34,7 @@ struct Complex {
 
 pub fn options<'a>() -> Options<'a> {
     let foam = Foam::default();
-    Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam, cgns: no_cgns }
+    Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam, script: no_script }
 }
 
 fn on_disk(set: &LeafSet) -> (tempfile::TempDir, OnDisk) {
