@@ -3,6 +3,7 @@
 use super::command;
 use super::description::{self, Description};
 use super::failure::{End, Failure};
+use super::interrupt;
 use super::launcher::{self, Launcher};
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
@@ -250,6 +251,10 @@ impl Engine {
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
         let _alone = options.services.map(Services::ranks);
+        // While this thread waited for the others.
+        if interrupt::requested() {
+            return Err(self.failure(End::Interrupted));
+        }
         let serving = options.services.and_then(|services| Some((services, self.serves()?)));
         if let Some((services, serve)) = serving {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());

@@ -82,6 +82,10 @@ impl Services {
     ) -> Result<f64, Failure> {
         let slot = self.slot(name);
         let mut slot = lock(&slot);
+        // While this thread waited for another one.
+        if interrupt::requested() {
+            return Err(Failure::new(watch.name, End::Interrupted));
+        }
         let service = Self::started(&mut slot, name, start)?;
         service.send(words);
         let answer = service.wait(watch);
