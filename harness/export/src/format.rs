@@ -4,10 +4,8 @@ use std::path::Path;
 
 use crate::foam;
 use crate::htg;
-use crate::mesh::Mesh;
-use crate::options::{Options, Summary};
+use crate::options::Write;
 use crate::scripted;
-use crate::selection::Selection;
 use crate::{p8est, vtu};
 use contract::failure::Failure;
 
@@ -21,9 +19,6 @@ pub struct Format {
     /// Writes the selected leaves of a mesh.
     pub write: Write,
 }
-
-/// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
-pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, Failure>;
 
 /// All formats.
 pub const FORMATS: &[Format] = &[

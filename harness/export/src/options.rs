@@ -5,6 +5,8 @@ use std::path::Path;
 
 use contract::case::Case;
 
+use crate::mesh::Mesh;
+use crate::selection::Selection;
 use contract::failure::Failure;
 use contract::watch::Watch;
 
@@ -82,6 +84,9 @@ impl Options<'_> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
 }
+
+/// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
+pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, Failure>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

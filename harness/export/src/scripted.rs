@@ -1,9 +1,8 @@
 //! Formats that a script makes of those that are written here: CGNS of a polyMesh, MFEM's of a forest of p4est.
 
 use crate::foam;
-use crate::format::Write;
 use crate::mesh::Mesh;
-use crate::options::{Options, Summary};
+use crate::options::{Options, Summary, Write};
 use crate::p8est;
 use crate::selection::Selection;
 use contract::failure::Failure;

@@ -11,7 +11,9 @@ use super::launcher::SharedMemory;
 use super::output::Output;
 use super::process::{self, Watch, end_child, kill_session};
 use super::reap::try_reap;
+use super::session;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::Signal;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read, Write};
@@ -102,7 +104,8 @@ impl Services {
             return Ok(time_s);
         }
         let _ = fs::write(watch.log("stderr"), &error);
-        if answer.is_err() {
+        // After an interrupt all services are ended at the same time: one after the other, there is no time left for a report.
+        if answer.as_ref().is_err_and(|end| *end != End::Interrupted) {
             let _ = end_child(&service.child);
             *slot = None;
         }
@@ -148,7 +151,12 @@ impl Drop for Services {
     fn drop(&mut self) {
         // All end at the same time.
         for slot in lock(&self.by_name).values() {
-            lock(slot).iter_mut().for_each(|service| drop(service.requests.take()));
+            for service in lock(slot).iter_mut() {
+                drop(service.requests.take());
+                if interrupt::requested() {
+                    session::signal(service.child.id(), Signal::TERM);
+                }
+            }
         }
     }
 }
