@@ -289,8 +289,11 @@ fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) ->
             let is_cut = (p[axis] < plane) != (q[axis] < plane);
             is_cut.then(|| p + (q - p) * ((plane - p[axis]) / (q[axis] - p[axis])))
         });
-        let shown = bounds.clip_segment(ends.next()?, ends.next()?)?;
-        Some([shown.a, shown.b].map(|end| axes.map(|a| end[a])))
+        let (from, to) = (ends.next()?, ends.next()?);
+        // `clip_segment` returns a part of the line where the line meets the box beyond the segment.
+        let (enters, leaves) = bounds.clip_line_parameters(from, to - from)?;
+        let ends = [enters.max(0.0), leaves.min(1.0)];
+        (ends[0] <= ends[1]).then(|| ends.map(|t| axes.map(|a| from[a] + (to - from)[a] * t)))
     };
     facets.iter().filter_map(cut).collect()
 }

@@ -170,6 +170,20 @@ fn a_clip_box_is_the_window() {
     assert_eq!((picture.squares.leaves, picture.key[0].name.as_str()), (2, "2"));
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Lines of segments outside of the window may still cross it.
+    #[test]
+    fn the_section_lies_in_the_window(facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(0f32..8.0)), 1..40)) {
+        let (_place, mesh) = on_disk(vec![eight_and_seven()]);
+        let clip = [[1.0, 2.0, 0.0], [3.0, 3.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
+        let selection = Selection { clip: Some(clip), ..at(2, 4.0) };
+        let shown = Request { selection, body: Some(&facets), ..request(Colour::Spacing) };
+        Picture::collect(&mesh, &shown, &DETAIL).unwrap().check_invariants();
+    }
+}
+
 #[test]
 fn a_picture_without_cells_and_unknown_sides_are_errors() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
