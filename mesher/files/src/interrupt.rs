@@ -13,9 +13,9 @@ use signal_hook::low_level;
 pub use signal_hook::low_level::exit as exit_at_once;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::sleep;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{park, sleep};
 use std::time::Duration;
 use std::{env, fmt, io};
 
@@ -78,7 +78,11 @@ pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
     Ok(SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)))
 }
 
-/// Runs `body` without a signal in between on this thread: for steps that create a file and note that it exists.
+/// Whether another thread ends the process and has removed what was unfinished. Held while output is begun.
+static IS_ENDING: Mutex<bool> = Mutex::new(false);
+
+/// Runs `body` without a signal in between on this thread, and not while another thread removes what is unfinished: for steps that create
+/// a file and note that it exists. After [`abandon_unfinished`] it waits for the end of the process.
 pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
     let mut before = MaybeUninit::uninit();
     // SAFETY: the sets are initialised by sigemptyset and by the first pthread_sigmask, which cannot fail with these arguments.
@@ -88,7 +92,15 @@ pub fn uninterrupted<T>(body: impl FnOnce() -> T) -> T {
         SIGNALS.iter().for_each(|&s| _ = libc::sigaddset(signals.as_mut_ptr(), s));
         libc::pthread_sigmask(libc::SIG_BLOCK, signals.as_ptr(), before.as_mut_ptr());
     }
+    let ending = IS_ENDING.lock().unwrap_or_else(PoisonError::into_inner);
+    if *ending {
+        drop(ending);
+        loop {
+            park();
+        }
+    }
     let result = body();
+    drop(ending);
     // SAFETY: as above. A panic in `body` ends the process.
     unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), null_mut()) };
     result
@@ -110,8 +122,10 @@ pub fn abandon() {
     abandon_all(true);
 }
 
-/// Removes all files that are unfinished, also if others are complete: for a program with several outputs.
+/// Removes all files that are unfinished, also if others are complete, and lets no other thread begin one: for a program with several
+/// outputs, whose process then ends.
 pub fn abandon_unfinished() {
+    *IS_ENDING.lock().unwrap_or_else(PoisonError::into_inner) = true;
     abandon_all(false);
 }
 

@@ -1,15 +1,17 @@
 //! Where output goes, and what other runs leave of it.
 #![allow(missing_docs)]
 
-use files::{Claim, ClaimError, Draft, write_atomically};
+use files::{Claim, ClaimError, Draft, interrupt, write_atomically};
+use std::env;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, exit};
 use std::sync::Barrier;
 use std::thread;
+use std::time::Duration;
 
 fn write(path: &Path, text: &str) -> io::Result<()> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
@@ -21,6 +23,25 @@ fn names(directory: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(directory).unwrap().map(name).collect();
     names.sort();
     names
+}
+
+/// In a process of its own: nothing can be begun in it afterwards.
+#[test]
+fn nothing_is_begun_once_another_thread_ends_the_process() {
+    const FILE: &str = "FILE_AFTER_THE_END";
+    if let Some(path) = env::var_os(FILE) {
+        interrupt::abandon_unfinished();
+        // If it returned, the draft would remain, as `exit` drops nothing.
+        let begun = thread::spawn(move || Draft::create(Path::new(&path)).map(std::mem::forget));
+        thread::sleep(Duration::from_millis(100));
+        exit(i32::from(begun.is_finished()));
+    }
+    let place = tempfile::tempdir().unwrap();
+    let mut child = Command::new(env::current_exe().unwrap());
+    child.args(["--exact", "nothing_is_begun_once_another_thread_ends_the_process"]);
+    let status = child.env(FILE, place.path().join("file")).status().unwrap();
+    assert!(status.success());
+    assert_eq!(names(place.path()), [""; 0]);
 }
 
 #[test]

@@ -175,11 +175,12 @@ pub fn clean() {
     }
     children.iter().for_each(|&child| session::signal(child, Signal::KILL));
     session::end_adopted(&[]);
-    // Until the process ends, nothing else is published.
+    // Until the process ends, nothing else is staged or published.
     let staged = contract::files::publications();
     interrupt::abandon_unfinished();
     let kept = leftovers();
     kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
+    std::mem::forget(staged);
 }
 
 fn remove(directory: &Path) {
