@@ -64,10 +64,11 @@ impl Efficiency {
     }
 
     /// Ranks wait for each other at the end of phases, so neither their balance nor their waiting can gain time.
-    fn check_invariants(&self) {
+    /// `off` are the relative errors of both by rounding.
+    fn check_invariants(&self, off: [f64; 2]) {
         let Self { load_balance, serialisation, transfer, computation_scaling, .. } = *self;
-        assert!(load_balance <= 1.0 + ROUNDING, "load balance of at most 1: {self:?}");
-        assert!(serialisation <= 1.0 + ROUNDING, "serialisation of at most 1: {self:?}");
+        assert!(load_balance <= 1.0 + off[0], "load balance of at most 1: {self:?}");
+        assert!(serialisation <= 1.0 + off[1], "serialisation of at most 1: {self:?}");
         let are_positive = transfer >= 0.0 && computation_scaling >= 0.0;
         assert!(are_positive, "efficiencies of at least 0: {self:?}");
     }
@@ -77,8 +78,8 @@ impl Efficiency {
 const ABOVE_ONE: f64 = 1.005;
 /// Factors up to this are shown as 1.
 const SHOWN_AS_ONE: f64 = 1.0005;
-/// Relative error of times that are stored to the microsecond.
-const ROUNDING: f64 = 1e-3;
+/// Error of a time that is stored to the microsecond.
+const ROUNDING_S: f64 = 1e-6;
 
 /// Returns the modelled time of a phase's messages on one rank, in seconds.
 pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
@@ -150,8 +151,10 @@ fn factors(
         time_s,
         has_fixed_facets: run.facets == reference.facets && run.cells != reference.cells,
     };
-    efficiency.check_invariants();
-    efficiency
+    // A sum of stored times has the errors of all.
+    let off = |of_s: f64| 1e-9 + ROUNDING_S * (run.phases.len() + 1) as f64 / of_s.max(ROUNDING_S);
+    efficiency.check_invariants([useful_s.max, path_s].map(off));
+    Efficiency { load_balance: efficiency.load_balance.min(1.0), ..efficiency }
 }
 
 fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
@@ -240,13 +243,16 @@ mod tests {
     proptest! {
         #[test]
         fn efficiencies_of_drawn_runs_satisfy_the_invariants(
-            times in prop::collection::vec(prop::collection::vec(0.0..9.0f64, 3), 1..5), wall_s in 0.1..9.0f64, one in 0.0..9.0f64,
+            times in prop::collection::vec(prop::collection::vec(0.0..9.0f64, 3), 1..12), wall_s in 0.1..9.0f64, one in 0.0..9.0f64,
+            unit_s in prop::sample::select(vec![1.0, 1e-4, 1e-6]),
         ) {
+            // A small mesh takes microseconds, which are rounded.
+            let times: Vec<Vec<f64>> = times.iter().map(|t| t.iter().map(|t| t * unit_s).collect()).collect();
             let phases: Vec<(&str, &[f64])> = times.iter().map(|times| ("a", &times[..])).collect();
             let mut many = run(Comm::Mpi, 100, &phases);
-            many.time_wall_s = wall_s;
-            let one = run(Comm::Solo, 90, &[("a", &[one])]);
-            efficiency(&many, &one, &FREE);
+            many.time_wall_s = wall_s * unit_s;
+            let one = run(Comm::Solo, 90, &[("a", &[one * unit_s])]);
+            above_one(&[efficiency(&many, &one, &FREE)]);
         }
     }
 
