@@ -10,11 +10,11 @@
 
 use super::ends::{Target, is_free, leaf_at};
 use super::report::{Passage, Report};
-use crate::tree::{Point, from_edges, from_point, triangle};
+use crate::tree::{Point, from_edges, from_point, met, triangle};
 use contract::case::Case;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
-use parry3d_f64::query::{Ray, RayCast};
+use parry3d_f64::query::Ray;
 use parry3d_f64::shape::Segment;
 
 /// Exceeds the rounding of printed points, in lattice units.
@@ -102,12 +102,12 @@ impl Passage {
             let around = facet.local_aabb();
             let near = groups.iter().filter(|(bounds, _)| bounds.intersects(&around));
             for (leg, clearance) in near.flat_map(|(_, legs)| legs.iter()) {
-                let is_met = facet.intersects_local_ray(&Ray::new(leg.a, leg.b - leg.a), 1.0);
+                let is_met = met(&facet, &Ray::new(leg.a, leg.b - leg.a), 1.0).is_some();
                 let of_ends = from_point(leg.a, &facet).min(from_point(leg.b, &facet));
                 let distance = if is_met { -1.0 } else { of_ends.min(from_edges(leg, &facet)) };
                 assert!(
                     distance >= clearance - ROUNDING,
-                    "facet {number} is {distance} units from a leg of clearance {clearance}"
+                    "facet {number} is {distance} units from {leg:?} of clearance {clearance}"
                 );
             }
         }
