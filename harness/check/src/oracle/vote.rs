@@ -1,8 +1,8 @@
 //! Comparison of the mesh with the oracles and with exact rays.
 //!
 //! Every point has a side in the mesh, an answer of each oracle, and the result of the harness's own six exact
-//! rays, which decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or
-//! three unanimous oracles contradict it. On any other body the side belongs to a component and not to a point,
+//! rays, which decide if they agree. On a watertight body they always agree, and the mesh fails if the rays or,
+//! unless facets coincide, three unanimous oracles contradict it. On any other body the side belongs to a component and not to a point,
 //! so contradictions are reported only. So are all contradictions of a case with seeds, which decide instead of rays.
 
 /// One oracle's answers.
@@ -25,6 +25,8 @@ pub struct Ballot<'a> {
     pub oracles: &'a [Answer],
     /// Whether the body is watertight.
     pub watertight: bool,
+    /// Whether facets coincide: then the oracles may contradict rays, which decide.
+    pub doubled: bool,
     /// Whether seeds and not rays determine the sides. Then no vote can contradict the mesh.
     pub seeds: bool,
 }
@@ -43,7 +45,7 @@ impl Ballot<'_> {
 
     /// Number of points where a vote can fail the mesh.
     pub fn decisive(&self) -> u64 {
-        match self.oracles.len() >= MAJORITY {
+        match self.oracles.len() >= MAJORITY && !self.doubled {
             true => self.mesh.len() as u64,
             false => self.exact.iter().flatten().count() as u64,
         }
@@ -118,7 +120,8 @@ impl Tally {
             ))
         };
         let exact = sentence("all six exact rays", &self.exact_against);
-        let oracles = sentence("all oracles", &self.all_against);
+        let oracles =
+            (!ballot.doubled).then(|| sentence("all oracles", &self.all_against)).flatten();
         let reasons: Vec<String> = exact.into_iter().chain(oracles).collect();
         (!reasons.is_empty()).then(|| reasons.join("; "))
     }
@@ -139,6 +142,10 @@ impl Tally {
         };
         let mut notes: Vec<String> =
             self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
+        if ballot.doubled && !self.all_against.is_empty() {
+            let count = self.all_against.len();
+            notes.push(format!("at {count} points all oracles contradict the mesh: facets coincide, and rays decide"));
+        }
         let Some(why) = ballot.advisory() else { return notes };
         if !self.exact_against.is_empty() {
             let count = self.exact_against.len();
@@ -176,7 +183,9 @@ mod tests {
         seeds: bool,
     ) -> (Tally, Option<String>, Vec<String>) {
         let (oracles, mesh) = (answers(all), [false, true, true]);
-        let ballot = Ballot { mesh: &mesh, exact: &exact, oracles: &oracles, watertight, seeds };
+        let doubled = false;
+        let ballot =
+            Ballot { mesh: &mesh, exact: &exact, oracles: &oracles, watertight, doubled, seeds };
         let count = count(&ballot);
         let points = [[0.0; 3], [1.0; 3], [2.0; 3]];
         let (failure, notes) = (count.failure(&ballot, &points), count.notes(&ballot));
@@ -190,6 +199,26 @@ mod tests {
     fn unanimous_answers_have_no_failure_and_no_notes() {
         let (_, failure, notes) = vote(TRUE, [YES, YES, YES], true);
         assert_eq!((failure, notes), (None, vec![]));
+    }
+
+    #[test]
+    fn oracles_that_count_doubled_facets_do_not_fail_the_mesh() {
+        let (oracles, mesh) = (answers([&[1, 1, 1]; 3]), [false; 3]);
+        let exact = [Some(false); 3];
+        let ballot = |doubled| Ballot {
+            mesh: &mesh,
+            exact: &exact,
+            oracles: &oracles,
+            watertight: true,
+            doubled,
+            seeds: false,
+        };
+        let judged = |doubled| {
+            let (ballot, points) = (ballot(doubled), [[0.0; 3]; 3]);
+            let count = count(&ballot);
+            (count.failure(&ballot, &points).is_some(), count.notes(&ballot).len())
+        };
+        assert_eq!((judged(false), judged(true)), ((true, 3), (false, 4)));
     }
 
     #[test]

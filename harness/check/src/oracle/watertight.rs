@@ -18,6 +18,19 @@ pub fn is_watertight(facets: &[FacetLattice]) -> bool {
     edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
 }
 
+/// Whether two facets have the same vertices. Rays cancel them; the oracles may count both.
+pub fn is_doubled(facets: &[FacetLattice]) -> bool {
+    let sorted = |facet: &FacetLattice| {
+        let mut vertices = *facet;
+        vertices.sort_unstable();
+        vertices
+    };
+    let mut all: Vec<FacetLattice> = facets.iter().map(sorted).collect();
+    all.retain(|[a, b, c]| a != b && b != c);
+    all.sort_unstable();
+    all.windows(2).any(|pair| pair[0] == pair[1])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -45,8 +58,10 @@ mod tests {
     #[test]
     fn two_copies_of_a_facet_cancel() {
         let mut body = tetrahedron();
-        body.push(body[0]);
-        assert!(!is_watertight(&body));
+        assert!(!is_doubled(&body));
+        let [a, b, c] = body[0];
+        body.push([b, a, c]);
+        assert!(!is_watertight(&body) && is_doubled(&body));
         body.push(body[0]);
         assert!(is_watertight(&body));
     }

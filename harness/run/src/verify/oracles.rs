@@ -7,7 +7,7 @@ use crate::engine::failure::{End, Failure};
 use crate::oracle::Question;
 use check::oracle::sample::{self, Sample};
 use check::oracle::vote::{self, Answer, Ballot};
-use check::oracle::watertight::is_watertight;
+use check::oracle::watertight::{is_doubled, is_watertight};
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::parity::Parity;
@@ -94,6 +94,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
         exact: &exact,
         oracles: answers,
         watertight: is_watertight(&case.facets_lattice),
+        doubled: is_doubled(&case.facets_lattice),
         seeds: !case.seeds.is_empty(),
     };
     let count = vote::count(&ballot);
