@@ -2,13 +2,14 @@
 //!
 //! - [`study`]: series of runs and targets, declared in a file; [`experiments`]: the runs, their record and its analysis;
 //! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit; [`statistics`] for all of them;
-//! - [`shrink`](mod@shrink): the smallest case that still fails;
+//! - [`shrink`](mod@shrink): the smallest case that still fails; [`replay`]: what a repetition elsewhere must give.
 
 pub mod experiments;
 pub mod gate;
 pub mod jsonl;
 pub mod order;
 pub mod origin;
+pub mod replay;
 pub mod shrink;
 pub mod statistics;
 pub mod study;

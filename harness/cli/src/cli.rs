@@ -29,6 +29,10 @@ pub enum Command {
     Bench(Box<commands::bench::Arguments>),
     /// Make figures, a web page, and a LaTeX fragment from benchmark records
     Report(commands::report::Arguments),
+    /// Put a report, its study and what a repetition must give into one directory, an RO-Crate
+    Archive(commands::archive::Arguments),
+    /// Repeat the runs of an archive here, and compare: digests and counts exactly, ratios within bands
+    Replay(Box<commands::replay::Arguments>),
     /// Keep a history of metrics by commit and detect where they changed
     Track(Box<commands::track::Arguments>),
     /// Reduce a failing case to the smallest one that fails in the same way
@@ -49,7 +53,7 @@ pub enum Command {
     Import(commands::import::Arguments),
     /// Report where two leaf-set directories differ and which rule of the definition decides
     Diff(commands::diff::Arguments),
-    /// Explain the size and the side of the leaf at a point, or find splits that nothing requires
+    /// Explain the size and the side of the leaf at a point
     Why(commands::why::Arguments),
     /// Print a completion script for a shell
     Completions(commands::completions::Arguments),

@@ -95,6 +95,8 @@ fn dispatch(arguments: Arguments) -> Result<u8, Failure> {
         Command::Gate(arguments) => commands::gate::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
+        Command::Archive(arguments) => commands::archive::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Track(arguments) => commands::track::run(&arguments),
         Command::Shrink(arguments) => commands::shrink::run(&arguments),
         Command::Audit(arguments) => commands::audit::run(&arguments),

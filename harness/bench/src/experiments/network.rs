@@ -11,7 +11,11 @@ pub const ASSUMED: Network =
 impl fmt::Display for Network {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (latency, bandwidth) = (self.latency_s * 1e6, self.bandwidth_bytes_per_s / 1e9);
-        let how = if self.measured { "measured by ping-pong" } else { "given" };
+        let how = match self.measured {
+            true => "measured by ping-pong",
+            false if *self == ASSUMED => "assumed",
+            false => "given",
+        };
         write!(f, "{latency:.2} µs per message and {bandwidth:.2} GB/s ({how})")
     }
 }

@@ -60,7 +60,7 @@ pub fn read(path: &Path) -> io::Result<Content> {
 }
 
 /// Returns the current time, as `2026-01-31T12:00:00Z`.
-fn now_utc() -> String {
+pub fn now_utc() -> String {
     Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 

@@ -18,7 +18,7 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
 
 /// Returns the lines of sessions on the same machine and commit as the last one, without runs of other builds of the program than the
 /// last run's.
-fn of_last_origin(lines: &[Line]) -> Vec<Line> {
+pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin =
         |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
     let program = |line: &Line| match &line.entry {

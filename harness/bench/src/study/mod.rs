@@ -8,6 +8,7 @@
 pub mod file;
 pub mod judge;
 pub mod measure;
+pub mod package;
 mod plan;
 mod series;
 mod session;

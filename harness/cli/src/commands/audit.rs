@@ -27,7 +27,7 @@ Examples:
   harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, needless splits
   harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
-  harness audit mesh --case body.toml --promises p4est a mesh that need not keep the whole definition
+  harness audit mesh --case all.toml --promises p4est  a mesh that need not keep the whole definition (p4est deletes nothing)
   harness audit mesh.vtu --balance faces               nothing but the balance
   harness audit forest.p8est --balance corners         every tree, and the balance across their faces, edges and corners
   harness audit mesh.vtu --promises 'complete = true'  nothing but these promises
@@ -139,6 +139,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Some(failure) if report.holds() => return Err(failure),
         Some(failure) => println!("left out: proof: {}", failure.why),
         None => {}
+    }
+    let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
+    if opened.is_imported() && case.is_none() && has_holes {
+        eprintln!(
+            "harness: without --case, an imported mesh is taken for one that fills its root, so every hole is a finding"
+        );
     }
     Ok(verdict(&report, *require_checks))
 }

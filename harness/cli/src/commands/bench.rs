@@ -16,7 +16,7 @@ use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
-use run::engine::programs::Programs;
+use run::engine::programs::{Given, Programs};
 use run::engine::runner::Engine;
 use rustix::fs::{Access, access};
 use std::collections::BTreeMap;
@@ -87,7 +87,7 @@ fn measure(arguments: &Arguments) -> Result<u8, Failure> {
             .map_err(|error| named(directory, &error.into()))?;
     }
     let mut study = read(arguments)?;
-    let programs = programs(arguments, &mut study)?;
+    let programs = programs(arguments.programs.given(), &mut study)?;
     let record = record_path(arguments);
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
@@ -108,8 +108,7 @@ fn measure(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Finds the programs, and replaces the names in the series by those of the results.
-fn programs(arguments: &Arguments, study: &mut Study) -> Result<Programs, Failure> {
-    let given = arguments.programs.given();
+pub(super) fn programs(given: Given, study: &mut Study) -> Result<Programs, Failure> {
     let names = study.engines();
     let mut foreign = names.iter().filter(|name| !is_own(name));
     if names.len() > 1 && given.mesher.is_some() {

@@ -123,11 +123,11 @@ impl Source {
     /// If it is not a usable mesh, or if Python or VTK is missing.
     pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Opened, Failure> {
         if has_manifest(mesh) {
-            return Ok(Opened { dir: mesh.to_owned(), _made: None });
+            return Ok(Opened { dir: mesh.to_owned(), made: None });
         }
         let made = tempfile::tempdir()?;
         self.read(mesh, case)?.link(made.path())?;
-        Ok(Opened { dir: made.path().to_owned(), _made: Some(made) })
+        Ok(Opened { dir: made.path().to_owned(), made: Some(made) })
     }
 }
 
@@ -139,7 +139,14 @@ fn has_manifest(mesh: &Path) -> bool {
 pub struct Opened {
     /// The directory.
     pub dir: PathBuf,
-    _made: Option<TempDir>,
+    made: Option<TempDir>,
+}
+
+impl Opened {
+    /// Whether it was made of another program's mesh, whose requirements are unknown.
+    pub fn is_imported(&self) -> bool {
+        self.made.is_some()
+    }
 }
 
 /// Reads and writes; returns the exit code.

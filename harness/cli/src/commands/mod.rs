@@ -1,5 +1,6 @@
 //! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
 
+pub mod archive;
 pub mod audit;
 pub mod bench;
 pub mod completions;
@@ -18,6 +19,7 @@ mod paper;
 pub mod picture;
 pub mod planted;
 mod programs;
+pub mod replay;
 pub mod report;
 mod selection;
 pub mod selftest;

@@ -53,15 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 /// One sentence, if a record cannot be read, or the report cannot be written.
 pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String> {
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
-    let mut lines = Vec::new();
-    for path in &records {
-        let (read, broken) =
-            record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        for (line, why) in broken {
-            eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
-        }
-        lines.extend(read);
-    }
+    let lines = read(&records)?;
     if lines.is_empty() {
         let shown = directory.display();
         return Err(format!(
@@ -85,7 +77,22 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     Ok(written.numbers)
 }
 
-fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
+/// Reads records, and says which lines it cannot read.
+pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
+    let mut lines = Vec::new();
+    for path in records {
+        let (read, broken) =
+            record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        for (line, why) in broken {
+            eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
+        }
+        lines.extend(read);
+    }
+    Ok(lines)
+}
+
+/// The records in a directory.
+pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = std::fs::read_dir(directory)
         .map_err(|error| format!("{}: {error}", directory.display()))?;
     let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "jsonl");

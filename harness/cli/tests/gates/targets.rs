@@ -99,6 +99,47 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
 }
 
 #[test]
+fn an_archive_is_replayed_and_another_mesh_is_noticed() {
+    let fixture = scripted();
+    let rows = TARGETS.find("[[row]]").unwrap();
+    let rate = TARGETS[rows..].split("[[row]]").find(|row| row.contains("rate")).unwrap();
+    fixture.write("mine.toml", &format!("{}[[row]]{rate}", &TARGETS[..rows]));
+    let bench = fixture.harness("bench mine.toml --mesher ./mesher --report out");
+    assert_eq!(bench.code, 0, "{}", bench.printed);
+    let archive = "archive out mine.toml -o a --title T --licence MIT";
+    let made = fixture.harness(archive);
+    assert_eq!(made.code, 0, "{}", made.printed);
+    assert_eq!(fixture.harness(archive).code, 2, "it exists");
+    let metadata = fs::read_to_string(fixture.path("a/ro-crate-metadata.json")).unwrap();
+    for name in
+        ["study/study.toml", "study/case.toml", "study/body.stl", "expected.json", "record.jsonl"]
+    {
+        assert!(
+            metadata.contains(&format!("\"@id\": \"{name}\""))
+                && fixture.path("a").join(name).is_file()
+        );
+    }
+    // What was measured with is not needed any more.
+    for name in ["case.toml", "body.stl", "mine.toml"] {
+        fs::remove_file(fixture.path(name)).unwrap();
+    }
+    let replay = || fixture.harness("replay a --mesher ./mesher");
+    let equal = replay();
+    assert_eq!(equal.code, 0, "{}", equal.printed);
+    assert!(
+        equal.printed.contains("exact: 2 equal, 0 differ; ratios: 1 inside"),
+        "{}",
+        equal.printed
+    );
+    fixture.write("mesher", &MESHER.replace("\"00\"", "\"01\""));
+    let other = replay();
+    assert!(other.code == 1 && other.printed.contains("DIFFERS"), "{}", other.printed);
+    fixture.write("mesher", "#!/bin/sh\nexit 70\n");
+    let nothing = replay();
+    assert!(nothing.code == 3 && nothing.printed.contains("4 missing"), "{}", nothing.printed);
+}
+
+#[test]
 fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
     let fixture = scripted();
     let outcome = fixture.harness(&format!("{TARGETS_COMMAND} --no-mpi --report out"));

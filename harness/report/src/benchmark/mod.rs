@@ -20,6 +20,7 @@ use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use contract::files::{named, write_atomically};
 use html::Drawn;
+pub use latex::machines;
 use numbers::{Number, numbers};
 use rules::Broken;
 use std::fs;

@@ -1,0 +1,387 @@
+//! What the runs of a record must give when they are repeated elsewhere: digests and counts exactly, ratios within bands. Times are
+//! those of a machine, so they are shown and not judged.
+//!
+//! Invariants, executed by [`Expected::check_invariants`] and [`Replayed::check_invariants`] before anything is written or printed: a
+//! quantity of a run is there once; a band contains its value; a ratio is inside if and only if its band contains it, and an exact
+//! value is equal if and only if it is the same text.
+
+use crate::experiments::entry::{Entry, Line, Setup};
+use crate::experiments::group::{Group, Groups};
+use crate::statistics::Median;
+use crate::study::judge::of_last_origin;
+use contract::failure::Failure;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashMap};
+
+/// Name and version of the schema.
+const SCHEMA: &str = "octree-replay/1";
+/// How far a ratio may be outside of the interval of its repetitions.
+pub const TOLERANCE: f64 = 0.25;
+/// The share of all ratios that must be inside of their bands.
+const INSIDE: f64 = 0.95;
+
+/// What a repetition must give.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    schema: String,
+    /// The time that all runs took, in seconds.
+    pub seconds: f64,
+    /// The time that one run of each took, with its warm-up.
+    pub seconds_once: f64,
+    /// The values, run by run.
+    pub values: Vec<Value>,
+}
+
+/// A quantity of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// The run.
+    pub run: String,
+    /// The quantity.
+    pub quantity: String,
+    /// Its value.
+    #[serde(flatten)]
+    pub found: Found,
+}
+
+/// A value, by how it is compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Found {
+    /// The same everywhere.
+    Exact(String),
+    /// A ratio of times or of memory, with the band in which it is expected.
+    Ratio {
+        /// The median.
+        value: f64,
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+        /// `measured`, `projected` ...: only the same are compared.
+        how: String,
+    },
+    /// Seconds, which are not compared.
+    Time(f64),
+}
+
+impl Expected {
+    /// The values of the runs of the last machine and program in a record.
+    ///
+    /// # Errors
+    /// If it has no run.
+    pub fn of(lines: &[Line]) -> Result<Self, Failure> {
+        let lines = of_last_origin(lines);
+        let groups = Groups::of(&lines);
+        if groups.all.is_empty() {
+            return Err(Failure::missing("the record has no run that could be repeated"));
+        }
+        let (mut seconds, mut once) = (0.0, 0.0);
+        let mut longest: HashMap<String, f64> = HashMap::new();
+        for line in &lines {
+            let (run, time_s) = match &line.entry {
+                Entry::Run(run) if run.warm_up => ("warm-up".to_owned(), run.time_launch_s),
+                Entry::Run(run) => (name(&run.setup), run.time_launch_s),
+                Entry::Audit(audited) => (name(&audited.setup), audited.time_wall_s),
+                _ => continue,
+            };
+            seconds += time_s;
+            if run == "warm-up" {
+                once += time_s;
+            } else {
+                let longest = longest.entry(run).or_default();
+                *longest = longest.max(time_s);
+            }
+        }
+        once += longest.values().sum::<f64>();
+        let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
+        let expected = Self { schema: SCHEMA.to_owned(), seconds, seconds_once: once, values };
+        expected.check_invariants();
+        Ok(expected)
+    }
+
+    /// Reads the values of an archive.
+    ///
+    /// # Errors
+    /// One sentence, if the text is no such file.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let read: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let is_judged = |value: &Value| !matches!(value.found, Found::Time(_));
+        match () {
+            () if read.schema != SCHEMA => {
+                Err(format!("its schema is {}, not {SCHEMA}", read.schema))
+            }
+            () if !read.values.iter().any(is_judged) => Err("nothing in it is compared".to_owned()),
+            () => Ok(read),
+        }
+    }
+
+    /// How often each run may be repeated in that many seconds; `None` for as often as the study does.
+    ///
+    /// # Errors
+    /// If one repetition takes longer.
+    pub fn repeats_within(&self, limit_s: f64) -> Result<Option<u16>, Failure> {
+        if self.seconds <= limit_s {
+            return Ok(None);
+        }
+        match (limit_s / self.seconds_once) as u16 {
+            0 => Err(Failure::input(format!(
+                "one run of each took {:.0} minutes on the archive's machine: give --minutes",
+                (self.seconds_once / 60.0).ceil()
+            ))),
+            repeats => Ok(Some(repeats)),
+        }
+    }
+
+    /// Executes the invariants at the head of this file.
+    fn check_invariants(&self) {
+        let mut seen = BTreeMap::new();
+        for Value { run, quantity, found } in &self.values {
+            let before = seen.insert((run, quantity), found);
+            assert!(before.is_none(), "{run}: {quantity} is there twice");
+            if let Found::Ratio { value, low, high, .. } = found {
+                assert!(low <= value && value <= high, "{run}: {quantity} is not in its band");
+            }
+        }
+        assert!(self.seconds_once <= self.seconds + 1e-6, "one run takes longer than all");
+    }
+
+    /// Compares with a record of the repetition.
+    pub fn compare(&self, lines: &[Line]) -> Replayed {
+        let groups = Groups::of(lines);
+        let measured = groups.all.iter().flat_map(|group| values(&groups, group));
+        let measured: HashMap<(String, String), Found> =
+            measured.map(|v| ((v.run, v.quantity), v.found)).collect();
+        let row = |expected: &Value| {
+            let key = (expected.run.clone(), expected.quantity.clone());
+            let measured = measured.get(&key).cloned();
+            let verdict = verdict(&expected.found, measured.as_ref());
+            Row { expected: expected.clone(), measured, verdict }
+        };
+        let replayed = Replayed(self.values.iter().map(row).collect());
+        replayed.check_invariants();
+        replayed
+    }
+}
+
+/// The verdict on a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// An exact value is the same.
+    Equal,
+    /// An exact value is another.
+    Differs,
+    /// A ratio is within its band.
+    Inside,
+    /// A ratio is not.
+    Outside,
+    /// A time, or a ratio that was measured in another way.
+    NotCompared,
+    /// The repetition does not have it.
+    Missing,
+}
+
+fn verdict(expected: &Found, measured: Option<&Found>) -> Verdict {
+    match (expected, measured) {
+        (_, None) => Verdict::Missing,
+        (Found::Exact(a), Some(Found::Exact(b))) if a == b => Verdict::Equal,
+        (Found::Exact(_), _) => Verdict::Differs,
+        (Found::Ratio { low, high, how, .. }, Some(Found::Ratio { value, how: here, .. }))
+            if how == here =>
+        {
+            let is_inside = (low..=high).contains(&value);
+            if is_inside { Verdict::Inside } else { Verdict::Outside }
+        }
+        _ => Verdict::NotCompared,
+    }
+}
+
+/// A value and what the repetition gave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What was expected.
+    pub expected: Value,
+    /// What was found.
+    pub measured: Option<Found>,
+    /// The verdict.
+    pub verdict: Verdict,
+}
+
+/// A repetition beside what was expected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replayed(pub Vec<Row>);
+
+impl Replayed {
+    /// The number of values with this verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.0.iter().filter(|row| row.verdict == verdict).count()
+    }
+
+    /// Whether no exact value differs, and enough ratios are inside of their bands.
+    pub fn holds(&self) -> bool {
+        let [inside, outside] = [Verdict::Inside, Verdict::Outside].map(|v| self.count(v) as f64);
+        self.count(Verdict::Differs) == 0 && inside >= INSIDE * (inside + outside)
+    }
+
+    /// Whether something was compared.
+    pub fn is_judged(&self) -> bool {
+        use Verdict::{Differs, Equal, Inside, Outside};
+        [Equal, Differs, Inside, Outside].iter().any(|verdict| self.count(*verdict) > 0)
+    }
+
+    /// Executes the invariants at the head of this file.
+    fn check_invariants(&self) {
+        for row in &self.0 {
+            let again = verdict(&row.expected.found, row.measured.as_ref());
+            assert_eq!(row.verdict, again, "the verdict follows from both values: {row:?}");
+            let same = Some(&row.expected.found) == row.measured.as_ref();
+            let fails = matches!(row.verdict, Verdict::Differs | Verdict::Outside);
+            assert!(!(same && fails), "equal values agree: {row:?}");
+        }
+    }
+}
+
+/// A run by all that was given.
+fn name(s: &Setup) -> String {
+    let Setup { engine, case, experiment, spacing_min, layer_cells_min: n, ranks, .. } = s;
+    let (comm, division) = (crate::name_of(&s.comm), s.division());
+    format!("{engine} {case} {experiment} {spacing_min:e} n={n} {comm}:{ranks} {division}")
+}
+
+/// The values of a group.
+fn values(groups: &Groups, group: &Group) -> Vec<Value> {
+    let (run, first) = (name(&group.setup), &group.runs[0]);
+    let mut exact = vec![("cells".to_owned(), first.cells.to_string())];
+    exact.push(("digest".to_owned(), first.digest.clone()));
+    exact.push(("facets".to_owned(), first.geometry.clone().unwrap_or_default()));
+    // A program may count what it does not promise to be the same.
+    let is_exact = |name: &&String| {
+        let of = |run: &crate::experiments::entry::Run| run.counters.get(*name).map(|c| c.sum);
+        group.runs.iter().all(|run| of(run) == of(first))
+    };
+    let counters = first.counters.keys().filter(is_exact);
+    exact.extend(counters.map(|name| (name.clone(), first.counters[name].sum.to_string())));
+    exact.retain(|(_, value)| !value.is_empty());
+    let exact = exact.into_iter().map(|(quantity, value)| (quantity, Found::Exact(value)));
+
+    let base = groups.reference(group);
+    let (scales, how) = (base.setup.ranks < group.setup.ranks, group.how().to_owned());
+    let efficiency = groups.efficiency(group);
+    let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
+    let speedup = || group.time_s.falling(|time_s| base.time_s.value / time_s);
+    let ratios = [
+        ("bytes per cell", Some(group.bytes_per_cell())),
+        ("load imbalance", (group.setup.ranks > 1).then(|| single(1.0 / efficiency.load_balance))),
+        ("speedup", (scales && base.cells() == group.cells()).then(speedup)),
+        ("efficiency", scales.then(|| single(efficiency.global()))),
+    ];
+    let ratio = |(quantity, median): (&str, Option<Median>)| {
+        let Median { value, low, high, .. } = median.filter(|m| m.value.is_finite())?;
+        let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
+        Some((quantity.to_owned(), Found::Ratio { value, low, high, how: how.clone() }))
+    };
+    let time = ("time".to_owned(), Found::Time(group.time_s.value));
+    let all = exact.chain(ratios.into_iter().filter_map(ratio)).chain([time]);
+    all.map(|(quantity, found)| Value { run: run.clone(), quantity, found }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::entry::{Comm, Run, Spread};
+    use crate::testing::{line, run};
+    use proptest::prelude::*;
+
+    /// A record of one mesh on one and on two ranks.
+    fn record(two: [f64; 2]) -> Vec<Line> {
+        let counted = |run: Run| Run {
+            counters: [("rays".to_owned(), Spread::of(&vec![6.0; run.setup.ranks]))].into(),
+            time_launch_s: 10.0,
+            ..run
+        };
+        let runs = [&[4.0][..], &two].map(|times| run(Comm::Sim, 1000, &[("a", times)]));
+        runs.map(|run| line(Entry::Run(Box::new(counted(run))))).to_vec()
+    }
+
+    fn edited(edit: impl Fn(&mut Run)) -> Vec<Line> {
+        let mut lines = record([2.0, 2.0]);
+        for line in &mut lines {
+            if let Entry::Run(run) = &mut line.entry {
+                edit(run);
+            }
+        }
+        lines
+    }
+
+    fn expected() -> Expected {
+        Expected::of(&record([2.0, 2.0])).unwrap()
+    }
+
+    #[test]
+    fn a_record_replays_itself_and_is_read_back() {
+        let expected = expected();
+        let text = serde_json::to_string(&expected).unwrap();
+        assert_eq!(Expected::parse(&text).unwrap(), expected);
+        let replayed = expected.compare(&record([2.0, 2.0]));
+        assert!(replayed.holds() && replayed.is_judged());
+        // Cells, digest and rays of two runs; memory of two, and imbalance, speedup and efficiency of one; times.
+        let counts = [Verdict::Equal, Verdict::Inside, Verdict::NotCompared, Verdict::Missing];
+        assert_eq!(counts.map(|verdict| replayed.count(verdict)), [6, 5, 2, 0]);
+        assert!(Expected::of(&[]).is_err());
+        assert!(Expected::parse(&text.replace("replay/1", "replay/2")).is_err());
+        let nothing = Expected { values: Vec::new(), ..expected };
+        assert!(Expected::parse(&serde_json::to_string(&nothing).unwrap()).is_err());
+    }
+
+    #[test]
+    fn other_meshes_and_counts_fail_and_slower_machines_do_not() {
+        let expected = expected();
+        let slower = |run: &mut Run| {
+            let slow =
+                |of: &Spread| Spread::of(&of.by_rank.iter().map(|t| t * 3.0).collect::<Vec<f64>>());
+            run.useful_s = slow(&run.useful_s);
+            run.phases[0].useful_s = slow(&run.phases[0].useful_s);
+        };
+        assert!(expected.compare(&edited(slower)).holds());
+        let faults: [fn(&mut Run); 3] = [
+            |run| run.digest = "1".repeat(32),
+            |run| run.counters.values_mut().for_each(|c| *c = Spread::of(&[7.0])),
+            |run| run.cells += 1,
+        ];
+        for fault in faults {
+            let replayed = expected.compare(&edited(fault));
+            assert!(!replayed.holds() && replayed.count(Verdict::Differs) == 2, "{replayed:?}");
+        }
+        // An imbalance of 1.6, a speedup of 1.25.
+        let replayed = expected.compare(&record([3.2, 0.8]));
+        assert_eq!((replayed.count(Verdict::Outside), replayed.holds()), (3, false));
+        let missing = expected.compare(&record([2.0, 2.0])[..1]);
+        assert_eq!(missing.count(Verdict::Missing), 8);
+    }
+
+    #[test]
+    fn a_replay_has_as_many_repetitions_as_time() {
+        let mut lines = record([2.0, 2.0]);
+        lines.extend(record([2.0, 2.0]));
+        let expected = Expected::of(&lines).unwrap();
+        assert_eq!((expected.seconds, expected.seconds_once), (40.0, 20.0));
+        let of = |limit_s: f64| expected.repeats_within(limit_s);
+        assert_eq!((of(40.0), of(39.0)), (Ok(None), Ok(Some(1))));
+        assert!(of(19.0).unwrap_err().why.contains("1 minutes"));
+    }
+
+    proptest! {
+        #[test]
+        fn the_invariants_hold_for_drawn_times(a in prop::array::uniform2(0.1..9.0f64), b in prop::array::uniform2(0.1..9.0f64)) {
+            Expected::of(&record(a)).unwrap().compare(&record(b));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "the verdict follows from both values")]
+    fn a_wrong_verdict_is_noticed() {
+        let mut replayed = expected().compare(&record([3.2, 0.8]));
+        replayed.0.iter_mut().for_each(|row| row.verdict = Verdict::Inside);
+        replayed.check_invariants();
+    }
+}
