@@ -61,6 +61,8 @@ def reader_for(path):
     with open(path, "rb") as file:
         head = file.read(4096)
     if head.startswith(b"\x89HDF\r\n\x1a\n"):
+        if not vtkHDFReader().CanReadFile(path):
+            raise Refused("is an HDF5 file, but none of VTK's")
         return vtkHDFReader()
     if head.startswith(b"# vtk DataFile"):
         return vtkUnstructuredGridReader()

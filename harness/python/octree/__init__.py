@@ -15,6 +15,7 @@ import json
 import operator
 import shutil
 import subprocess
+import sys
 import sysconfig
 import tempfile
 import weakref
@@ -57,7 +58,7 @@ def run(program: str, *arguments: str | PathLike[str]) -> str:
     if ended.returncode != 0:
         raise Failed(ended.returncode, (ended.stderr.strip() or ended.stdout.strip()))
     if ended.stderr:
-        print(ended.stderr, end="")
+        print(ended.stderr, end="", file=sys.stderr)
     return ended.stdout
 
 
@@ -168,7 +169,7 @@ def mesh(
     place = None if out else tempfile.mkdtemp(prefix="octree-")
     directory = Path(out) if out else Path(place) / "mesh"
     try:
-        run("mesher", body, *given, *options, "--quiet", "--out", directory)
+        run("mesher", body, *given, *options, "--out", directory)
         made = Mesh(directory)
     except BaseException:
         if place:

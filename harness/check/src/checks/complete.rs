@@ -103,8 +103,12 @@ fn check_holes(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     Contacts { tree, sought: HOLES, matters: &matters }.visit(&mut |octant, kind, across| {
         if across & HOLES != 0 {
             result.report_with(|| {
-                let (side, leaf) = (contact::name(1 << kind), terms.root.describe(&octant));
-                format!("the {side} leaf {leaf} has a hole across a face")
+                let leaf = terms.root.describe(&octant);
+                let side = match terms.sides {
+                    Sides::Known => format!("{} ", contact::name(1 << kind)),
+                    Sides::Unknown => String::new(),
+                };
+                format!("the {side}leaf {leaf} has a hole across a face")
             });
         }
     });

@@ -107,12 +107,19 @@ fn time_by_layers(case: &str, all: &[&Group]) -> Figure {
     over_cells(format!("time-over-layers-{case}"), title, caption, "run time / s", series)
 }
 
-/// Rate and memory of groups with at most one rank per core, whose wall times are meaningful.
+/// Rate and memory of groups with at most one rank per core, whose wall times are meaningful: those of a study of spacings, or else
+/// the serial runs of several meshes or programs.
 fn rate_and_memory(groups: &Groups) -> Vec<Figure> {
-    let is_measured =
-        |g: &&Group| provenance(g) == Provenance::Measured && g.setup.experiment == "spacing";
-    let all: Vec<&Group> = groups.all.iter().filter(is_measured).collect();
+    let is_measured = |g: &&Group| provenance(g) == Provenance::Measured;
+    let of = |experiment: &'static str| {
+        let is_of = move |g: &&Group| g.setup.experiment == experiment;
+        groups.all.iter().filter(is_measured).filter(is_of)
+    };
+    let mut all: Vec<&Group> = of("spacing").collect();
     if all.is_empty() {
+        all = of("strong").filter(|g| g.setup.ranks == 1).collect();
+    }
+    if distinct(all.iter().map(|g| (&g.setup.engine, g.cells()))).len() < 2 {
         return Vec::new();
     }
     let cases = distinct(all.iter().map(|group| group.setup.case.as_str())).join(", ");

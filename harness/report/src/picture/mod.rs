@@ -186,8 +186,12 @@ impl Picture {
         }
         let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
         if squares.squares.is_empty() {
-            let why =
-                "no leaf of the selection is in the slice: give another --slice or a larger --clip";
+            let why = match mesh.manifest.leaves {
+                0 => "the mesh has no leaves",
+                _ => {
+                    "no leaf of the selection is in the slice: give another --slice or a larger --clip"
+                }
+            };
             return Err(Failure::input(why.to_owned()));
         }
         let values = squares.squares.iter().map(|s| s.value).collect();
