@@ -85,11 +85,13 @@ fn length(facets: u32) -> u64 {
 /// Bytes that are neither text nor a binary file: probably a binary file that is truncated.
 fn damaged(bytes: &[u8]) -> Unusable {
     let found = bytes.len();
+    let how = |count| if (found as u64) < length(count) { "truncated" } else { "longer" };
     match facet_count(bytes) {
         Some(count) => wrong(&format!(
-            "its header promises {count} facets, which take {} bytes, but the file has {found}: it is truncated, or not an STL file; \
+            "its header promises {count} facets, which take {} bytes, but the file has {found}: it is {}, or not an STL file; \
              export it again",
-            length(count)
+            length(count),
+            how(count)
         )),
         None => wrong(&format!(
             "it is not text, and its {found} bytes are fewer than the header of a binary file: it is truncated; export it again"
@@ -126,7 +128,11 @@ fn ascii(bytes: &[u8]) -> Result<Body, Unusable> {
         let facet_first = body.facets.len();
         let line = loop {
             match words.next() {
-                Some((word, _)) if is(word, "facet") => body.facets.push(facet(&mut words)?),
+                Some((word, _)) if is(word, "facet") => {
+                    let before = body.facets.len();
+                    let located = |why| Unusable::because(format!("{why}, after {before} facets"));
+                    body.facets.push(facet(&mut words).map_err(located)?);
+                }
                 Some((word, line)) if is(word, "endsolid") => break line,
                 other => return Err(unexpected("facet` or `endsolid", other)),
             }

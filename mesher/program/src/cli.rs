@@ -302,11 +302,17 @@ pub fn division(args: &Args) -> Result<Division, Error> {
 }
 
 /// The files to write; none without --out.
-pub fn output(args: &Args) -> Option<Output> {
+///
+/// # Errors
+/// If ranks are asked for, and no file that could have them.
+pub fn output(args: &Args) -> Result<Option<Output>, Error> {
     let has = |files| args.write.contains(&files);
     let (words, tree) = (has(Files::Words), has(Files::Htg));
+    if args.cell_ranks && !tree {
+        return Err(Error::input("--cell-ranks is of the tree: add --write htg"));
+    }
     let out = args.out.clone();
-    out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks })
+    Ok(out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks }))
 }
 
 /// The case in advice to the user: only case files have a name.

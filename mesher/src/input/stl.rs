@@ -47,10 +47,11 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
         if length == HEADER + RECORD * count {
             stl.binary = Some(count);
         } else if !stl.looks_like_text()? {
+            let wanted = HEADER + RECORD * count;
+            let how = if length < wanted { "truncated" } else { "longer" };
             return Err(Error::input(format!(
-                "{}: the header promises {count} facets, which take {} bytes, but the file has {length}: it is truncated or not an STL; export it again",
-                path.display(),
-                HEADER + RECORD * count
+                "{}: the header promises {count} facets, which take {wanted} bytes, but the file has {length}: it is {how} or not an STL; export it again",
+                path.display()
             )));
         }
     }

@@ -69,7 +69,7 @@ impl AuditReport {
 
     /// Whether needless splits were not sought, because memory does not suffice.
     pub fn exceeds_memory(&self) -> bool {
-        self.not_run().any(|check| check.name == checks::NEEDLESS)
+        self.leaves > 0 && self.not_run().any(|check| check.name == checks::NEEDLESS)
     }
 
     /// Whether any property of the leaves was checked, beyond their files and counts.

@@ -19,7 +19,7 @@ pub(super) const CHECK: Check = Check {
     run: |subject, result| match subject.facets() {
         Some(facets) => {
             let crossed = Crossed::new(facets, &subject.terms, subject.promises.surface);
-            crossed.check(subject.tree(), result);
+            Crossed { of_coarser: true, ..crossed }.check(subject.tree(), result);
         }
         None => result.lacks(NO_GEOMETRY),
     },
@@ -31,6 +31,8 @@ pub struct Crossed<'a> {
     terms: &'a Terms,
     /// The depth, in lattice units.
     tolerance: i64,
+    /// Whether it is that of leaves coarser than the surface alone.
+    of_coarser: bool,
 }
 
 impl<'a> Crossed<'a> {
@@ -38,7 +40,7 @@ impl<'a> Crossed<'a> {
     pub fn new(facets: &'a Facets, terms: &'a Terms, surface: Option<Surface>) -> Self {
         let cells = surface.map_or(0.0, |surface| surface.tolerance_cells);
         let tolerance = (cells * (UNITS_PER_EDGE >> terms.level_surface) as f64) as i64;
-        Self { facets, terms, tolerance }
+        Self { facets, terms, tolerance, of_coarser: false }
     }
 
     fn check(&self, tree: &Tree, result: &mut CheckResult) {
@@ -95,7 +97,9 @@ impl<'a> Crossed<'a> {
     ) {
         let (low, high) = octant.bounds();
         if let Some(kind) = handle.as_leaf() {
-            let (low, high) = (low.map(|c| c + self.tolerance), high.map(|c| c - self.tolerance));
+            let is_exact = self.of_coarser && octant.level >= self.terms.level_surface;
+            let tolerance = if is_exact { 0 } else { self.tolerance };
+            let (low, high) = (low.map(|c| c + tolerance), high.map(|c| c - tolerance));
             // A leaf far below the surface level may be smaller than the tolerance.
             let is_box = low[0] <= high[0];
             let found = is_box.then(|| self.facets.first_meeting(candidates, low, high)).flatten();
@@ -139,7 +143,10 @@ mod tests {
     fn checked(facet: FacetLattice, tolerance_cells: f64) -> CheckResult {
         let surface = Some(Surface { tolerance_cells });
         let mut result = CheckResult::new("surface");
-        Crossed::new(&Facets::new(&[facet]), &terms(), surface).check(&tree(), &mut result);
+        let facets = Facets::new(&[facet]);
+        let terms = terms();
+        let crossed = Crossed::new(&facets, &terms, surface);
+        Crossed { of_coarser: true, ..crossed }.check(&tree(), &mut result);
         result
     }
 
@@ -148,6 +155,8 @@ mod tests {
         let fine = facet([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]]);
         let result = checked(fine, 0.0);
         assert_eq!((result.examined, result.findings_total, result.was_run()), (1, 0, true));
+        // Half a cell within a leaf of one cell is a point.
+        assert_eq!(checked(fine, 0.5).examined, 1);
         let coarse = facet([[6.5, 6.5, 6.5], [7.5, 6.5, 6.5], [6.5, 7.5, 6.5]]);
         let result = checked(coarse, 0.0);
         assert_eq!((result.examined, result.findings_total), (1, 1));

@@ -10,7 +10,7 @@ use export::mesh::Mesh;
 use report::picture::format::{Format, put, write};
 use report::picture::scene::Scene;
 use report::picture::set::{Drawn, MEMBERS, Made, Member, Part, RANKS, page, request};
-use report::picture::{DETAIL, Picture, Request, svg};
+use report::picture::{DETAIL, NO_LEAF, Picture, Request, svg};
 use run::engine::layout::{Layout, Ranks};
 use run::engine::paths::Paths;
 use run::engine::programs::Programs;
@@ -43,8 +43,14 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
         let case = variant(&plain, made).write(place.path(), StlForm::Any)?;
         let meshed = source.engine.mesh(&engine, &case, &layout, made == Made::Base)?;
         for member in members {
-            let drawn = draw_member(member, &meshed, staging.path(), &paths, source)?;
-            pictures.push((*member, drawn));
+            match draw_member(member, &meshed, staging.path(), &paths, source) {
+                Ok(drawn) => pictures.push((*member, drawn)),
+                // In a close-up everything may be deleted.
+                Err(failure) if failure.why == NO_LEAF => {
+                    eprintln!("harness: {} is left out: no leaf is in its slice", member.0);
+                }
+                Err(failure) => return Err(failure),
+            }
         }
     }
     let text = page(&source.mesh, &command(), &pictures);

@@ -96,6 +96,10 @@ pub struct Picture {
     pub section: Option<Vec<[Planar; 2]>>,
 }
 
+/// Why a picture would be empty.
+pub const NO_LEAF: &str =
+    "no leaf of the selection is in a slice: give another --slice or a larger --clip";
+
 /// Squares of a slice: about two megabytes of SVG.
 pub const DETAIL: Detail =
     Detail { squares_max: 60_000, outlined_max: 30_000, level_max: LEVEL_MAX };
@@ -186,12 +190,7 @@ impl Picture {
         }
         let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
         if squares.squares.is_empty() {
-            let why = match mesh.manifest.leaves {
-                0 => "the mesh has no leaves",
-                _ => {
-                    "no leaf of the selection is in the slice: give another --slice or a larger --clip"
-                }
-            };
+            let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
             return Err(Failure::input(why.to_owned()));
         }
         let values = squares.squares.iter().map(|s| s.value).collect();

@@ -4,7 +4,7 @@
 use super::colour::Entry;
 use super::squares::{Detail, Squares};
 use super::surface::{Surface, ranks_at};
-use super::{Colour, Request, halfway, middle, plane_name, zoomed};
+use super::{Colour, NO_LEAF, Request, halfway, middle, plane_name, zoomed};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use contract::failure::Failure;
@@ -96,9 +96,7 @@ impl Scene {
             slices.push((slice, request.squares(mesh, slice, clip, PAGE / edge, &DETAIL)?));
         }
         if slices.iter().all(|(_, squares)| squares.squares.is_empty()) {
-            let why =
-                "no leaf of the selection is in any slice: give another --slice or a larger --clip";
-            return Err(Failure::input(why.to_owned()));
+            return Err(Failure::input(NO_LEAF));
         }
         let surface = request.body.map(Surface::of);
         let ranks = match (&surface, request.colour) {

@@ -126,6 +126,8 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
         let all = [&["body.stl", "--spacing-min=0.1"], args].concat();
         run(workspace.mesher(&all)).refuses(INPUT, &["--out"]);
     }
+    let args = ["body.stl", "--spacing-min=0.1", "--cell-ranks", "--out=words"];
+    refused(&workspace, &args, INPUT, &["--write htg"]);
     fs::create_dir(workspace.path().join("full")).expect("a directory");
     workspace.write("full/kept.txt", "kept");
     let args = ["body.stl", "--spacing-min=0.1", "--write=htg", "--out=full"];
