@@ -10,6 +10,8 @@ use std::fmt::Write;
 /// Name of the metadata's file, which the standard gives.
 pub const METADATA: &str = "ro-crate-metadata.json";
 
+const AUTHOR: &str = "#author";
+
 /// A file of the archive: its path, with `/` between directories, and its size in bytes.
 pub type Member = (String, u64);
 
@@ -18,6 +20,8 @@ pub type Member = (String, u64);
 pub struct About {
     /// Its title.
     pub title: String,
+    /// Whoever made it.
+    pub author: String,
     /// Identifier of its licence in the list of SPDX, or an address.
     pub licence: String,
     /// The day, such as `2026-01-31`.
@@ -58,7 +62,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         let used = programs.iter().filter(|(_, digest)| {
             of.iter().any(|l| matches!(&l.entry, Entry::Run(run) if run.program == *digest))
         });
-        let used: Vec<Value> = used.map(|(_, digest)| id(&program_id(digest))).collect();
+        let used = one_or_many(used.map(|(_, digest)| id(&program_id(digest))).collect());
         Some(json!({
             "@id": format!("#session-{name}"), "@type": "CreateAction",
             "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
@@ -68,12 +72,11 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         }))
     };
     let actions: Vec<Value> = sessions.iter().filter_map(action).collect();
-    let ids =
-        |of: &[Value]| of.iter().map(|entity| json!({"@id": entity["@id"]})).collect::<Vec<_>>();
+    let ids = |of: &[Value]| one_or_many(of.iter().map(|e| json!({"@id": e["@id"]})).collect());
     let root = json!({
         "@id": "./", "@type": "Dataset", "name": about.title, "datePublished": about.day, "license": id(&licence),
         "description": "Benchmarks of oct-tree meshers: the record, its figures, the study that made it, and what a repetition must give",
-        "hasPart": ids(&files), "mentions": ids(&actions),
+        "author": id(AUTHOR), "hasPart": ids(&files), "mentions": ids(&actions),
     });
     let head = json!({
         "@id": METADATA, "@type": "CreativeWork", "about": id("./"),
@@ -83,7 +86,8 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         "@id": licence, "@type": "CreativeWork", "name": about.licence,
         "description": "The licence of this archive; those of geometries are in study/",
     });
-    let graph: Vec<Value> = [head, root, of_licence]
+    let author = json!({"@id": AUTHOR, "@type": "Person", "name": about.author});
+    let graph: Vec<Value> = [head, root, of_licence, author]
         .into_iter()
         .chain(files)
         .chain(programs.iter().map(program))
@@ -92,9 +96,15 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
 }
 
+/// A single value stands alone.
+fn one_or_many(mut values: Vec<Value>) -> Value {
+    if values.len() == 1 { values.remove(0) } else { Value::Array(values) }
+}
+
 /// The page for whoever opens the archive.
 pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
-    let mut text = format!("# {}\n\n{}, licence {}.\n\n", about.title, about.day, about.licence);
+    let About { title, author, licence, day } = about;
+    let mut text = format!("# {title}\n\n{author}, {day}, licence {licence}.\n\n");
     let commits = machines(lines).into_iter().map(|machine| {
         let _ = writeln!(text, "Measured on {machine}.");
         machine.commit.trim_end_matches("-dirty").to_owned()
@@ -159,24 +169,28 @@ mod tests {
         let mut measured = run(Comm::Solo, 1000, &[("a", &[1.0])]);
         measured.program = "7".repeat(32);
         let lines = [Entry::Session(Box::new(session)), Entry::Run(Box::new(measured))].map(line);
-        let about =
-            About { title: "T".into(), licence: "CC-BY-4.0".into(), day: "2026-01-31".into() };
+        let about = About {
+            title: "T".into(),
+            author: "A".into(),
+            licence: "CC-BY-4.0".into(),
+            day: "2026-01-31".into(),
+        };
         let members = [("record.jsonl".to_owned(), 9), ("study/a wing_1.stl".to_owned(), 8)];
         let crate_ = metadata(&about, &members, &lines);
         let graph = crate_["@graph"].as_array().unwrap();
         let ids: Vec<&str> = graph.iter().map(|entity| entity["@id"].as_str().unwrap()).collect();
         assert!(ids.contains(&"study/a%20wing_1.stl"), "{ids:?}");
-        for part in graph[1]["hasPart"]
+        let named = graph[1]["hasPart"]
             .as_array()
             .unwrap()
             .iter()
-            .chain(graph[1]["mentions"].as_array().unwrap())
-        {
+            .chain([&graph[1]["mentions"], &graph[1]["author"]]);
+        for part in named {
             assert!(ids.contains(&part["@id"].as_str().unwrap()), "{part}");
         }
         let action = graph.last().unwrap();
         assert_eq!(action["name"], "harness bench 'my study.toml'");
-        assert_eq!(action["instrument"][0]["@id"], format!("#program-{}", "7".repeat(32)));
+        assert_eq!(action["instrument"]["@id"], format!("#program-{}", "7".repeat(32)));
         let text = readme(&about, &lines, &Expected::of(&lines).unwrap());
         assert!(text.contains("at commit abc:") && text.contains("chip"), "{text}");
     }

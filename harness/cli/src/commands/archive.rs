@@ -33,6 +33,9 @@ pub struct Arguments {
     /// Title of the archive
     #[arg(long)]
     pub title: String,
+    /// Whoever made it
+    #[arg(long, value_name = "NAME")]
+    pub author: String,
     /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
     #[arg(long, value_name = "SPDX|URL")]
     pub licence: String,
@@ -43,7 +46,7 @@ pub struct Arguments {
 /// # Errors
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { report, study, out, title, licence } = arguments;
+    let Arguments { report, study, out, title, author, licence } = arguments;
     if out.exists() {
         return Err(Failure::input(format!("{} exists: name another directory", out.display())));
     }
@@ -70,7 +73,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         fs::copy(&sources, of_study.join("SOURCES.md")).map_err(|e| Failure::at(&sources, e))?;
     }
     let day = now_utc().chars().take("2026-01-31".len()).collect();
-    let about = About { title: title.clone(), licence: licence.clone(), day };
+    let about =
+        About { title: title.clone(), author: author.clone(), licence: licence.clone(), day };
     put("README.md", readme(&about, &lines, &expected))?;
     let mut members = Vec::new();
     list(place, "", &mut members)?;

@@ -4,7 +4,8 @@ use super::archive::{EXPECTED, STUDY};
 use super::bench::programs;
 use super::programs::ProgramArguments;
 use super::values::Input;
-use bench::replay::{Expected, Found, Replayed, Row, Verdict};
+use bench::experiments::entry::{Line, Session};
+use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::{self, SessionOptions, Study, package};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
@@ -56,7 +57,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return Ok(EXIT_INTERRUPTED);
     }
     let replayed = expected.compare(&outcome.lines);
-    print!("{}", table(&replayed).text());
+    let session = outcome.lines.iter().find_map(Line::session);
+    print!("{}", table(&replayed, session).text());
     Ok(code(&replayed))
 }
 
@@ -78,42 +80,45 @@ fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
     }
 }
 
-fn table(replayed: &Replayed) -> Table {
+/// A row per run with the number of exact values that are equal, and one for each other value.
+fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     let shown = |found: &Found| match found {
         Found::Exact(text) => text.clone(),
         Found::Ratio { value, .. } | Found::Time(value) => format!("{value:.4}"),
     };
-    let band = |row: &Row| match &row.expected.found {
-        Found::Ratio { low, high, .. } => format!("{low:.3} to {high:.3}"),
-        Found::Exact(_) => "exact".to_owned(),
-        Found::Time(_) => "not compared".to_owned(),
+    let row = |row: &Row| {
+        let (band, how) = match (&row.expected.found, &row.measured) {
+            (Found::Exact(_), _) => ("exact".to_owned(), ""),
+            (Found::Ratio { low, high, .. }, Some(Found::Ratio { how, .. })) => {
+                (format!("{low:.3} to {high:.3}"), how.as_str())
+            }
+            (Found::Ratio { low, high, .. }, _) => (format!("{low:.3} to {high:.3}"), ""),
+            (Found::Time(_), _) => ("not compared".to_owned(), ""),
+        };
+        let verdict = match row.verdict {
+            Verdict::Equal => "equal",
+            Verdict::Differs => "DIFFERS",
+            Verdict::Inside => "inside",
+            Verdict::Outside => "OUTSIDE",
+            Verdict::Missing => "missing",
+            Verdict::NotCompared => how,
+        };
+        let (expected, measured) = (shown(&row.expected.found), row.measured.as_ref().map(shown));
+        let Value { run, quantity, .. } = &row.expected;
+        [run, quantity, &expected, &band, &measured.unwrap_or_default(), verdict]
+            .map(|field: &str| field.to_owned())
+            .to_vec()
     };
-    let how = |found: &Found| match found {
-        Found::Ratio { how, .. } => how.clone(),
-        _ => String::new(),
-    };
-    let verdict = |row: &Row| match row.verdict {
-        Verdict::Equal => "equal".to_owned(),
-        Verdict::Differs => "DIFFERS".to_owned(),
-        Verdict::Inside => "inside".to_owned(),
-        Verdict::Outside => "OUTSIDE".to_owned(),
-        Verdict::Missing => "missing".to_owned(),
-        Verdict::NotCompared => row.measured.as_ref().map(how).unwrap_or_default(),
-    };
-    let table = Table::of(
-        String::new(),
-        &replayed.0,
-        &[
-            ("run", &|row| row.expected.run.clone()),
-            ("quantity", &|row| row.expected.quantity.clone()),
-            ("expected", &|row| shown(&row.expected.found)),
-            ("band", &band),
-            ("measured", &|row| row.measured.as_ref().map(shown).unwrap_or_default()),
-            ("verdict", &verdict),
-        ],
-    );
+    let mut rows = Vec::new();
+    for of_run in replayed.0.chunk_by(|a, b| a.expected.run == b.expected.run) {
+        let equal = of_run.iter().filter(|row| row.verdict == Verdict::Equal).count();
+        let count = equal.to_string();
+        let all = [&of_run[0].expected.run, "digests and counts", &count, "exact", &count, "equal"];
+        rows.extend((equal > 0).then(|| all.map(str::to_owned).to_vec()));
+        rows.extend(of_run.iter().filter(|r| r.verdict != Verdict::Equal).map(row));
+    }
     let count = |verdict| replayed.count(verdict);
-    let note = format!(
+    let mut notes = vec![format!(
         "exact: {} equal, {} differ; ratios: {} inside of their bands, {} outside; {} missing; {} not compared",
         count(Verdict::Equal),
         count(Verdict::Differs),
@@ -121,8 +126,17 @@ fn table(replayed: &Replayed) -> Table {
         count(Verdict::Outside),
         count(Verdict::Missing),
         count(Verdict::NotCompared)
-    );
-    Table { notes: vec![note], ..table }
+    )];
+    let busy = session.filter(|s| s.load_average > 0.5 * s.machine.cores as f64);
+    notes.extend(busy.map(|s| {
+        let Session { load_average, machine, .. } = s;
+        format!(
+            "the load was {load_average} on {} cores when it began: ratios need an idle machine",
+            machine.cores
+        )
+    }));
+    let columns = vec!["run", "quantity", "expected", "band", "measured", "verdict"];
+    Table { columns, rows, notes, ..Table::default() }
 }
 
 fn code(replayed: &Replayed) -> u8 {

@@ -106,7 +106,7 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     fixture.write("mine.toml", &format!("{}[[row]]{rate}", &TARGETS[..rows]));
     let bench = fixture.harness("bench mine.toml --mesher ./mesher --report out");
     assert_eq!(bench.code, 0, "{}", bench.printed);
-    let archive = "archive out mine.toml -o a --title T --licence MIT";
+    let archive = "archive out mine.toml -o a --title T --author A --licence MIT";
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
