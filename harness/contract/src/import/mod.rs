@@ -96,6 +96,13 @@ pub fn guess(path: &Path) -> Result<Format, Unusable> {
             manifest::FILE
         )));
     }
+    let named = |name: &str| path.file_name().is_some_and(|of_path| of_path == name);
+    if !is_directory && named(manifest::FILE) {
+        return Err(Unusable::because("is the manifest of a leaf set: give its directory"));
+    }
+    if path.extension().is_some_and(|extension| extension == "toml") {
+        return Err(Unusable::because("is a case file by its name: give a mesh"));
+    }
     let format = match is_directory {
         true => poly_mesh(path).map(|_| Format::Openfoam),
         false => of_content(&head(path)?),
@@ -199,6 +206,16 @@ pub fn side(code: f64, cell: usize) -> Result<Side, Unusable> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_manifest_and_a_case_file_are_no_meshes() {
+        let place = tempfile::tempdir().unwrap();
+        for (name, why) in [("a.toml", "case file"), (manifest::FILE, "give its directory")] {
+            let path = place.path().join(name);
+            fs::write(&path, "{}").unwrap();
+            assert!(guess(&path).unwrap_err().to_string().contains(why), "{name}");
+        }
+    }
 
     #[test]
     fn formats_are_recognised_by_content() {
