@@ -24,6 +24,8 @@ const INSIDE: f64 = 0.95;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     schema: String,
+    /// The commit of the programs; empty if it is unknown.
+    pub commit: String,
     /// The time that all runs took, in seconds.
     pub seconds: f64,
     /// The time that one run of each took, with its warm-up.
@@ -95,7 +97,9 @@ impl Expected {
         }
         once += longest.values().sum::<f64>();
         let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
-        let expected = Self { schema: SCHEMA.to_owned(), seconds, seconds_once: once, values };
+        let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
+        let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
+        let expected = Self { schema, commit, seconds, seconds_once: once, values };
         expected.check_invariants();
         Ok(expected)
     }

@@ -59,6 +59,13 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let replayed = expected.compare(&outcome.lines);
     let session = outcome.lines.iter().find_map(Line::session);
     print!("{}", table(&replayed, session).text());
+    let commit = session.map_or("", |session| &session.machine.commit);
+    if commit != expected.commit {
+        println!(
+            "the archive is of commit {}, and this repository is at {commit}: counts may differ",
+            expected.commit
+        );
+    }
     Ok(code(&replayed))
 }
 

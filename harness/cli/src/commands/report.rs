@@ -91,11 +91,15 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
     Ok(lines)
 }
 
-/// The records in a directory.
+/// The records in a directory; other files of JSON lines, such as a history, are none.
 pub(super) fn records_in(directory: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = std::fs::read_dir(directory)
         .map_err(|error| format!("{}: {error}", directory.display()))?;
-    let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "jsonl");
+    let has_schema = |text: Vec<u8>| text.windows(13).any(|part| part == b"octree-bench/");
+    let is_record = |path: &PathBuf| {
+        path.extension().is_some_and(|e| e == "jsonl")
+            && files::read_log(path).is_ok_and(has_schema)
+    };
     let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_record).collect();
     found.sort();
     Ok(found)
