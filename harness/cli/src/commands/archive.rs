@@ -75,7 +75,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let day = now_utc().chars().take("2026-01-31".len()).collect();
     let about =
         About { title: title.clone(), author: author.clone(), licence: licence.clone(), day };
-    put("README.md", readme(&about, &lines, &expected))?;
+    let page = if place.join("README.md").exists() { "REPLAY.md" } else { "README.md" };
+    put(page, readme(&about, &lines, &expected))?;
     let mut members = Vec::new();
     list(place, "", &mut members)?;
     members.sort();
