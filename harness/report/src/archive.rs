@@ -4,12 +4,20 @@ use crate::benchmark::machines;
 use bench::experiments::entry::{Entry, Line};
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
+use bench::study::package;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// Name of the metadata's file, which the standard gives.
 pub const METADATA: &str = "ro-crate-metadata.json";
 
+/// All records.
+pub const RECORD: &str = "record.jsonl";
+/// The values that a repetition must give, with their bands.
+pub const EXPECTED: &str = "expected.json";
+/// Directory of the study, its cases and geometries.
+pub const STUDY: &str = "study";
+/// The entity of the author.
 const AUTHOR: &str = "#author";
 
 /// A file of the archive: its path, with `/` between directories, and its size in bytes.
@@ -68,7 +76,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
             "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
             "description": opening.machine.to_string(),
             "startTime": of.first()?.time_utc, "endTime": of.last()?.time_utc,
-            "instrument": used, "object": id("study/study.toml"), "result": id("record.jsonl"),
+            "instrument": used, "object": id(&format!("{STUDY}/{}", package::STUDY)), "result": id(RECORD),
         }))
     };
     let actions: Vec<Value> = sessions.iter().filter_map(action).collect();
@@ -125,7 +133,7 @@ pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
     text
 }
 
-/// A path as a relative address: other bytes than letters, digits and `/._-` are escaped.
+/// A path as a relative address: bytes other than `A` to `Z`, `a` to `z`, digits and `/._-` are escaped.
 fn address(path: &str) -> String {
     let escape = |byte: u8| match byte {
         b'/' | b'.' | b'_' | b'-' => (byte as char).to_string(),

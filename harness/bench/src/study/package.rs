@@ -3,9 +3,8 @@
 use super::Study;
 use contract::catalogue::Catalogue;
 use contract::failure::Failure;
-use contract::files::{named, read_text};
+use contract::files::{self, named, read_text, write_atomically};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -20,6 +19,9 @@ pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Fa
     let directory = Study::read(study)?.directory;
     let mut table = read(study)?;
     let mut package = Package { out, copied: BTreeMap::new() };
+    // No case may have its name.
+    let path = study.canonicalize().map_err(|error| named(study, &error))?;
+    package.copied.insert(STUDY.into(), path);
     let meshes = table.get_mut("mesh").and_then(Value::as_table_mut);
     let meshes = meshes.into_iter().flat_map(|meshes| meshes.iter_mut().map(|(_, mesh)| mesh));
     let meshes: Vec<&mut Value> = meshes.collect();
@@ -38,7 +40,20 @@ fn read(path: &Path) -> Result<Table, Failure> {
 }
 
 fn write(path: &Path, table: &Table) -> Result<(), Failure> {
-    fs::write(path, table.to_string()).map_err(|error| Failure::at(path, error))
+    put(path, table.to_string().as_bytes())
+}
+
+/// Copies a file, which must be no pipe: it would be waited for.
+///
+/// # Errors
+/// If it cannot be read or written.
+pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
+    let bytes = files::read(from).map_err(|error| Failure::at(from, error))?;
+    put(to, &bytes)
+}
+
+fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    write_atomically(path, |out| out.write_all(bytes)).map_err(|error| Failure::at(path, error))
 }
 
 struct Package<'a> {
@@ -68,7 +83,7 @@ impl Package<'_> {
             let (name, is_new) = self.place(&body)?;
             *geometry = name.display().to_string();
             if is_new {
-                fs::copy(&body, self.out.join(name)).map_err(|error| named(&body, &error))?;
+                copy(&body, &self.out.join(name))?;
             }
         }
         write(&self.out.join(name), &table)
@@ -92,6 +107,7 @@ impl Package<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn a_study_elsewhere_has_its_own_cases() {

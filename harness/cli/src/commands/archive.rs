@@ -4,21 +4,14 @@ use super::report::{read, records_in};
 use super::values::Input;
 use bench::experiments::record::now_utc;
 use bench::replay::Expected;
-use bench::study::package::package;
+use bench::study::package::{copy, package};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
-use contract::files::{Staging, named};
-use report::archive::{About, METADATA, Member, metadata, readme};
+use contract::files::{Staging, named, nearest_directory, write_atomically};
+use report::archive::{About, EXPECTED, METADATA, Member, RECORD, STUDY, metadata, readme};
 use run::engine::paths::Paths;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Directory of the study in an archive.
-pub const STUDY: &str = "study";
-/// The values that a repetition must give.
-pub const EXPECTED: &str = "expected.json";
-/// All records.
-const RECORD: &str = "record.jsonl";
 
 /// `harness archive`.
 #[derive(Args, Debug)]
@@ -50,17 +43,23 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if out.exists() {
         return Err(Failure::input(format!("{} exists: name another directory", out.display())));
     }
+    let inside = nearest_directory(out).canonicalize()?.starts_with(report.canonicalize()?);
+    if inside {
+        let why = format!("{} is in the report: name a directory beside it", out.display());
+        return Err(Failure::input(why));
+    }
     let records = records_in(report)?;
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
     let wrong = |error| named(out, &error);
     let staging = Staging::beside(out).map_err(wrong)?;
     let place = staging.path();
-    copy(report, place, &|path| records.iter().all(|record| record != path))?;
+    copy_tree(report, place, &|path| records.iter().all(|record| record != path))?;
     let text = lines.iter().map(|line| serde_json::to_string(line).expect("plain data") + "\n");
     let put = |name: &str, text: String| {
         let path = place.join(name);
-        fs::write(&path, text).map_err(|error| Failure::at(&path, error))
+        write_atomically(&path, |out| out.write_all(text.as_bytes()))
+            .map_err(|error| Failure::at(&path, error))
     };
     put(RECORD, text.collect())?;
     put(EXPECTED, serde_json::to_string_pretty(&expected).expect("plain data") + "\n")?;
@@ -70,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     package(study, &catalogue, &of_study)?;
     let sources = catalogue.path().with_file_name("SOURCES.md");
     if sources.is_file() {
-        fs::copy(&sources, of_study.join("SOURCES.md")).map_err(|e| Failure::at(&sources, e))?;
+        copy(&sources, &of_study.join("SOURCES.md"))?;
     }
     let day = now_utc().chars().take("2026-01-31".len()).collect();
     let about =
@@ -88,16 +87,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(EXIT_HOLDS)
 }
 
-/// Copies the files of a directory and of those in it that are `wanted`.
-fn copy(from: &Path, to: &Path, wanted: &dyn Fn(&PathBuf) -> bool) -> Result<(), Failure> {
+/// Copies the files of a directory and of those in it that are `wanted`. Links to directories, which may lead in a circle, are refused.
+fn copy_tree(from: &Path, to: &Path, wanted: &dyn Fn(&PathBuf) -> bool) -> Result<(), Failure> {
     for entry in fs::read_dir(from).map_err(|error| Failure::at(from, error))? {
-        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name()))?;
-        let (copied, at) = (to.join(name), |error| Failure::at(&path, error));
-        if path.is_dir() {
-            fs::create_dir(&copied).map_err(at)?;
-            copy(&path, &copied, wanted)?;
+        let entry = entry?;
+        let (path, copied) = (entry.path(), to.join(entry.file_name()));
+        if entry.file_type()?.is_dir() {
+            fs::create_dir(&copied).map_err(|error| Failure::at(&copied, error))?;
+            copy_tree(&path, &copied, wanted)?;
         } else if wanted(&path) {
-            fs::copy(&path, &copied).map_err(at)?;
+            copy(&path, &copied)?;
         }
     }
     Ok(())

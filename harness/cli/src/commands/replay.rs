@@ -1,6 +1,5 @@
 //! `harness replay`: repeats the runs of an archive.
 
-use super::archive::{EXPECTED, STUDY};
 use super::bench::programs;
 use super::programs::ProgramArguments;
 use super::values::Input;
@@ -9,6 +8,7 @@ use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::{self, SessionOptions, Study, package};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use report::archive::{EXPECTED, STUDY};
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
@@ -55,6 +55,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let outcome = study::measure(&session, record, &study, &programs, &progress)?;
     if outcome.interrupted {
         return Ok(EXIT_INTERRUPTED);
+    }
+    if let Some(missing) = &outcome.missing {
+        eprintln!("harness: {missing}");
     }
     let replayed = expected.compare(&outcome.lines);
     let session = outcome.lines.iter().find_map(Line::session);

@@ -107,6 +107,8 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     let bench = fixture.harness("bench mine.toml --mesher ./mesher --report out");
     assert_eq!(bench.code, 0, "{}", bench.printed);
     let archive = "archive out mine.toml -o a --title T --author A --licence MIT";
+    let inside = fixture.harness(&archive.replace("-o a", "-o out/a"));
+    assert!(inside.code == 2 && inside.printed.contains("is in the report"), "{}", inside.printed);
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");

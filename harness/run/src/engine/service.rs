@@ -43,7 +43,7 @@ pub struct Services {
     ranks: Mutex<()>,
 }
 
-/// What a thread that panicked has left behind is as good as before: the panic ends the program.
+/// A lock that a thread held when it panicked is as good as any: the panic ends the program.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
