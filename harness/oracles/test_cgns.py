@@ -2,30 +2,24 @@
 
 Needs target/debug/{harness,reference}, which `cargo test --workspace` builds, and `cgnscheck` for one test (Debian's cgns-convert)."""
 
-import pathlib
 import re
 import shutil
 import subprocess
-import tempfile
 import unittest
 
 import numpy as np
 import pyvista
 
+from built import InDirectory, needs
 from test_import import ROOT, run
-from test_vtu import PROGRAMS, decode
+from test_vtu import decode
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
-class CgnsTest(unittest.TestCase):
+@needs("harness", "reference")
+class CgnsTest(InDirectory):
     @classmethod
     def setUpClass(cls):
-        place = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(place.cleanup)
-        cls.at = pathlib.Path(place.name)
+        super().setUpClass()
         for program, *arguments in [
             ("reference", ROOT / "geometries/cube-small.toml", "--out", cls.at / "mesh"),
             ("harness", "export", cls.at / "mesh", cls.at / "mesh.cgns", "--side", "outside"),

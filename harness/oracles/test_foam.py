@@ -16,9 +16,8 @@ import unittest
 import numpy as np
 
 import import_cells
+from built import PROGRAMS, ROOT, needs
 
-ROOT = pathlib.Path(__file__).parent.parent.parent
-PROGRAMS = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug"
 TEMPLATE = ROOT / "harness/solvers/openfoam/case"
 ENVIRONMENT = {
     "WM_PROJECT_DIR": "/usr/share/openfoam",
@@ -41,10 +40,7 @@ def call(directory, *command):
     return done.stdout
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
+@needs("harness", "reference")
 @unittest.skipUnless(shutil.which("checkMesh"), "OpenFOAM is not installed: run ci/peers snappy")
 class FoamTest(unittest.TestCase):
     def setUp(self):
@@ -207,10 +203,7 @@ class FoamTest(unittest.TestCase):
         self.assertTrue(((seen == 1) | (seen == 2)).all())
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "mesher")),
-    f"harness or mesher is not built in {PROGRAMS}: run cargo build -p harness -p mesher",
-)
+@needs("harness", "mesher")
 @unittest.skipUnless(shutil.which("potentialFoam"), "OpenFOAM is not installed: run ci/peers snappy")
 class RunTest(unittest.TestCase):
     """The script `run`, with the programs of the tests."""

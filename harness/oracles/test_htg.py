@@ -13,13 +13,11 @@ import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 import import_vtk
-from test_vtu import EDGE_BITS, PROGRAMS, ROOT, decode
+from built import PROGRAMS, ROOT, needs
+from test_vtu import EDGE_BITS, decode
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "mesher")),
-    f"harness or mesher is not built in {PROGRAMS}: run cargo build -p harness -p mesher",
-)
+@needs("harness", "mesher")
 class TreeTest(unittest.TestCase):
     def run_program(self, program, *arguments):
         environment = {**os.environ, "HARNESS_PYTHON": "/nowhere/python"}

@@ -15,8 +15,8 @@ import numpy as np
 import pyvista
 import vtk
 
-ROOT = pathlib.Path(__file__).parent.parent.parent
-PROGRAMS = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug"
+from built import PROGRAMS, ROOT, needs
+
 ORIGIN, EDGE, DEPTH = np.array([-1.0, 2.0, 0.5]), 4.0, 4
 
 
@@ -131,10 +131,7 @@ def unstructured_files(at, grid):
     return sorted(path for path in at.iterdir() if path.suffix != ".json" and not path.name.startswith("parallel_"))
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
+@needs("harness", "reference")
 class ImportTest(unittest.TestCase):
     def setUp(self):
         self.directory = tempfile.TemporaryDirectory()

@@ -3,27 +3,20 @@
 Needs target/debug/{harness,reference}, which `cargo test --workspace` builds, and for one test MFEM: pip install mfem numba scipy."""
 
 import importlib.util
-import pathlib
-import tempfile
 import unittest
 
 import numpy as np
 
+from built import InDirectory, needs
 from export_mfem import CORNERS, DEPTH, FACES, forest, packed
 from test_import import ROOT, run
-from test_vtu import PROGRAMS
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
-class MfemTest(unittest.TestCase):
+@needs("harness", "reference")
+class MfemTest(InDirectory):
     @classmethod
     def setUpClass(cls):
-        place = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(place.cleanup)
-        cls.at = pathlib.Path(place.name)
+        super().setUpClass()
         for program, *arguments in [
             ("reference", ROOT / "geometries/cube-small.toml", "--out", cls.at / "mesh"),
             ("harness", "export", cls.at / "mesh", cls.at / "mesh.p8est"),

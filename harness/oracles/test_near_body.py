@@ -15,7 +15,8 @@ import xml.etree.ElementTree
 import numpy as np
 import pyvista
 
-from test_vtu import EDGE_BITS, PROGRAMS, ROOT, decode
+from built import PROGRAMS, ROOT, InDirectory, needs
+from test_vtu import EDGE_BITS, decode
 
 EDGE, FINEST = 4.0, 5
 CASE = f"""geometry = "body.stl"
@@ -59,16 +60,11 @@ def outline(points):
     return area, (points.min(axis=0) + points.max(axis=0)) / 2, normal / area
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
-class NearBodyTest(unittest.TestCase):
+@needs("harness", "reference")
+class NearBodyTest(InDirectory):
     @classmethod
     def setUpClass(cls):
-        place = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(place.cleanup)
-        cls.at = pathlib.Path(place.name)
+        super().setUpClass()
         pyvista.Sphere(radius=0.7, theta_resolution=20, phi_resolution=14).save(cls.at / "body.stl")
         cls.body = pyvista.read(cls.at / "body.stl")
         (cls.at / "case.toml").write_text(CASE)

@@ -14,8 +14,8 @@ import unittest
 import numpy as np
 import pyvista
 
-ROOT = pathlib.Path(__file__).parent.parent.parent
-PROGRAMS = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug"
+from built import PROGRAMS, ROOT, needs
+
 EDGE_BITS = 19
 
 
@@ -29,10 +29,7 @@ def decode(words):
     return corners, (words >> np.uint64(2) & np.uint64(31)).astype(int), (words & np.uint64(3)).astype(int)
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
+@needs("harness", "reference")
 class VtuTest(unittest.TestCase):
     def exported(self, keep, name):
         """The words of a small mesh, its root, and its grid as pyvista reads it."""
@@ -83,10 +80,7 @@ class VtuTest(unittest.TestCase):
         self.assertLess(volume, whole)
 
 
-@unittest.skipUnless(
-    all((PROGRAMS / name).is_file() for name in ("harness", "reference")),
-    f"harness or reference is not built in {PROGRAMS}: run cargo build -p harness -p reference",
-)
+@needs("harness", "reference")
 class DamagedVtuTest(unittest.TestCase):
     """Every damage to a file is noticed when it is read: the file is refused, or the digest differs."""
 
