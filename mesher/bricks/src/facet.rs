@@ -218,13 +218,23 @@ mod kernel {
     /// Mask of the octants (i, j, k) where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
     #[inline(always)]
     pub fn plane_lanes(n: [i64; 3], most: i64, least: i64) -> u64 {
-        let mut mask = 0;
-        for bit in 0..64u32 {
-            let index = |a: u32| i64::from((bit >> a & 1) | (bit >> (a + 3) & 1) << 1);
-            let v = n[0] * index(0) + n[1] * index(1) + n[2] * index(2);
-            mask |= u64::from((v + most >= 0) & (v + least <= 0)) << bit;
+        // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
+        let mut low = [0i64; 8];
+        for i in 0..8usize {
+            for a in 0..3 {
+                low[i] += n[a] * (i >> a & 1) as i64;
+            }
         }
-        mask
+        let mut outside = 0;
+        for byte in 0..8usize {
+            let base = 2 * low[byte];
+            for i in 0..8usize {
+                let v = low[i] + base;
+                let misses = (v + most < 0) | (v + least > 0);
+                outside |= u64::from(misses) << (8 * byte + i);
+            }
+        }
+        !outside
     }
 
     /// Mask of the squares (i, j), i fastest, where `ci * i + cj * j + c >= 0`, as two bytes.
