@@ -166,7 +166,8 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["track", file, "--alpha", "7"], "greater than 0 and at most 1"),
         (&["track", file, "--alpha", "nan"], "greater than 0 and at most 1"),
         (&["track", file, "--effect-min", "1e9"], "percentage"),
-        (&["gate", "--baseline", file], "neither a record of harness gate"),
+        (&["gate", "--baseline", file], "neither a program that can be executed nor"),
+        (&["gate", "--candidate", file], "neither a program that can be executed nor"),
         (&["gate", "--budget", "nan"], "greater than 0"),
     ] {
         let output = harness(arguments);

@@ -38,7 +38,7 @@ pub fn open_tree(dir: &Path, manifest: &Manifest) -> Result<Option<TreeFile>, Un
     let tree = TreeFile::open(&path, sides).and_then(|tree| match tree.root == manifest.root {
         true => Ok(tree),
         false => Err(TreeError::Unknown(format!(
-            "its root is {:?}, but that of the manifest {:?}",
+            "its root is {}, but that of the manifest {}",
             tree.root, manifest.root
         ))),
     });

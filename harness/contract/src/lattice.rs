@@ -2,6 +2,7 @@
 
 use crate::octant::{LEVEL_MAX, Octant};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Lattice units along an edge of the root.
 pub const UNITS_PER_EDGE: i64 = 1 << 27;
@@ -17,6 +18,12 @@ pub struct Root {
     pub origin: [f64; 3],
     /// Edge length.
     pub edge: f64,
+}
+
+impl fmt::Display for Root {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "corner {:?}, edge {}", self.origin, self.edge)
+    }
 }
 
 impl Root {

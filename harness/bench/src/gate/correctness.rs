@@ -1,12 +1,14 @@
 //! The layer of correctness: `harness verify` on the candidate and the gate's cases, serially and on the ranks of the rules.
 //!
-//! A mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more findings.
+//! A mesher whose baseline fails checks passes if it fails none that the baseline holds, and none with more findings. A check that had
+//! nothing to check is compared only if the baseline's had nothing either: what a mesh no longer states cannot be found wrong.
 
 use super::Bench;
-use super::measures::{LayerName, Measures, Numbers};
+use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::Selected;
 use super::subject::Baseline;
+use check::checks::CHECKS as CHECKS_OF_MESHES;
 use contract::failure::Failure;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
@@ -14,6 +16,7 @@ use run::verify::case::RUNS;
 use run::verify::options::Options;
 use run::verify::report::{CaseReport, Check, Outcome, Tally};
 use run::verify::verify;
+use std::collections::BTreeSet;
 
 /// Verifies the candidate on the cases of this layer: every check of what it promises. Oracles and p4est are left to
 /// `harness verify`.
@@ -24,14 +27,19 @@ pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Resul
     for case in bench.cases_of(LayerName::Correctness) {
         let name = &case.rule.name;
         let report = verified(bench, &bench.candidate, case)?;
-        measures.case(name).findings = known(&report);
+        let new = Known::of(&report);
+        let is_plain = new.findings.is_empty() && new.unchecked.iter().all(BTreeSet::is_empty);
         let baseline = match &bench.baseline {
-            _ if !report.failed() => None,
-            Baseline::None => None,
-            Baseline::Record(_, record) => record.cases.get(name).map(|case| case.findings.clone()),
-            Baseline::Program(subject) => Some(known(&verified(bench, &subject.engine, case)?)),
+            Baseline::Program(subject) if !is_plain => {
+                Known::of(&verified(bench, &subject.engine, case)?)
+            }
+            Baseline::Record(_, record) => {
+                record.cases.get(name).map(Known::of_record).unwrap_or_default()
+            }
+            Baseline::Program(_) | Baseline::None => Known::default(),
         };
-        let baseline = baseline.unwrap_or_default();
+        let of_case = measures.case(name);
+        (of_case.findings, of_case.unchecked) = (new.findings, new.unchecked);
         layer.findings.extend(findings(name, &case.mpi, &report, &baseline));
     }
     Ok(())
@@ -57,13 +65,38 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
     cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.rule.name)))
 }
 
-/// A finding for the serial mesh, and one for each number of ranks. `baseline` has the findings of the baseline's failed checks.
-fn findings(
-    case: &str,
-    mpi: &[usize],
-    report: &CaseReport,
-    baseline: &Numbers,
-) -> Vec<GateFinding> {
+/// What is known of the checks of a program on a case.
+#[derive(Default)]
+struct Known {
+    /// Number of findings by failed check.
+    findings: Numbers,
+    /// The checks of meshes that were left out; `None` if unknown.
+    unchecked: Option<BTreeSet<String>>,
+}
+
+impl Known {
+    fn of(case: &CaseReport) -> Self {
+        let failed = case.checks.iter().filter(|check| check.failed());
+        let unchecked = case.checks.iter().filter(|check| is_unchecked(check));
+        Self {
+            findings: failed.map(|check| (key(check), count(check))).collect(),
+            unchecked: Some(unchecked.map(key).collect()),
+        }
+    }
+
+    fn of_record(case: &CaseMeasures) -> Self {
+        Self { findings: case.findings.clone(), unchecked: case.unchecked.clone() }
+    }
+}
+
+/// Whether a mesh gave this check nothing to check.
+fn is_unchecked(check: &Check) -> bool {
+    let is_of_mesh = CHECKS_OF_MESHES.iter().any(|of_mesh| of_mesh.name == check.name);
+    is_of_mesh && matches!(check.outcome, Outcome::LeftOut { .. })
+}
+
+/// A finding for the serial mesh, and one for each number of ranks.
+fn findings(case: &str, mpi: &[usize], report: &CaseReport, baseline: &Known) -> Vec<GateFinding> {
     if let Some(why) = &report.input_error {
         return vec![GateFinding::noted(case, CHECKS, Verdict::Regression, why)];
     }
@@ -75,9 +108,9 @@ fn findings(
     std::iter::once(None).chain(mpi.iter().copied().map(Some)).map(of_ranks).collect()
 }
 
-fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Numbers) -> GateFinding {
+fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Known) -> GateFinding {
     let Tally { pass, fail, .. } = checks.iter().copied().collect();
-    let before = |check: &Check| baseline.get(&key(check)).copied().unwrap_or(0);
+    let before = |check: &Check| baseline.findings.get(&key(check)).copied().unwrap_or(0);
     let old: u64 = checks.iter().map(|check| before(check)).sum();
     let new: u64 = checks.iter().map(|check| count(check)).sum();
     let counts = format!("{fail} checks fail with {new} findings, {old} in the baseline");
@@ -86,6 +119,9 @@ fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Numbers) -> G
         Outcome::LeftOut { why } => Some(why.clone()),
         _ => None,
     });
+    let was_checked =
+        |check: &&&Check| baseline.unchecked.as_ref().is_some_and(|u| !u.contains(&key(check)));
+    let unchecked = checks.iter().filter(|check| is_unchecked(check)).find(was_checked);
     let (verdict, note) = match checks.iter().find(|check| count(check) > before(check)) {
         Some(worse) => {
             let (check, why) = (key(worse), first_line(worse));
@@ -94,6 +130,14 @@ fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Numbers) -> G
         None if without_mesh.is_some() => {
             let why = without_mesh.map_or("", |check| first_line(check));
             let note = format!("neither program makes a mesh: {why}");
+            return GateFinding::noted(case, metric, Verdict::Missing, note);
+        }
+        None if unchecked.is_some() => {
+            let check = unchecked.map_or(String::new(), |check| key(check));
+            let note = format!(
+                "the baseline's {check} is checked, and the candidate's is not: {}",
+                left_out.unwrap_or_default()
+            );
             return GateFinding::noted(case, metric, Verdict::Missing, note);
         }
         None if new < old => (Verdict::Improvement, counts),
@@ -122,11 +166,6 @@ fn count(check: &Check) -> u64 {
     if check.failed() { check.findings.max(1) } else { 0 }
 }
 
-/// The number of findings of the failed checks of a case, by mesh and name of the check.
-fn known(case: &CaseReport) -> Numbers {
-    case.checks.iter().filter(|check| check.failed()).map(|c| (key(c), count(c))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,13 +184,13 @@ mod tests {
         CaseReport { name: "c".into(), checks, ..CaseReport::default() }
     }
 
-    fn against(case: &CaseReport, baseline: &Numbers) -> GateFinding {
+    fn against(case: &CaseReport, baseline: &Known) -> GateFinding {
         findings("c", &[], case, baseline).remove(0)
     }
 
     #[test]
     fn only_new_and_more_findings_are_a_regression() {
-        let baseline = known(&case(&[("layer", 7), ("spacing", 2)]));
+        let baseline = Known::of(&case(&[("layer", 7), ("spacing", 2)]));
         let of = |failed: &[(&str, u64)]| against(&case(failed), &baseline).verdict;
         assert_eq!(of(&[("layer", 7), ("spacing", 2)]), Verdict::Unchanged);
         assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Improvement);
@@ -163,11 +202,25 @@ mod tests {
     }
 
     #[test]
+    fn a_check_that_the_baseline_has_and_the_candidate_leaves_out_is_missing() {
+        let (all, mut without) = (case(&[]), case(&[]));
+        without.checks[0].outcome = Outcome::left_out("the sides of the leaves are unknown");
+        let missing = against(&without, &Known::of(&all));
+        assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
+        assert!(missing.note.contains("serial: layer is checked"), "{}", missing.note);
+        assert!(missing.note.ends_with("the sides of the leaves are unknown"), "{}", missing.note);
+        let verdict = |known: &Known| against(&without, known).verdict;
+        assert_eq!(verdict(&Known::of(&without)), Verdict::Unchanged);
+        assert_eq!(verdict(&Known::default()), Verdict::Unchanged, "an old record");
+        assert_eq!(against(&all, &Known::of(&without)).verdict, Verdict::Unchanged);
+    }
+
+    #[test]
     fn two_programs_without_a_mesh_cannot_be_compared() {
-        let baseline = known(&case(&[(RUNS, 1)]));
-        let finding = |known: &Numbers| against(&case(&[(RUNS, 1)]), known);
+        let baseline = Known::of(&case(&[(RUNS, 1)]));
+        let finding = |known: &Known| against(&case(&[(RUNS, 1)]), known);
         let missing = finding(&baseline);
         assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
-        assert_eq!(finding(&Numbers::new()).verdict, Verdict::Regression);
+        assert_eq!(finding(&Known::default()).verdict, Verdict::Regression);
     }
 }

@@ -2,7 +2,7 @@
 //! and a point in the history of `harness track`.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// Version of the JSON form.
@@ -97,6 +97,9 @@ pub struct CaseMeasures {
     /// Number of findings by failed check.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub findings: Numbers,
+    /// The checks of meshes that were left out; `None` if none was run, and in old records.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unchecked: Option<BTreeSet<String>>,
 }
 
 impl CaseMeasures {
@@ -135,17 +138,10 @@ impl Measures {
     /// # Errors
     /// One sentence, if it is neither.
     pub fn parse(text: &[u8]) -> Result<Self, String> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Either {
-            Report { candidate_measures: Measures },
-            Record(Measures),
-        }
-        let measures = match serde_json::from_slice(text) {
-            Ok(Either::Report { candidate_measures }) => candidate_measures,
-            Ok(Either::Record(measures)) => measures,
-            Err(error) => return Err(format!("not a record of `harness gate`: {error}")),
-        };
+        let wrong = |error| format!("not a record of `harness gate`: {error}");
+        let mut value: serde_json::Value = serde_json::from_slice(text).map_err(wrong)?;
+        let of_report = value.get_mut("candidate_measures").map(serde_json::Value::take);
+        let measures: Self = serde_json::from_value(of_report.unwrap_or(value)).map_err(wrong)?;
         match measures.schema == SCHEMA {
             true => Ok(measures),
             false => Err(format!("schema {:?}, not {SCHEMA:?}", measures.schema)),

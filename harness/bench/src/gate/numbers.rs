@@ -1,5 +1,5 @@
 //! The layers of numbers with a tolerance: counters and peak memory of the program, serially and on ranks, and what valgrind
-//! counts. Numbers are compared by name; the program that lacks one that the other has is not compared in it.
+//! counts. Numbers are compared by name; one that the candidate no longer has is missing, and a new one is a change.
 
 use super::Bench;
 use super::callgrind::{Profile, differences};
@@ -107,8 +107,12 @@ fn compare(
         return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
     }
     let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
-    let mut findings =
-        compared_numbers(name, layer, old.of_layer(layer), new.of_layer(layer), &tolerance);
+    let measured: Vec<String> = case.layouts().map(prefix).collect();
+    let numbers = [old.of_layer(layer), new.of_layer(layer)];
+    let mut findings = compared_numbers(name, layer, numbers, &measured, &tolerance);
+    if layer == LayerName::Counters {
+        findings.extend(without_counter(case, [&old.exact, &new.exact]));
+    }
     let is_known = old.digest.is_some() || new.digest.is_some();
     if layer == LayerName::Counters && is_known {
         findings.insert(0, same_mesh(name, &old.digest, &new.digest));
@@ -124,6 +128,21 @@ fn compare(
     findings
 }
 
+/// A finding for each tolerance of the case that has the name of no quantity.
+fn without_counter(case: &Selected, counters: [&Numbers; 2]) -> Vec<GateFinding> {
+    let of_layers = [CELLS, MEMORY, INSTRUCTIONS];
+    let is_known = |name: &String| {
+        let is = |other: &String| other == name || other.ends_with(&format!("/{name}"));
+        let last = name.rsplit('/').next().unwrap_or(name);
+        case.no_mpi.is_some()
+            || of_layers.contains(&last)
+            || counters.iter().any(|of| of.keys().any(is))
+    };
+    let unknown = case.rule.tolerance.keys().filter(|name| !is_known(name));
+    let why = "the rules have a tolerance for it, and neither program counts it";
+    unknown.map(|n| GateFinding::noted(&case.rule.name, n, Verdict::Missing, why)).collect()
+}
+
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct.
 fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFinding {
     let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
@@ -134,12 +153,13 @@ fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFind
     GateFinding::noted(case, "digest", verdict, note)
 }
 
-/// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
+/// Compares all numbers of both sides, of which those with these beginnings were measured now. If both sides together have numbers
+/// beside the cells, they must share one of them.
 fn compared_numbers(
     case: &str,
     layer: LayerName,
-    old: &Numbers,
-    new: &Numbers,
+    [old, new]: [&Numbers; 2],
+    measured: &[String],
     tolerance: &dyn Fn(&str) -> f64,
 ) -> Vec<GateFinding> {
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
@@ -148,18 +168,27 @@ fn compared_numbers(
     let mut findings = Vec::new();
     if counters.peek().is_some() && !counters.any(|both| both.iter().all(Option::is_some)) {
         let [old, new] = count;
-        let why = format!("no quantity is in both: the baseline has {old}, the candidate {new}");
+        let why = format!(
+            "no quantity but {CELLS} is in both: the baseline has {old}, the candidate {new}"
+        );
         findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
     }
     findings.extend(names.into_iter().map(|metric| {
-        let changed = |note| GateFinding::noted(case, metric, Verdict::Changed, note);
+        let noted = |verdict, note| GateFinding::noted(case, metric, verdict, note);
+        let beginning = metric.rsplit_once('/').map_or("", |(ranks, _)| ranks);
+        let is_measured = measured.iter().any(|of| of.trim_end_matches('/') == beginning);
         match of(metric) {
             [Some(&old), Some(&new)] => {
                 let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
                 GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
             }
-            [Some(old), None] => changed(format!("removed, was {old}")),
-            [None, new] => changed(format!("new, {}", new.unwrap_or(&0))),
+            [Some(old), None] if is_measured => {
+                noted(Verdict::Missing, format!("the candidate does not report it; it was {old}"))
+            }
+            [Some(old), None] => {
+                noted(Verdict::LeftOut, format!("not measured on these ranks now; it was {old}"))
+            }
+            [None, new] => noted(Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),
         }
     }));
     findings
@@ -287,20 +316,23 @@ mod tests {
 
     fn verdicts(layer: LayerName, old: &Numbers, new: &Numbers) -> Vec<(String, Verdict)> {
         let tolerance = |metric: &str| if metric.ends_with("messages") { 10.0 } else { 0.0 };
-        let found = compared_numbers("c", layer, old, new, &tolerance);
+        let measured = ["", "2 MPI ranks/", "4 ranks/"].map(String::from);
+        let found = compared_numbers("c", layer, [old, new], &measured, &tolerance);
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 
     #[test]
-    fn every_change_is_shown_and_only_growth_fails() {
-        let old = numbers(&[("cells", 8), ("rays", 6), ("4 ranks/messages", 10), ("words", 5)]);
+    fn every_change_is_shown_and_only_growth_and_loss_fail() {
+        let mut old = numbers(&[("cells", 8), ("rays", 6), ("4 ranks/messages", 10)]);
+        old.extend(numbers(&[("8 ranks/messages", 12), ("words", 5)]));
         let new = numbers(&[("cells", 9), ("rays", 5), ("4 ranks/messages", 11), ("hops", 1)]);
         let expected = [
             ("4 ranks/messages", Verdict::Changed),
+            ("8 ranks/messages", Verdict::LeftOut),
             ("cells", Verdict::Changed),
             ("hops", Verdict::Changed),
             ("rays", Verdict::Improvement),
-            ("words", Verdict::Changed),
+            ("words", Verdict::Missing),
         ];
         let found = verdicts(LayerName::Counters, &old, &new);
         assert_eq!(found, expected.map(|(name, verdict)| (name.to_owned(), verdict)));

@@ -161,6 +161,13 @@ impl Rules {
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
         ])?;
+        let Tolerance { counters, instructions, memory, of } = &self.tolerance;
+        let mut tolerances = [counters, instructions, memory]
+            .into_iter()
+            .chain(of.values())
+            .chain(self.cases.iter().flat_map(|case| case.tolerance.values()));
+        let is_percentage = tolerances.all(|percent| (0.0..=1e6).contains(percent));
+        refuse(&[(!is_percentage, "a tolerance must be between 0 and 1000000 percent")])?;
         for (i, case) in self.cases.iter().enumerate() {
             let is_second = self.cases[..i].iter().any(|other| other.name == case.name);
             let has_one = case.ranks.iter().chain(&case.mpi).any(|ranks| *ranks < 2);
@@ -177,7 +184,7 @@ impl Rules {
     /// Returns the named cases, or all if no name is given.
     ///
     /// # Errors
-    /// If a name is missing from the rules or the catalogue.
+    /// If a name is missing from the rules or the catalogue, or a case cannot be read.
     pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<Selected>, Failure> {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
@@ -191,22 +198,19 @@ impl Rules {
     }
 
     fn find(rule: &CaseRule, programs: &Programs) -> Result<Selected, Failure> {
-        let path = match &rule.file {
-            Some(path) => {
-                std::fs::canonicalize(path).map_err(|error| format!("{}: {error}", path.display()))
-            }
+        let (path, absent) = match &rule.file {
+            Some(path) => (std::path::absolute(path)?, None),
             None => {
-                let catalogue = &programs.paths.catalogue;
-                let found = catalogue.named(&rule.name)?;
-                found.absent.clone().map_or_else(|| Ok(found.path.clone()), Err)
+                let found = programs.paths.catalogue.named(&rule.name)?;
+                (found.path.clone(), found.absent.clone())
             }
         };
         let (engine, mpirun) = (programs.engine.description(), &programs.paths.mpirun);
-        let path = path.and_then(|path| match Case::read(&path) {
-            Ok(case) => engine.declines(&case).map_or(Ok(path), Err),
-            // What is wrong with the case is for the layers to report.
-            Err(_) => Ok(path),
-        });
+        // Only a geometry that has to be fetched may be missing.
+        let path = match absent {
+            Some(why) => Err(why),
+            None => engine.declines(&Case::read(&path)?).map_or(Ok(path), Err),
+        };
         let (mut simulated, mut mpi) = (rule.ranks.clone(), rule.mpi.clone());
         if engine.run.simulated.is_none() {
             mpi.extend(simulated.drain(..).filter(|ranks| !rule.mpi.contains(ranks)));

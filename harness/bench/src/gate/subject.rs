@@ -97,14 +97,15 @@ impl Subject {
 
     fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         if Path::new(named).is_file() {
+            let is_data =
+                Path::new(named).extension().is_some_and(|of| of == "json" || of == "toml");
             let mode = fs::metadata(named).map_or(0, |metadata| metadata.permissions().mode());
             // One that another program interprets need not be executable.
             let is_started =
                 engine.description().run.serial.first().is_some_and(|word| word == "{program}");
-            if is_started && mode & 0o111 == 0 {
-                let why =
-                    "neither a record of harness gate --record nor a program that can be executed";
-                return Err(Failure::input(format!("{named} is {why}")));
+            if is_data || is_started && mode & 0o111 == 0 {
+                let why = "is neither a program that can be executed nor, as --baseline, a record of harness gate --record";
+                return Err(Failure::input(format!("{named} {why}")));
             }
             let program =
                 fs::canonicalize(named).map_err(|error| Failure::input(error.to_string()))?;

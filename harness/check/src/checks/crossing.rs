@@ -7,7 +7,7 @@
 
 use super::surface::Crossed;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, UNKNOWN_SIDES, contact};
+use super::{Check, CheckResult, Subject, contact};
 use contract::manifest::Sides;
 use contract::octant::Octant;
 use contract::tree::{Kind, Tree};
@@ -26,7 +26,7 @@ const CROSSING: Kind = Side::Crossing as Kind;
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
-        return result.lacks(UNKNOWN_SIDES);
+        return super::unknown_sides(subject, subject.promises.crossing, result);
     }
     let (Some(facets), Some(truth)) = (subject.facets(), subject.truth()) else {
         return result.lacks(super::NO_GEOMETRY);

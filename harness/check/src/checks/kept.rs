@@ -9,7 +9,7 @@ mod alone;
 
 use super::components::Component;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, Terms, for_definition, some_leaves};
+use super::{Check, CheckResult, Subject, Terms, for_definition, json, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Sides};
 use contract::octant::Octant;
 use contract::tree::Tree;
@@ -131,7 +131,9 @@ fn same_counts(
     };
     if !agree {
         result.report(format!(
-            "{prefix}the manifest places an enclosed component at {claimed:?}, and the first one is at {expected:?}"
+            "{prefix}the manifest places an enclosed component at {}, and the first one is at {}",
+            json(&claimed),
+            json(&expected)
         ));
     }
 }

@@ -4,13 +4,16 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. `sides` checks the
 //! ambiguous components and `kept` the numbers of components.
 
-use std::fmt::Debug;
+use serde::Serialize;
 
-use super::{Check, CheckResult, Pass, Subject, Terms, always, nothing};
+use super::{Check, CheckResult, Pass, Subject, Terms, always, json, nothing};
 use contract::lattice::Root;
 use contract::manifest::{BySide, Components, Geometry, Leak, Manifest, Sides, Tree};
 
-pub(super) const CHECK: Check = Check { name: "manifest", wanted: always, needs: nothing, run };
+/// Name of the check.
+pub const NAME: &str = "manifest";
+
+pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothing, run };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     result.examined = 0;
@@ -52,7 +55,9 @@ fn of_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResul
         };
         if !equal {
             result.report(format!(
-                "{field}: {claimed:?} in the manifest, but {found:?} in the reference's"
+                "{field}: {} in the manifest, but {} in the reference's",
+                json(&claimed),
+                json(&found)
             ));
         }
     };
@@ -84,7 +89,11 @@ fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
         let opens = 0.0 < spacing_fine && spacing_fine < spacing_coarse;
         let is_region = 0.0 < volume && volume <= edge.powi(3) && (0..3).all(is_inside);
         if !(opens && is_region) {
-            result.report(format!("leaks: {leak:?} is not possible in {:?}", manifest.root));
+            result.report(format!(
+                "leaks: {} is not possible in the root {}",
+                json(leak),
+                json(&manifest.root)
+            ));
         }
     }
 }
@@ -125,7 +134,7 @@ fn of_leaves(prefix: &str, manifest: &Manifest, pass: &Pass, result: &mut CheckR
     }
 }
 
-fn same<T: PartialEq + Debug>(
+fn same<T: PartialEq + Serialize>(
     prefix: &str,
     field: &str,
     claimed: &T,
@@ -134,7 +143,8 @@ fn same<T: PartialEq + Debug>(
 ) {
     if claimed != found {
         result.report_with(|| {
-            format!("{prefix}{field}: {claimed:?} in the manifest, but {found:?} in fact")
+            let [claimed, found] = [claimed, found].map(json);
+            format!("{prefix}{field}: {claimed} in the manifest, but {found} in fact")
         });
     }
 }

@@ -35,6 +35,8 @@ pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
 pub use subject::{CAPACITY, Subject};
 pub use terms::Terms;
 
+use serde::Serialize;
+
 pub(crate) use needless::NAME as NEEDLESS;
 pub(crate) use pass::Pass;
 
@@ -109,6 +111,21 @@ impl Check {
         result.needs_objects(NO_LEAVES);
         result.check_invariants();
         result
+    }
+}
+
+/// A value as manifests state it.
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_else(|why| why.to_string())
+}
+
+/// Reports sides that are unknown, although they were promised or the case decides them; a mesh by itself may lack them.
+fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
+    match promised || subject.case.is_some() {
+        true => result.report(format!(
+            "{UNKNOWN_SIDES}, says the manifest (--sides names them in another format)"
+        )),
+        false => result.lacks(UNKNOWN_SIDES),
     }
 }
 

@@ -12,7 +12,7 @@ use super::components::Component;
 use super::contact::{self, Contacts};
 use super::region::Survey;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, Terms, UNKNOWN_SIDES, some_leaves};
+use super::{Check, CheckResult, Subject, Terms, json, some_leaves};
 use contract::manifest::{Ambiguous, Manifest, Sides};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Tree};
@@ -35,7 +35,7 @@ pub(super) const CHECK: Check = Check {
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
-        return result.lacks(UNKNOWN_SIDES);
+        return super::unknown_sides(subject, subject.promises.sides.is_some(), result);
     }
     if !subject.promises.definition {
         return Survey::of(subject, result, Survey::check_sides);
@@ -137,7 +137,8 @@ fn ambiguous(
     let placed = if found.is_empty() { example.is_none() } else { found.iter().any(near) };
     if !placed {
         result.report(format!(
-            "{prefix}the example {example:?} of an ambiguous component is in no such component"
+            "{prefix}the example {} of an ambiguous component is in no such component",
+            json(&example)
         ));
     }
 }

@@ -213,7 +213,7 @@ fn a_gate_that_compared_nothing_is_not_green() {
     for (cases, why) in [
         (serde_json::json!({}), "the record does not contain this case"),
         (serde_json::json!({"other.toml": case}), "the record does not contain this case"),
-        (serde_json::json!({"case": empty}), "no quantity is in both"),
+        (serde_json::json!({"case": empty}), "no quantity but cells is in both"),
     ] {
         measures["cases"] = cases;
         fixture.write("old.json", &measures.to_string());
@@ -236,6 +236,41 @@ fn a_gate_that_compared_nothing_is_not_green() {
     let none = fixture.harness(&format!("{gate} --baseline now.json"));
     assert_eq!(none.code, 2, "{}", none.printed);
     assert!(none.printed.contains("it has no [[case]]"), "{}", none.printed);
+}
+
+#[test]
+fn rules_that_cannot_be_followed_are_refused() {
+    let fixture = Fixture::new();
+    fixture.write("invalid.toml", "spacing_min = -1.0\n");
+    let rules = fs::read_to_string(fixture.path("gate.toml")).unwrap();
+    let also = |case: &str| format!("{rules}[[case]]\nname = '{case}'\nlayers = ['counters']\n");
+    for (wrong, code, why) in [
+        (also("missing.toml"), 2, "missing.toml"),
+        (also("invalid.toml"), 2, "invalid.toml"),
+        (format!("[tolerance]\nmemory = -1.0\n{rules}"), 2, "a tolerance must be between 0 and"),
+        (format!("[tolerance.of]\nwords = nan\n{rules}"), 2, "a tolerance must be between 0 and"),
+        (format!("{rules}tolerance = {{ wrods = 5.0 }}\n"), 3, "case: wrods: the rules have a tol"),
+        (format!("{rules}tolerance = {{ words = 5.0, '2 ranks/words' = 1.0 }}\n"), 0, "nothing got worse"),
+    ] {
+        fixture.write("gate.toml", &wrong);
+        let gate = "gate --engine engine.toml --rules gate.toml --layers counters";
+        let outcome = fixture.harness(&format!("{gate} --baseline engine"));
+        let has = outcome.printed.contains(why);
+        assert!(outcome.code == code && has, "{wrong}: {}", outcome.printed);
+    }
+}
+
+#[test]
+fn a_counter_that_vanishes_is_not_green() {
+    let fixture = Fixture::new();
+    let engine = fs::read_to_string(fixture.path("engine")).unwrap();
+    let counts = "\"counters\": {\"words\"";
+    fixture.program("more", &engine.replace(counts, "\"counters\": {\"hops\": [4], \"words\""));
+    let gate = "gate --engine engine.toml --rules gate.toml --baseline more --candidate engine";
+    let outcome = fixture.harness(gate);
+    assert_eq!(outcome.code, 3, "{}", outcome.printed);
+    let why = "INCOMPLETE: counters of case: 2 ranks/hops: the candidate does not report it";
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
 }
 
 #[test]

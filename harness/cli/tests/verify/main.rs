@@ -195,6 +195,36 @@ fn a_mesh_that_depends_on_the_rank_count_is_detected() {
     assert!(fixture.path("out/case/ranks-3-morton-auto/mesh/mesh.json").is_file());
 }
 
+/// The first serial run is the timed one, and the second has the mesh with which all ranks are compared.
+#[test]
+fn a_mesher_whose_serial_runs_differ_is_reported() {
+    let fixture = Fixture::new();
+    fixture.script_mpirun();
+    let first = "[ -e \"$here/seen\" ] || tree=other; touch \"$here/seen\"; from=";
+    fixture.script("mesher", &HOLDS.replace("from=", first));
+    let outcome = fixture.verify(&[]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    let why = "serial: deterministic: two serial runs differ";
+    assert!(outcome.printed.contains(why), "{}", outcome.printed);
+}
+
+#[test]
+fn a_wrong_digest_in_manifest_and_report_on_ranks_is_reported() {
+    let fixture = Fixture::new();
+    fixture.script_mpirun();
+    let digest = "00000000000000000000000000000001";
+    let lie = format!(
+        "[ -z \"$FAKE_RANKS\" ] || for file in \"$out/mesh.json\" \"$json\"; do \
+         sed -i 's/\"digest\": *\"[0-9a-f]*\"/\"digest\": \"{digest}\"/' \"$file\"; done"
+    );
+    fixture.script("mesher", &format!("{HOLDS}\n{lie}"));
+    let outcome = fixture.verify(&[]);
+    assert_eq!(outcome.code, 1, "{}", outcome.printed);
+    let why =
+        format!("2 ranks, morton, base auto; 3 ranks, morton, base auto: manifest: digest: \"{digest}\" in the");
+    assert!(outcome.printed.contains(&why), "{}", outcome.printed);
+}
+
 /// Each process of another MPI's launcher, or of a mesher without MPI, meshes the whole case.
 #[test]
 fn ranks_that_are_fewer_than_were_started_are_a_failure() {

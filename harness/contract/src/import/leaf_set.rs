@@ -26,10 +26,7 @@ pub fn leaf_set(
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
     let root = stated.map_or_else(|| root::derive(cells), Ok)?;
     if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
-        return Err(Unusable::because(format!(
-            "has a root that is not a cube: corner {:?}, edge {}",
-            root.origin, root.edge
-        )));
+        return Err(Unusable::because(format!("has a root that is not a cube: {root}")));
     }
     let words = cells.words(&root)?;
     let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);

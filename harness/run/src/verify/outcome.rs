@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Name of the check that a program runs to its end and that its run report is true.
 pub const RUNS: &str = "runs";
 
+/// Name of the check that two serial runs give the same mesh.
+pub const DETERMINISTIC: &str = "deterministic";
+
 /// The outcome of [`RUNS`] for a run whose number of cells and digest are those of its mesh.
 pub fn ended_well() -> Outcome {
     Outcome::held(2)

@@ -7,7 +7,7 @@ use super::report::{Check, Outcome};
 use super::run::{Program, Request};
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, SERIAL};
-use check::checks::{self, CheckResult, Subject};
+use check::checks::{self, CheckResult, Subject, identical, manifest};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -108,7 +108,7 @@ impl CaseRun<'_> {
             false => self.promised(case, &mesh),
             true => {
                 let subject = Subject::new(case, &mesh).with_reference(serial);
-                checks::only(&subject, &["manifest", "linear", "identical"])
+                checks::only(&subject, &[manifest::NAME, "linear", identical::NAME])
             }
         };
         let holds = results.iter().all(CheckResult::holds);

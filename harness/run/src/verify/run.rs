@@ -97,7 +97,7 @@ fn compare(report: &RunReport, mesh: &LeafSet) -> Result<(), String> {
     let reported = report.digest.as_ref().unwrap_or(&digest);
     if *reported != digest || report.cells != leaves {
         return Err(format!(
-            "reports {} cells and digest {reported}, but its mesh has {leaves} leaves and digest {digest}",
+            "reports {} cells and digest {reported}, but its mesh has {leaves} leaves and, by its manifest, digest {digest}",
             report.cells
         ));
     }

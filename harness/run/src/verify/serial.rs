@@ -2,7 +2,7 @@
 
 use super::case::{CaseRun, PROOF};
 use super::options::Need;
-use super::outcome::{RUNS, ended_well};
+use super::outcome::{DETERMINISTIC, RUNS, ended_well};
 use super::report::{Check, Outcome, Run};
 use super::run::{Meshed, Program, Request};
 use crate::engine::failure::{CODE_INPUT, End, Failure};
@@ -127,7 +127,7 @@ impl CaseRun<'_> {
                 mesh.words.len()
             )),
         };
-        self.add(Check::new("serial", "deterministic", outcome), None);
+        self.add(Check::new("serial", DETERMINISTIC, outcome), None);
     }
 
     /// Adds remarks about components that a user may not expect to the check that has counted them.

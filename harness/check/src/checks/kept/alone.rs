@@ -9,7 +9,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::checks::{CheckResult, Terms, components, contact};
+use crate::checks::{CheckResult, Terms, components, contact, json};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
 use contract::octant::{Octant, UNITS_PER_CELL};
 use contract::tree::{Handle, Tree};
@@ -183,8 +183,9 @@ fn possible(
         && example.is_some_and(|at| deleted_at(tree, at, kind, terms));
     if !none && !some {
         result.report(format!(
-            "{count} of {} outside components cannot be enclosed with {leaves} leaves of T0 and one at {example:?}",
-            counted.outside
+            "{count} of {} outside components cannot be enclosed with {leaves} leaves of T0 and one at {}",
+            counted.outside,
+            json(&example)
         ));
     }
     let kinds = tree.kinds(tree.root());
