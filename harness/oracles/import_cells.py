@@ -1,5 +1,6 @@
 """Reads a mesh of cubes in a table, in discretize's formats or in OpenFOAM's, for `harness import`. `imports` describes how it is called."""
 
+import itertools
 import json
 import pathlib
 import re
@@ -56,15 +57,20 @@ def npy(path, request):
 
 
 def csv(path, request):
-    """Lines of fields, separated by commas, semicolons or white space. A first line that is not numeric names the columns. Lines that begin
-    with # are comments."""
+    """Lines of fields, separated by commas, semicolons or white space. A first line that is not numeric names the columns, and so does a
+    comment before it with as many words as there are fields, as NumPy writes it. Other lines that begin with # are comments."""
     text = read_text(path).translate(str.maketrans(",;", "  ", '"'))
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    comments = list(itertools.takewhile(lambda line: line.startswith("#"), lines))
+    lines = [line for line in lines if not line.startswith("#")]
     names = lines[0].split() if lines else []
     is_named = bool(names) and not is_number(names[0])
     cells = lines[is_named:]
     if not cells:
         raise Refused("has no cells")
+    words = comments[-1].lstrip("#").split() if comments and not is_named else []
+    if len(words) == len(names) and not any(map(is_number, words)):
+        names, is_named = words, True
     try:
         columns = np.loadtxt(cells, ndmin=2, comments=None).T
     except ValueError as why:
@@ -83,7 +89,7 @@ def is_number(field):
 
 def read_text(path):
     try:
-        return pathlib.Path(path).read_text("utf-8")
+        return pathlib.Path(path).read_text("utf-8-sig")
     except UnicodeDecodeError:
         raise Refused("is not text in UTF-8") from None
 
@@ -141,12 +147,14 @@ def discretize(path, request):
 
 def grid(shape, origin, edges):
     """The root of smallest cells, of which there are `shape` with these edges along the axes."""
-    edge = edges[0]
+    edge, origin = edges[0], list(map(float, origin))
+    if not np.isfinite(origin).all():
+        raise Refused(f"has the corner {origin}: coordinates must be finite")
     if not (np.isfinite(edges).all() and edge > 0) or (np.abs(np.subtract(edges, edge)) > 1e-6 * edge).any():
-        raise Refused(f"has smallest cells with the edges {list(edges)}: only cubes can be leaves of an oct-tree")
+        raise Refused(f"has smallest cells with the edges {list(map(float, edges))}: only cubes can be leaves of an oct-tree")
     if min(shape) < 1 or max(shape) > 2**LEVEL_MAX:
         raise Refused(f"has {list(shape)} smallest cells along the axes, and from 1 to {2**LEVEL_MAX} are possible")
-    return {"origin": list(map(float, origin)), "edge": float(edge) * 2 ** (int(max(shape)) - 1).bit_length()}
+    return {"origin": origin, "edge": float(edge) * 2 ** (int(max(shape)) - 1).bit_length()}
 
 
 def of_json(text):

@@ -1,7 +1,7 @@
 """Reads a mesh of cubes in one of VTK's formats, for `harness import`. `imports` describes how it is called.
 
 The file is a legacy .vtk file, .vtu, .pvtu, .htg, or VTKHDF with an unstructured grid or a hyper-tree grid; its first bytes decide.
-A hyper-tree grid of 2^k trees along each axis states its root; masked leaves are left out. Files of `harness export` state their root and
+A hyper-tree grid of 2^k trees along each axis states its root; masked leaves are left out, and so are ghosts and hidden cells. Files of `harness export` state their root and
 the digest of their leaves. Unless another array is requested, their sides are those of the array `side`.
 """
 
@@ -14,7 +14,7 @@ from imports import TOLERANCE, Refused, run
 
 try:
     from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkBitArray, vtkIdList, vtkOutputWindow, vtkStringOutputWindow, vtkTypeInt64Array
+    from vtkmodules.vtkCommonCore import vtkBitArray, vtkIdList, vtkLogger, vtkOutputWindow, vtkStringOutputWindow, vtkTypeInt64Array
     from vtkmodules.vtkCommonDataModel import VTK_HEXAHEDRON, VTK_VOXEL
     from vtkmodules.vtkIOHDF import vtkHDFReader
     from vtkmodules.vtkIOLegacy import vtkUnstructuredGridReader
@@ -47,6 +47,8 @@ def rotations():
 
 
 ORDERS = {VTK_HEXAHEDRON: np.array(sorted(rotations())), VTK_VOXEL: np.array([code(VOXEL)])}
+# VTK's flags of cells that are another piece's, that finer ones replace, and that are hidden.
+NOT_OF_MESH = 1 | 8 | 32
 # Cells that are converted at a time. Larger arrays cost a page fault per page, five times the computation.
 CHUNK = 1 << 12
 READERS = {
@@ -74,6 +76,7 @@ def reader_for(path):
 
 def read(path):
     """The data set in the file. VTK reports errors in a window and returns what it has read until then."""
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     reader = reader_for(path)
@@ -207,7 +210,8 @@ def of_hyper_trees(grid):
     axes = [vtk_to_numpy(axis) for axis in (grid.GetXCoordinates(), grid.GetYCoordinates(), grid.GetZCoordinates())]
     steps = [np.diff(np.asarray(axis, np.float64)) for axis in axes]
     edge = steps[0][0]
-    if any((np.abs(step - edge) > 1e-6 * edge).any() for step in steps):
+    # Written so that NaN is no edge.
+    if not all((np.abs(step - edge) <= 1e-6 * edge).all() for step in steps):
         raise Refused("has trees that are not equal cubes")
     mask = vtk_to_numpy(grid.GetMask()).astype(bool) if grid.HasMask() else None
     shape = [len(step) for step in steps]
@@ -261,6 +265,10 @@ def cells(path, request):
     elif data is not None and data.IsA("vtkUnstructuredGrid"):
         (corners, edges), nodes = of_unstructured(data), slice(None)
         root, digest = of_export(path, data, edges)
+        ghosts = data.GetCellData().GetArray("vtkGhostType")
+        if ghosts is not None:
+            nodes = np.flatnonzero(vtk_to_numpy(ghosts) & NOT_OF_MESH == 0)
+            corners, edges = corners[nodes], edges[nodes]
         if digest is not None and data.GetCellData().HasArray("side"):
             name = name or "side"
             digest = digest if name == "side" else None

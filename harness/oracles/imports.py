@@ -42,6 +42,10 @@ def run(read):
     resource.setrlimit(resource.RLIMIT_AS, (memory, most))
     try:
         corners, edges, more = read(sys.argv[1], json.loads(sys.argv[3]))
+        wrong = np.flatnonzero(~(np.isfinite(corners).all(axis=1) & np.isfinite(edges) & (edges > 0)))
+        if len(wrong):
+            cell = f"cell {wrong[0]} with the corner {corners[wrong[0]].tolist()} and the edge {edges[wrong[0]]}"
+            raise Refused(f"has {cell}: coordinates must be finite, and edges positive")
     except Refused as why:
         print(str(why).replace("\n", " "), file=sys.stderr)
         raise SystemExit(2) from None

@@ -5,6 +5,7 @@ Needs target/debug/{harness,reference}, which `cargo test --workspace` builds.""
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,8 @@ import pyvista
 import vtk
 
 from built import PROGRAMS, ROOT, needs
+
+SAMPLES = ROOT / "harness/contract/tests/samples"
 
 ORIGIN, EDGE, DEPTH = np.array([-1.0, 2.0, 0.5]), 4.0, 4
 
@@ -278,6 +281,30 @@ class ImportTest(unittest.TestCase):
         self.assertIn("has cell 0 of VTK's type 10", self.refused(self.at / "tetrahedron.vtu"))
         message = self.refused(self.at / "moved.vtu", "--sides", "absent")
         self.assertIn("not an axis-aligned cube", message)
+
+    def test_cells_without_a_size_or_a_place_are_named(self):
+        path = self.at / "cells.csv"
+        for cell in ("1,0,0,0", "1,0,0,-1", "1,0,nan,1", "inf,0,0,1"):
+            path.write_text(f"x,y,z,edge\n0,0,0,1\n{cell}\n")
+            self.assertIn("has cell 1 with the corner", self.refused(path))
+        grid = hyper_trees(self.rows, self.sides, 1, False)
+        grid.GetYCoordinates().SetTuple1(1, np.nan)
+        write(grid, "vtkHDFWriter", self.at / "nan.vtkhdf")
+        self.assertIn("has trees that are not equal cubes", self.refused(self.at / "nan.vtkhdf"))
+        text = (SAMPLES / "cube.json").read_text()
+        (self.at / "nan.json").write_text(re.sub(r'"(x0|origin)": \[[^,]*', r'"\1": [NaN', text))
+        self.assertIn("has the corner [nan, ", self.refused(self.at / "nan.json"))
+
+    def test_ghosts_and_hidden_cells_are_left_out(self):
+        grid = hexahedra(self.rows, self.sides)
+        flags = np.zeros(len(self.rows), np.uint8)
+        flags[[0, 3, 7, 9]] = 1, 8, 32, 33
+        grid.cell_data["vtkGhostType"] = flags
+        kept = flags == 0
+        for path in (self.at / "ghosts.vtu", self.at / "ghosts.pvtu"):
+            writer = "vtkXMLPUnstructuredGridWriter" if path.suffix == ".pvtu" else "vtkXMLUnstructuredGridWriter"
+            write(grid, writer, path)
+            self.check(path, self.rows[kept], self.sides[kept])
 
     def test_an_absent_cell_array_is_named(self):
         path = self.at / "mesh.vtu"

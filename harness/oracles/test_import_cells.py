@@ -137,6 +137,18 @@ class CellsTest(unittest.TestCase):
         corners, edges, more = read(self.table("edge,z,y,x\n2,3,2,1"), position="centre")
         self.assertEqual((corners.tolist(), edges.tolist(), more["root"]), ([[0, 1, 2]], [2], None))
 
+    def test_a_comment_above_the_cells_names_the_columns_as_numpy_writes_it(self):
+        root = root_of([1.0, 2.0, 3.0, 8.0])
+        for names, expected in (("z y x level", [[3, 2, 1], [3, 2, 5]]), ("made by hand", [[1, 2, 3], [5, 2, 3]])):
+            np.savetxt(self.at / "table.csv", [[1, 2, 3, 1], [5, 2, 3, 3]], header=f"cubes\n{names}")
+            corners, _, _ = read(self.at / "table.csv", root=root)
+            self.assertEqual(corners.tolist(), expected)
+        np.savetxt(self.at / "table.csv", [[1, 2, 3, 1]], header="k,j,i,level", delimiter=",")
+        self.assertIn("has no column x: its columns are k, j, i, level", self.refused(self.at / "table.csv", root=root))
+        self.at.joinpath("table.csv").write_bytes(b"\xef\xbb\xbfx,y,z,edge\r\n1,2,3,4\r\n")
+        corners, _, _ = read(self.at / "table.csv")
+        self.assertEqual(corners.tolist(), [[1, 2, 3]])
+
     def test_arrays_of_numpy_are_tables(self):
         root, path = root_of([0.0, 0.0, 0.0, 1.0]), self.at / "table.npy"
         rows = [(0.0, 0.5, 0.0, 1), (0.5, 0.5, 0.0, 2)]

@@ -110,7 +110,7 @@ pub struct Row {
 /// Reads a name or a list of names.
 fn one_or_many<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<String>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(untagged, expecting = "a name or a list of names was expected")]
     enum OneOrMany {
         One(String),
         Many(Vec<String>),

@@ -1,6 +1,8 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
-//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts.
+//! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
+//! in which their commits were made, so that a commit may be measured later than its successors; one without a time follows the line
+//! before it.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
@@ -20,6 +22,7 @@ use crate::gate::time::{CPU, WALL};
 use crate::git;
 use crate::jsonl::{self, Line};
 use crate::origin::Origins;
+use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::io;
@@ -158,6 +161,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let mut index: HashMap<String, usize> = HashMap::new();
     let (mut machines, mut geometries) = (Origins::default(), Origins::default());
+    let mut times = vec![Timestamp::MIN];
     for Line { number, is_finished, content } in lines {
         let wrong = |why: String| format!("line {number}: {why}");
         let mut record = match content {
@@ -196,11 +200,19 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
                 history.records[same].accepted |= record.accepted;
             }
             None => {
+                let time = match &*record.time {
+                    "" => times[times.len() - 1],
+                    time => time.parse().map_err(|why| wrong(format!("time: {why}")))?,
+                };
+                times.push(time);
                 index.insert(record.commit.clone(), history.records.len());
                 history.records.push(record);
             }
         }
     }
+    let mut in_order: Vec<_> = times.into_iter().skip(1).zip(history.records).collect();
+    in_order.sort_by_key(|(time, _)| *time);
+    history.records = in_order.into_iter().map(|(_, record)| record).collect();
     history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
     Ok(history)
 }
@@ -253,6 +265,27 @@ mod tests {
         }
         let expected = [record("a", &[("x", 3.0), ("y", 4.0)]), record("b", &[("x", 2.5)])];
         assert_eq!(read(&path).unwrap().records, expected);
+    }
+
+    #[test]
+    fn a_commit_that_is_measured_later_has_its_place() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("history.jsonl");
+        for (commit, time) in [
+            ("c", "2026-03-01T12:00:00+02:00"),
+            ("d", ""),
+            ("a", "2026-01-01T00:00:00Z"),
+            ("b", "2026-03-01T11:30:00+02:00"),
+            ("e", "2026-03-01T12:00:00+01:00"),
+        ] {
+            append(&path, &Record { time: time.into(), ..record(commit, &[("x", 1.0)]) }).unwrap();
+        }
+        let records = read(&path).unwrap().records;
+        let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
+        assert_eq!(commits, ["a", "b", "c", "d", "e"]);
+        append(&path, &Record { time: "noon".into(), ..record("f", &[]) }).unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.contains("line 6: time: "), "{error}");
     }
 
     #[test]

@@ -67,12 +67,12 @@ pub struct Arguments {
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
     let (name, number) = text.split_once('=').ok_or("give CASE/METRIC=NUMBER")?;
-    let number: f64 = number.parse().map_err(|_| format!("{number:?} is not a number"))?;
-    if number.is_finite() {
-        Ok((name.to_owned(), number))
-    } else {
-        Err(format!("{number} is not finite"))
-    }
+    let is_named =
+        name.rsplit_once('/').is_some_and(|(case, of)| !case.is_empty() && !of.is_empty());
+    let number = number.parse().ok().filter(|number: &f64| is_named && number.is_finite());
+    number
+        .map(|number| (name.to_owned(), number))
+        .ok_or_else(|| "give CASE/METRIC=NUMBER".to_owned())
 }
 
 /// Appends, analyses, prints and writes; returns the exit code.
@@ -113,9 +113,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let none = Record::new(String::new());
     let last = records.last().unwrap_or(&none);
     let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
-    let worse = all.iter().any(|series| series.worse_recently(recent).is_some());
+    let worse: Vec<&str> = all
+        .iter()
+        .filter(|series| series.worse_recently(recent).is_some())
+        .map(|series| series.name.as_str())
+        .collect();
+    if !worse.is_empty() {
+        println!("FAILED: worse within the last {recent} values: {}", worse.join(", "));
+    }
     put_forms(
-        if worse { EXIT_FAILED } else { EXIT_HOLDS },
+        if worse.is_empty() { EXIT_HOLDS } else { EXIT_FAILED },
         &[
             (&arguments.page, &|| page::page(&records, &all, link)),
             (&arguments.bencher, &|| export::bencher(last)),

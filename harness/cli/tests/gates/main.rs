@@ -132,6 +132,9 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     let outcome = fixture.harness(&format!("track history.jsonl --fail-recent 6 {forms}"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(outcome.printed.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", outcome.printed);
+    let named = "FAILED: worse within the last 6 values: case/words";
+    assert!(outcome.printed.contains(named), "{}", outcome.printed);
+    assert_eq!(fixture.harness("track history.jsonl --value words=1").code, 2);
     assert_eq!(fs::read_to_string(fixture.path("trend.csv")).unwrap().lines().count(), 17);
     assert!(fs::read_to_string(fixture.path("trend.html")).unwrap().contains("commit-10"));
     assert_eq!(fixture.harness("track history.jsonl --fail-recent 5").code, 0);
@@ -250,7 +253,11 @@ fn rules_that_cannot_be_followed_are_refused() {
         (format!("[tolerance]\nmemory = -1.0\n{rules}"), 2, "a tolerance must be between 0 and"),
         (format!("[tolerance.of]\nwords = nan\n{rules}"), 2, "a tolerance must be between 0 and"),
         (format!("{rules}tolerance = {{ wrods = 5.0 }}\n"), 3, "case: wrods: the rules have a tol"),
-        (format!("{rules}tolerance = {{ words = 5.0, '2 ranks/words' = 1.0 }}\n"), 0, "nothing got worse"),
+        (
+            format!("{rules}tolerance = {{ words = 5.0, '2 ranks/words' = 1.0 }}\n"),
+            0,
+            "nothing got worse",
+        ),
     ] {
         fixture.write("gate.toml", &wrong);
         let gate = "gate --engine engine.toml --rules gate.toml --layers counters";

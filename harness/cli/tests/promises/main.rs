@@ -91,6 +91,8 @@ fn a_mesh_that_depends_on_what_it_must_not_is_reported() {
     fixture.engine("repetition", "deterministic = true");
     let repeated = fixture.verify("--no-mpi");
     assert!(failed(&repeated, "deterministic: two serial runs differ"), "{}", repeated.printed);
+    let command = format!(" --engine {} ", fixture.path("foreign.toml").display());
+    assert!(repeated.printed.contains(&command), "{}", repeated.printed);
     for (of, subject) in [("threads", "4 threads"), ("ranks", "3 ranks"), ("partitioner", "metis")]
     {
         fixture.engine(of, &format!("independent_of = ['{of}', 'ranks']"));

@@ -152,7 +152,8 @@ fn a_hang_is_killed_reported_and_kept() {
     let why = "did not end within 20 s and was killed; ranks 0, 1 were in: layer 7";
     assert!(outcome.printed.contains(why), "{}", outcome.printed);
     assert!(
-        outcome.printed.contains("repeat with: ") && outcome.printed.contains("--no-mpi --keep"),
+        outcome.printed.contains("repeat with: ")
+            && outcome.printed.contains("--timeout 20 --no-mpi --keep"),
         "{}",
         outcome.printed
     );
@@ -220,8 +221,9 @@ fn a_wrong_digest_in_manifest_and_report_on_ranks_is_reported() {
     fixture.script("mesher", &format!("{HOLDS}\n{lie}"));
     let outcome = fixture.verify(&[]);
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
-    let why =
-        format!("2 ranks, morton, base auto; 3 ranks, morton, base auto: manifest: digest: \"{digest}\" in the");
+    let why = format!(
+        "2 ranks, morton, base auto; 3 ranks, morton, base auto: manifest: digest: \"{digest}\" in the"
+    );
     assert!(outcome.printed.contains(&why), "{}", outcome.printed);
 }
 

@@ -78,7 +78,7 @@ pub struct PhaseReport {
 
 fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(untagged, expecting = "peak_rss_bytes must be a whole number or a list of them")]
     enum OneOrMany {
         One(u64),
         Many(Vec<u64>),
@@ -89,6 +89,9 @@ fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error
     })
 }
 
+/// Longest time that is believed, in seconds: 30 years.
+const SECONDS_MAX: f64 = 1e9;
+
 impl RunReport {
     /// Reads a run report.
     ///
@@ -97,7 +100,28 @@ impl RunReport {
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("the run report {} is unusable: {why}", path.display());
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))
+        let report: Self = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        report.fault().map_or(Ok(report), |why| Err(wrong(why)))
+    }
+
+    /// What cannot be true of any run, in one sentence: a time that no clock shows, or numbers of ranks whose sum exceeds 64 bits.
+    fn fault(&self) -> Option<String> {
+        let mut times = vec![self.time_wall_s.as_slice()];
+        let mut numbers = vec![("peak_rss_bytes", &self.peak_rss_bytes)];
+        numbers.extend(self.counters.iter().map(|(name, of)| (name.as_str(), of)));
+        for phase in &self.phases {
+            times.extend([&*phase.time_wall_s, &phase.time_cpu_s]);
+            times.extend([&*phase.time_comm_wall_s, &phase.time_comm_cpu_s]);
+            numbers.push(("messages", &phase.messages));
+            numbers.push(("message_bytes", &phase.message_bytes));
+        }
+        let is_possible = |time: &&f64| (0.0..=SECONDS_MAX).contains(*time);
+        if let Some(time) = times.concat().iter().find(|time| !is_possible(time)) {
+            return Some(format!("a time of {time:e} s is not possible"));
+        }
+        let sum = |of: &[u64]| of.iter().try_fold(0u64, |sum, n| sum.checked_add(*n));
+        let (name, _) = numbers.into_iter().find(|(_, of)| sum(of).is_none())?;
+        Some(format!("the sum of {name} over all ranks exceeds 64 bits"))
     }
 
     /// The report of a run that wrote a mesh and no run report.
@@ -153,6 +177,25 @@ mod tests {
         let reference =
             parse(r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#);
         assert_eq!((reference.ranks, reference.peak_rss_bytes_total()), (None, 9));
+    }
+
+    #[test]
+    fn impossible_numbers_are_refused() {
+        let phase = |of: &str| format!(r#""phases": [{{"name": "read", {of}}}]"#);
+        for (of, why) in [
+            (r#""time_wall_s": -1.0"#.to_owned(), "a time of -1e0 s"),
+            (r#""time_wall_s": 1e300"#.to_owned(), "a time of 1e300 s"),
+            (phase(r#""time_cpu_s": [1.0, -2.0]"#), "a time of -2e0 s"),
+            (phase(r#""messages": [9223372036854775808, 9223372036854775808]"#), "sum of messages"),
+            (r#""peak_rss_bytes": [18446744073709551615, 1]"#.to_owned(), "sum of peak_rss_bytes"),
+            (r#""counters": {"rays": [18446744073709551615, 1]}"#.to_owned(), "sum of rays over"),
+        ] {
+            let fault = parse(&format!(r#"{{"cells": 8, {of}}}"#)).fault().unwrap();
+            assert!(fault.contains(why), "{of}: {fault}");
+        }
+        let wrong = r#"{"cells": 8, "peak_rss_bytes": [-3]}"#;
+        let error = serde_json::from_str::<RunReport>(wrong).unwrap_err().to_string();
+        assert!(error.contains("must be a whole number or a list of them"), "{error}");
     }
 
     #[test]

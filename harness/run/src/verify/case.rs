@@ -166,8 +166,26 @@ impl<'a> CaseRun<'a> {
         let paths = &self.programs.paths;
         let mut words = vec![paths.harness.to_string_lossy().into_owned(), "verify".into()];
         words.push(self.selected.argument.clone());
-        if self.programs.engine.name() != "mesher" {
-            words.extend(["--engine".into(), self.programs.engine.name().to_owned()]);
+        let absolute = |path: &Path| {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+            path.to_string_lossy().into_owned()
+        };
+        match self.programs.engine.name() {
+            "mesher" => {}
+            file if file.ends_with(".toml") => {
+                words.extend(["--engine".into(), absolute(Path::new(file))]);
+            }
+            name => words.extend(["--engine".into(), name.to_owned()]),
+        }
+        let (chosen, usual) = (self.options, Options::of_leaves_alone(Vec::new()));
+        for (option, value, usual) in [
+            ("--timeout", chosen.timeout, usual.timeout),
+            ("--cells-max", chosen.cells_max, usual.cells_max),
+            ("--reference-cells-max", chosen.reference_cells_max, usual.reference_cells_max),
+        ] {
+            if value != usual {
+                words.extend([option.to_owned(), value.to_string()]);
+            }
         }
         let on_ranks = layout.filter(|layout| layout.rank_count().is_some());
         words.extend(on_ranks.map_or(vec!["--no-mpi".to_owned()], options_of));
@@ -176,7 +194,7 @@ impl<'a> CaseRun<'a> {
         for (name, engine) in programs {
             if let Some(program) = engine.program_given() {
                 words.push(format!("--{name}"));
-                words.push(program.to_string_lossy().into_owned());
+                words.push(absolute(program));
             }
         }
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
