@@ -176,6 +176,42 @@ fn without_a_start_the_regions_that_leaked_are_examined() {
     assert!(code == 2 && text.contains("nothing to examine"), "{code}: {text}");
 }
 
+/// The box is closed at both coarser spacings, with and without a seed in it.
+#[test]
+fn an_audit_with_the_case_finds_leaks_that_the_manifest_conceals() {
+    let reference = Path::new(env!("CARGO_BIN_EXE_harness")).with_file_name("reference");
+    if !reference.is_file() {
+        eprintln!("skipped: the reference was not built");
+        return;
+    }
+    let fixture = Fixture::new();
+    for seeds in ["", "keep = \"outside\"\nseeds = [[5.0, 5.0, 5.0]]\n"] {
+        let text = format!("geometry = \"box.stl\"\nspacing_min = 1.0\n{seeds}{ROOT}");
+        fs::write(fixture.path("case.toml"), text).unwrap();
+        let _ = fs::remove_dir_all(fixture.path("mesh"));
+        let mut command = Command::new(&reference);
+        command.args(["case.toml", "--out", "mesh"]).current_dir(fixture.0.path());
+        assert!(command.output().unwrap().status.success());
+        let audit = || {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+            command.args(["audit", "mesh", "--case", "case.toml"]);
+            let output = command.current_dir(fixture.0.path()).output().unwrap();
+            (output.status.code(), String::from_utf8(output.stdout).unwrap())
+        };
+        let (code, text) = audit();
+        assert_eq!(code, Some(0), "{text}");
+        let path = fixture.path("mesh/mesh.json");
+        let stated = fs::read_to_string(&path).unwrap();
+        let mut manifest: serde_json::Value = serde_json::from_str(&stated).unwrap();
+        let leaks = manifest["leaks"].as_array_mut().unwrap();
+        assert!(!leaks.is_empty());
+        leaks.pop();
+        fs::write(&path, manifest.to_string()).unwrap();
+        let (code, text) = audit();
+        assert!(code == Some(1) && text.contains("the manifest states the leaks ["), "{text}");
+    }
+}
+
 /// What the mesher advises finds the opening of the box with a hole in its lid, for every kind of seed.
 #[test]
 fn the_command_of_a_warning_finds_the_opening() {

@@ -1,8 +1,8 @@
 //! The manifest agrees with the files and with the case.
 //!
 //! Section 8 of reference/DEFINITION.md: counts, digests, inputs and, if the mesh equals the reference, the
-//! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. `sides` checks the
-//! ambiguous components and `kept` the numbers of components.
+//! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
+//! leaks and the ambiguous components, and `kept` the numbers of components.
 
 use serde::Serialize;
 

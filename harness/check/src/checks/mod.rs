@@ -15,6 +15,7 @@ pub mod gap;
 pub mod identical;
 pub mod kept;
 pub mod layer;
+mod leaks;
 pub mod linear;
 pub mod manifest;
 mod needless;

@@ -3,7 +3,7 @@
 //!
 //! Section 4 of reference/DEFINITION.md. With the case: the components of T0's leaves (connected through faces) are
 //! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf of the mesh and of
-//! an engine's T0 must have the side of T0's leaf. The manifest must state the number of ambiguous components. Without the case:
+//! an engine's T0 must have the side of T0's leaf. The manifest must state the number of ambiguous components, and the leaks. Without the case:
 //! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that
 //! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
 //! definition is judged beyond a band around the geometry ([`super::region`]).
@@ -50,8 +50,32 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         of_components("T0: ", tree, truth, subject, result);
         ambiguous("T0: ", &base.manifest, &truth.components, terms, result);
     }
+    stated_leaks(subject, truth, result);
     let undecided = truth.components.iter().filter(|c| c.is_ambiguous()).count();
     result.note = format!("{} components, {undecided} ambiguous", truth.components.len());
+}
+
+/// The manifests state the leaks of T0, if they state any or none.
+fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
+    let base = subject.base.as_ref().map(|(base, _)| &base.manifest);
+    let stated = [("", Some(subject.manifest)), ("T0: ", base)];
+    let stated = stated.map(|(prefix, manifest)| (prefix, manifest.and_then(|m| m.leaks.as_ref())));
+    let (Some(case), Some(facets)) = (subject.case, subject.facets()) else { return };
+    if stated.iter().all(|(_, leaks)| leaks.is_none()) {
+        return;
+    }
+    let leaks = super::leaks::find(case, facets, &subject.inputs, truth);
+    for (prefix, stated) in stated {
+        if let (Some(stated), Some(leaks)) = (stated, &leaks)
+            && stated != leaks
+        {
+            result.report(format!(
+                "{prefix}the manifest states the leaks {}, but T0 has {}",
+                json(stated),
+                json(leaks)
+            ));
+        }
+    }
 }
 
 /// Inside and outside leaves share no face.

@@ -1,0 +1,88 @@
+//! The leaks of T0: regions that are closed at a coarser spacing and open at that of the mesh (section 4 of reference/DEFINITION.md).
+
+use super::components::{self, Component};
+use super::facets::Facets;
+use super::terms::Terms;
+use super::truth::Truth;
+use contract::case::Case;
+use contract::lattice::FacetLattice;
+use contract::manifest::{Keep, Leak};
+use contract::octant::{LEVEL_MAX, Octant};
+use contract::word::{self, Side};
+use std::collections::HashSet;
+
+/// The leaks of a case with this T0; `None` if a coarser T0 has too many leaves, although there are fewer of them.
+pub(super) fn find(
+    case: &Case,
+    facets: &Facets,
+    terms: &Terms,
+    truth: &Truth,
+) -> Option<Vec<Leak>> {
+    if !terms.seeds.is_empty() && is_closed(&case.facets_lattice) {
+        return Some(Vec::new());
+    }
+    let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
+    let between = levels.map(|level| between(case, facets, terms, truth, level));
+    between.collect::<Option<Vec<_>>>().map(|leaks| leaks.concat())
+}
+
+/// Whether every edge belongs to an even number of facets.
+fn is_closed(facets: &[FacetLattice]) -> bool {
+    let mut odd = HashSet::new();
+    for [a, b, c] in facets {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            let edge = [from.min(to), from.max(to)];
+            if from != to && !odd.remove(&edge) {
+                odd.insert(edge);
+            }
+        }
+    }
+    odd.is_empty()
+}
+
+/// The leaks between T0 cut at a level, and T0.
+fn between(
+    case: &Case,
+    facets: &Facets,
+    terms: &Terms,
+    truth: &Truth,
+    level: u8,
+) -> Option<Vec<Leak>> {
+    let mut cut = Terms { level_surface: level, ..terms.clone() };
+    cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
+    let make = |terms: &Terms| Truth::new(facets, &case.facets_lattice, terms);
+    let mut coarse = make(&cut)?;
+    let seeded = components::seeded_leaves(&coarse.words, terms);
+    let is_crossing =
+        |&(leaf, _): &(u32, usize)| word::side(coarse.words[leaf as usize]) == Side::Crossing;
+    if seeded.iter().any(is_crossing) {
+        coarse = make(&Terms { seeds: Vec::new(), ..cut })?;
+    }
+    let edge = |level: u8| terms.root.edge / f64::from(1u32 << level);
+    let leak = |component: &Component| {
+        let octants =
+            component.leaves.iter().map(|&leaf| word::octant(coarse.words[leaf as usize]));
+        let units: u64 = octants.map(|octant: Octant| 1 << (3 * (LEVEL_MAX - octant.level))).sum();
+        Leak {
+            spacing_coarse: edge(level),
+            spacing_fine: edge(terms.level_surface),
+            volume: units as f64 * edge(LEVEL_MAX).powi(3),
+            point: terms.root.to_user(component.first.centre()),
+        }
+    };
+    let has_leaked = |component: &&Component| {
+        // All leaves of T0 within a leaf that no facet crosses have one side.
+        let fine = truth.component_at(&component.first).map(|fine| fine.side);
+        let leaks = match (component.side, fine) {
+            (Side::Inside, Some(Side::Outside)) => {
+                terms.seeds.is_empty() || terms.keep != Keep::Inside
+            }
+            (Side::Outside, Some(Side::Inside)) => terms.keep == Keep::Inside,
+            _ => false,
+        };
+        leaks && components::seed_in(&component.leaves, &seeded).is_none()
+    };
+    let mut leaked: Vec<&Component> = coarse.components.iter().filter(has_leaked).collect();
+    leaked.sort_by_key(|component| (component.first.level, word::key_of(component.first.corner)));
+    Some(leaked.into_iter().map(leak).collect())
+}
