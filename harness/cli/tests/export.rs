@@ -104,7 +104,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
             &["--side", "inside", "--level-max", "0"],
             "no leaf satisfies all conditions",
         ),
-        ("case/constant/polyMesh", &["--case", "cube-small"], "another root"),
+        ("case/constant/polyMesh", &["--case", "cube-small"], "not of the case cube-small"),
     ] {
         let (code, output, error) = export(&place, file, options);
         assert_eq!((code, output.as_str(), error.matches('\n').count()), (2, "", 1), "{error}");

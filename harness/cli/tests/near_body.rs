@@ -31,7 +31,7 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
     let files = ["-o", "a.stl", "-o", "a.vtp", "--json", "a.json"];
     let (code, output, error) = near_body(place.path(), &[&["mesh"], &files[..]].concat());
     assert_eq!((code, error.as_str()), (0, ""));
-    assert!(output.contains("24 faces of area 24.000000, closed"), "{output}");
+    assert!(output.contains("24 faces of area 24.0, closed"), "{output}");
     assert_eq!(fs::metadata(place.path().join("a.stl")).unwrap().len(), 84 + 50 * 48);
     let json = fs::read_to_string(place.path().join("a.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
@@ -82,4 +82,15 @@ fn a_surface_is_measured_and_written_or_refused_in_one_sentence() {
     fs::write(place.path().join("other.toml"), other).unwrap();
     let roots = "a root of edge 8 at (0, 0, 0) and surface level 0, the case a root of edge 4 at";
     refused(&["mesh", "--case", "other.toml"], roots);
+    // The geometry was replaced after the mesh was made.
+    let manifest = place.path().join("mesh/mesh.json");
+    let stated = fs::read_to_string(&manifest).unwrap();
+    let geometry = format!(r#"{{"geometry": {{"facets": 7, "digest": "{}"}},"#, "0".repeat(32));
+    fs::write(&manifest, stated.replacen('{', &geometry, 1)).unwrap();
+    refused(&["mesh", "--case", "case.toml"], "7 facets of the digest 000");
+    fs::write(&manifest, stated.replacen("\"digest\":\"", "\"digest\":\"0", 1)).unwrap();
+    refused(&["mesh"], "a digest is 32 lower-case hex digits");
+    let digest = stated.split("\"digest\":\"").nth(1).unwrap()[..32].to_owned();
+    fs::write(&manifest, stated.replace(&digest, &"1".repeat(32))).unwrap();
+    refused(&["mesh"], "and its manifest states 1111");
 }

@@ -5,9 +5,10 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use contract::case::Case;
+use contract::digest::Digest;
 use contract::htg::TreeFile;
 use contract::lattice::Root;
-use contract::manifest::Sides;
+use contract::manifest::{Geometry, Sides};
 use contract::mesh::{self, Order};
 use contract::npy::PartFile;
 use contract::word;
@@ -43,17 +44,22 @@ impl Mesh {
         Ok(Self { files: mesh::Mesh::open(path)?, leaves_by_rank: OnceLock::new() })
     }
 
-    /// Refuses a case that was not meshed here, by its root and its surface level.
+    /// Refuses a case that was not meshed here, by its root, its surface level and its facets.
     ///
     /// # Errors
     /// If the mesh cannot be one of the case.
     pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
-        let stated = |root: Root, level: u8| {
+        let stated = |root: Root, level: u8, geometry: Option<Geometry>| {
             let Root { origin: [x, y, z], edge } = root;
-            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}")
+            let facets = geometry.map_or(String::new(), |Geometry { facets, digest }| {
+                format!(", with {facets} facets of the digest {digest}")
+            });
+            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
         };
-        let of_mesh = stated(self.manifest.root, self.manifest.level_surface);
-        let of_case = stated(case.root, case.level_surface);
+        let geometry = self.manifest.geometry;
+        let of_mesh = stated(self.manifest.root, self.manifest.level_surface, geometry);
+        let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
+        let of_case = stated(case.root, case.level_surface, geometry);
         if of_mesh == of_case {
             return Ok(());
         }
@@ -139,14 +145,15 @@ impl Mesh {
     /// Visits the selected leaves in Morton order. All leaves are read once, and `check` is called from time to time.
     ///
     /// # Errors
-    /// If a part cannot be read or is not a sequence of leaves; or the first error of `check` or `visit`, which ends the traversal.
+    /// If a part cannot be read or is not a sequence of leaves, or if the leaves do not have the digest in the manifest; or the first error
+    /// of `check` or `visit`, which ends the traversal.
     pub fn visit(
         &self,
         selection: &Selection,
         check: Check<'_>,
         visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let (mut order, mut index) = (Order::default(), 0u64);
+        let (mut order, mut index, mut digest) = (Order::default(), 0u64, Digest::default());
         let mut one = |word: u64, rank: u32| {
             if index.is_multiple_of(CHECKED) {
                 check()?;
@@ -156,6 +163,7 @@ impl Mesh {
             }
             let leaf = Leaf { octant: word::octant(word), side: word::side(word), rank, index };
             index += 1;
+            digest.add(word);
             if selection.has(&leaf) { visit(leaf) } else { Ok(()) }
         };
         let mut visited = Ok(());
@@ -164,7 +172,12 @@ impl Mesh {
             visited = words.iter().enumerate().try_for_each(|(i, &word)| one(word, rank(i)));
             visited.is_ok()
         })?;
-        visited
+        visited?;
+        let stated = self.manifest.digest;
+        let why = format!(
+            "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
+        );
+        if digest == stated { Ok(()) } else { Err(Failure::input(why)) }
     }
 }
 

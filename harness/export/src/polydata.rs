@@ -39,7 +39,7 @@ pub(crate) fn array(name: &str, values: impl Into<IOBuffer>) -> Attribute {
 }
 
 /// Writes a file of one piece.
-pub(crate) fn write(title: &str, piece: PolyDataPiece, out: impl Write) -> io::Result<()> {
+pub(crate) fn write(title: &str, piece: PolyDataPiece, mut out: impl Write) -> io::Result<()> {
     let file = Vtk {
         version: Version { major: 1, minor: 0 },
         title: title.into(),
@@ -47,5 +47,8 @@ pub(crate) fn write(title: &str, piece: PolyDataPiece, out: impl Write) -> io::R
         data: DataSet::inline(piece),
         file_path: None,
     };
-    file.write_xml(out).map_err(|error| io::Error::other(format!("{error:?}")))
+    // The errors of vtkio do not say what the system said.
+    let mut bytes = Vec::new();
+    file.write_xml(&mut bytes).map_err(|error| io::Error::other(format!("{error:?}")))?;
+    out.write_all(&bytes)
 }

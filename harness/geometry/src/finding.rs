@@ -18,8 +18,9 @@ pub enum Kind {
     Winding,
     /// Closed shells of consistent winding that enclose a negative volume, and cannot lie in another closed shell.
     InsideOut,
-    /// Closed shells of consistent winding that enclose a negative volume, within the bounding box of another closed shell.
-    Cavities,
+    /// Closed shells of consistent winding that enclose a negative volume, within the bounding box of another closed shell; and other
+    /// closed shells that lie in an odd number of closed ones.
+    Nested,
     /// Facets with the three vertices of an earlier facet, in any order.
     Duplicates,
     /// Facets without area on the lattice.

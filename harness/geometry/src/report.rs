@@ -116,10 +116,10 @@ impl Diagnosis {
             [edges.odd, edges.even, edges.flipped],
             "findings of edges with {edges:?}"
         );
-        let inward = count(Kind::InsideOut) + count(Kind::Cavities);
+        let inward = count(Kind::InsideOut) + count(Kind::Nested);
         assert!(
             inward <= shells.closed,
-            "{inward} of {} closed shells are wound inward",
+            "{inward} of {} closed shells are wound inward, or nested",
             shells.closed
         );
         assert!(

@@ -1,11 +1,14 @@
 //! Shells: components of facets that are connected by shared edges.
 
 use contract::lattice::FacetLattice;
+use contract::manifest::Keep;
+use contract::parity::Parity;
 use contract::sets::Sets;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use std::collections::HashMap;
 
 /// A shell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,15 +128,38 @@ impl Shells {
             && !(one.may_be_in(other) || other.may_be_in(one))
     }
 
-    /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one.
+    /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one. Among the latter
+    /// also solids whose interior is outside because they lie in an odd number of other closed shells.
     pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
-        let mut findings = [Kind::InsideOut, Kind::Cavities].map(Finding::new);
-        let closed = || self.all.iter().filter(|shell| shell.is_closed);
-        for shell in closed().filter(|shell| shell.is_wound_inward()) {
-            let at = usize::from(closed().any(|other| shell.may_be_in(other)));
+        let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
+        let closed = || self.all.iter().enumerate().filter(|(_, shell)| shell.is_closed);
+        let mut interiors: HashMap<usize, Parity> = HashMap::new();
+        for (_, shell) in closed() {
+            let around: Vec<usize> =
+                closed().filter(|(_, other)| shell.may_be_in(other)).map(|(i, _)| i).collect();
             let facet = shell.facet_first;
+            let corner = input.lattice[facet as usize][0];
+            let mut contains = |other: &&usize| {
+                let interior = interiors.entry(**other);
+                let interior = interior.or_insert_with(|| self.interior(**other as u32, input));
+                interior.inside(corner) == [true; 6]
+            };
+            let at = match shell.is_wound_inward() {
+                true => usize::from(!around.is_empty()),
+                false if around.iter().filter(&mut contains).count() % 2 == 1 => {
+                    findings[1].count_changing += u64::from(input.keep != Keep::Outside);
+                    1
+                }
+                false => continue,
+            };
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
         findings
+    }
+
+    /// The interior of a shell.
+    fn interior(&self, shell: u32, input: &Input) -> Parity {
+        let of_shell = input.lattice.iter().zip(&self.of).filter(|(_, of)| **of == shell);
+        Parity::new(&of_shell.map(|(facet, _)| *facet).collect::<Vec<_>>())
     }
 }

@@ -16,7 +16,7 @@ use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Exit code of the script for a file that is not such a mesh.
@@ -85,6 +85,7 @@ pub fn import(
 ) -> Result<Imported, Failure> {
     let input = |error: Unusable| Failure::from(error.of_file(path));
     let root = request.root.or(case.map(|case| case.root));
+    parts(path).iter().try_for_each(|part| files::register_input(part))?;
     let format = format.map_or_else(|| import::guess(path), Ok).map_err(input)?;
     if format == Format::Vtk {
         let sides = request.sides.as_deref();
@@ -96,6 +97,22 @@ pub fn import(
     let cells = read(path, format, &Request { root, ..request.clone() }, paths, limit)?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
+}
+
+/// The files of a mesh that consists of several: of a directory of OpenFOAM, and the pieces that a `.pvtu` names.
+fn parts(path: &Path) -> Vec<PathBuf> {
+    let within = [path.to_owned(), path.join("constant/polyMesh")];
+    let entries = within.iter().filter_map(|dir| fs::read_dir(dir).ok()).flatten().flatten();
+    let text = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvtu")) {
+        true => contract::files::read_text(path).unwrap_or_default(),
+        false => String::new(),
+    };
+    let named = text.split("Source=").skip(1).filter_map(|rest| {
+        let quote = rest.chars().next()?;
+        rest[quote.len_utf8()..].split(quote).next()
+    });
+    let beside = path.parent().unwrap_or(Path::new(""));
+    entries.map(|entry| entry.path()).chain(named.map(|name| beside.join(name))).collect()
 }
 
 /// Reads the cells of a file.

@@ -4,6 +4,7 @@
 //! and counts are plain numbers in the units of their names; values over the ranks are stored as sum and maximum, and
 //! rank by rank only for useful times on up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
+use run::engine::report::SECONDS_MAX;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -27,6 +28,30 @@ pub struct Line {
 }
 
 impl Line {
+    /// What cannot be true of any run, in one sentence.
+    pub fn fault(&self) -> Option<String> {
+        let run = match &self.entry {
+            Entry::Run(run) => run,
+            Entry::Network(Network { latency_s, bandwidth_bytes_per_s, .. }) => {
+                let is_possible = (0.0..=SECONDS_MAX).contains(latency_s)
+                    && *bandwidth_bytes_per_s > 0.0
+                    && bandwidth_bytes_per_s.is_finite();
+                return (!is_possible).then(|| "its network is not possible".to_owned());
+            }
+            _ => return None,
+        };
+        let is_possible = |time: &f64| (0.0..=SECONDS_MAX).contains(time);
+        let phases = run.phases.iter().flat_map(|phase| [&phase.useful_s, &phase.wall_s]);
+        let of_ranks = phases.chain([&run.useful_s]);
+        let of_ranks = of_ranks.flat_map(|s| s.by_rank.iter().copied().chain([s.sum, s.max]));
+        let times = of_ranks.chain([run.time_wall_s]);
+        if let Some(time) = times.into_iter().find(|time| !is_possible(time)) {
+            return Some(format!("a time of {time:e} s is not possible"));
+        }
+        (run.time_wall_s == 0.0 || run.setup.ranks == 0)
+            .then(|| "it has no wall time, or no ranks".to_owned())
+    }
+
     /// Returns the session that the line begins, if it begins one.
     pub fn session(&self) -> Option<&Session> {
         match &self.entry {

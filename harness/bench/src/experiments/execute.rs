@@ -210,7 +210,7 @@ fn measurements(setup: Setup, report: RunReport, time_process_s: f64) -> Run {
         geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
         cells: report.cells,
         time_wall_s,
-        peak_rss_bytes: Spread::brief(&peak_rss_bytes(&setup, &report)),
+        peak_rss_bytes: spread(&report.peak_rss_bytes),
         useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
         phases: report.phases.iter().map(phase).collect(),
         counters: report.counters.iter().map(|(name, of)| (name.clone(), spread(of))).collect(),
@@ -240,15 +240,6 @@ fn phase(phase: &PhaseReport) -> Phase {
         wall_s: Spread::brief(&phase.time_wall_s),
         messages: spread(&phase.messages),
         message_bytes: spread(&phase.message_bytes),
-    }
-}
-
-fn peak_rss_bytes(setup: &Setup, report: &RunReport) -> Vec<f64> {
-    let by_rank = report.peak_rss_bytes.iter().map(|&bytes| bytes as f64);
-    match setup.comm {
-        // One process contains all simulated ranks, and each reports the peak of that process.
-        Comm::Sim => by_rank.reduce(f64::max).into_iter().collect(),
-        _ => by_rank.collect(),
     }
 }
 
@@ -288,8 +279,8 @@ mod tests {
         assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
         assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
         assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
-        // All simulated ranks are in one process.
-        assert_eq!(measurements(setup(Comm::Sim, 2), report, 1.0).peak_rss_bytes.sum, 70.0);
+        // A simulated rank reports its part of the one process.
+        assert_eq!(measurements(setup(Comm::Sim, 2), report, 1.0).peak_rss_bytes.sum, 140.0);
     }
 
     #[test]

@@ -11,9 +11,10 @@ use super::cause::sentence;
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
-use crate::order::by_key;
+use crate::order::{by_key, distinct};
 use crate::origin::Origins;
 use crate::statistics::{Median, median};
+use run::engine::lacks::EQUAL_RUNS;
 use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.
@@ -31,25 +32,27 @@ pub struct Group {
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
+    /// The network of projected times: the last one that a session on the machine of the runs states.
+    pub network: Network,
 }
 
 impl Group {
     /// Groups the repetitions of one setup; `None` for no repetitions.
-    fn of(setup: Setup, runs: Vec<Run>, network: &Network) -> Option<Self> {
-        let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, network)).collect();
+    fn of(setup: Setup, runs: Vec<Run>, network: Network) -> Option<Self> {
+        let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, &network)).collect();
         let mut time_s = median(&times)?;
-        let off = |run: &&Run| (pop::time_s(run, network) - time_s.value).abs();
+        let off = |run: &&Run| (pop::time_s(run, &network) - time_s.value).abs();
         let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
         let by_rank = reports_ranks(&runs);
         if by_rank {
             quieten(&mut typical, &runs);
             if setup.comm == Comm::Sim {
-                time_s.value = pop::time_s(&typical, network);
+                time_s.value = pop::time_s(&typical, &network);
                 time_s.low = time_s.low.min(time_s.value);
                 time_s.high = time_s.high.max(time_s.value);
             }
         }
-        Some(Self { setup, runs, time_s, typical, by_rank })
+        Some(Self { setup, runs, time_s, typical, by_rank, network })
     }
 
     /// Returns the origin of the times of single ranks, for a caption.
@@ -98,8 +101,8 @@ impl Group {
     }
 
     /// Returns the efficiencies of the typical run relative to that of `reference`.
-    pub fn efficiency(&self, reference: &Group, network: &Network) -> Efficiency {
-        pop::efficiency(&self.typical, &reference.typical, network)
+    pub fn efficiency(&self, reference: &Group) -> Efficiency {
+        pop::efficiency(&self.typical, &reference.typical, &self.network)
     }
 }
 
@@ -138,8 +141,6 @@ pub struct Groups {
     pub left_out: Vec<LeftOut>,
     /// By program: what it does not do or promise.
     pub lacks: BTreeMap<String, Vec<String>>,
-    /// The network of the last line that has one.
-    pub network: Network,
     /// A sentence for every program and case of which there are several series.
     pub origins: Vec<String>,
 }
@@ -148,26 +149,41 @@ impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
         let (lines, origins) = apart(lines);
-        let (mut network, mut lacks) = (ASSUMED, BTreeMap::new());
+        let mut lacks = BTreeMap::new();
         let (mut left_out, mut runs) = (Vec::new(), Vec::new());
+        let mut digests = HashMap::new();
+        let (mut machines, mut networks) = (HashMap::new(), HashMap::new());
+        let machine =
+            |machines: &HashMap<&str, String>, session: &str| machines.get(session).cloned();
         for line in &lines {
             match &line.entry {
-                Entry::Network(n) => network = *n,
-                Entry::Session(session) => lacks.extend(session.lacks.clone()),
+                Entry::Network(network) => {
+                    networks.insert(machine(&machines, &line.session), *network);
+                }
+                Entry::Session(session) => {
+                    lacks.extend(session.lacks.clone());
+                    machines.insert(line.session.as_str(), session.machine.label());
+                }
                 Entry::LeftOut(left) => left_out.push(left.clone()),
                 Entry::Failure(Failure { setup, why, .. }) => {
                     let why = format!("{} failed: {why}", setup.engine);
                     left_out.push(LeftOut { setup: setup.clone(), why });
                 }
-                Entry::Run(run) => runs.extend((!run.warm_up).then_some(&**run)),
+                Entry::Run(run) if run.warm_up => {}
+                Entry::Run(run) => match another_mesh(run, &lacks, &mut digests) {
+                    None => runs.push((&**run, &line.session)),
+                    Some(why) => left_out.push(LeftOut { setup: run.setup.clone(), why }),
+                },
                 Entry::Audit(_) | Entry::Target(_) => {}
             }
         }
-        let group = |(setup, runs): (Setup, Vec<&Run>)| {
-            Group::of(setup, runs.into_iter().cloned().collect(), &network)
+        let group = |(setup, runs): (Setup, Vec<(&Run, &String)>)| {
+            // All are of one machine.
+            let network = networks.get(&machine(&machines, runs[0].1)).copied().unwrap_or(ASSUMED);
+            Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
         };
-        let all = by_key(runs, |run| run.setup.clone()).into_iter().filter_map(group).collect();
-        let groups = Self { all, left_out, lacks, network, origins };
+        let all = by_key(runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
+        let groups = Self { all: all.collect(), left_out, lacks, origins };
         groups.check_invariants();
         groups
     }
@@ -195,7 +211,11 @@ impl Groups {
             let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
             let size = match weak {
                 true => o.experiment == "weak",
-                false => o.spacing_min == s.spacing_min && (o.ranks == 1 || alike),
+                // Another partition on as many ranks is no base.
+                false => {
+                    let is_base = o.ranks == 1 || alike && s.experiment != "weights";
+                    o.spacing_min == s.spacing_min && is_base
+                }
             };
             size && (&o.case, o.layer_cells_min, &o.engine)
                 == (&s.case, s.layer_cells_min, &s.engine)
@@ -209,12 +229,18 @@ impl Groups {
 
     /// Returns the efficiencies of a group relative to its reference.
     pub fn efficiency(&self, group: &Group) -> Efficiency {
-        group.efficiency(self.reference(group), &self.network)
+        group.efficiency(self.reference(group))
+    }
+
+    /// Returns the networks of these groups, as text.
+    pub fn networks<'a>(groups: impl IntoIterator<Item = &'a Group>) -> String {
+        let networks = groups.into_iter().map(|group| group.network.to_string());
+        distinct(networks).join("; on another machine ")
     }
 
     /// Returns the largest loss of efficiency of a group in one sentence.
     pub fn cause(&self, group: &Group) -> String {
-        sentence(&group.typical, &self.reference(group).typical, &self.network)
+        sentence(&group.typical, &self.reference(group).typical, &group.network)
     }
 
     /// Returns simulated groups, each with that of the same mesh on equally many ranks of MPI without oversubscription.
@@ -226,6 +252,28 @@ impl Groups {
         let sims = self.all.iter().filter(|g| g.setup.comm == Comm::Sim);
         sims.filter_map(|sim| Some([sim, measured(sim)?])).collect()
     }
+}
+
+/// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
+fn another_mesh(
+    run: &Run,
+    lacks: &BTreeMap<String, Vec<String>>,
+    digests: &mut HashMap<String, String>,
+) -> Option<String> {
+    let s = &run.setup;
+    let engine = s.engine.split(" [").next().unwrap_or_default();
+    let lacks = lacks.get(engine).map_or(&[][..], Vec::as_slice);
+    if run.digest.is_empty() || lacks.iter().any(|what| what == EQUAL_RUNS) {
+        return None;
+    }
+    let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
+    if !lacks.is_empty() {
+        mesh += &format!(" {} {}", s.ranks, s.partitioner);
+    }
+    let first = digests.entry(mesh).or_insert_with(|| run.digest.clone());
+    let digest = &run.digest;
+    (first != digest)
+        .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
 }
 
 /// Returns the lines with the runs of every further machine, build or geometry as those of another program or case, and a

@@ -51,7 +51,10 @@ pub fn read(path: &Path) -> io::Result<Content> {
     let (mut lines, mut broken) = Content::default();
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
-            Ok(line) if line.schema == SCHEMA => lines.push(line),
+            Ok(line) if line.schema == SCHEMA => match line.fault() {
+                None => lines.push(line),
+                Some(why) => broken.push((number, why)),
+            },
             Ok(line) => broken.push((number, format!("its schema is {}", line.schema))),
             Err(why) => broken.push((number, why)),
         }

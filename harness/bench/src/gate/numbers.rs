@@ -145,10 +145,13 @@ fn without_counter(case: &Selected, counters: [&Numbers; 2]) -> Vec<GateFinding>
 
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct.
 fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFinding {
-    let shown = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "none".into());
-    let (verdict, note) = match old == new {
-        true => (Verdict::Unchanged, shown(new)),
-        false => (Verdict::Changed, format!("different mesh: {} was {}", shown(new), shown(old))),
+    let (verdict, note) = match (old, new) {
+        (Some(old), Some(new)) if old == new => (Verdict::Unchanged, new.clone()),
+        (Some(old), Some(new)) => (Verdict::Changed, format!("different mesh: {new} was {old}")),
+        (Some(old), None) => {
+            (Verdict::Missing, format!("the candidate's run report has none; it was {old}"))
+        }
+        (None, new) => (Verdict::Changed, format!("new, {}", new.as_deref().unwrap_or_default())),
     };
     GateFinding::noted(case, "digest", verdict, note)
 }
@@ -251,8 +254,10 @@ pub(super) fn count(
         }
         let bytes = report.peak_rss_bytes_total();
         measures.memory.extend((bytes > 0).then(|| (format!("{prefix}{MEMORY}"), bytes)));
+        // A list without a rank counts nothing, not 0.
+        let counters = report.counters.into_iter().filter(|(_, of)| !of.is_empty());
         let total = |(name, of): (String, Vec<u64>)| (format!("{prefix}{name}"), of.iter().sum());
-        measures.exact.extend(report.counters.into_iter().map(total));
+        measures.exact.extend(counters.map(total));
     }
     Ok(measures)
 }

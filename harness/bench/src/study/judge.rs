@@ -111,13 +111,7 @@ fn measured(
 ) -> Result<(f64, &'static str, String), String> {
     let absent = |name: &String| format!("run {name} is not in the record");
     let groups = Groups::of(lines);
-    let mut sample = Sample {
-        runs: &[],
-        against: None,
-        phases: &row.phase,
-        network: &groups.network,
-        audits: &[],
-    };
+    let mut sample = Sample { runs: &[], against: None, phases: &row.phase, audits: &[] };
     if row.measure.input == Input::Audit {
         let name = &row.run[0];
         let audit = |line: &'_ Line| match &line.entry {
@@ -138,7 +132,7 @@ fn measured(
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
     (sample.runs, sample.against) = (&runs, Some(against));
-    let efficiencies = runs.iter().map(|run| run.efficiency(against, &groups.network));
+    let efficiencies = runs.iter().map(|run| run.efficiency(against));
     let efficiencies: Vec<Efficiency> =
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
     let why = above_one(&efficiencies).unwrap_or_default();

@@ -1,6 +1,6 @@
 //! The measures, each a function of the medians of the repetitions of runs. reports/README.md defines them.
 
-use crate::experiments::entry::{Audited, Network};
+use crate::experiments::entry::Audited;
 use crate::experiments::group::Group;
 use crate::experiments::number::grouped;
 use crate::experiments::pop;
@@ -45,8 +45,6 @@ pub(super) struct Sample<'a> {
     pub against: Option<&'a Group>,
     /// The requested phases, if any.
     pub phases: &'a [String],
-    /// Latency and bandwidth of messages.
-    pub network: &'a Network,
     /// The audits of a mesh on disk: at least one, or none for runs.
     pub audits: &'a [Audited],
 }
@@ -96,12 +94,10 @@ pub static MEASURES: [Measure; 18] = [
         Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
     }),
     measure("efficiency", Against, plain, |s| match s.against().setup.ranks {
-        1 => Ok(s.run().efficiency(s.against(), s.network).global()),
+        1 => Ok(s.run().efficiency(s.against()).global()),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
-    measure("parallel_efficiency", Alone, plain, |s| {
-        Ok(s.run().efficiency(s.run(), s.network).parallel())
-    }),
+    measure("parallel_efficiency", Alone, plain, |s| Ok(s.run().efficiency(s.run()).parallel())),
     measure("phase_share", Phases, |v| format!("{:.2} %", v * 100.0), share),
     // A single failed audit is a failure.
     measure("audit_holds", Audit, holds, |s| {
@@ -197,7 +193,8 @@ fn growth(runs: &[&Group]) -> f64 {
 
 /// The fraction of the time that the named phases take. Missing phases count as zero, but at least one must exist.
 fn share(sample: &Sample) -> Result<f64, String> {
-    let (run, network, names) = (&sample.run().typical, sample.network, sample.phases);
+    let (run, network) = (&sample.run().typical, &sample.run().network);
+    let names = sample.phases;
     let selected = run.phases.iter().filter(|p| names.contains(&p.name));
     let times: Vec<f64> = selected.map(|phase| pop::phase_s(run, phase, network)).collect();
     if times.is_empty() {
@@ -210,7 +207,7 @@ fn share(sample: &Sample) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Entry, Run, Spread};
+    use crate::experiments::entry::{Comm, Entry, Network, Run, Spread};
     use crate::experiments::group::Groups;
     use crate::testing::line;
     use crate::testing::run;
@@ -228,7 +225,7 @@ mod tests {
 
     fn value(name: &str, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {
         let phases = &["b".into()];
-        (named(name).of)(&Sample { runs, against, phases, network: &FREE, audits: &[] })
+        (named(name).of)(&Sample { runs, against, phases, audits: &[] })
     }
 
     /// Returns a group with the given ranks, time and cells.
@@ -299,7 +296,7 @@ mod tests {
         let share = |phases: &[&str]| {
             let phases: Vec<String> = phases.iter().map(|p| (*p).to_owned()).collect();
             let (runs, audits): (&[&Group], &[Audited]) = (&[&two], &[]);
-            let sample = Sample { runs, against: None, phases: &phases, network: &FREE, audits };
+            let sample = Sample { runs, against: None, phases: &phases, audits };
             (named("phase_share").of)(&sample)
         };
         assert_eq!(share(&["a", "b", "c"]), Ok(1.0));
@@ -322,7 +319,7 @@ mod tests {
         let all = [audited(true, 3.0, 10), audited(false, 9.0, 30), audited(true, 2.0, 20)];
         let of = |name: &str, audits: &[Audited]| {
             let (runs, phases): (&[&Group], &[String]) = (&[], &[]);
-            (named(name).of)(&Sample { runs, against: None, phases, network: &FREE, audits })
+            (named(name).of)(&Sample { runs, against: None, phases, audits })
         };
         assert_eq!(of("audit_holds", &all), Ok(0.0));
         assert_eq!(of("audit_holds", &all[..1]), Ok(1.0));

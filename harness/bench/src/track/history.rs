@@ -31,6 +31,9 @@ use std::path::Path;
 /// Version of a line.
 pub const SCHEMA: &str = "octree-track/1";
 
+/// Greatest number of a metric, of whose squares sums are finite.
+const VALUE_MAX: f64 = 1e100;
+
 /// One commit's numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -172,6 +175,11 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             }
             Err(why) => return Err(wrong(why)),
         };
+        if let Some((name, value)) = record.metrics.iter().find(|(_, n)| n.abs() > VALUE_MAX) {
+            return Err(wrong(format!(
+                "{name} is {value:e}, and at most {VALUE_MAX:e} is possible"
+            )));
+        }
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
@@ -286,6 +294,10 @@ mod tests {
         append(&path, &Record { time: "noon".into(), ..record("f", &[]) }).unwrap();
         let error = read(&path).unwrap_err();
         assert!(error.contains("line 6: time: "), "{error}");
+        fs::write(&path, "").unwrap();
+        append(&path, &record("g", &[("x", 1e308)])).unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.contains("line 1: x is 1e308"), "{error}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::benchmark::numbers::Number;
 use report::benchmark::prose::{self, Checked};
 use report::benchmark::report;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// `harness report`.
@@ -77,16 +78,26 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     Ok(written.numbers)
 }
 
-/// Reads records, and says which lines it cannot read.
+/// Reads records, and says which lines it cannot read. A line that is there twice, as in a copy of a record, is one result.
 pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
-    let mut lines = Vec::new();
+    let (mut lines, mut known) = (Vec::new(), HashSet::new());
     for path in records {
         let (read, broken) =
             record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
         for (line, why) in broken {
             eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
         }
-        lines.extend(read);
+        let count = read.len();
+        let new = read.into_iter().filter(|line| known.insert(format!("{line:?}")));
+        let before = lines.len();
+        lines.extend(new);
+        let repeated = count - (lines.len() - before);
+        if repeated > 0 {
+            eprintln!(
+                "harness: {}: {repeated} lines repeat earlier ones and are skipped",
+                path.display()
+            );
+        }
     }
     Ok(lines)
 }

@@ -141,11 +141,7 @@ fn read<'a>(
     options: &'a Options<'a>,
 ) -> Result<(Mesh<'a>, Vec<Size>), Failure> {
     let root = mesh.manifest.root;
-    if options.foam.case.is_some_and(|case| case.root != root) {
-        return Err(Failure::input(
-            "the mesh has another root than the case: give the case that was meshed".to_owned(),
-        ));
-    }
+    options.foam.case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.leaves_by_rank()?.len() > 1).then(Vec::new);
     let (mut words, mut cells) = (Vec::new(), 0);
     mesh.visit(&Selection::default(), &|| options.check(), &mut |leaf| {

@@ -17,7 +17,7 @@ use crate::polydata::{array, write};
 /// Writes the polygons as triangles, whose normals point away from the body. Coordinates have single precision.
 ///
 /// # Errors
-/// If writing fails, or if there are more than 2^32 triangles.
+/// If writing fails, if there are more than 2^32 triangles, or if single precision does not resolve one.
 pub fn stl(root: &Root, faces: &[Face], polygons: &Polygons, out: impl Write) -> io::Result<()> {
     let single = |at: [i64; 3]| root.to_user(at).map(|c| c as f32);
     let point =
@@ -36,6 +36,13 @@ pub fn stl(root: &Root, faces: &[Face], polygons: &Polygons, out: impl Write) ->
             i64::from(face.corner[a]) * UNITS_PER_CELL + along
         });
         triangles.extend((0..corners.len()).map(|i| [single(middle), corner(i), corner(i + 1)]));
+    }
+    if let Some([at, ..]) = triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
+        let why = format!(
+            "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
+             origin, or write a .vtp file"
+        );
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     write_stl_binary(&triangles, out)
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use contract::lattice::Root;
+use contract::number::number;
 use contract::octant::{LEVEL_MAX, Octant};
 use serde::Serialize;
 
@@ -213,7 +214,7 @@ impl fmt::Display for Report {
             0 => "closed".to_owned(),
             open => format!("open at {open} edges"),
         };
-        writeln!(f, "{} faces of area {:.6}, {closed}", self.faces, self.area)?;
+        writeln!(f, "{} faces of area {}, {closed}", self.faces, number(self.area))?;
         for (level, count) in self.faces_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
             writeln!(f, "  level {level}: {count}")?;
         }
@@ -223,7 +224,8 @@ impl fmt::Display for Report {
             let keys = ["least", "least_cells", "centre", "centre_cells"];
             let names = ["face", "face, in cells", "centre", "centre, in cells"];
             for (name, Spread { min, median, p95, max }) in names.iter().zip(keys.map(|k| gap[k])) {
-                writeln!(f, "  {name:<18} {min:>12.6} {median:>12.6} {p95:>12.6} {max:>12.6}")?;
+                let [min, median, p95, max] = [min, median, p95, max].map(number);
+                writeln!(f, "  {name:<18} {min:>12} {median:>12} {p95:>12} {max:>12}")?;
             }
         }
         match &self.ranks {

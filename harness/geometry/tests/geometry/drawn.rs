@@ -21,7 +21,7 @@ proptest! {
     fn closed_shapes_have_no_findings_but_a_cavity(facets in shape()) {
         let found = diagnosis(facets, Some(0.002));
         // The inner one of two spheres is a cavity.
-        let cavity = (found.shells.count == 2).then_some((Kind::Cavities, 1));
+        let cavity = (found.shells.count == 2).then_some((Kind::Nested, 1));
         prop_assert_eq!(counts(&found), Vec::from_iter(cavity));
     }
 

@@ -135,8 +135,14 @@ fn a_closed_shell_that_is_wound_inward_is_inside_out_or_a_cavity() {
     assert!(!beside.changes_region);
     assert_eq!(
         counts(&diagnosis([cube(), small.clone()].concat(), Some(0.25))),
-        [(Kind::Cavities, 1)]
+        [(Kind::Nested, 1)]
     );
+    // A solid in a solid is outside, which changes what an internal mesh keeps; one in the cavity of another is not.
+    let solid = cuboid([1.25; 3], [1.75; 3]);
+    let nested = diagnosis([cube(), solid.clone()].concat(), Some(0.25));
+    assert_eq!((counts(&nested), nested.changes_region), (vec![(Kind::Nested, 1)], false));
+    let in_cavity = diagnosis([cube(), small.clone(), solid].concat(), Some(0.25));
+    assert_eq!(count(&in_cavity, Kind::Nested), 1);
     // An open shell has no volume.
     assert_eq!(counts(&diagnosis(small[1..].to_vec(), None)), [(Kind::Openings, 1)]);
     let far = [inward([-15.0; 3], [-14.0; 3]), cuboid([14.0; 3], [15.0; 3])].concat();

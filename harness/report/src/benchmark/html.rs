@@ -43,7 +43,7 @@ fn summary(groups: &Groups, lines: &[Line]) -> Markup {
             (runs) " runs of " (groups.all.len()) " configurations"
             @if failed > 0 { ", " (failed) " more failed" }
             ". For simulated ranks, time is the critical path: the sum over phases of the CPU time of the slowest rank, plus "
-            (groups.network) "."
+            (Groups::networks(&groups.all)) "."
         }
         nav {
             a href="#figures" { "figures" } " " a href="#tables" { "tables" } " "

@@ -28,16 +28,20 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
             find(differs(&groups(arguments), numbers));
             continue;
         }
-        for key in uses(code) {
-            let known = numbers.iter().any(|number| number.key == key);
-            find((!known).then(|| format!("the record has no result {key}")));
-        }
         for literal in literals(code) {
             let known = numbers.iter().any(|number| rounds_to(number, literal));
             find(
                 (!known)
                     .then(|| format!("{literal} is written by hand, and no result rounds to it")),
             );
+        }
+    }
+    let code: String = text.lines().map(|line| without_comment(line).to_owned() + "\n").collect();
+    for (at, key) in uses(&code) {
+        checked.compared += 1;
+        let line = 1 + code[..at].matches('\n').count();
+        if !numbers.iter().any(|number| number.key == key) {
+            checked.findings.push(format!("line {line}: the record has no result {key}"));
         }
     }
     checked
@@ -69,14 +73,16 @@ fn differs(arguments: &[&str], numbers: &[Number]) -> Option<String> {
     }
 }
 
-/// The keys of the uses of `\result`.
-fn uses(code: &str) -> impl Iterator<Item = &str> {
-    code.split("\\result").skip(1).filter_map(|rest| {
+/// Where `\result` is used, and with which key. White space may stand around its arguments, and ends of lines.
+fn uses(code: &str) -> impl Iterator<Item = (usize, &str)> {
+    const COMMAND: &str = "\\result";
+    code.match_indices(COMMAND).filter_map(|(at, _)| {
+        let rest = code[at + COMMAND.len()..].trim_start();
         let rest = match rest.strip_prefix('[') {
-            Some(option) => option.split_once(']')?.1,
+            Some(option) => option.split_once(']')?.1.trim_start(),
             None => rest,
         };
-        Some(rest.strip_prefix('{')?.split_once('}')?.0)
+        Some((at, rest.strip_prefix('{')?.split_once('}')?.0.trim()))
     })
 }
 
@@ -96,8 +102,11 @@ fn literals(code: &str) -> impl Iterator<Item = &str> {
 
 /// Whether a unit of TeX follows, or a length such as `\textwidth`.
 fn is_length(rest: &str) -> bool {
-    let units = ["pt", "cm", "mm", "in", "em", "ex", "bp", "\\"];
-    units.iter().any(|unit| rest.starts_with(unit))
+    let units = ["pt", "cm", "mm", "in", "em", "ex", "bp"];
+    let ends = ["width", "height", "size", "skip", "sep", "indent", "unitlength"];
+    let command = rest.strip_prefix('\\').unwrap_or_default();
+    let name = command.split(|c: char| !c.is_ascii_alphabetic()).next().unwrap_or_default();
+    units.iter().any(|unit| rest.starts_with(unit)) || ends.iter().any(|end| name.ends_with(end))
 }
 
 /// Whether the text ends within an option `[...]`, or within the argument of a command that names a label, a file or a source.
@@ -144,9 +153,12 @@ mod tests {
         let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\%\n\
                      \\defresult{a/time}{1.234}{1.10--1.30}{s}";
-        assert_eq!(check(right, &record), Checked { compared: 6, findings: vec![] });
+        assert_eq!(check(right, &record), Checked { compared: 7, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
+            ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),
+            ("12.34\\%", "12.34 is written by hand"),
+            ("77.77\\,s", "77.77 is written by hand"),
             ("x\n1.25 s", "line 2: 1.25 is written by hand"),
             ("\\textbf{12.4}", "12.4 is written by hand"),
             (

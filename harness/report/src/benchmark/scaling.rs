@@ -114,13 +114,12 @@ impl Study<'_> {
         let cells_text = grouped(cells);
         let caption = format!(
             "Speedup of {subject} with {cells_text} cells at n = {} over one rank of the same program: {}. {}. Hollow markers: projected from \
-             simulated ranks (critical path of CPU times plus messages at {:.2} µs and {:.1} GB/s), or measured with more ranks than \
+             simulated ranks (critical path of CPU times plus {}), or measured with more ranks than \
              cores. Lines join powers of two.{notes}",
             all[0].setup.layer_cells_min,
             self.base_cases(all),
             repetitions(all),
-            groups.network.latency_s * 1e6,
-            groups.network.bandwidth_bytes_per_s / 1e9,
+            Groups::networks(all.iter().copied()),
         );
         let title = format!("Speedup: {subject}, {cells_text} cells");
         let axes = [ranks_axis(all), Axis::log("speedup")];
@@ -175,13 +174,13 @@ impl Study<'_> {
 
     /// Time by phase, summed over ranks: with ideal scaling, all bars are equal.
     fn phases(&self) -> Option<Figure> {
-        let Self { groups, subject, experiment, .. } = self;
+        let Self { subject, experiment, .. } = self;
         let simulated = self.with("projected");
         let last = &simulated.last()?.typical;
         let weak = *experiment == "weak";
         let time = |g: &Group, name: &str| {
             let phase = g.typical.phases.iter().find(|p| p.name == name);
-            let time_s = phase.map_or(0.0, |p| phase_s(&g.typical, p, &groups.network));
+            let time_s = phase.map_or(0.0, |p| phase_s(&g.typical, p, &g.network));
             time_s * g.setup.ranks as f64
         };
         let mut names: Vec<&str> = last.phases.iter().map(|p| p.name.as_str()).collect();

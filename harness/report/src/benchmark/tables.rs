@@ -22,7 +22,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
 
 /// All tables as text, with the causes of lost efficiency.
 pub fn text(groups: &Groups) -> String {
-    let mut lines = vec![format!("network: {}", groups.network)];
+    let mut lines = vec![format!("network: {}", Groups::networks(&groups.all))];
     lines.extend(groups.origins.iter().cloned());
     lines.extend(tables(groups).iter().map(|table| format!("\n{}", table.text().trim_end())));
     lines.push("\ncauses of lost efficiency".to_owned());
@@ -117,7 +117,7 @@ fn largest<'a>(groups: &'a Groups) -> Vec<&'a Group> {
 
 /// The phases of a group's typical run: useful time, efficiencies, messages.
 fn phases(groups: &Groups, group: &Group) -> Table {
-    let (run, network) = (&group.typical, &groups.network);
+    let (run, network) = (&group.typical, &group.network);
     let reference = &groups.reference(group).typical;
     let with = |p| (p, phase_efficiency(run, p, reference, network));
     let of: Vec<With<Phase>> = run.phases.iter().map(with).collect();

@@ -5,6 +5,9 @@ use check::promises::{Independence, Touching};
 use contract::manifest::Keep;
 use contract::octant::LEVEL_MAX;
 
+/// What an engine lacks that is not deterministic.
+pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
+
 impl Description {
     /// Returns what the engine does not do or promise; empty if it keeps the whole definition on any number of ranks.
     pub fn lacks(&self) -> Vec<String> {
@@ -23,7 +26,7 @@ impl Description {
             (promised(promises.sides.is_some()), "inside and outside"),
             (deletes, "deletion of either side"),
             (takes.seeds, "seeds"),
-            (promises.is_deterministic(), "equal meshes from equal runs"),
+            (promises.is_deterministic(), EQUAL_RUNS),
             (parallel, "MPI"),
             (!parallel || of_ranks, "equal meshes on any number of ranks"),
         ];

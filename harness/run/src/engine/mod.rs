@@ -5,7 +5,7 @@ mod command;
 pub mod description;
 pub mod failure;
 pub mod interrupt;
-mod lacks;
+pub mod lacks;
 pub mod launcher;
 pub mod layout;
 mod memory;

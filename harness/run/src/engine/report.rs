@@ -90,7 +90,7 @@ fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error
 }
 
 /// Longest time that is believed, in seconds: 30 years.
-const SECONDS_MAX: f64 = 1e9;
+pub const SECONDS_MAX: f64 = 1e9;
 
 impl RunReport {
     /// Reads a run report.
@@ -100,8 +100,14 @@ impl RunReport {
     pub fn read(path: &Path) -> Result<Self, String> {
         let wrong = |why: String| format!("the run report {} is unusable: {why}", path.display());
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        let report: Self = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-        report.fault().map_or(Ok(report), |why| Err(wrong(why)))
+        let mut report: Self =
+            serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        if let Some(why) = report.fault() {
+            return Err(wrong(why));
+        }
+        // A clock that is too coarse for the run shows nothing.
+        report.time_wall_s = report.time_wall_s.filter(|time| *time > 0.0);
+        Ok(report)
     }
 
     /// What cannot be true of any run, in one sentence: a time that no clock shows, or numbers of ranks whose sum exceeds 64 bits.

@@ -54,6 +54,10 @@ fn leaks_are_warnings_or_errors() {
             warnings[0].starts_with("the facets bound no inside at spacings of 2, 4 and 8"),
             "{warnings:?}"
         );
+        // An inner flow without an inside is none, strictly.
+        let (warnings, leaks) = meshed(&slit(20.0, 11.0, Keep::Inside, vec![]), comm);
+        assert_eq!((warnings.len(), leaks), (1, json!([])));
+        assert!(warnings[0].starts_with("nothing is inside the geometry"), "{warnings:?}");
         let mut sheet = closed;
         sheet.facets.truncate(2);
         assert_eq!(meshed(&sheet, comm), (vec![], json!([])));

@@ -224,6 +224,22 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
 }
 
 #[test]
+fn a_box_that_refines_nothing_produces_a_warning() {
+    for (corner, count) in [("64.0", 1), ("1e7", 1), ("63.0", 0)] {
+        let workspace = Workspace::new();
+        workspace.write("body.stl", stl(&cuboid([24.0; 3], [40.0; 3])));
+        let root = "root = { origin = [0.0, 0.0, 0.0], edge = 64.0 }";
+        let text = format!(
+            "geometry = \"body.stl\"\nspacing_min = 2.0\n{root}\n[[box]]\nmin = [{corner}, 1.0, 1.0]\nmax = [1e8, 9.0, 9.0]\nspacing = 1.0\n"
+        );
+        workspace.write("case.toml", text);
+        let finished = run(workspace.mesher(&["case.toml"]));
+        let found = finished.stderr.matches("no volume within the root").count();
+        assert_eq!((finished.code, found), (Some(0), count), "{corner}: {finished:?}");
+    }
+}
+
+#[test]
 fn a_seed_in_the_far_field_and_a_body_that_ends_at_the_root_produce_no_warnings() {
     for (facets, options) in [
         (box_in_box(), &["--seed", "2,2,2", "--seed", "16,32,32"][..]),

@@ -1,9 +1,10 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
-use crate::input::lattice::Keep;
+use crate::input::lattice::{ExtentBox, Keep};
 use crate::mesh::Mesh;
 use crate::output::report::leaks::LeakEntry;
 use crate::sides::Summary;
+use bricks::octant::ROOT_EDGE;
 
 /// A sentence for each warning: what was found, and what to try.
 pub fn of(mesh: &Mesh) -> Vec<String> {
@@ -16,9 +17,12 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     // These two already advise to enlarge the root.
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
     let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
+    let has_effect = |b: &&ExtentBox| b.meets([0; 3], ROOT_EDGE);
+    let without_effect = mesh.rules.boxes.iter().filter(|b| !has_effect(b)).count();
     let warnings = [
         of_leaks(mesh),
-        empty,
+        (without_effect > 0).then(|| boxes_without_effect(without_effect)),
+        empty.filter(|_| !mesh.bounds_nothing || !mesh.leaks.0.is_empty()),
         summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
         summary.flow_misses_boundary.then(flow_without_far_field),
         (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
@@ -26,13 +30,14 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     warnings.into_iter().flatten().collect()
 }
 
-/// The warning of a geometry that leaks.
+/// The warning of a geometry that leaks, or that is open and bounds nothing.
 pub fn of_leaks(mesh: &Mesh) -> Option<String> {
     // Each region counts once, with the finest spacing that closes it: there it has the most of its volume.
     let leaks = LeakEntry::of(mesh);
     let regions = || leaks.iter().zip(&mesh.leaks.0).filter(|(_, of)| !of.is_part);
     let Some((largest, of)) = regions().max_by_key(|(_, of)| of.volume) else {
-        return mesh.bounds_nothing.then(|| bounds_nothing(mesh));
+        let empty = || empty_region(mesh.rules.keep, &mesh.sides.summary);
+        return mesh.bounds_nothing.then(|| empty().unwrap_or_else(|| bounds_nothing(mesh)));
     };
     let (count, volume) =
         regions().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
@@ -113,6 +118,12 @@ fn flow_without_far_field() -> String {
     "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
      to the far field, or set keep = inside if the flow is internal"
         .to_owned()
+}
+
+fn boxes_without_effect(count: usize) -> String {
+    format!(
+        "{count} extent boxes ([[box]]) have no volume within the root, and refine nothing: correct their corners or their unit"
+    )
 }
 
 fn body_cut(facets: u64, total: u64) -> String {

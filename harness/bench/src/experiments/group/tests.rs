@@ -93,6 +93,58 @@ fn a_sum_that_is_not_that_of_the_ranks_is_noticed() {
     planted(|group| group.typical.phases[0].useful_s.sum += 1.0);
 }
 
+/// Two sessions on two machines, each with its network; and one run that has another mesh.
+#[test]
+fn a_projection_has_the_network_of_its_machine_and_a_run_with_another_mesh_is_left_out() {
+    let slow = Network { latency_s: 1.0, bandwidth_bytes_per_s: 1e30, measured: true };
+    let of_machine = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
+    let session = |cpu: &str| {
+        let machine = Machine { cpu: cpu.into(), ..Machine::default() };
+        let (command, nodes) = (Vec::new(), String::new());
+        let lacks = BTreeMap::new();
+        Entry::Session(Box::new(Session { command, machine, nodes, load_average: 0.0, lacks }))
+    };
+    let mut sim = run(Comm::Sim, 9, &[("a", &[1.0, 1.0])]);
+    sim.phases[0].messages = Spread::of(&[3.0, 3.0]);
+    let other = Run { digest: "other".into(), ..sim.clone() };
+    let of = |run: &Run| Entry::Run(Box::new(run.clone()));
+    let lines = [
+        of_machine("1", session("fast")),
+        of_machine("1", free().entry),
+        of_machine("1", of(&sim)),
+        of_machine("1", of(&other)),
+        of_machine("2", session("slow")),
+        of_machine("2", Entry::Network(slow)),
+        of_machine("2", of(&sim)),
+    ];
+    let groups = Groups::of(&lines);
+    let times: Vec<(f64, usize)> =
+        groups.all.iter().map(|group| (group.time_s.value, group.runs.len())).collect();
+    assert_eq!(times, [(1.0, 1), (4.0, 1)]);
+    let [left] = &groups.left_out[..] else { panic!("{:?}", groups.left_out) };
+    assert!(left.why.starts_with("its mesh has the digest other"), "{}", left.why);
+}
+
+#[test]
+fn impossible_numbers_of_a_line_are_named() {
+    let fault = |change: fn(&mut Run)| {
+        let mut run = run(Comm::Mpi, 9, &[("a", &[1.0, 2.0])]);
+        change(&mut run);
+        line_of(run).fault()
+    };
+    assert_eq!(fault(|_| ()), None);
+    let faults: [fn(&mut Run); 5] = [
+        |run| run.time_wall_s = 0.0,
+        |run| run.time_wall_s = 1e308,
+        |run| run.phases[0].useful_s.by_rank[1] = -1.0,
+        |run| run.useful_s.max = f64::NAN,
+        |run| run.setup.ranks = 0,
+    ];
+    assert!(faults.into_iter().all(|change| fault(change).is_some()));
+    let network = Network { latency_s: -1.0, bandwidth_bytes_per_s: 1.0, measured: true };
+    assert!(line(Entry::Network(network)).fault().is_some());
+}
+
 #[test]
 fn repetitions_form_a_group_without_warm_ups() {
     let mut cold = run(Comm::Sim, 9, &[("a", &[50.0, 50.0])]);
@@ -112,7 +164,7 @@ fn repetitions_form_a_group_without_warm_ups() {
     assert_eq!(two.typical.useful_s.sum, 4.0);
     let reference = groups.reference(two);
     assert_eq!(reference.setup.ranks, 1);
-    let e = two.efficiency(reference, &groups.network);
+    let e = two.efficiency(reference);
     assert!((e.global() - 9.0 / 4.0).abs() < 1e-9);
 }
 
