@@ -27,8 +27,9 @@ const PRECISION: f64 = 1.05;
 const MARCH: f64 = 0.01;
 /// Cells of a smaller half diagonal, in radii of the ball that passes, show the clearance to `PRECISION`.
 const SMALL: f64 = 0.015;
-/// Searches for the widest path, at most. If they do not suffice, the bounds on the width are wider apart than 5 %.
-const SEARCHES_MAX: usize = 500;
+/// Searches for the widest path, at most. If they do not suffice, as along a slit in which many places are equally narrow, the bounds on
+/// the width are wider apart than 5 %.
+const SEARCHES_MAX: usize = 300;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
 
@@ -58,6 +59,8 @@ struct Search<'a> {
     from: Vec<Point>,
     /// Empty for the far field.
     to: Vec<Point>,
+    /// Number of searches so far.
+    searches: usize,
     stop: &'a dyn Fn() -> bool,
 }
 
@@ -74,7 +77,7 @@ pub fn widest(
     let mut space = Space::new(words, facets).expect("the tree was searched before");
     let from = approach(&mut space, from);
     let to = to.map_or(Vec::new(), |to| approach(&mut space, to));
-    let mut search = Search { facets, space, from, to, stop };
+    let mut search = Search { facets, space, from, to, searches: 0, stop };
     let leaf = UNITS_PER_EDGE as f64 / f64::from(1u32 << level);
     let (mut way, mut bound) = search.converge()?;
     for _ in 0..OPENED_MAX {
@@ -140,7 +143,6 @@ impl Search<'_> {
         let start = self.from[self.from.len() - 1];
         let goal = self.to.last().map_or(Goal::Far, |&to| Goal::At(to));
         let mut cap = f32::INFINITY;
-        let mut searches = 0;
         loop {
             let first = self.space.locate(start);
             let found = self.space.widest(first, goal, cap, Space::radius, self.stop)?;
@@ -150,9 +152,9 @@ impl Search<'_> {
                 cap = width;
                 continue;
             }
-            searches += 1;
+            self.searches += 1;
             let (way, bound) = (self.way(&cells), f64::from(cap));
-            if searches == SEARCHES_MAX || !self.divide(&way, bound) {
+            if self.searches >= SEARCHES_MAX || !self.divide(&way, bound) {
                 return Ok((way, bound));
             }
         }
