@@ -1,6 +1,7 @@
 //! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
 use super::entry::Network;
+use contract::number::number;
 use serde::Deserialize;
 use std::fmt;
 
@@ -16,7 +17,8 @@ impl fmt::Display for Network {
             false if *self == ASSUMED => "assumed",
             false => "given",
         };
-        write!(f, "{latency:.2} µs per message and {bandwidth:.2} GB/s ({how})")
+        let [latency, bandwidth] = [latency, bandwidth].map(number);
+        write!(f, "{latency} µs per message and {bandwidth} GB/s ({how})")
     }
 }
 

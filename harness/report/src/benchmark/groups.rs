@@ -99,8 +99,11 @@ pub fn is_summarised(group: &Group) -> bool {
 
 /// A number of cells to two digits, for names of files.
 pub fn cells_label(cells: u64) -> String {
-    let (value, unit) =
-        if cells >= 1_000_000_000 { (cells as f64 / 1e9, "G") } else { (cells as f64 / 1e6, "M") };
+    let (value, unit) = match cells {
+        1_000_000_000.. => (cells as f64 / 1e9, "G"),
+        1_000_000.. => (cells as f64 / 1e6, "M"),
+        _ => (cells as f64 / 1e3, "k"),
+    };
     let text = if value < 9.5 { format!("{value:.1}") } else { format!("{value:.0}") };
     format!("{}{unit}", text.trim_end_matches(".0").replace('.', "p"))
 }

@@ -17,9 +17,9 @@ pub fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
     match (axis.log, low <= high) {
         (true, false) => 1.0..10.0,
         (false, false) => 0.0..1.0,
-        // A margin keeps markers off the frame.
+        // A margin keeps markers off the frame, and leaves room for ticks around a single value.
         (true, true) => {
-            let margin = (high / low).max(1.5).powf(0.05);
+            let margin = if high < 1.1 * low { 1.5 } else { (high / low).max(1.5).powf(0.05) };
             low / margin..high * margin
         }
         (false, true) => low.min(0.0)..if high > 0.0 { high * 1.06 } else { 1.0 },
@@ -114,6 +114,13 @@ mod tests {
         );
         assert!((3..9).contains(&of(&Axis::log(""), &[9.0, 10.0]).len()));
         assert!((3..9).contains(&of(&Axis::log(""), &[1e-6, 1e9]).len()));
+    }
+
+    #[test]
+    fn a_single_value_has_ticks_around_it() {
+        for value in [0.73, 1.0, 99_522.0, 1e9] {
+            assert!(of(&Axis::log(""), &[value]).len() > 2, "{value}");
+        }
     }
 
     #[test]
