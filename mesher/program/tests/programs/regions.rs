@@ -234,7 +234,7 @@ fn a_box_that_refines_nothing_produces_a_warning() {
         );
         workspace.write("case.toml", text);
         let finished = run(workspace.mesher(&["case.toml"]));
-        let found = finished.stderr.matches("no volume within the root").count();
+        let found = finished.stderr.matches("without volume within the root").count();
         assert_eq!((finished.code, found), (Some(0), count), "{corner}: {finished:?}");
     }
 }

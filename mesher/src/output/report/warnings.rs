@@ -121,8 +121,10 @@ fn flow_without_far_field() -> String {
 }
 
 fn boxes_without_effect(count: usize) -> String {
+    let boxes =
+        if count == 1 { "an extent box".to_owned() } else { format!("{count} extent boxes") };
     format!(
-        "{count} extent boxes ([[box]]) have no volume within the root, and refine nothing: correct their corners or their unit"
+        "{boxes} ([[box]]) without volume within the root: nothing is refined there; correct the corners or their unit"
     )
 }
 
