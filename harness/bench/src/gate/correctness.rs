@@ -78,9 +78,11 @@ impl Known {
     fn of(case: &CaseReport) -> Self {
         let failed = case.checks.iter().filter(|check| check.failed());
         let unchecked = case.checks.iter().filter(|check| is_unchecked(check));
+        let has_mesh = !case.checks.iter().any(|check| check.failed() && check.name == RUNS);
         Self {
             findings: failed.map(|check| (key(check), count(check))).collect(),
-            unchecked: Some(unchecked.map(key).collect()),
+            // Without a mesh, no check of it is known to have been possible.
+            unchecked: has_mesh.then(|| unchecked.map(key).collect()),
         }
     }
 
@@ -115,35 +117,33 @@ fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Known) -> Gat
     let new: u64 = checks.iter().map(|check| count(check)).sum();
     let counts = format!("{fail} checks fail with {new} findings, {old} in the baseline");
     let without_mesh = checks.iter().find(|check| check.failed() && check.name == RUNS);
-    let left_out = checks.iter().find_map(|check| match &check.outcome {
-        Outcome::LeftOut { why } => Some(why.clone()),
-        _ => None,
-    });
     let was_checked =
         |check: &&&Check| baseline.unchecked.as_ref().is_some_and(|u| !u.contains(&key(check)));
     let unchecked = checks.iter().filter(|check| is_unchecked(check)).find(was_checked);
-    let (verdict, note) = match checks.iter().find(|check| count(check) > before(check)) {
-        Some(worse) => {
+    let worse = checks.iter().find(|check| count(check) > before(check));
+    let (verdict, note) = match (worse, unchecked) {
+        (Some(worse), _) => {
             let (check, why) = (key(worse), first_line(worse));
             (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
         }
-        None if without_mesh.is_some() => {
+        (None, _) if without_mesh.is_some() => {
             let why = without_mesh.map_or("", |check| first_line(check));
             let note = format!("neither program makes a mesh: {why}");
             return GateFinding::noted(case, metric, Verdict::Missing, note);
         }
-        None if unchecked.is_some() => {
-            let check = unchecked.map_or(String::new(), |check| key(check));
-            let note = format!(
-                "the baseline's {check} is checked, and the candidate's is not: {}",
-                left_out.unwrap_or_default()
-            );
+        (None, Some(check)) => {
+            let (key, why) = (key(check), first_line(check));
+            let note =
+                format!("the baseline's {key} is checked, and the candidate's is not: {why}");
             return GateFinding::noted(case, metric, Verdict::Missing, note);
         }
-        None if new < old => (Verdict::Improvement, counts),
-        None if fail > 0 => (Verdict::Unchanged, counts),
-        None if pass > 0 => (Verdict::Unchanged, format!("{pass} checks hold")),
-        None => (Verdict::Missing, left_out.unwrap_or("no check was run".to_owned())),
+        (None, None) if new < old => (Verdict::Improvement, counts),
+        (None, None) if fail > 0 => (Verdict::Unchanged, counts),
+        (None, None) if pass > 0 => (Verdict::Unchanged, format!("{pass} checks hold")),
+        (None, None) => {
+            let why = checks.first().map_or("no check was run", |check| first_line(check));
+            (Verdict::Missing, why.to_owned())
+        }
     };
     let compared = (pass + fail) as u64;
     GateFinding { compared, ..GateFinding::noted(case, metric, verdict, note) }
@@ -153,10 +153,10 @@ fn key(check: &Check) -> String {
     format!("{}: {}", check.subject, check.name)
 }
 
-/// Why a check fails.
+/// Why a check fails, or was left out.
 fn first_line(check: &Check) -> &str {
     match &check.outcome {
-        Outcome::Fail { why } => why.lines().next().unwrap_or_default(),
+        Outcome::Fail { why } | Outcome::LeftOut { why } => why.lines().next().unwrap_or_default(),
         _ => "",
     }
 }

@@ -82,6 +82,19 @@ impl Record {
         Ok(Self { time, subject, ..Self::new(commit) })
     }
 
+    /// Checks that the metrics can be analysed.
+    ///
+    /// # Errors
+    /// One sentence, if they cannot.
+    pub fn check(&self) -> Result<(), String> {
+        match self.metrics.iter().find(|(_, value)| value.abs() > VALUE_MAX) {
+            Some((name, value)) => {
+                Err(format!("{name} is {value:e}, and at most {VALUE_MAX:e} is possible"))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Adds the metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
     /// dedicated machine only.
     ///
@@ -175,11 +188,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             }
             Err(why) => return Err(wrong(why)),
         };
-        if let Some((name, value)) = record.metrics.iter().find(|(_, n)| n.abs() > VALUE_MAX) {
-            return Err(wrong(format!(
-                "{name} is {value:e}, and at most {VALUE_MAX:e} is possible"
-            )));
-        }
+        record.check().map_err(wrong)?;
         if record.schema != SCHEMA {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }

@@ -11,19 +11,13 @@ use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, Side};
 use std::collections::HashSet;
 
-/// The leaks of a case with this T0; `None` if a coarser T0 has too many leaves, although there are fewer of them.
-pub(super) fn find(
-    case: &Case,
-    facets: &Facets,
-    terms: &Terms,
-    truth: &Truth,
-) -> Option<Vec<Leak>> {
+/// The leaks of a case with this T0.
+pub(super) fn find(case: &Case, facets: &Facets, terms: &Terms, truth: &Truth) -> Vec<Leak> {
     if !terms.seeds.is_empty() && is_closed(&case.facets_lattice) {
-        return Some(Vec::new());
+        return Vec::new();
     }
     let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
-    let between = levels.map(|level| between(case, facets, terms, truth, level));
-    between.collect::<Option<Vec<_>>>().map(|leaks| leaks.concat())
+    levels.flat_map(|level| between(case, facets, terms, truth, level)).collect()
 }
 
 /// Whether every edge belongs to an even number of facets.
@@ -41,22 +35,19 @@ fn is_closed(facets: &[FacetLattice]) -> bool {
 }
 
 /// The leaks between T0 cut at a level, and T0.
-fn between(
-    case: &Case,
-    facets: &Facets,
-    terms: &Terms,
-    truth: &Truth,
-    level: u8,
-) -> Option<Vec<Leak>> {
+fn between(case: &Case, facets: &Facets, terms: &Terms, truth: &Truth, level: u8) -> Vec<Leak> {
     let mut cut = Terms { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
-    let make = |terms: &Terms| Truth::new(facets, &case.facets_lattice, terms);
-    let mut coarse = make(&cut)?;
+    let make = |terms: &Terms| {
+        let coarse = Truth::new(facets, &case.facets_lattice, terms);
+        coarse.expect("T0 that is cut has no more leaves than T0")
+    };
+    let mut coarse = make(&cut);
     let seeded = components::seeded_leaves(&coarse.words, terms);
     let is_crossing =
         |&(leaf, _): &(u32, usize)| word::side(coarse.words[leaf as usize]) == Side::Crossing;
     if seeded.iter().any(is_crossing) {
-        coarse = make(&Terms { seeds: Vec::new(), ..cut })?;
+        coarse = make(&Terms { seeds: Vec::new(), ..cut });
     }
     let edge = |level: u8| terms.root.edge / f64::from(1u32 << level);
     let leak = |component: &Component| {
@@ -84,5 +75,5 @@ fn between(
     };
     let mut leaked: Vec<&Component> = coarse.components.iter().filter(has_leaked).collect();
     leaked.sort_by_key(|component| (component.first.level, word::key_of(component.first.corner)));
-    Some(leaked.into_iter().map(leak).collect())
+    leaked.into_iter().map(leak).collect()
 }

@@ -124,7 +124,7 @@ fn json(value: &impl Serialize) -> String {
 fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     match promised || subject.case.is_some() {
         true => result.report(format!(
-            "{UNKNOWN_SIDES}, says the manifest (--sides names them in another format)"
+            "{UNKNOWN_SIDES} by the manifest; of a mesh in another format, name their array with --sides"
         )),
         false => result.lacks(UNKNOWN_SIDES),
     }

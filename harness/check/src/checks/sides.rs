@@ -66,13 +66,11 @@ fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     }
     let leaks = super::leaks::find(case, facets, &subject.inputs, truth);
     for (prefix, stated) in stated {
-        if let (Some(stated), Some(leaks)) = (stated, &leaks)
-            && stated != leaks
-        {
+        if let Some(stated) = stated.filter(|stated| **stated != leaks) {
             result.report(format!(
                 "{prefix}the manifest states the leaks {}, but T0 has {}",
                 json(stated),
-                json(leaks)
+                json(&leaks)
             ));
         }
     }

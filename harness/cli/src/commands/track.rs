@@ -150,6 +150,8 @@ fn append(arguments: &Arguments) -> Result<(), Failure> {
         let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
         return Err(Failure::missing(why));
     }
+    // It would make the history unreadable.
+    record.check().map_err(Failure::input)?;
     jsonl::append(&arguments.history, &record)
         .map_err(|error| Failure::at(&arguments.history, error))
 }

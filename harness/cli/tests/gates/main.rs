@@ -134,7 +134,9 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     assert!(outcome.printed.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", outcome.printed);
     let named = "FAILED: worse within the last 6 values: case/words";
     assert!(outcome.printed.contains(named), "{}", outcome.printed);
-    assert_eq!(fixture.harness("track history.jsonl --value words=1").code, 2);
+    for wrong in ["words=1", "case/words=1e200", "case/words=nan"] {
+        assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
+    }
     assert_eq!(fs::read_to_string(fixture.path("trend.csv")).unwrap().lines().count(), 17);
     assert!(fs::read_to_string(fixture.path("trend.html")).unwrap().contains("commit-10"));
     assert_eq!(fixture.harness("track history.jsonl --fail-recent 5").code, 0);
