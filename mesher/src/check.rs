@@ -225,14 +225,21 @@ fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) ->
     BrickSet::from_unsorted(received.values().collect())
 }
 
-/// The octants one step from those of a brick of level `l`, four bricks along each axis, some of them empty.
+/// The octants one step from those of a brick of level `l`. Some of the bricks may be empty.
 fn face_neighbours(l: Level, b: Brick) -> impl Iterator<Item = Brick> {
-    (0..3).flat_map(|axis| [(axis, false), (axis, true)]).flat_map(move |(axis, up)| {
+    (0..3).flat_map(move |axis| beside(l, b, axis))
+}
+
+/// The octants one step along an axis from those of a brick of level `l`. Some of the bricks may be empty.
+fn beside(l: Level, b: Brick, axis: usize) -> [Brick; 4] {
+    let step = |up| {
         let within = brick::moved(b.bits, axis, up) & brick::valid(l);
         let next = if l < 2 { None } else { neighbour(l - 2, b.key, axis, up) };
         let across = if next.is_some() { brick::across(b.bits, axis, up) } else { 0 };
         [Brick { bits: within, ..b }, Brick { key: next.unwrap_or(b.key), bits: across }]
-    })
+    };
+    let [[w, x], [y, z]] = [false, true].map(step);
+    [w, x, y, z]
 }
 
 /// Whether an octant is one of some leaves or lies in one.

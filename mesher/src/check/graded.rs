@@ -1,7 +1,7 @@
 //! Gradation by its definition: every octant is split that a rule asks for, and no other. Each octant of a layer is reached by steps
 //! from one octant to the next, and messages go to owners alone: nothing is shared with tiles, whole groups and redistribution.
 
-use super::{face_neighbours, is_in_leaf, to_owners};
+use super::{beside, is_in_leaf, to_owners};
 use crate::mesh::Mesh;
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
@@ -68,9 +68,13 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
 fn dilated(mut set: BrickSet, l: Level, radius: u32) -> BrickSet {
     for axis in 0..3 {
         for _ in 0..radius.min(1 << l) {
-            let steps = |b: Brick| face_neighbours(l, b).skip(4 * axis).take(4).chain([b]);
-            let reached: Vec<Brick> = set.bricks().flat_map(steps).collect();
+            let before = set.count();
+            let steps = |b: Brick| beside(l, b, axis).into_iter().chain([b]);
+            let reached = set.bricks().flat_map(steps).filter(|b| b.bits != 0).collect();
             set = BrickSet::from_unsorted(reached);
+            if set.count() == before {
+                break;
+            }
         }
     }
     set

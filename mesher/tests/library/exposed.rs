@@ -1,11 +1,13 @@
 //! The exposed faces that the mesher counts by bit operations, compared with a search for the neighbours of every leaf.
 
+use crate::support::fibres;
 use crate::support::{Run, Small, config, options, run, small, soup, thin};
 use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
 use mesher::record::Recorder;
 use mesher::{Options, mesh, words};
 use proptest::prelude::*;
-use ranks::{Comm, sim};
+use ranks::Comm;
+use ranks::sim::{Adversary, Sim};
 use std::collections::BTreeMap;
 
 /// The leaves on a side: their level by the start of their interval of the curve.
@@ -71,7 +73,7 @@ type Counted = (Vec<u64>, Option<u64>);
 fn counted(case: &Small, run: &Run, weight: Option<u32>) -> (Vec<Counted>, String) {
     let case = case.mesher_case();
     let options = Options { weight_exposed: weight, ..options(run.division, false) };
-    let mut ranks = sim::run(run.ranks, run.seed, |comm| {
+    let mut ranks = fibres::run(run.ranks, Adversary::new(run.seed), move |comm: &Sim| {
         let (words, ..) = words(&case, &options, comm).expect("the case is good");
         let report = mesh(&case, &options, comm, &mut Recorder::default()).expect("it is");
         let counts = report.counters.get("exposed_faces");

@@ -14,7 +14,7 @@
 //! What remains is one permutation of the messages for each receiver of each sparse all-to-all. All combinations of these
 //! permutations are run, not only each by itself. `ORDERS` is the number of drawn cases; `ci/schedules` runs more of them.
 
-use crate::support::fibres::Fibres;
+use crate::support::fibres;
 use crate::support::orders::{Orders, Turns, permute};
 use crate::support::schedules::{Serial, cases, drawn};
 use crate::support::{Run, Small, cuboid, run};
@@ -41,13 +41,12 @@ const ORDERS_MAX: f64 = 20_000.0;
 fn every_order(
     serial: &Serial,
     run: &Run,
-    fibres: &mut Fibres,
     wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + Clone + 'static,
 ) -> Option<(u64, bool)> {
     let orders = Orders::default();
     for number in 1.. {
         let got = catch_unwind(AssertUnwindSafe(|| {
-            serial.on_ranks(fibres, run, orders.clone(), false, wrap.clone())
+            serial.on_ranks(run, orders.clone(), false, wrap.clone())
         }));
         if !got.is_ok_and(|got| serial.equals(&got)) {
             return Some((number, false));
@@ -98,9 +97,9 @@ struct Counts {
 }
 
 impl Counts {
-    fn add(&mut self, what: &str, serial: &Serial, run: &Run, fibres: &mut Fibres) {
+    fn add(&mut self, what: &str, serial: &Serial, run: &Run) {
         assert!(level_max(serial) <= u64::from(LEVEL));
-        match every_order(serial, run, fibres, plain) {
+        match every_order(serial, run, plain) {
             None => self.left_out += 1,
             Some((orders, is_serial)) => {
                 assert!(is_serial, "{what}: order {orders} of {run:?}, {:?}", serial.small);
@@ -146,8 +145,7 @@ fn tree(split: u8) -> Small {
 
 #[test]
 fn every_order_makes_the_serial_mesh_on_every_tree_of_two_levels() {
-    let (mut fibres, mut counts, started) =
-        (Fibres::default(), Counts::default(), ProcessTime::now());
+    let (mut counts, started) = (Counts::default(), ProcessTime::now());
     for split in 0..=255 {
         let serial = Serial::new(tree(split));
         for ranks in [2, 3] {
@@ -158,7 +156,7 @@ fn every_order_makes_the_serial_mesh_on_every_tree_of_two_levels() {
                     level_base,
                 };
                 let run = Run { ranks, seed: 0, division };
-                counts.add(&format!("tree {split:08b}"), &serial, &run, &mut fibres);
+                counts.add(&format!("tree {split:08b}"), &serial, &run);
             }
         }
     }
@@ -170,12 +168,11 @@ fn every_order_makes_the_serial_mesh_on_every_tree_of_two_levels() {
 fn every_order_makes_the_serial_mesh_of_drawn_cases() {
     let number = std::env::var("ORDERS").map_or(40, |n| n.parse().expect("a number of cases"));
     let (cases, runs) = (cases(), runs().boxed());
-    let (mut fibres, mut counts, started) =
-        (Fibres::default(), Counts::default(), ProcessTime::now());
+    let (mut counts, started) = (Counts::default(), ProcessTime::now());
     for number in 0..number {
         let serial = Serial::new(shallow(drawn(&cases, number)));
         let run = drawn(&runs, number);
-        counts.add(&format!("case {number}"), &serial, &run, &mut fibres);
+        counts.add(&format!("case {number}"), &serial, &run);
     }
     counts.print("drawn cases", started);
     assert!(counts.runs.iter().all(|&runs| runs > 0));
@@ -186,7 +183,7 @@ fn every_order_makes_the_serial_mesh_of_drawn_cases() {
 #[test]
 fn every_order_of_ranks_before_every_call_makes_the_serial_mesh() {
     let (cases, runs) = (cases(), runs().boxed());
-    let (mut fibres, mut orders) = (Fibres::default(), 0);
+    let mut orders = 0;
     for number in 0..8 {
         let serial = Serial::new(shallow(drawn(&cases, number)));
         for ranks in [2, 3] {
@@ -198,7 +195,7 @@ fn every_order_of_ranks_before_every_call_makes_the_serial_mesh() {
                     let calls = Rc::new(Cell::new(0));
                     let counted = calls.clone();
                     let turns = Turns { order: order.clone(), call, turns: 0 };
-                    let got = serial.on_ranks(&mut fibres, &run, turns, false, move |sim, work| {
+                    let got = serial.on_ranks(&run, turns, false, move |sim, work| {
                         work(&Faulty::new(sim, Bug::None, &counted));
                     });
                     assert!(serial.equals(&got), "{order:?} before call {call} of {run:?}");
@@ -215,12 +212,11 @@ fn every_order_of_ranks_before_every_call_makes_the_serial_mesh() {
 
 #[test]
 fn the_walk_visits_every_combination_of_orders_once() {
-    let (mut fibres, orders, seen) =
-        (Fibres::default(), Orders::default(), Rc::new(RefCell::new(BTreeSet::new())));
+    let (orders, seen) = (Orders::default(), Rc::new(RefCell::new(BTreeSet::new())));
     let mut runs = 0;
     loop {
         // All send to all, then ranks 0 and 1 to rank 2: three permutations of three messages, and one of two.
-        let received = fibres.run(3, orders.clone(), |c: &Sim| {
+        let received = fibres::run(3, orders.clone(), |c: &Sim| {
             let senders = |m: MessageBuffer| m.messages().map(|m| m.0).collect::<Vec<_>>();
             let all = c.sparse_all_to_all((0..3).map(|r| (r, [1])).collect());
             let to_last = (c.rank() < 2).then_some((2, [1]));
@@ -345,11 +341,11 @@ impl Comm for Faulty<'_> {
 }
 
 /// Whether some order of a run reveals a bug. The first order, in which messages arrive by sender, never does.
-fn reveals(bug: Bug, serial: &Serial, run: &Run, fibres: &mut Fibres) -> bool {
+fn reveals(bug: Bug, serial: &Serial, run: &Run) -> bool {
     let wrap = move |sim: &Sim, work: &mut dyn FnMut(&dyn Comm)| {
         work(&Faulty::new(sim, bug, &Cell::new(0)));
     };
-    let found = every_order(serial, run, fibres, wrap);
+    let found = every_order(serial, run, wrap);
     assert!(found != Some((1, false)), "the first order has no bug");
     found.is_some_and(|(_, is_serial)| !is_serial)
 }
@@ -357,16 +353,15 @@ fn reveals(bug: Bug, serial: &Serial, run: &Run, fibres: &mut Fibres) -> bool {
 #[test]
 fn planted_errors_that_depend_on_the_order_are_found() {
     let (cases, runs) = (cases(), runs().boxed());
-    let mut fibres = Fibres::default();
     // On two ranks no receiver has a choice in most cases.
     let (mut late, mut one, ranks) = (0, 0, 3);
     for number in 0..2 {
         let serial = Serial::new(shallow(drawn(&cases, number)));
         let run = Run { ranks, ..drawn(&runs, number) };
-        late += u64::from(reveals(Bug::LostIfLate, &serial, &run, &mut fibres));
+        late += u64::from(reveals(Bug::LostIfLate, &serial, &run));
         for call in 0..40 {
             let bug = Bug::LostInOneOrder { call, rank: number as usize % ranks };
-            one += u64::from(reveals(bug, &serial, &run, &mut fibres));
+            one += u64::from(reveals(bug, &serial, &run));
         }
     }
     println!(

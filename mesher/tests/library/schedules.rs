@@ -3,7 +3,6 @@
 //! The number of a schedule determines its case, rank count, division and adversary. `SCHEDULES` is the number of
 //! schedules, `SCHEDULES_FIRST` the number of the first one; `ci/schedules` runs many of them.
 
-use crate::support::fibres::Fibres;
 use crate::support::schedules::{Meshed, Serial, case, cases, drawn, run_words, write};
 use crate::support::{Run, first_difference, run};
 use cpu_time::ProcessTime;
@@ -40,7 +39,6 @@ fn runs() -> impl Strategy<Value = Run> {
 fn schedules_do_not_change_the_mesh() {
     let (first, count) = (from_env("SCHEDULES_FIRST", 0), from_env("SCHEDULES", 2000));
     let (cases, runs) = (cases(), runs().boxed());
-    let mut fibres = Fibres::default();
     let mut serial: Option<(u64, Serial)> = None;
     let (mut by_ranks, mut cells, mut refused) = (BTreeMap::<usize, u64>::new(), 0, 0);
     let started = ProcessTime::now();
@@ -52,7 +50,7 @@ fn schedules_do_not_change_the_mesh() {
         };
         let run = drawn(&runs, number);
         let whole = number % WHOLE == 0;
-        let got = catch_unwind(AssertUnwindSafe(|| serial.on_seed(&mut fibres, &run, whole)));
+        let got = catch_unwind(AssertUnwindSafe(|| serial.on_seed(&run, whole)));
         if !got.as_ref().is_ok_and(|got| serial.equals(got)) {
             panic!("{}", explain(number, serial, &run, got.ok()));
         }

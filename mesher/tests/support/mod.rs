@@ -10,7 +10,9 @@ use mesher::output::report::leaks::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use mesher::{Options, words};
-use ranks::{Solo, sim};
+use ranks::Solo;
+use ranks::sim::Adversary;
+use std::rc::Rc;
 
 pub mod draw;
 pub mod fibres;
@@ -21,6 +23,7 @@ pub mod symmetry;
 // Each test uses some of these.
 #[allow(unused_imports)]
 pub use draw::{closed, config, cuboid, leaky_on_rays, rooms, run, slit, small, soup, thin};
+use schedules::{on_ranks, plain};
 
 pub type Facet = [[f32; 3]; 3];
 
@@ -140,28 +143,16 @@ impl Small {
         self.outcome(&Run { ranks, seed, division }, ungraded).words
     }
 
-    /// The mesher's result with a run configuration. Asserts that ranks agree and that each rank's words are sorted.
+    /// The mesher's result with a run configuration.
     pub fn outcome(&self, run: &Run, ungraded: bool) -> Outcome {
         self.try_outcome(run, ungraded).expect("the case is good")
     }
 
     /// As [`Small::outcome`], for cases that may have unusable seeds.
     pub fn try_outcome(&self, run: &Run, ungraded: bool) -> Result<Outcome, Error> {
-        let options = options(run.division, ungraded);
-        let case = self.mesher_case();
-        let parts = sim::run(run.ranks, run.seed, |c| words(&case, &options, c));
-        let errors: Vec<&Error> = parts.iter().filter_map(|p| p.as_ref().err()).collect();
-        let agree = errors.is_empty() || errors.len() == run.ranks;
-        assert!(agree && errors.iter().all(|e| *e == errors[0]), "ranks must agree on errors");
-        let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let summary = parts[0].1;
-        assert!(parts.iter().all(|p| p.1 == summary), "ranks must agree on components");
-        assert!(parts.iter().all(|p| p.0.is_sorted()), "parts must be sorted");
-        assert!(parts.iter().all(|p| p.2 == parts[0].2), "ranks must agree on leaks");
-        let leaks = parts[0].2.clone();
-        let mut words: Vec<u64> = parts.into_iter().flat_map(|p| p.0).collect();
-        words.sort_unstable();
-        Ok(Outcome { words, summary, leaks })
+        let (case, options) = (self.mesher_case(), options(run.division, ungraded));
+        let schedule = Adversary::new(run.seed);
+        Ok(on_ranks(Rc::new(case), options, run.ranks, schedule, false, plain)?.outcome)
     }
 
     /// The nearest case on a root of edge 64 at the origin whose coordinates are multiples of 1/128. They are lattice

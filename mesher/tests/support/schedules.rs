@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs)]
 
 use super::draw::{leaky_on_rays, soup, thin};
-use super::fibres::Fibres;
+use super::fibres;
 use super::{Outcome, Run, Small, options, small};
 use mesher::error::Error;
 use mesher::input::case::Case;
@@ -52,33 +52,46 @@ impl Serial {
         }
     }
 
-    /// The mesh on the ranks of a run, as coroutines, each of which communicates through what `wrap` makes of its rank. With all phases,
-    /// the report and the checks of invariants if `whole` is true, otherwise with phases 1 to 8.
+    /// The mesh on the ranks of a run, each of which communicates through what `wrap` makes of it. With all phases, the report and the
+    /// checks of invariants if `whole` is true, otherwise with phases 1 to 8.
     pub fn on_ranks(
         &self,
-        fibres: &mut Fibres,
         run: &Run,
         schedule: impl Schedule + 'static,
         whole: bool,
         wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + 'static,
     ) -> Result<Meshed, Error> {
-        let case = self.case.clone();
         let options = Options { check: whole, ..options(run.division, false) };
-        let parts = fibres.run(run.ranks, schedule, move |sim: &Sim| {
-            let mut result = None;
-            let mut work = |comm: &dyn Comm| result = Some(part(&case, &options, whole, comm));
-            // Counting messages needs the clocks, which take longer than passing the token on.
-            sim.uncounted(&mut || wrap(sim, &mut work));
-            result.expect("the work has been done")
-        });
-        merge(parts)
+        on_ranks(self.case.clone(), options, run.ranks, schedule, whole, wrap)
     }
 
     /// The same under the schedule of the run's seed.
-    pub fn on_seed(&self, fibres: &mut Fibres, run: &Run, whole: bool) -> Result<Meshed, Error> {
-        let schedule = Adversary::new(run.seed);
-        self.on_ranks(fibres, run, schedule, whole, |sim, work| work(sim))
+    pub fn on_seed(&self, run: &Run, whole: bool) -> Result<Meshed, Error> {
+        self.on_ranks(run, Adversary::new(run.seed), whole, plain)
     }
+}
+
+/// A rank that communicates as it is.
+pub fn plain(sim: &Sim, work: &mut dyn FnMut(&dyn Comm)) {
+    work(sim);
+}
+
+/// The mesh of a case on simulated ranks.
+pub fn on_ranks(
+    case: Rc<Case>,
+    options: Options,
+    ranks: usize,
+    schedule: impl Schedule + 'static,
+    whole: bool,
+    wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + 'static,
+) -> Result<Meshed, Error> {
+    merge(fibres::run(ranks, schedule, move |sim: &Sim| {
+        let mut result = None;
+        let mut work = |comm: &dyn Comm| result = Some(part(&case, &options, whole, comm));
+        // Counting messages needs the clocks, which take longer than passing the token on.
+        sim.uncounted(&mut || wrap(sim, &mut work));
+        result.expect("the work has been done")
+    }))
 }
 
 /// Leaf words, components and leaks, and digest and number of cells in the report if it was asked for.
@@ -103,7 +116,7 @@ pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Par
 /// The mesh of which these are the parts of all ranks.
 ///
 /// # Panics
-/// If ranks do not agree on the error or on the components.
+/// If ranks do not agree on the error, the components or the leaks, or a part is not sorted.
 pub fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
     let (mut all, mut same) = (Vec::new(), None);
     for part in parts {
@@ -111,6 +124,7 @@ pub fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
             Ok((words, common, reported)) => (words, Ok((common, reported))),
             Err(e) => (Vec::new(), Err(e)),
         };
+        assert!(words.is_sorted(), "parts must be sorted");
         all.extend(words);
         assert!(*same.get_or_insert(common.clone()) == common, "ranks must agree on the result");
     }

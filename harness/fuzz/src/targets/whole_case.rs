@@ -8,12 +8,10 @@ use crate::Scratch;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use ranks::sim::{Adversary, Sim};
-use ranks::{Comm, Solo};
-use std::cell::RefCell;
+use ranks::Solo;
+use ranks::sim::Adversary;
 use std::rc::Rc;
-use support::fibres::Fibres;
-use support::schedules::{Meshed, merge, part};
+use support::schedules::{Meshed, merge, on_ranks, part, plain};
 pub(crate) use support::{Outcome, Run, Small};
 
 /// One in this many cases is compared before gradation, too. The final mesh contains the base tree, unless parts of it were deleted.
@@ -60,7 +58,6 @@ fn drawn() -> BoxedStrategy<(Small, Run)> {
 
 thread_local! {
     static DRAWN: BoxedStrategy<(Small, Run)> = drawn();
-    static FIBRES: RefCell<Fibres> = RefCell::default();
 }
 
 /// A case, how it was meshed in parallel, and the mesh; `None` if its seeds were refused.
@@ -118,18 +115,11 @@ fn compared(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Outc
 fn meshed(case: &Small, run: &Run, ungraded: bool, whole: bool) -> Option<Meshed> {
     let case = Rc::new(case.mesher_case());
     let options = mesher::Options { check: whole, ..support::options(run.division, ungraded) };
-    let parts = match run.ranks {
-        1 => vec![part(&case, &options, whole, &Solo)],
-        ranks => FIBRES.with_borrow_mut(|fibres| {
-            fibres.run(ranks, Adversary::new(run.seed), move |sim: &Sim| {
-                let mut mine = None;
-                // Counting messages needs the clocks, which take longer than passing the token on.
-                sim.uncounted(&mut || mine = Some(part(&case, &options, whole, sim)));
-                mine.expect("the part has been made")
-            })
-        }),
-    };
-    merge(parts).ok()
+    match run.ranks {
+        1 => merge(vec![part(&case, &options, whole, &Solo)]),
+        ranks => on_ranks(case, options, ranks, Adversary::new(run.seed), whole, plain),
+    }
+    .ok()
 }
 
 fn words(mesh: &Option<Meshed>) -> &[u64] {
