@@ -5,14 +5,17 @@
 //! a component have that parity: so a closed surface does not leak.
 //!
 //! A surface that closes the openings of consistently oriented facets has at least the area of the sum of their normals. If that is a
-//! large part of their own area, an opening is no tear: the facets are a sheet.
+//! large part of their own area, an opening is no tear: the facets are a sheet. Facets that are oriented at random may have such a sum without
+//! any opening. But a boundary of length L is closed by an area of at most L^2 / 4 pi, which must be as large, too; for consistently oriented
+//! facets it is.
 //!
 //! Both are sums over the facets, to which each rank contributes those of its slice.
 
 use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
 use bricks::widest;
-use ranks::{Comm, uncounted};
+use ranks::{Comm, MessageBuffer, uncounted};
+use std::f64::consts::PI;
 
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
@@ -72,7 +75,31 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
         std::array::from_fn(|i| sum[i] + of_rank[i])
     });
     let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
-    closing >= SHEET * area as f64
+    // Normals are twice as long as the areas.
+    let closed_by_boundary = boundary_length(mine, comm).powi(2) / (2.0 * PI);
+    closing.min(closed_by_boundary) >= SHEET * area as f64
+}
+
+/// Length of the boundary of the facets of all ranks. Collective.
+fn boundary_length(mine: &[Facet], comm: &dyn Comm) -> f64 {
+    let edges = mine.iter().flat_map(|f| [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|i| f.v[i])));
+    let entry = |mut ends: [[i32; 3]; 2]| {
+        ends.sort_unstable();
+        let words: [u64; 3] = bytemuck::cast(ends);
+        // All ranks send an edge to the same rank.
+        let of_all = words.iter().fold(0, |sum, &word| mix(sum ^ word) as u64);
+        ((of_all % comm.size() as u64) as usize, words)
+    };
+    let out = MessageBuffer::of_entries(edges.map(entry).collect());
+    let received = uncounted(comm, || comm.sparse_all_to_all(out));
+    let mut edges: Vec<[u64; 3]> = received.values().collect();
+    edges.sort_unstable();
+    let on_boundary = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
+    let length = |same: &[[u64; 3]]| {
+        let [from, to]: [[i32; 3]; 2] = bytemuck::cast(same[0]);
+        (0..3).map(|a| (f64::from(to[a]) - f64::from(from[a])).powi(2)).sum::<f64>().sqrt() as u64
+    };
+    uncounted(comm, || comm.sum(on_boundary.map(length).sum())) as f64
 }
 
 #[cfg(test)]
@@ -136,5 +163,9 @@ mod tests {
         let mut turned = cube.clone();
         turned[2][0].v.swap(0, 1);
         assert_eq!(kind(&turned), CLOSED, "whatever the orientation");
+        let mut torn = cube.clone();
+        torn[0][1] = Facet { v: [[0; 3]; 3] };
+        torn[2].iter_mut().for_each(|f| f.v.swap(0, 1));
+        assert_eq!(kind(&torn), OPEN, "a side is turned, and the tear is small");
     }
 }

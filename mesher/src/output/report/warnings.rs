@@ -19,10 +19,12 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
     let has_effect = |b: &&ExtentBox| b.meets([0; 3], ROOT_EDGE);
     let without_effect = mesh.rules.boxes.iter().filter(|b| !has_effect(b)).count();
+    let leaks = of_leaks(mesh);
+    let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let warnings = [
-        of_leaks(mesh),
+        leaks,
         (without_effect > 0).then(|| boxes_without_effect(without_effect)),
-        empty.filter(|_| !mesh.bounds_nothing || !mesh.leaks.0.is_empty()),
+        empty,
         summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
         summary.flow_misses_boundary.then(flow_without_far_field),
         (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
@@ -36,8 +38,12 @@ pub fn of_leaks(mesh: &Mesh) -> Option<String> {
     let leaks = LeakEntry::of(mesh);
     let regions = || leaks.iter().zip(&mesh.leaks.0).filter(|(_, of)| !of.is_part);
     let Some((largest, of)) = regions().max_by_key(|(_, of)| of.volume) else {
-        let empty = || empty_region(mesh.rules.keep, &mesh.sides.summary);
-        return mesh.bounds_nothing.then(|| empty().unwrap_or_else(|| bounds_nothing(mesh)));
+        let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
+        let is_inner = mesh.rules.keep == Keep::Inside;
+        return match mesh.bounds_nothing {
+            true => empty.or_else(|| Some(bounds_nothing(mesh))),
+            false => empty.filter(|_| is_inner),
+        };
     };
     let (count, volume) =
         regions().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
@@ -87,7 +93,8 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
         _ if kept > 0 => return None,
         Keep::Inside => {
             "nothing is inside the geometry, so the mesh has at most crossing leaves: close inlets, outlets and holes that are \
-             wider than a cell (`harness leak` finds them), increase spacing_min, or set keep = outside"
+             wider than a cell (`harness leak` finds them), remove facets that appear twice (`harness geometry`), change spacing_min, or \
+             set keep = outside"
         }
         Keep::Outside => {
             "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
