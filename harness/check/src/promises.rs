@@ -107,7 +107,7 @@ impl Promises {
         } else if self.surface.is_some_and(|s| !(0.0..1.0).contains(&s.tolerance_cells)) {
             "`tolerance_cells` must be at least 0 and less than 1"
         } else if self.sides.is_some_and(|s| !(0.0..=1e6).contains(&s.band_cells)) {
-            "`band_cells` must be at least 0"
+            "`band_cells` must be from 0 to 1e6"
         } else {
             return None;
         };

@@ -147,12 +147,27 @@ impl<'a> Survey<'a> {
         self.descend(self.tree.root(), Octant::ROOT, &self.facets.all(), visit);
     }
 
-    fn descend(&self, handle: Handle, octant: Octant, candidates: &[u32], visit: Visit) {
+    /// The facets that meet an octant or the band around it.
+    fn near(&self, octant: &Octant, candidates: &[u32]) -> Vec<u32> {
         let (low, high) = octant.bounds();
+        let band = (self.band_cells * (UNITS_PER_EDGE >> self.terms.level_surface) as f64) as i64;
+        self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band))
+    }
+
+    /// The position of a part beyond the band of an octant that no facet crosses. All of it lies on one side.
+    fn beyond_band(&self, octant: Octant, candidates: &[u32]) -> Option<Position> {
+        let near = self.near(&octant, candidates);
+        if near.is_empty() {
+            return Some(self.position(octant));
+        }
+        let children = if octant.level < self.terms.level_surface { 0..8 } else { 0..0 };
+        let mut parts = children.map(|digit| octant.child(digit));
+        parts.find_map(|part| self.beyond_band(part, &near))
+    }
+
+    fn descend(&self, handle: Handle, octant: Octant, candidates: &[u32], visit: Visit) {
         let surface = self.terms.level_surface;
-        let band = (self.band_cells * (UNITS_PER_EDGE >> surface) as f64) as i64;
-        let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
-        let near = self.facets.meeting(candidates, low, high);
+        let near = self.near(&octant, candidates);
         if near.is_empty() {
             return self.uniform(handle, octant, self.position(octant), visit);
         }
@@ -160,7 +175,8 @@ impl<'a> Survey<'a> {
         if kind.is_some() || handle == Handle::HOLE && octant.level >= surface {
             let (low, high) = octant.bounds();
             let crossed = self.facets.first_meeting(&near, low, high).is_some();
-            return visit(octant, kind, Position::Near { crossed });
+            let beyond = if crossed { None } else { self.beyond_band(octant, &near) };
+            return visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
         }
         for digit in 0..8 {
             let child = self.tree.child(handle, digit, octant.level);
