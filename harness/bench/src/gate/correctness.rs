@@ -36,7 +36,8 @@ pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Resul
             Baseline::Record(_, record) => {
                 record.cases.get(name).map(Known::of_record).unwrap_or_default()
             }
-            Baseline::Program(_) | Baseline::None => Known::default(),
+            Baseline::Program(_) => Known::default(),
+            Baseline::None => Known { is_absent: true, ..Known::default() },
         };
         let of_case = measures.case(name);
         (of_case.findings, of_case.unchecked) = (new.findings, new.unchecked);
@@ -72,6 +73,8 @@ struct Known {
     findings: Numbers,
     /// The checks of meshes that were left out; `None` if unknown.
     unchecked: Option<BTreeSet<String>>,
+    /// Whether there is nothing to compare with.
+    is_absent: bool,
 }
 
 impl Known {
@@ -83,11 +86,13 @@ impl Known {
             findings: failed.map(|check| (key(check), count(check))).collect(),
             // Without a mesh, no check of it is known to have been possible.
             unchecked: has_mesh.then(|| unchecked.map(key).collect()),
+            is_absent: false,
         }
     }
 
     fn of_record(case: &CaseMeasures) -> Self {
-        Self { findings: case.findings.clone(), unchecked: case.unchecked.clone() }
+        let (findings, unchecked) = (case.findings.clone(), case.unchecked.clone());
+        Self { findings, unchecked, is_absent: false }
     }
 }
 
@@ -124,7 +129,11 @@ fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Known) -> Gat
     let (verdict, note) = match (worse, unchecked) {
         (Some(worse), _) => {
             let (check, why) = (key(worse), first_line(worse));
-            (Verdict::Regression, format!("{counts}; worse than the baseline: {check}: {why}"))
+            let what = match baseline.is_absent {
+                true => format!("{fail} checks fail with {new} findings: {check}: {why}"),
+                false => format!("{counts}; worse than the baseline: {check}: {why}"),
+            };
+            (Verdict::Regression, what)
         }
         (None, _) if without_mesh.is_some() => {
             let why = without_mesh.map_or("", |check| first_line(check));

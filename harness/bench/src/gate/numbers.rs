@@ -43,7 +43,10 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         };
         layer.findings.extend(match bench.measured(&bench.candidate, case, name) {
             Err(why) if why.is_interrupt() => break,
-            Err(why) => noted("runs", Verdict::Regression, why.to_string()),
+            Err(why) => {
+                let (verdict, why) = without_result(old(bench, case, name), name, &why);
+                noted("runs", verdict, why)
+            }
             Ok(new) => {
                 measures.case(&case.rule.name).add(new.clone());
                 match old(bench, case, name) {
@@ -60,6 +63,21 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
                 }
             }
         });
+    }
+}
+
+/// The verdict on a candidate without a result, given what the baseline has.
+fn without_result(
+    old: Result<Option<CaseMeasures>, String>,
+    layer: LayerName,
+    why: &Failure,
+) -> (Verdict, String) {
+    match old {
+        Ok(None) => (Verdict::Regression, why.to_string()),
+        Ok(Some(old)) if !old.of_layer(layer).is_empty() => {
+            (Verdict::Regression, format!("the candidate has no result: {why}"))
+        }
+        _ => (Verdict::Missing, format!("neither program has a result: {why}")),
     }
 }
 
@@ -215,7 +233,7 @@ fn verdict(
         () if old == new => (Verdict::Unchanged, String::new()),
         // The size of the mesh is a result, not a cost: a change is neither better nor worse.
         () if metric == CELLS || metric.ends_with("leaves") => {
-            (Verdict::Changed, "different mesh".to_owned())
+            (Verdict::Changed, "another number of leaves".to_owned())
         }
         () if is_within && layer == LayerName::Counters => {
             (Verdict::Changed, format!("within the tolerance of {tolerance} %"))
@@ -292,7 +310,9 @@ pub(super) fn instructions(
     command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
-    process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place))?;
+    let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place));
+    // A program that fails without valgrind, too, states the cause.
+    counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
     let profile = profile_of_all(&place).map_err(|why| engine.unusable(why))?;
     let counted = [(INSTRUCTIONS.to_owned(), profile.instructions())].into();
     Ok(CaseMeasures { counted, functions: profile.own, ..CaseMeasures::default() })

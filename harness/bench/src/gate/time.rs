@@ -28,6 +28,9 @@ pub const CPU: &str = "CPU time";
 /// Wall time of the whole process.
 pub const WALL: &str = "wall time";
 
+/// The candidate's place in a round, after two of the baseline.
+const CANDIDATE: usize = 2;
+
 /// A time that the gate compares, over all rounds of a case on some ranks.
 #[derive(Debug)]
 struct Quantity {
@@ -88,12 +91,21 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     }
 }
 
+/// Why a case has no times: the baseline fails, or the candidate alone.
+enum NoTimes {
+    Baseline(Failure),
+    Candidate(Failure),
+}
+
 /// The finding about runs that failed; none if the user interrupted them.
-fn failed(case: &Selected, ranks: Ranks, why: &Failure) -> Option<GateFinding> {
-    let metric = format!("{}time", prefix(ranks));
-    let missing =
-        || GateFinding::noted(&case.rule.name, &metric, Verdict::Missing, why.to_string());
-    (!why.is_interrupt()).then(missing)
+fn failed(case: &Selected, ranks: Ranks, failure: &NoTimes) -> Option<GateFinding> {
+    let (verdict, who, why) = match failure {
+        NoTimes::Baseline(why) => (Verdict::Missing, "baseline", why),
+        NoTimes::Candidate(why) => (Verdict::Regression, "candidate", why),
+    };
+    let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
+    let note = || format!("the {who} has no result: {why}");
+    (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, verdict, note()))
 }
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
@@ -103,12 +115,14 @@ fn rounds(
     case: &Selected,
     ranks: Ranks,
     again: bool,
-) -> Result<[Quantity; 2], Failure> {
-    let path = bench.prepare(baseline, case, "time")?;
-    let engines = [baseline, baseline, &bench.candidate];
+) -> Result<[Quantity; 2], NoTimes> {
+    let path = bench.prepare(baseline, case, "time").map_err(NoTimes::Baseline)?;
+    let run = |index: usize| match index {
+        CANDIDATE => run(bench, &bench.candidate, &path, ranks).map_err(NoTimes::Candidate),
+        _ => run(bench, baseline, &path, ranks).map_err(NoTimes::Baseline),
+    };
     // The first run reads program and geometry from disk and is not counted.
-    let first = run(bench, baseline, &path, ranks)?;
-    let also = run(bench, &bench.candidate, &path, ranks)?;
+    let (first, also) = (run(0)?, run(CANDIDATE)?);
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget.unwrap_or(rules.budget_s);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
@@ -121,7 +135,7 @@ fn rounds(
         random.shuffle(&mut order);
         let mut times = [(0.0, 0.0); 3];
         for index in order {
-            let run = run(bench, engines[index], &path, ranks)?;
+            let run = run(index)?;
             times[index] = (run.time_process_cpu_s, run.time_process_s);
         }
         // A microsecond is the resolution of the clocks.
