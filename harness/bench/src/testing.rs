@@ -28,8 +28,7 @@ pub fn run(comm: Comm, cells: u64, useful: &[(&str, &[f64])]) -> Run {
             comm,
             partitioner: "metis".into(),
             weights: "area".into(),
-            level_base: None,
-            weight_exposed: None,
+            ..Setup::default()
         },
         repeat: 0,
         warm_up: false,

@@ -62,8 +62,8 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             comm,
             partitioner: if weights.is_empty() { String::new() } else { "morton".into() },
             weights: weights.into(),
-            level_base: None,
             weight_exposed: (experiment == "weights").then_some(0),
+            ..Setup::default()
         };
         let both_phases: Vec<f64> = times(repeat).iter().map(|t| 2.0 * t).collect();
         // The first rank has three times as many exposed faces as any other.

@@ -235,6 +235,9 @@ pub struct Setup {
     /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight_exposed: Option<u32>,
+    /// Cells that a series of several meshes was asked for, so that two such series of a case are apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series_cells: Option<f64>,
 }
 
 impl Setup {

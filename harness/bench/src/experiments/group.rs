@@ -27,8 +27,8 @@ pub struct Group {
     /// Time in seconds, measured or projected (see [`pop::time_s`]). A projected time with values by rank is that of the
     /// typical run; the interval of the repetitions' projections is then extended to include it.
     pub time_s: Median,
-    /// Represents single ranks: the run whose time is closest to the median, with every rank's useful time in every phase
-    /// replaced by its median over the repetitions if all repetitions report it.
+    /// Represents single ranks: the run whose time is closest to the median, with that median as its time, and every rank's useful time in
+    /// every phase replaced by its median over the repetitions if all repetitions report it.
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
@@ -46,22 +46,15 @@ impl Group {
         let by_rank = reports_ranks(&runs);
         if by_rank {
             quieten(&mut typical, &runs);
-            if setup.comm == Comm::Sim {
-                time_s.value = pop::time_s(&typical, &network);
-                time_s.low = time_s.low.min(time_s.value);
-                time_s.high = time_s.high.max(time_s.value);
-            }
+        }
+        if setup.comm != Comm::Sim {
+            typical.time_wall_s = time_s.value;
+        } else if by_rank {
+            time_s.value = pop::time_s(&typical, &network);
+            time_s.low = time_s.low.min(time_s.value);
+            time_s.high = time_s.high.max(time_s.value);
         }
         Some(Self { setup, runs, time_s, typical, by_rank, network })
-    }
-
-    /// Returns the origin of the times of single ranks, for a caption.
-    pub fn rank_times_caption(&self) -> String {
-        let n = self.runs.len();
-        match self.by_rank {
-            true => format!("Times of a rank in a phase are medians of {n} runs"),
-            false => format!("Run of median time among {n}"),
-        }
     }
 
     /// Returns the number of cells of the mesh.
@@ -190,12 +183,17 @@ impl Groups {
 
     /// Executes the invariants at the head of this file.
     pub fn check_invariants(&self) {
-        for Group { setup, runs, time_s: t, typical, .. } in &self.all {
+        for Group { setup, runs, time_s: t, typical, by_rank, network } in &self.all {
             let name = format!("{} on {} at {} ranks", setup.engine, setup.case, setup.ranks);
             let count = runs.len();
             assert!(count > 0 && t.count == count, "{name} has {count} runs");
             assert!(runs.iter().all(|run| run.setup == *setup), "{name} pools other setups");
             assert!(t.low <= t.value && t.value <= t.high, "{name}: {t:?} is in its interval");
+            let is_in_phases = setup.comm == Comm::Sim && !*by_rank;
+            assert!(
+                is_in_phases || pop::time_s(typical, network) == t.value,
+                "{name} has one time"
+            );
             assert!((0.0..=1.0).contains(&t.coverage), "{name}: {t:?} is a coverage");
             for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
                 spread.check_invariants();
@@ -217,14 +215,23 @@ impl Groups {
                     o.spacing_min == s.spacing_min && is_base
                 }
             };
-            size && (&o.case, o.layer_cells_min, &o.engine)
-                == (&s.case, s.layer_cells_min, &s.engine)
+            let is_of_series = !weak || o.series_cells == s.series_cells;
+            size && is_of_series
+                && (&o.case, o.layer_cells_min, &o.engine)
+                    == (&s.case, s.layer_cells_min, &s.engine)
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
         let rank = |o: &&Group| {
             (o.setup.ranks, o.setup.comm != s.comm, o.setup.experiment != s.experiment)
         };
         self.all.iter().filter(is_comparable).min_by_key(rank).unwrap_or(group)
+    }
+
+    /// Returns the speedup of a group over its reference, times the ranks of that: over one rank, if it ran on one.
+    pub fn speedup(&self, group: &Group) -> Median {
+        let base = self.reference(group);
+        let base_s = base.time_s.value * base.setup.ranks as f64;
+        group.time_s.falling(|time_s| base_s / time_s)
     }
 
     /// Returns the efficiencies of a group relative to its reference.

@@ -2,9 +2,9 @@
 //!
 //! Times are CPU times of whole processes, seen from outside: they include the start of the program and reading, hardly
 //! depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in which
-//! a program finds the facets near an octant.
+//! a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::entry::Comm;
+use super::entry::{Comm, Setup};
 use super::group::{Group, Groups};
 use crate::order::by_key;
 use crate::statistics::Median;
@@ -37,13 +37,16 @@ pub struct Comparison<'a> {
     pub notes: Vec<String>,
 }
 
+fn is_on_one_core(setup: &Setup) -> bool {
+    setup.ranks == 1 && setup.comm != Comm::Sim
+}
+
 impl Groups {
     /// Returns the comparisons of programs, in the order of the record.
     pub fn comparisons(&self) -> Vec<Comparison<'_>> {
         let is_compared = |g: &&Group| {
-            let s = &g.setup;
-            let by_size = ["strong", "spacing"].contains(&s.experiment.as_str());
-            by_size && s.ranks == 1 && s.comm != Comm::Sim && g.cpu_s().is_some()
+            let by_size = ["strong", "spacing"].contains(&g.setup.experiment.as_str());
+            by_size && is_on_one_core(&g.setup) && g.cpu_s().is_some()
         };
         let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
         let by_case = by_key(self.all.iter().filter(is_compared), of_case);
@@ -56,10 +59,14 @@ impl Groups {
         let mut programs = by_key(groups, |g| g.setup.engine.as_str());
         programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
         let left_out = self.left_out.iter().filter(|left| {
-            (&left.setup.case, left.setup.layer_cells_min) == (case, layer_cells_min)
+            let s = &left.setup;
+            (&s.case, s.layer_cells_min) == (case, layer_cells_min) && is_on_one_core(s)
         });
-        let left_out = left_out
-            .map(|left| format!("No mesh at spacing {:.2e}: {}", left.setup.spacing_min, left.why));
+        let left_out = left_out.map(|left| {
+            let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
+            let what = if is_repeated { "A run is missing" } else { "No mesh" };
+            format!("{what} at spacing {:.2e}: {}", left.setup.spacing_min, left.why)
+        });
         let lacks = programs.iter().filter_map(|(name, _)| {
             let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
             Some(format!("{name} does not provide: {}", lacks.join(", ")))

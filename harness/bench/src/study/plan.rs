@@ -107,6 +107,7 @@ impl Plan<'_> {
                         weights: choice.0.to_owned(),
                         partitioner: choice.1.to_owned(),
                         weight_exposed: choice.2,
+                        series_cells: cells.filter(|_| series.experiment.has_several_meshes()),
                         ..Setup::serial(&base.name, spacing, n)
                     },
                     case: case.clone(),

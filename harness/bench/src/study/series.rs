@@ -27,6 +27,13 @@ pub enum Experiment {
     Weights,
 }
 
+impl Experiment {
+    /// Whether the runs of a series are of several meshes.
+    pub(super) fn has_several_meshes(self) -> bool {
+        matches!(self, Experiment::Weak | Experiment::Spacing | Experiment::Layers)
+    }
+}
+
 impl fmt::Display for Experiment {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&crate::name_of(self))

@@ -1,6 +1,6 @@
 //! Figures of load balance: useful time per rank, and load imbalance by weights and partitioner.
 
-use super::groups::{Subject, by_subject};
+use super::groups::{Subject, by_subject, rank_times};
 use super::paper;
 use crate::figure::{Axis, Bars, Body, Figure, Provenance};
 use bench::experiments::cause::heaviest_base_leaf;
@@ -53,7 +53,7 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
         "Useful time (CPU time outside communication) per rank: {subject}, {} cells on {ranks} simulated ranks.{counterpart} Load imbalance λ = max/mean: {lambda:.3} by time, {:.3} by cells. {}.",
         grouped(run.cells),
         run.counters.get("leaves").map_or(1.0, |leaves| leaves.lambda(ranks)),
-        group.rank_times_caption()
+        rank_times(&[group])
     );
     let bars = Bars {
         categories: (0..ranks).map(|r| r.to_string()).collect(),

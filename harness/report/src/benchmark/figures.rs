@@ -1,6 +1,6 @@
 //! The figures of a record: counterparts of the paper's Figures 17 to 23, and time, rate and memory over cells.
 
-use super::groups::{by_case, engines, point, provenance, repetitions};
+use super::groups::{Subject, by_case, engines, point, provenance, repetitions};
 use super::paper::{self, cited};
 use super::{balance, scaling};
 use crate::figure::{Axis, Body, Figure, Point, Provenance, Series};
@@ -15,8 +15,8 @@ const PAPER: &str = "the paper: 1, 2, 32 and 64 ranks";
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut all = Vec::new();
-    all.extend(by_case(groups, "spacing").iter().map(|(case, of)| time_by_spacing(case, of)));
-    all.extend(by_case(groups, "layers").iter().map(|(case, of)| time_by_layers(case, of)));
+    all.extend(by_case(groups, "spacing").iter().map(|(of, all)| time_by_spacing(of, all)));
+    all.extend(by_case(groups, "layers").iter().map(|(of, all)| time_by_layers(of, all)));
     all.extend(scaling::figures(groups));
     all.extend(balance::figures(groups));
     all.extend(rate_and_memory(groups));
@@ -60,7 +60,8 @@ fn series(all: &[&Group], value: impl Fn(&Group) -> Point) -> Vec<Series> {
 }
 
 /// The counterpart of the paper's Figure 17.
-fn time_by_spacing(case: &str, all: &[&Group]) -> Figure {
+fn time_by_spacing(subject: &Subject, all: &[&Group]) -> Figure {
+    let case = subject.mesh();
     let mut series = series(all, |group| at(group, group.time_s));
     let mut caption = format!(
         "Run time of {} over the number of cells of {case} at n = {}. The spacing is halved from point to point. {}. Lines join meshes \
@@ -69,7 +70,7 @@ fn time_by_spacing(case: &str, all: &[&Group]) -> Figure {
         all[0].setup.layer_cells_min,
         repetitions(all)
     );
-    if paper::is_counterpart(case) {
+    if paper::is_counterpart(subject.case) {
         let runs = paper::runs().map(|(cells, _, time_s)| (cells, time_s));
         series.push(cited(PAPER, runs));
         caption += &format!(
@@ -78,11 +79,18 @@ fn time_by_spacing(case: &str, all: &[&Group]) -> Figure {
         );
     }
     let title = format!("Run time over cells, by spacing: {case}");
-    over_cells(format!("time-over-cells-{case}"), title, caption, "run time / s", series)
+    over_cells(
+        format!("time-over-cells-{}", subject.file()),
+        title,
+        caption,
+        "run time / s",
+        series,
+    )
 }
 
 /// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: it has no number of ranks.
-fn time_by_layers(case: &str, all: &[&Group]) -> Figure {
+fn time_by_layers(subject: &Subject, all: &[&Group]) -> Figure {
+    let case = subject.mesh();
     let mut layers: Vec<u32> = all.iter().map(|g| g.setup.layer_cells_min).collect();
     layers.sort_unstable();
     layers.dedup();
@@ -95,7 +103,7 @@ fn time_by_layers(case: &str, all: &[&Group]) -> Figure {
         layers.join(", "),
         repetitions(all)
     );
-    if paper::is_counterpart(case) {
+    if paper::is_counterpart(subject.case) {
         let [cells, min] = ["thick_cells", "thick_min"].map(number);
         caption += &format!(
             " The paper's Figure 18, which \"does not scale linearly\", is the counterpart. Its largest mesh, {cells:e} cells in {min} min, \
@@ -104,7 +112,13 @@ fn time_by_layers(case: &str, all: &[&Group]) -> Figure {
     }
     let title = format!("Run time over cells, by layer thickness: {case}");
     let series = series(all, |group| at(group, group.time_s));
-    over_cells(format!("time-over-layers-{case}"), title, caption, "run time / s", series)
+    over_cells(
+        format!("time-over-layers-{}", subject.file()),
+        title,
+        caption,
+        "run time / s",
+        series,
+    )
 }
 
 /// Rate and memory of groups with at most one rank per core, whose wall times are meaningful: those of a study of spacings, or else

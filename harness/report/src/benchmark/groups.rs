@@ -3,6 +3,7 @@
 use crate::figure::{Point, Provenance};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
+use bench::experiments::number::grouped;
 use bench::order::{by_key, distinct};
 use bench::statistics::Median;
 use std::fmt;
@@ -23,13 +24,10 @@ pub fn point(x: f64, m: Median) -> Point {
 
 /// The number of repetitions and the meaning of the error bars, as a sentence without its full stop.
 pub fn repetitions(groups: &[&Group]) -> String {
-    let counts: Vec<usize> = groups.iter().map(|g| g.time_s.count).collect();
-    let (least, most) =
-        (counts.iter().min().copied().unwrap_or(0), counts.iter().max().copied().unwrap_or(0));
     let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
-    let n = if least == most { format!("{least}") } else { format!("{least} to {most}") };
     format!(
-        "Medians of {n} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{}",
+        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{}",
+        counts(groups),
         covered * 100.0,
         if groups.iter().any(|g| g.by_rank && g.setup.comm == Comm::Sim) {
             "; projections use medians per rank, and their bars are those of the projections of single runs"
@@ -39,9 +37,28 @@ pub fn repetitions(groups: &[&Group]) -> String {
     )
 }
 
-/// The groups of an experiment by case, in the order of the record.
-pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(&'a str, Vec<&'a Group>)> {
-    by_key(of(groups, experiment), |group| group.setup.case.as_str())
+/// The origin of the times of single ranks, as a sentence without its full stop.
+pub fn rank_times(groups: &[&Group]) -> String {
+    let n = counts(groups);
+    match (groups.iter().all(|g| g.by_rank), groups.iter().any(|g| g.by_rank)) {
+        (true, _) => format!("Times of a rank in a phase are medians of {n} runs"),
+        (_, false) => format!("Runs of median time among {n}"),
+        _ => format!(
+            "Times of a rank in a phase are medians of {n} runs, or those of the one of median time"
+        ),
+    }
+}
+
+/// The number of repetitions, or the range of numbers.
+fn counts(groups: &[&Group]) -> String {
+    let counts = || groups.iter().map(|g| g.time_s.count);
+    distinct([counts().min(), counts().max()].into_iter().flatten().map(|n| n.to_string()))
+        .join(" to ")
+}
+
+/// The groups of an experiment by case, programs together, in the order of the record.
+pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
+    by_key(of(groups, experiment), |group| Subject { engine: OWN, ..Subject::of(&group.setup) })
 }
 
 /// The groups of an experiment by engine and case, in the order of the record.
@@ -54,32 +71,43 @@ fn of<'a>(groups: &'a Groups, experiment: &str) -> impl Iterator<Item = &'a Grou
 }
 
 /// The program and the case of a figure that shows only one of each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subject<'a> {
     /// The program.
     pub engine: &'a str,
     /// The case.
     pub case: &'a str,
+    /// Cells that its series of several meshes was asked for.
+    pub cells: Option<f64>,
 }
 
 impl<'a> Subject<'a> {
     /// The program and the case of a run.
     pub fn of(setup: &'a Setup) -> Self {
-        Self { engine: &setup.engine, case: &setup.case }
+        Self { engine: &setup.engine, case: &setup.case, cells: setup.series_cells }
     }
 
     /// A name for files: the case, and before it the program unless that is the mesher of this repository.
     pub fn file(&self) -> String {
+        let size = self.cells.map_or(String::new(), |n| format!("-{}", cells_label(n as u64)));
         match self.engine {
-            OWN => self.case.to_owned(),
-            engine => format!("{engine}-{}", self.case),
+            OWN => format!("{}{size}", self.case),
+            engine => format!("{engine}-{}{size}", self.case),
         }
+    }
+
+    /// The case and the size of its series, as text.
+    pub fn mesh(&self) -> String {
+        let size = self
+            .cells
+            .map_or(String::new(), |n| format!(" (series of {} cells)", grouped(n as u64)));
+        format!("{}{size}", self.case)
     }
 }
 
 impl fmt::Display for Subject<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} by {}", self.case, self.engine)
+        write!(f, "{} by {}", self.mesh(), self.engine)
     }
 }
 

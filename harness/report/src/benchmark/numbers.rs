@@ -44,7 +44,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         ("cpu", group.cpu_s(), "s"),
         ("rate", Some(group.time_s.falling(rate)), "10^6 cells/s/rank"),
         ("memory", Some(group.bytes_per_cell()), "B/cell"),
-        ("speedup", is_speedup.then(|| group.time_s.falling(|t| base.time_s.value / t)), ""),
+        ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
         ("efficiency", scales.then(|| single(groups.efficiency(group).global())), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
@@ -80,11 +80,16 @@ const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \resu
   \expandafter\def\csname result/#1/interval\endcsname{#3}\expandafter\def\csname result/#1/unit\endcsname{#4}}
 ";
 
+/// The unit of a result in LaTeX.
+pub fn unit_tex(number: &Number) -> String {
+    number.unit.replace("10^6", "$10^6$")
+}
+
 /// `numbers.tex`.
 pub fn tex(numbers: &[Number]) -> String {
     let mut out = HEAD.to_owned();
-    for Number { key, value, interval, unit } in numbers {
-        let unit = unit.replace("10^6", "$10^6$");
+    for number @ Number { key, value, interval, .. } in numbers {
+        let unit = unit_tex(number);
         let _ = writeln!(out, "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{unit}}}");
     }
     out

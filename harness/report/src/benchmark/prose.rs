@@ -4,7 +4,7 @@
 //! record, or a number of three or more significant digits that is written by hand and that no result rounds to. Numbers in comments,
 //! in arguments of commands that name something, and lengths are not read; years and section numbers have too few digits or no point.
 
-use super::numbers::Number;
+use super::numbers::{Number, unit_tex};
 
 /// What a text has.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
             checked.findings.extend(what.map(|what| format!("line {line}: {what}")));
         };
         if let Some(arguments) = code.trim_start().strip_prefix("\\defresult") {
-            find(differs(&groups(arguments), numbers));
+            find(defines_otherwise(&groups(arguments), numbers));
             continue;
         }
         for literal in literals(code) {
@@ -37,12 +37,18 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
         }
     }
     let code: String = text.lines().map(|line| without_comment(line).to_owned() + "\n").collect();
-    for (at, key) in uses(&code) {
+    for (at, option, key) in uses(&code) {
         checked.compared += 1;
         let line = 1 + code[..at].matches('\n').count();
-        if !numbers.iter().any(|number| number.key == key) {
-            checked.findings.push(format!("line {line}: the record has no result {key}"));
-        }
+        let why = match numbers.iter().find(|number| number.key == key) {
+            None => format!("the record has no result {key}"),
+            Some(n) if option == "interval" && n.interval.is_empty() => {
+                format!("{key} has no interval")
+            }
+            Some(_) if ["value", "interval", "unit"].contains(&option) => continue,
+            Some(_) => format!("\\result has no option {option}: give value, interval or unit"),
+        };
+        checked.findings.push(format!("line {line}: {why}"));
     }
     checked
 }
@@ -59,38 +65,40 @@ fn groups(text: &str) -> Vec<&str> {
 }
 
 /// What a definition says that the record does not say.
-fn differs(arguments: &[&str], numbers: &[Number]) -> Option<String> {
-    let [key, value, interval, _] = arguments else {
+fn defines_otherwise(arguments: &[&str], numbers: &[Number]) -> Option<String> {
+    let [key, here @ ..] = arguments else {
         return Some("\\defresult needs four arguments".to_owned());
     };
-    match numbers.iter().find(|number| number.key == *key) {
-        None => Some(format!("the record has no result {key}")),
-        Some(n) if n.value != *value || n.interval != *interval => Some(format!(
-            "{key} is {value} ({interval}) here and {} ({}) in the record",
-            n.value, n.interval
-        )),
-        Some(_) => None,
-    }
+    let Some(n) = numbers.iter().find(|number| number.key == *key) else {
+        return Some(format!("the record has no result {key}"));
+    };
+    let [here, there] = [here, &[&n.value, &n.interval, &unit_tex(n)]].map(|of| of.join(" "));
+    (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
-/// Where `\result` is used, and with which key. White space may stand around its arguments, and ends of lines.
-fn uses(code: &str) -> impl Iterator<Item = (usize, &str)> {
+/// Where `\result` is used, and with which option and key. White space may stand around its arguments, and ends of lines.
+fn uses(code: &str) -> impl Iterator<Item = (usize, &str, &str)> {
     const COMMAND: &str = "\\result";
     code.match_indices(COMMAND).filter_map(|(at, _)| {
         let rest = code[at + COMMAND.len()..].trim_start();
-        let rest = match rest.strip_prefix('[') {
-            Some(option) => option.split_once(']')?.1.trim_start(),
-            None => rest,
+        let (option, rest) = match rest.strip_prefix('[') {
+            Some(option) => option.split_once(']')?,
+            None => ("value", rest),
         };
-        Some((at, rest.strip_prefix('{')?.split_once('}')?.0.trim()))
+        Some((at, option, rest.trim_start().strip_prefix('{')?.split_once('}')?.0.trim()))
     })
 }
 
-/// Numbers with a decimal point and three or more significant digits, as they stand in the text.
+/// Numbers with a decimal point and three or more significant digits, as they stand in the text. Zero before the point may be missing.
 fn literals(code: &str) -> impl Iterator<Item = &str> {
     let not_part = |c: char| !c.is_ascii_digit() && c != '.';
-    let is_start = move |at: usize| code[..at].chars().next_back().is_none_or(not_part);
-    let starts = code.char_indices().filter(move |&(at, c)| c.is_ascii_digit() && is_start(at));
+    let is_start = move |&(at, c): &(usize, char)| {
+        let before = code[..at].chars().next_back();
+        let is_point = c == '.' && code[at + 1..].starts_with(|c: char| c.is_ascii_digit());
+        (c.is_ascii_digit() || is_point && before.is_none_or(|c| !c.is_alphanumeric()))
+            && before.is_none_or(not_part)
+    };
+    let starts = code.char_indices().filter(is_start);
     starts.filter_map(move |(at, _)| {
         let end = code[at..].find(not_part).map_or(code.len(), |length| at + length);
         let literal = code[at..end].trim_end_matches('.');
@@ -109,9 +117,15 @@ fn is_length(rest: &str) -> bool {
     units.iter().any(|unit| rest.starts_with(unit)) || ends.iter().any(|end| name.ends_with(end))
 }
 
-/// Whether the text ends within an option `[...]`, or within the argument of a command that names a label, a file or a source.
+/// Whether the text ends within an option `[...]` of a command, or within the argument of a command that names a label, a file or a
+/// source.
 fn is_name(before: &str) -> bool {
-    if before.rfind('[').is_some_and(|open| !before[open..].contains(']')) {
+    let of_command = |text: &str| {
+        let name = text.trim_end().trim_end_matches(|c: char| c.is_ascii_alphabetic() || c == '*');
+        text.ends_with(['}', ']']) || name.len() < text.trim_end().len() && name.ends_with('\\')
+    };
+    let option = before.rfind('[').filter(|&open| !before[open..].contains(']'));
+    if option.is_some_and(|open| of_command(&before[..open])) {
         return true;
     }
     let Some(open) = before.rfind('{').filter(|&open| !before[open..].contains('}')) else {
@@ -131,10 +145,12 @@ fn is_name(before: &str) -> bool {
 /// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
 fn rounds_to(number: &Number, literal: &str) -> bool {
     let decimals = literal.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let literal =
+        &if literal.starts_with('.') { format!("0{literal}") } else { literal.to_owned() };
     let ends = number.interval.split("--");
     ends.chain([number.value.as_str()]).any(|text| {
         let value: Result<f64, _> = text.replace(',', "").parse();
-        value.is_ok_and(|value| text == literal || format!("{value:.decimals$}") == literal)
+        value.is_ok_and(|value| text == *literal || format!("{value:.decimals$}") == *literal)
     })
 }
 
@@ -163,8 +179,14 @@ mod tests {
             ("\\textbf{12.4}", "12.4 is written by hand"),
             (
                 "\\defresult{a/time}{1.3}{1.10--1.30}{s}",
-                "a/time is 1.3 (1.10--1.30) here and 1.234",
+                "a/time is 1.3 1.10--1.30 s here and 1.234 1.10--1.30 s in the record",
             ),
+            ("\\defresult{a/time}{1.234}{1.10--1.30}{ms}", "1.10--1.30 ms here"),
+            ("[9.87, 1.23]", "9.87 is written by hand"),
+            ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
+            ("a factor of .987", ".987 is written by hand"),
+            ("\\result[intervall]{a/time}", "no option intervall"),
+            ("\\result[interval]{a/speedup}", "a/speedup has no interval"),
             ("\\defresult{b}{1.3}{}{}", "no result b"),
         ] {
             let found = findings(text);

@@ -1,6 +1,6 @@
 //! Figures over ranks: speedup, efficiency and its factors, time by phase.
 
-use super::groups::{Subject, by_subject, cells_label, point, provenance, repetitions};
+use super::groups::{Subject, by_subject, cells_label, point, provenance, rank_times, repetitions};
 use super::paper::{self, cited};
 use crate::figure::{Axis, Bars, Body, Figure, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
@@ -84,10 +84,7 @@ impl Study<'_> {
         let mut series = vec![ideal(all, |r| r)];
         for (style, how) in ["measured", "oversubscribed", "projected", "serial"].iter().enumerate()
         {
-            let speedup = |g: &&Group| {
-                let base = groups.reference(g).time_s.value;
-                point(g.setup.ranks as f64, g.time_s.falling(|time_s| base / time_s))
-            };
+            let speedup = |g: &&Group| point(g.setup.ranks as f64, groups.speedup(g));
             let of = self.with(how);
             if let Some(first) = of.first() {
                 let name = format!("{}, {how}", subject.engine);
@@ -113,7 +110,7 @@ impl Study<'_> {
         }
         let cells_text = grouped(cells);
         let caption = format!(
-            "Speedup of {subject} with {cells_text} cells at n = {} over one rank of the same program: {}. {}. Hollow markers: projected from \
+            "Speedup of {subject} with {cells_text} cells at n = {} over the same program on the fewest ranks, times their number: {}. {}. Hollow markers: projected from \
              simulated ranks (critical path of CPU times plus {}), or measured with more ranks than \
              cores. Lines join powers of two.{notes}",
             all[0].setup.layer_cells_min,
@@ -153,8 +150,11 @@ impl Study<'_> {
         let efficiency_max = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
         let size = match *experiment {
             "weak" => {
-                let cells = grouped(last.cells() / last.setup.ranks as u64);
-                format!("{cells} cells per rank, {}", facets(&simulated))
+                let of = |g: &&Group| g.cells() / g.setup.ranks as u64;
+                let (least, most) =
+                    (simulated.iter().map(of).min(), simulated.iter().map(of).max());
+                let range = distinct([least, most].into_iter().flatten().map(grouped)).join(" to ");
+                format!("{range} cells per rank, {}", facets(&simulated))
             }
             _ => format!("{} cells", grouped(last.cells())),
         };
@@ -163,7 +163,7 @@ impl Study<'_> {
              projected from simulated ranks. Lines join powers of two. {}",
             last.setup.layer_cells_min,
             self.base_cases(&[last]),
-            last.rank_times_caption(),
+            rank_times(&simulated),
             above_one(&efficiencies).unwrap_or_default()
         );
         let y = Axis { range: Some((0.0, efficiency_max * 1.1)), ..Axis::linear("efficiency") };
@@ -201,7 +201,7 @@ impl Study<'_> {
              scaling all bars are equal. {}, projected from simulated ranks.",
             grouped(last.cells),
             last.setup.ranks,
-            simulated[0].rank_times_caption()
+            rank_times(&simulated)
         );
         let bars = Bars {
             categories: simulated.iter().map(|g| g.setup.ranks.to_string()).collect(),

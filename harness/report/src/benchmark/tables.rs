@@ -2,7 +2,7 @@
 
 use super::groups::{Subject, is_summarised};
 use crate::table::Table;
-use bench::experiments::entry::Phase;
+use bench::experiments::entry::{Comm, Phase};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, above_one, phase_efficiency, phase_s};
@@ -156,7 +156,10 @@ fn programs(comparison: &Comparison) -> Table {
         format!("programs on one core: {}, n = {}", comparison.case, comparison.layer_cells_min),
         &groups,
         &[
-            ("engine", &|g| g.setup.engine.clone()),
+            ("engine", &|g| match g.setup.comm {
+                Comm::Mpi => format!("{} with mpirun", g.setup.engine),
+                _ => g.setup.engine.clone(),
+            }),
             ("cells", &|g| grouped(g.cells())),
             ("CPU time / s", &|g| format!("{:.2}", cpu_s(g))),
             ("of it search / s", &|g| {
@@ -172,7 +175,7 @@ fn programs(comparison: &Comparison) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Comm, Entry, LeftOut, Line, Machine, Session, Setup};
+    use bench::experiments::entry::{Entry, LeftOut, Line, Machine, Session, Setup};
     use bench::testing::{line, run};
 
     #[test]
@@ -214,7 +217,7 @@ mod tests {
         };
         let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
         let left = LeftOut {
-            setup: Setup { engine: "slow".into(), ..setup },
+            setup: Setup { engine: "slow".into(), spacing_min: 0.05, ..setup },
             why: "slow would take 9 s".into(),
         };
         let lines = [
@@ -229,7 +232,7 @@ mod tests {
         assert_eq!(table.rows[0].join(" "), "mesher 2,000,000 2.00 not separate 1.000 0.5");
         assert_eq!(table.rows[1].join(" "), "slow 1,000,000 2.00 0.50 0.500 1.0");
         let notes = [
-            "No mesh at spacing 1.00e-1: slow would take 9 s",
+            "No mesh at spacing 5.00e-2: slow would take 9 s",
             "slow does not provide: layers, MPI",
         ];
         assert_eq!(table.notes, notes);

@@ -25,6 +25,8 @@ type Entry<'a> = (&'a str, Box<dyn Fn(&Canvas, At) + 'a>);
 
 /// Length of a line in the legend.
 const LENGTH: f64 = SYMBOL - 18.0;
+/// Up to this number of bars, each has a label.
+const STAGGERED_MAX: usize = 12;
 /// Space at the right of the data.
 const RIGHT: f64 = 40.0;
 
@@ -159,8 +161,8 @@ fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
     canvas.text_below(&figure.x.label, below);
 }
 
-/// The lines of the label below every bar. Labels too long for their bars are broken at spaces; where that does not
-/// suffice, only every second, third ... bar has one.
+/// The lines of the label below every bar. Labels too long for their bars are broken at spaces; where that does not suffice, those of
+/// neighbouring bars are on different lines. Only every second, third ... of many bars has one.
 fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
     let widest = |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).fold(0.0, f64::max);
     let whole: Vec<Vec<String>> = names.iter().map(|n| vec![n.clone()]).collect();
@@ -168,7 +170,14 @@ fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
         names.iter().map(|n| n.split(' ').map(str::to_owned).collect()).collect();
     let mut chosen = if widest(&whole) + 16.0 <= step { whole } else { broken };
     let every = ((widest(&chosen) + 4.0) / step).ceil().max(1.0) as usize;
-    chosen.iter_mut().enumerate().filter(|(i, _)| i % every != 0).for_each(|(_, l)| l.clear());
+    let lines = chosen.iter().map(Vec::len).max().unwrap_or(0);
+    for (i, label) in chosen.iter_mut().enumerate() {
+        match names.len() <= STAGGERED_MAX {
+            true => drop(label.splice(0..0, vec![String::new(); i % every * lines])),
+            false if i % every != 0 => label.clear(),
+            false => {}
+        }
+    }
     chosen
 }
 #[cfg(test)]
@@ -221,7 +230,9 @@ mod tests {
         assert_eq!(labels(&names, 500.0), [vec!["metis unit"], vec!["morton area"]]);
         let broken = [vec!["metis", "unit"], vec!["morton", "area"]];
         assert_eq!(labels(&names, 228.0), broken);
-        assert_eq!(labels(&names, 120.0), [vec!["metis", "unit"], vec![]]);
+        assert_eq!(labels(&names, 120.0), [vec!["metis", "unit"], vec!["", "", "morton", "area"]]);
+        let ranks: Vec<String> = (100..164).map(|rank| rank.to_string()).collect();
+        assert_eq!(labels(&ranks, 30.0)[..2], [vec!["100"], vec![]]);
     }
 
     #[test]
