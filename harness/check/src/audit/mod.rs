@@ -67,9 +67,9 @@ impl AuditReport {
         self.checks.iter().filter(|check| !check.was_run())
     }
 
-    /// Whether needless splits were not sought, because memory does not suffice.
+    /// Whether splits were not checked, because memory does not suffice.
     pub fn exceeds_memory(&self) -> bool {
-        self.leaves > 0 && self.not_run().any(|check| check.name == checks::NEEDLESS)
+        self.leaves > 0 && self.not_run().any(|check| check.name == checks::SPLITS)
     }
 
     /// Whether any property of the leaves was checked, beyond their files and counts.

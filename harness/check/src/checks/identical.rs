@@ -31,18 +31,13 @@ pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
         return result;
     }
     let first = mesh.iter().zip(reference).take_while(|(a, b)| a == b).count();
-    result.report(difference(("mesh", mesh), ("reference", reference), first, root));
+    let text = |words: &[u64]| {
+        words.get(first).map_or("no more leaves".to_owned(), |word| describe(*word, root))
+    };
+    let (has, wanted) = (text(mesh), text(reference));
+    result.report(format!("first difference: the mesh has {has}; it should have {wanted}"));
     result.findings_total = symmetric_difference(&mesh[first..], &reference[first..]);
     result
-}
-
-/// The words of two named sequences at the first index where they differ, as text.
-fn difference(a: (&str, &[u64]), b: (&str, &[u64]), first: usize, root: &Root) -> String {
-    let text = |(name, words): (&str, &[u64])| match words.get(first) {
-        Some(&word) => format!("{name} has {}", describe(word, root)),
-        None => format!("{name} has no more leaves"),
-    };
-    format!("first difference: {}; {}", text(a), text(b))
 }
 
 /// A word as text, whether or not it is a leaf.
@@ -87,7 +82,7 @@ mod tests {
         assert_eq!(result.findings_total, 2);
         let detail = &result.findings[0].detail;
         assert!(detail.contains("mesh has inside leaf: octant 3 (level 1)"), "{detail}");
-        assert!(detail.contains("reference has outside leaf: octant 3 (level 1)"), "{detail}");
+        assert!(detail.contains("it should have outside leaf: octant 3 (level 1)"), "{detail}");
         assert_eq!(compare(&fine[..7], &fine, &ROOT).findings_total, 1);
     }
 }

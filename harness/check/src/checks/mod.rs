@@ -18,17 +18,17 @@ pub mod layer;
 mod leaks;
 pub mod linear;
 pub mod manifest;
-mod needless;
 mod outcome;
 mod pass;
 mod region;
 mod result;
 pub mod sides;
 pub mod spacing;
+mod splits;
 mod subject;
 mod surface;
 pub mod terms;
-pub mod trail;
+pub(crate) mod trail;
 pub mod truth;
 
 pub use outcome::Outcome;
@@ -38,8 +38,8 @@ pub use terms::Terms;
 
 use serde::Serialize;
 
-pub(crate) use needless::NAME as NEEDLESS;
 pub(crate) use pass::Pass;
+pub(crate) use splits::NAME as SPLITS;
 
 /// Why what needs sides is not checked.
 const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
@@ -74,7 +74,7 @@ pub const CHECKS: [Check; 13] = [
     kept::CHECK,
     balance::CHECK,
     layer::CHECK,
-    needless::CHECK,
+    splits::CHECK,
     identical::CHECK,
 ];
 

@@ -3,7 +3,7 @@
 //! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface,
 //! and every leaf whose interior meets the interior of a box has at least the level of the box. T0 is the
 //! smallest such tree: an engine's T0 splits what the harness's own splits, and nothing else. Of the mesh the check
-//! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `needless`
+//! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `splits`
 //! detects needless refinement.
 
 use super::{Check, CheckResult, Subject, Terms, for_definition, some_leaves};

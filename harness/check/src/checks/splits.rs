@@ -1,15 +1,16 @@
-//! No octant is split without a cause.
+//! An octant is split if and only if a facet, a box, a layer or the balance requires it.
 //!
 //! Section 6 of reference/DEFINITION.md: refinement is least. Together with the other checks this establishes that the mesh is
-//! the one of the definition, without another mesh to compare it with ([`crate::why::unneeded`]). It needs the facets and, for a
-//! final mesh, memory in proportion to the leaves.
+//! the one of the definition, without another mesh to compare it with ([`crate::why::least`]). `layer` and `balance` check what a reader
+//! may rely on, which is less: layers around leaves that balance made are required, too, and meshes that lack them pass both. The check
+//! needs the facets and, for a final mesh, memory in proportion to the leaves.
 
 use std::fs;
 
 use super::{Check, CheckResult, FINDINGS_LISTED, NO_GEOMETRY, Subject, nothing};
 use crate::why::Mesh;
 
-pub(crate) const NAME: &str = "needless";
+pub(crate) const NAME: &str = "splits";
 
 /// Memory that the audit takes for each leaf: 22 bytes were measured on 4 million cells, and tables double when they are full.
 const BYTES_PER_LEAF: u64 = 40;
@@ -33,16 +34,21 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         return result.lacks(&why);
     }
     let mesh = Mesh::new(subject.manifest, subject.tree(), subject.inputs.clone(), Some(body));
-    let found = match mesh.unneeded(FINDINGS_LISTED) {
+    let found = match mesh.least(FINDINGS_LISTED) {
         Ok(found) => found,
         Err(why) => return result.lacks(&why),
     };
-    result.examined = found.splits;
-    for octant in &found.first {
-        let place = subject.terms.root.describe(octant);
-        result.report(format!("nothing requires the split of {place}"));
+    result.examined = found.splits + found.leaves;
+    let faults = [
+        ("a layer or the balance requires the split of", &found.missing),
+        ("nothing requires the split of", &found.unneeded),
+    ];
+    for (what, octant) in
+        faults.iter().flat_map(|(what, faults)| faults.first.iter().map(move |o| (what, o)))
+    {
+        result.report(format!("{what} {}", subject.terms.root.describe(octant)));
     }
-    result.findings_total = found.unneeded;
+    result.findings_total = found.missing.total + found.unneeded.total;
 }
 
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
@@ -56,7 +62,7 @@ fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "the search for needless splits needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
+        "the check of splits needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
          case, or use a machine with more memory",
         needed as f64 / 1e9,
         available as f64 / 1e9

@@ -49,6 +49,12 @@ impl Trail {
         self.neighbourhoods.iter().rev().find(fits).unwrap_or(&self.neighbourhoods[0])
     }
 
+    /// Whether a predicate of content and level holds for octants that contain everything within `margin` of the current octant.
+    pub fn all_nearby(&self, margin: i64, predicate: impl Fn(Handle, u8) -> bool) -> bool {
+        let (wide, _) = self.wide(margin);
+        wide.handles.iter().all(|&handle| predicate(handle, wide.octant.level))
+    }
+
     /// Level of the coarsest leaf in a region within `margin` of the current octant, if it is coarser than
     /// `bound`; otherwise a level that is at least `bound` and at most that of the coarsest leaf.
     pub fn coarsest_nearby(&self, tree: &Tree, margin: i64, region: &Region, bound: u8) -> u8 {

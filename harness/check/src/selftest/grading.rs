@@ -36,6 +36,12 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("refinement missing along a plane, as for a lost halo", "layer", AUDITED, halo_missing),
     words("extra layer around deleted leaves missing", "layer", INFORMED, extra_layer_missing),
+    // Beside leaves that balance made, for instance: a reader may not rely on the layers of section 6 there.
+    words("layer that only section 6 requires missing", "identical", INFORMED, |s| {
+        merge_where(s, |level, near| {
+            near.touching.max(near.within_layer) <= level && !near.in_surface_layer
+        })
+    }),
 ];
 
 /// Number of coarser neighbours across faces (index 1), edges (2) and corners (3).

@@ -62,13 +62,7 @@ impl Mesh<'_> {
 
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
     pub(super) fn is_deep(&self, octant: &Octant) -> bool {
-        self.remembered(Question::Deep, octant, || {
-            let levels = octant.level + 2..=self.level_deepest;
-            let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
-            self.base_splits(octant)
-                || self.extra_layer(octant).is_some()
-                || self.any_leaf_near(octant, levels, forces)
-        })
+        self.remembered(Question::Deep, octant, || self.is_forced(octant, octant.level + 2))
     }
 
     /// Whether a rule requires an octant to be split.
@@ -79,6 +73,19 @@ impl Mesh<'_> {
                 let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
                 level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces)
             })
+    }
+
+    /// Whether a rule requires a leaf to be split. The answer is not remembered: about a leaf it is asked once.
+    pub(super) fn requires_split(&self, leaf: &Octant) -> bool {
+        self.is_forced(leaf, leaf.level + 1)
+    }
+
+    /// Whether T0, the extra layer or a leaf of a level from `first` on forces an octant to split.
+    fn is_forced(&self, octant: &Octant, first: u8) -> bool {
+        let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
+        self.base_splits(octant)
+            || self.extra_layer(octant).is_some()
+            || self.any_leaf_near(octant, first..=self.level_deepest, forces)
     }
 
     /// The answer to a question, which is sought once.

@@ -1,8 +1,8 @@
-//! Why a leaf has its size and its side, and which splits of a mesh have no cause.
+//! Why a leaf has its size and its side, and which splits of a mesh are needless or missing.
 //!
 //! - [`base`](mod@base): T0 (section 3 of reference/DEFINITION.md); [`gradation`]: the leaves that force an octant to split (section 6);
 //! - [`answer`]: the answer about a point, with a chain of such leaves to a cause in T0; [`text`]: the answer for people;
-//! - [`unneeded`]: the audit of a whole mesh.
+//! - [`least`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
 //! so their parents are split by T0, by the extra layer, or by a step of a deeper level. A chain therefore goes to ever
@@ -24,8 +24,8 @@ use crate::diff::fields::differing_inputs;
 pub mod answer;
 mod base;
 mod gradation;
+pub mod least;
 mod text;
-pub mod unneeded;
 
 /// The body of a case: its facets, and T0 with the sides of its leaves.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! A correct mesh has no needless split, and every planted one is counted.
+//! A correct mesh has no needless and no missing split, and every planted one is found.
 
 use super::*;
 use contract::octant::LEVEL_MAX;
@@ -36,11 +36,46 @@ proptest! {
         let case = correct.case.keep_crossing.then_some(None).into_iter();
         for case in case.chain([Some(&correct.case)]) {
             let mutated = correct.mesh.with_parts(vec![words.clone()]);
-            let found = with_mesh(&mutated, case, |mesh| mesh.unneeded(100).unwrap());
-            prop_assert_eq!(found.unneeded, planted as u64, "{}{:?}", text, found);
+            let found = with_mesh(&mutated, case, |mesh| mesh.least(100).unwrap());
+            prop_assert_eq!(found.unneeded.total, planted as u64, "{}{:?}", text, found);
             let splits = octants_of(&words).len() - words.len();
-            prop_assert_eq!(found.splits, splits as u64);
-            prop_assert_eq!(found.unneeded, found.first.len() as u64);
+            prop_assert_eq!((found.splits, found.leaves), (splits as u64, words.len() as u64));
+            prop_assert_eq!(found.missing.total, 0, "{}{:?}", text, found);
+            prop_assert_eq!(found.unneeded.total, found.unneeded.first.len() as u64);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    /// The mesh is the least one, so whatever is merged has to be split.
+    #[test]
+    fn every_merged_octant_is_found(
+        text in settings(1..5), facets in prop_oneof![soup(1..8), hull()], boxes in boxes(0..3, 6),
+        which in prop::collection::vec(any::<prop::sample::Index>(), 1..4),
+    ) {
+        let text = text + &boxes.concat();
+        let correct = made(&text, &facets);
+        let parent = |w: &u64| (word::level(*w) > 0).then(|| {
+            let octant = word::octant(*w);
+            octant.ancestor(octant.level - 1)
+        });
+        for which in which {
+            let mut words = correct.mesh.words.clone();
+            let groups: Vec<_> = (0..words.len().saturating_sub(7))
+                .filter(|&i| parent(&words[i]).is_some() && words[i..i + 8].iter().all(|w| parent(w) == parent(&words[i])))
+                .collect();
+            if groups.is_empty() {
+                continue;
+            }
+            let at = groups[which.index(groups.len())];
+            let octant = parent(&words[at]).expect("it has siblings");
+            let side = word::decode(words[at]).unwrap().side;
+            words.splice(at..at + 8, [word::encode(&Leaf { octant, side })]);
+            let mutated = correct.mesh.with_parts(vec![words]);
+            let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(100).unwrap());
+            prop_assert!(found.missing.first.contains(&octant), "{}{} {:?}", text, octant, found);
         }
     }
 }
@@ -57,16 +92,18 @@ fn a_needless_split_is_found_wherever_it_is() {
     for (name, text) in cases {
         let correct = support::selftest_case(name, text);
         let (case, words) = (Some(&correct.case), &correct.mesh.words);
-        let count = |set: &LeafSet| with_mesh(set, case, |mesh| mesh.unneeded(1).unwrap());
-        assert_eq!(count(&correct.mesh).unneeded, 0, "{name}");
-        assert_eq!(count(&correct.base).unneeded, 0, "{name}");
+        let count = |set: &LeafSet| with_mesh(set, case, |mesh| mesh.least(1).unwrap());
+        for set in [&correct.mesh, &correct.base] {
+            let found = count(set);
+            assert_eq!((found.unneeded.total, found.missing.total), (0, 0), "{name}");
+        }
         for at in (0..words.len()).step_by(words.len() / 12) {
             let mut mutated = words.clone();
             split(&mut mutated, at);
             let found = count(&correct.mesh.with_parts(vec![mutated]));
-            assert_eq!(found.unneeded, 1, "{name}: {found:?}");
+            assert_eq!(found.unneeded.total, 1, "{name}: {found:?}");
             let planted = word::octant(words[at]);
-            assert_eq!(found.first[0], planted, "{name}: {found:?}");
+            assert_eq!(found.unneeded.first[0], planted, "{name}: {found:?}");
         }
         // No layer and no balance requires a split of the base tree.
         let words = &correct.base.words;
@@ -74,7 +111,7 @@ fn a_needless_split_is_found_wherever_it_is() {
             let mut mutated = words.clone();
             split(&mut mutated, at);
             let found = count(&correct.base.with_parts(vec![mutated]));
-            assert_eq!(found.unneeded, 1, "{name}: {found:?}");
+            assert_eq!(found.unneeded.total, 1, "{name}: {found:?}");
         }
     }
 }
@@ -97,7 +134,7 @@ fn deleted_crossing_leaves_require_the_layers_around_them_and_other_deleted_leav
             let words = &correct.mesh.words;
             let count = |words: Vec<u64>| {
                 let set = correct.mesh.with_parts(vec![words]);
-                with_mesh(&set, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap().unneeded)
+                with_mesh(&set, Some(&correct.case), |mesh| mesh.least(1).unwrap().unneeded.total)
             };
             assert_eq!(count(words.clone()), 0, "{n} cells, {keep}");
             let coarsest = words.iter().map(|&w| word::level(w)).min().unwrap();
@@ -125,9 +162,9 @@ fn needless_splits_of_all_leaves_are_counted_and_no_other() {
         let mut words = correct.mesh.words.clone();
         (0..words.len()).rev().for_each(|i| split(&mut words, i));
         let mutated = correct.mesh.with_parts(vec![words]);
-        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(1).unwrap());
+        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(1).unwrap());
         assert_eq!(
-            found.unneeded,
+            found.unneeded.total,
             correct.mesh.words.len() as u64,
             "{keep}, {crossing}: {found:?}"
         );
@@ -162,8 +199,8 @@ fn a_layer_thicker_than_the_root_refines_all_of_it_and_a_single_leaf_has_no_spli
         let correct = support::selftest_case("thick", &text);
         assert_eq!(correct.mesh.words.len(), leaves);
         for case in [None, Some(&correct.case)] {
-            let found = with_mesh(&correct.mesh, case, |mesh| mesh.unneeded(1).unwrap());
-            assert_eq!((found.unneeded, found.splits), (0, splits), "{found:?}");
+            let found = with_mesh(&correct.mesh, case, |mesh| mesh.least(1).unwrap());
+            assert_eq!((found.unneeded.total, found.splits), (0, splits), "{found:?}");
         }
     }
 }
@@ -179,8 +216,8 @@ fn as_many_octants_are_listed_as_wanted() {
     split(&mut words, last);
     let mutated = correct.mesh.with_parts(vec![words]);
     for wanted in [2, 1] {
-        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.unneeded(wanted).unwrap());
-        assert_eq!((found.unneeded, found.first.len()), (3, wanted));
+        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(wanted).unwrap());
+        assert_eq!((found.unneeded.total, found.unneeded.first.len()), (3, wanted));
     }
 }
 
@@ -188,6 +225,6 @@ fn as_many_octants_are_listed_as_wanted() {
 fn without_crossing_leaves_the_case_is_required() {
     let text = include_str!("../../../selftest-cases/inside.toml");
     let correct = support::selftest_case("inside", text);
-    let why = with_mesh(&correct.mesh, None, |mesh| mesh.unneeded(1).unwrap_err());
+    let why = with_mesh(&correct.mesh, None, |mesh| mesh.least(1).unwrap_err());
     assert!(why.contains("--case"), "{why}");
 }

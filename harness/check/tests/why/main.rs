@@ -7,8 +7,8 @@ mod support;
 mod brute;
 mod causes;
 mod chains;
+mod least;
 mod sides;
-mod unneeded;
 
 use check::selftest::CASES;
 use check::selftest::SelftestCase;

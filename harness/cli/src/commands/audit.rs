@@ -24,7 +24,7 @@ const LIMIT: Duration = Duration::from_secs(86_400);
 #[command(after_help = "\
 Examples:
   harness audit mesh                                   what the leaves alone show
-  harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, needless splits
+  harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, every split
   harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
   harness audit mesh --case all.toml --promises p4est  a mesh that need not keep the whole definition (p4est deletes nothing)
