@@ -123,6 +123,10 @@ def rows(columns, request):
         if len(wrong):
             raise Refused(f"cell {wrong[0]} has the level {level[wrong[0]]}, and levels are whole numbers from 0 to {LEVEL_MAX}")
         edges = root["edge"] / 2.0**level
+        wrong = np.flatnonzero(~(np.abs(columns.get("edge", edges) / edges - 1) <= TOLERANCE))
+        if len(wrong):
+            cell = wrong[0]
+            raise Refused(f"cell {cell} has the level {level[cell]:.0f}, which is an edge of {edges[cell]}, and the edge {columns['edge'][cell]}")
     if position == "index":
         at = np.array(root["origin"]) + at * edges[:, None]
     elif position == "centre":
@@ -157,14 +161,22 @@ def grid(shape, origin, edges):
     return {"origin": origin, "edge": float(edge) * 2 ** (int(max(shape)) - 1).bit_length()}
 
 
+def whole(given):
+    """An array of integers."""
+    array = np.array(given)
+    if array.dtype.kind != "i":
+        raise ValueError("indexes and levels of cells must be whole numbers")
+    return array.astype(np.int64)
+
+
 def of_json(text):
     """The centre of each cell in halves of smallest cells, and its level."""
     try:
         mesh = json.loads(text)
         widths = [np.array(h, float) for h in mesh["h"]]
         origin = np.array(mesh["origin"] if "origin" in mesh else mesh["x0"], float)
-        centres = np.array(mesh["cell_state"]["indexes"], np.int64).reshape(-1, 3)
-        levels = np.array(mesh["cell_state"]["levels"], np.int64)
+        centres, levels = (whole(mesh["cell_state"][name]) for name in ("indexes", "levels"))
+        centres = centres.reshape(-1, 3)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as why:
         raise Refused(f"is not a three-dimensional TreeMesh in JSON: {why}") from None
     if len(widths) != 3 or origin.shape != (3,) or any(w.ndim != 1 or not len(w) for w in widths):
@@ -175,7 +187,11 @@ def of_json(text):
         other = along[np.abs(along - along[0]) > 1e-6 * along[0]]
         if len(other):
             raise Refused(f"has widths {along[0]} and {other[0]} along axis {axis + 1}: an oct-tree of cubes has equal smallest cells")
-    root = grid([len(along) for along in widths], origin, [along[0] for along in widths])
+    shape = [len(along) for along in widths]
+    root = grid(shape, origin, [along[0] for along in widths])
+    wrong = np.flatnonzero(((centres < 1) | (centres >= 2 * np.array(shape))).any(axis=1))
+    if len(wrong):
+        raise Refused(f"has cell {wrong[0]} with the indexes {centres[wrong[0]].tolist()}, beyond {shape} smallest cells along the axes")
     # A centre is an odd number of half edges from the origin, so its lowest bit gives the edge.
     edges = centres[:, 0] & -centres[:, 0]
     corners = origin + (centres - edges[:, None]) / 2 * widths[0][0]

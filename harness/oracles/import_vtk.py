@@ -143,14 +143,14 @@ def of_unstructured(grid):
 def of_export(path, grid, edges):
     """Root and digest that a file of `harness export` states; None for other files."""
     root, digest = fields(path, grid)
-    arrays = ("level", "spacing", "id", "rank")
+    arrays = ("level", "spacing", "id")
     if digest is None and (root is None or not all(grid.GetCellData().HasArray(name) for name in arrays)):
         return None, None
     if root is None or digest is None:
         lost = "root" if root is None else "digest"
         raise Refused(f"was written by harness export, but lacks its field {lost}: it is damaged")
     # The digest is that of corners, edges and sides, from which the other arrays follow.
-    level, spacing, index, _ = (cell_array(grid, name) for name in arrays)
+    level, spacing, index = (cell_array(grid, name) for name in arrays)
     with np.errstate(all="ignore"):
         agrees = (np.abs(spacing / edges - 1) <= TOLERANCE) & (np.abs(root[3] / edges / 2.0**level - 1) <= TOLERANCE)
     agrees[1:] &= index[1:] > index[:-1]
@@ -163,7 +163,7 @@ def fields(path, grid):
     """The fields `root` and `digest` of the file, or None. For a .pvtu, VTK returns the fields of a part."""
     root, digest = grid.GetFieldData().GetArray("root"), grid.GetFieldData().GetAbstractArray("digest")
     root = vtk_to_numpy(root).ravel().tolist() if root is not None else None
-    digest = digest.GetValue(0) if digest is not None and digest.IsA("vtkStringArray") and digest.GetSize() else None
+    digest = digest.GetValue(0) if digest is not None and digest.IsA("vtkStringArray") and digest.GetNumberOfTuples() else None
     with open(path, "rb") as file:
         if b'type="PUnstructuredGrid"' in file.read(4096):
             arrays = {array.get("Name"): array for array in ElementTree.parse(path).iterfind("*/FieldData/DataArray")}

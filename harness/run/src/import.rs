@@ -94,7 +94,13 @@ pub fn import(
             return Ok(Imported::Tree(Box::new(tree)));
         }
     }
-    let cells = read(path, format, &Request { root, ..request.clone() }, paths, limit)?;
+    let cells = read(
+        path,
+        format,
+        &Request { root, is_root_of_case: request.root.is_none(), ..request.clone() },
+        paths,
+        limit,
+    )?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
 }

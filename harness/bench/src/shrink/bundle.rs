@@ -6,7 +6,15 @@ use contract::plain::StlForm;
 use run::engine::layout::Ranks;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The files of the directory.
+const FILES: [&str; 3] = ["case.toml", "body.stl", "README.md"];
+
+/// The first file that writing into a directory would replace: of the case itself, perhaps.
+pub fn replaced(directory: &Path) -> Option<PathBuf> {
+    FILES.iter().map(|name| directory.join(name)).find(|path| path.exists())
+}
 
 /// Writes `case.toml`, `body.stl` and `README.md` into a directory; returns the text of the README. `options` choose the program in the
 /// command that repeats the failure.

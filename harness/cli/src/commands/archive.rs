@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             .map_err(|error| Failure::at(&path, error))
     };
     put(RECORD, text.collect())?;
-    put(EXPECTED, serde_json::to_string_pretty(&expected).expect("plain data") + "\n")?;
+    put(EXPECTED, expected.json())?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
     let catalogue = Paths::find().catalogue;

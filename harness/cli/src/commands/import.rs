@@ -104,7 +104,12 @@ impl Source {
     /// Reads the mesh.
     fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
         let Self { format, root, sides, position, timeout, case: _ } = self;
-        let request = Request { sides: sides.clone(), root: *root, position: *position };
+        let request = Request {
+            sides: sides.clone(),
+            root: *root,
+            position: *position,
+            ..Request::default()
+        };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
         let limit = Duration::from_secs(*timeout);
         let mut imported = import(mesh, *format, &request, case, program, &Paths::find(), limit)?;

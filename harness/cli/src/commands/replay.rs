@@ -2,13 +2,14 @@
 
 use super::bench::programs;
 use super::programs::ProgramArguments;
+use super::report::read;
 use super::values::Input;
 use bench::experiments::entry::{Line, Session};
 use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::{self, SessionOptions, Study, package};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
-use report::archive::{EXPECTED, STUDY};
+use report::archive::{EXPECTED, RECORD, STUDY};
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
@@ -39,9 +40,13 @@ pub struct Arguments {
 /// If the archive cannot be read, a program is missing, or the time does not suffice for one repetition.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { archive, record, session, .. } = arguments;
+    let expected = Expected::of(&read(&[archive.join(RECORD)])?)?;
     let path = archive.join(EXPECTED);
     let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
-    let expected = Expected::parse(&text).map_err(|why| Failure::input(why).of_file(&path))?;
+    if text != expected.json() {
+        let why = "does not follow from the record: it was changed, or is of another version of the harness. The record's values are compared";
+        eprintln!("harness: {} {why}", path.display());
+    }
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
     let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };

@@ -68,6 +68,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let catalogue = &programs.paths.catalogue;
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
+    if let Some(exists) = bundle::replaced(&out).filter(|_| !arguments.test_only) {
+        let exists = exists.display();
+        let why =
+            format!("{exists} would be replaced: remove it, or give another directory with --out");
+        return Err(Failure::input(why));
+    }
     let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
     let given = Trial { case: PlainCase::read(&path)?, ranks };
     let judged = probe.judge(&given)?;
@@ -85,8 +93,6 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     eprintln!("harness shrink: the case fails {first}");
     let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
     let shrunk = shrink(given, &first, &budget, |trial| probe.judge(trial))?;
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
     let mut options = vec!["--engine", &arguments.engine];
     options.extend(program.iter().flat_map(|program| ["--mesher", program]));
     let readme = bundle::write(&shrunk, &options, &out).map_err(|error| named(&out, &error))?;

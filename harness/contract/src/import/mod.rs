@@ -72,6 +72,9 @@ pub struct Request {
     pub sides: Option<String>,
     /// The root, if it is not that of the file.
     pub root: Option<Root>,
+    /// Whether the root is that of a case. A forest that states another one than the unit cube is then not moved.
+    #[serde(skip)]
+    pub is_root_of_case: bool,
     /// The meaning of x, y and z in a table.
     pub position: Position,
 }

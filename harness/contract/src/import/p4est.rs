@@ -1,7 +1,7 @@
 //! Forests that p4est wrote with `p8est_save`, as one mesh.
 //!
-//! Trees are placed by their vertices. `--root` maps the least cube around them onto the root: most forests are in the
-//! unit cube, whatever the size of the body.
+//! Trees are placed by their vertices. `--root` maps the least cube around them onto the root; the root of a case does so for forests in the
+//! unit cube only, which most are, whatever the size of the body.
 //!
 //! A forest that `harness export` wrote has one byte of data per quadrant: the side, or [`FILLER`]. `--sides data` reads it. The
 //! attribute of its only tree, if it has one, is the edge of the root to the last bit.
@@ -13,6 +13,9 @@ use crate::failure::Unusable;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use crate::word;
+
+/// The root of most forests, whatever the size of the body.
+const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 
 use std::ops::Range;
 use std::path::Path;
@@ -42,6 +45,14 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
         _ => root::derive(&trees)?,
     };
     let placed = request.root.unwrap_or(stated);
+    let units = 1e-9 * placed.edge;
+    let ends = |root: &Root| [root.origin[0], root.origin[1], root.origin[2], root.edge];
+    let is_there = ends(&stated).iter().zip(ends(&placed)).all(|(a, b)| (a - b).abs() <= units);
+    if request.is_root_of_case && stated != UNIT && !is_there {
+        return Err(Unusable::because(format!(
+            "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
+        )));
+    }
     let scale = placed.edge / stated.edge;
     let sides = with_sides.then(Vec::new);
     let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };

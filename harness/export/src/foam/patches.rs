@@ -1,5 +1,6 @@
 //! The patches of a mesh: the root's sides, the body or its solids, and the cut.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use contract::case::Case;
@@ -52,13 +53,15 @@ impl Patches {
 
     fn add_solids(&mut self, case: &Case, path: &Path) -> Result<(), String> {
         let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
-        for solid in body.solids {
-            let name = patch_name(solid.name.as_deref().unwrap_or_default());
-            let known = self.names.iter().position(|known| *known == name);
-            let patch = known.unwrap_or(self.names.len());
-            if known.is_none() && solid.facets > 0 {
-                self.names.push(name);
-            }
+        let mut patch_of = HashMap::new();
+        for solid in body.solids.into_iter().filter(|solid| solid.facets > 0) {
+            let patch = *patch_of.entry(solid.name.clone()).or_insert_with(|| {
+                let name = patch_name(solid.name.as_deref().unwrap_or_default());
+                let numbered = (2..).map(|number| format!("{name}_{number}"));
+                let mut names = std::iter::once(name.clone()).chain(numbered);
+                self.names.extend(names.find(|name| !self.names.contains(name)));
+                self.names.len() - 1
+            });
             self.of_facet.extend(std::iter::repeat_n(patch, solid.facets));
         }
         if self.names.len() > SIDES.len() + 1 {
@@ -95,7 +98,8 @@ impl Patches {
     }
 }
 
-/// The name of a solid as a patch: characters that OpenFOAM's words may not have become underscores.
+/// The name of a solid as a patch: characters that OpenFOAM's words may not have become underscores. Another solid whose name becomes the
+/// same has a number at its end.
 fn patch_name(solid: &str) -> String {
     let allowed = |c: char| c.is_alphanumeric() || "_-.+:".contains(c);
     let name: String = solid.chars().map(|c| if allowed(c) { c } else { '_' }).collect();

@@ -97,7 +97,8 @@ fn imported(
     options: &RunOptions,
 ) -> Result<Imported, End> {
     let (sides, position) = (engine.run.sides.clone(), engine.run.position);
-    let request = Request { sides, position, root: None };
+    let root = Some(case.root);
+    let request = Request { sides, position, root, ..Request::default() };
     let paths = Paths::find();
     let read = import(written, Some(format), &request, Some(case), label, &paths, options.limit);
     let why = |why: String| format!("wrote a mesh that cannot be imported: {why}");
