@@ -10,6 +10,7 @@ dimensions there, so those of HDF5 are transposed.
 Exit codes: 0 success; 2 the mesh cannot be read or is too large; 3 a package cannot be imported.
 """
 
+import itertools
 import pathlib
 import re
 import sys
@@ -50,6 +51,14 @@ def node(parent, name, label, data=None):
     if data is not None:
         group.create_dataset(" data", data=data)
     return group
+
+
+def shortened(name):
+    """A name in the 32 characters of CGNS, and further ones if it is that of another patch."""
+    yield name[:32]
+    for number in itertools.count(2):
+        end = f"_{number}"
+        yield name[: 32 - len(end)] + end
 
 
 def integers(values):
@@ -98,12 +107,15 @@ def write(at, file):
     elements(zone, "NGON_n", NGON, 1, begins, vertices + 1)
     elements(zone, "NFACE_n", NFACE, last + 1, of_cells, faces)
     conditions = node(zone, "ZoneBC", "ZoneBC_t")
+    known = set()
     for name, kind, count, start in PATCH.findall((at / "boundary").read_text()):
         if int(count):  # A range cannot be empty.
+            name = next(short for short in shortened(name) if short not in known)
+            known.add(name)
             # Programs assign a type to a family by its name; only walls are known here.
-            node(node(base, name[:32], "Family_t"), "FamilyBC", "FamilyBC_t", "BCWall" if kind == "wall" else "UserDefined")
-            condition = node(conditions, name[:32], "BC_t", "FamilySpecified")
-            node(condition, "FamilyName", "FamilyName_t", name[:32])
+            node(node(base, name, "Family_t"), "FamilyBC", "FamilyBC_t", "BCWall" if kind == "wall" else "UserDefined")
+            condition = node(conditions, name, "BC_t", "FamilySpecified")
+            node(condition, "FamilyName", "FamilyName_t", name)
             node(condition, "PointRange", "IndexRange_t", integers([[int(start) + 1], [int(start) + int(count)]]))
             node(condition, "GridLocation", "GridLocation_t", "FaceCenter")
     solution = node(zone, "Cells", "FlowSolution_t")

@@ -134,7 +134,8 @@ const PART_OF_CELLS: f64 = 64.0;
 const CELLS_MOMENT: f64 = 8.4e6;
 /// Greatest number of cells of a pilot run: layers of many cells fill the far field, and only a large pilot shows how that grows.
 const CELLS_PILOT: f64 = 1e9;
-/// Bytes per cell of the tree's file.
+/// Bytes per cell of the tree's file with layers of at least four cells: the surface takes most of them, and thinner layers have fewer cells
+/// for it.
 const TREE_BYTES_PER_CELL: f64 = 0.055;
 /// CPU time to write the leaf word of a cell, in seconds, and its part of the tree.
 const TIMES_WRITTEN_S: [f64; 2] = [4e-9, 2.5e-9];
@@ -340,6 +341,8 @@ fn from_pilots(
     let before: f64 = gather(comm, &[problem.time_cpu_s]).into_iter().sum();
     let mut plan = at(0);
     plan.pilots = entries;
+    let thin = f64::max(4.0 / f64::from(problem.rules.layer_cells_min), 1.0);
+    plan.tree_bytes = (plan.tree_bytes as f64 * thin) as u64;
     let written = |o: &Output| [o.words, o.tree].map(|is| f64::from(u8::from(is)));
     let written = problem.output.map_or([0.0; 2], written);
     let per_cell: f64 = written.iter().zip(TIMES_WRITTEN_S).map(|(is, time)| is * time).sum();

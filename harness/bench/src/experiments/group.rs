@@ -234,6 +234,11 @@ impl Groups {
         group.time_s.falling(|time_s| base_s / time_s)
     }
 
+    /// Whether a group has a reference on fewer ranks, or is on one.
+    pub fn has_reference(&self, group: &Group) -> bool {
+        group.setup.ranks == 1 || self.reference(group).setup.ranks < group.setup.ranks
+    }
+
     /// Returns the efficiencies of a group relative to its reference.
     pub fn efficiency(&self, group: &Group) -> Efficiency {
         group.efficiency(self.reference(group))

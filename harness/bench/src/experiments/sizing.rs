@@ -5,6 +5,8 @@
 
 /// Tolerated relative deviation of the number of cells.
 const TOLERANCE: f64 = 0.02;
+/// Up to this number of cells, the answer is the spacing of a mesh that was made: levels make small meshes grow unevenly.
+const MADE_MAX: f64 = 1e7;
 /// Two meshes within this factor of the requested size determine the exponent.
 const NEAR: f64 = 4.0;
 /// Size of the next mesh as a fraction of the requested size: an overshooting mesh would cost more than the requested one.
@@ -41,6 +43,7 @@ impl Sizes {
             }
             let next = match self.finest_below(cells) {
                 None => coarse,
+                Some(_) if self.has_two_near(cells) => self.guess(cells),
                 Some((spacing, count)) => {
                     let more = AIM * cells / count;
                     let more = if count < cells { more.clamp(1.5, STEP) } else { more.min(0.8) };
@@ -52,24 +55,30 @@ impl Sizes {
             self.meshes.push((next, count));
             self.meshes.sort_by(|a, b| b.0.total_cmp(&a.0));
         }
-        let answer = self.guess(cells);
+        let nearest = self.nearest(cells).filter(|_| cells <= MADE_MAX);
+        let answer = nearest.map_or_else(|| self.guess(cells), |mesh| mesh.0);
         self.answers.push((cells, answer));
         Ok(answer)
     }
 
-    /// Whether one mesh is close enough, or two determine the exponent.
+    /// Whether one mesh is close enough, or two determine the exponent and suffice.
     fn is_known(&self, cells: f64) -> bool {
-        let off = |m: &&(f64, f64)| (m.1 / cells).ln().abs();
-        let close = self.meshes.iter().any(|m| off(&m) < TOLERANCE);
-        close || self.meshes.iter().filter(|m| off(m) < NEAR.ln()).count() > 1
+        let is_close = self.nearest(cells).is_some_and(|m| off(m, cells) < TOLERANCE);
+        is_close || cells > MADE_MAX && self.has_two_near(cells)
+    }
+
+    fn has_two_near(&self, cells: f64) -> bool {
+        self.meshes.iter().filter(|m| off(**m, cells) < NEAR.ln()).count() > 1
+    }
+
+    fn nearest(&self, cells: f64) -> Option<(f64, f64)> {
+        let meshes = self.meshes.iter().copied();
+        meshes.min_by(|a, b| off(*a, cells).total_cmp(&off(*b, cells)))
     }
 
     fn guess(&self, cells: f64) -> f64 {
-        let nearest = self
-            .meshes
-            .iter()
-            .min_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
-        nearest.map_or(1.0, |m| m.0 * (m.1 / cells).powf(1.0 / self.power(cells)))
+        let scaled = |m: (f64, f64)| m.0 * (m.1 / cells).powf(1.0 / self.power(cells));
+        self.nearest(cells).map_or(1.0, scaled)
     }
 
     fn finest_below(&self, cells: f64) -> Option<(f64, f64)> {
@@ -79,12 +88,17 @@ impl Sizes {
     /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
     fn power(&self, cells: f64) -> f64 {
         let mut near = self.meshes.clone();
-        near.sort_by(|a, b| (a.1 / cells).ln().abs().total_cmp(&(b.1 / cells).ln().abs()));
+        near.sort_by(|a, b| off(*a, cells).total_cmp(&off(*b, cells)));
         match near[..] {
             [a, b, ..] if a.0 != b.0 => ((a.1 / b.1).ln() / (b.0 / a.0).ln()).clamp(1.0, 3.0),
             _ => 2.0,
         }
     }
+}
+
+/// Relative deviation of a mesh from a number of cells, as a logarithm.
+fn off(mesh: (f64, f64), cells: f64) -> f64 {
+    (mesh.1 / cells).ln().abs()
 }
 
 #[cfg(test)]
@@ -106,6 +120,20 @@ mod tests {
             assert!(error.abs() < 0.08, "{target}: {error}");
             // Overshooting would be expensive.
             assert!(most as f64 <= target.max(1e5) * 1.1, "{most}");
+        }
+    }
+
+    #[test]
+    fn a_small_mesh_that_grows_unevenly_is_within_five_percent() {
+        // Layers of every level begin at another spacing.
+        let truth = |s: f64| {
+            let level = (1.0 / s).log2();
+            (40.0 / (s * s) * (1.0 + 0.3 * (level * 3.0).sin())) as u64
+        };
+        for target in [2e4, 8e4, 3.2e5, 5e6] {
+            let spacing = Sizes::default().spacing(target, 0.2, |s| Ok::<u64, ()>(truth(s)));
+            let error = truth(spacing.unwrap()) as f64 / target - 1.0;
+            assert!(error.abs() < 0.05, "{target}: {error}");
         }
     }
 

@@ -185,11 +185,28 @@ impl Study {
             && mesh.layer_cells_min.is_none_or(|n| n == setup.layer_cells_min)
     }
 
+    /// Whether runs on a case of this name are of the study.
+    pub fn has_case(&self, name: &str) -> bool {
+        let is_of =
+            |series: &Series| Path::new(&series.case).file_stem().is_some_and(|s| s == name);
+        self.mesh.contains_key(name) || self.series.iter().any(is_of)
+    }
+
     fn check(&self) -> Result<(), String> {
         if self.row.is_empty() && self.series.is_empty() {
             return Err("it has no [[series]] and no [[row]]".to_owned());
         }
         self.series.iter().try_for_each(Series::check)?;
+        let stem = |case: &str| Path::new(case).file_stem().map(|name| name.to_owned());
+        let cases: Vec<&String> = self.series.iter().map(|series| &series.case).collect();
+        for (i, case) in cases.iter().enumerate() {
+            if let Some(other) = cases[..i].iter().find(|of| of != &case && stem(of) == stem(case))
+            {
+                return Err(format!(
+                    "the cases {other} and {case} have the same name in results: rename one"
+                ));
+            }
+        }
         for (name, mesh) in &self.mesh {
             mesh.check().map_err(|why| format!("mesh {name}: {why}"))?;
         }

@@ -9,6 +9,7 @@ use super::measure::{Input, Measure, Sample};
 use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{Efficiency, above_one};
+use std::collections::HashMap;
 
 /// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
 pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
@@ -16,24 +17,28 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
-/// Returns the lines of sessions on the same machine and commit as the last one, without runs of other builds of the program than the
-/// last run's.
+/// Returns the lines of sessions on the same machine and commit as the last one, without runs of other builds of a program than in its
+/// last run.
 pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin =
         |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
-    let program = |line: &Line| match &line.entry {
-        Entry::Run(run) => Some(run.program.clone()),
-        _ => None,
-    };
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
-    let built = lines.iter().rev().find_map(program);
+    let built: HashMap<&String, &String> = lines.iter().filter_map(program).collect();
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
     let is_of = |line: &&Line| {
         sessions.contains(&line.session.as_str())
-            && (program(line).is_none() || program(line) == built)
+            && program(line).is_none_or(|(engine, of)| built[engine] == of)
     };
     lines.iter().filter(is_of).cloned().collect()
+}
+
+/// Program and build of a run.
+fn program(line: &Line) -> Option<(&String, &String)> {
+    match &line.entry {
+        Entry::Run(run) => Some((&run.setup.engine, &run.program)),
+        _ => None,
+    }
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
@@ -263,6 +268,25 @@ mod tests {
         );
         assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison, LeftOut]);
         assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed, LeftOut]);
+    }
+
+    #[test]
+    fn each_program_has_a_last_build() {
+        let ran_by = |engine: &str, program: &str| {
+            let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
+            (run.setup.engine, run.program) = (engine.to_owned(), program.to_owned());
+            line(Entry::Run(Box::new(run)))
+        };
+        let opened = line(Entry::Session(Box::new(Session {
+            command: Vec::new(),
+            machine: Machine::default(),
+            nodes: String::new(),
+            load_average: 0.0,
+            lacks: Default::default(),
+        })));
+        let (old, new, other) = (ran_by("a", "1"), ran_by("a", "2"), ran_by("b", "3"));
+        let kept = of_last_origin(&[opened.clone(), other.clone(), old, new.clone()]);
+        assert_eq!(kept, [opened, other, new]);
     }
 
     #[test]

@@ -80,7 +80,14 @@ pub static MEASURES: [Measure; 18] = [
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
     }),
     measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
-    measure("speed_up", Against, plain, |s| Ok(s.against().time_s.value / s.run().time_s.value)),
+    measure("speed_up", Against, plain, |s| match [s.against().cells(), s.run().cells()] {
+        [before, cells] if before != cells => Err(format!(
+            "the runs are of different meshes, of {} and {} cells",
+            grouped(before),
+            grouped(cells)
+        )),
+        _ => Ok(s.against().time_s.value / s.run().time_s.value),
+    }),
     measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against().rate())),
     measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
     measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),

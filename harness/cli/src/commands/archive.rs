@@ -2,8 +2,10 @@
 
 use super::report::{read, records_in};
 use super::values::Input;
+use bench::experiments::entry::Entry;
 use bench::experiments::record::now_utc;
 use bench::replay::Expected;
+use bench::study::Study;
 use bench::study::package::{copy, package};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
@@ -51,6 +53,17 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let records = records_in(report)?;
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
+    let of_study = Study::read(study)?;
+    let other = lines.iter().find_map(|line| match &line.entry {
+        Entry::Run(run) => Some(&run.setup.case).filter(|case| !of_study.has_case(case)),
+        _ => None,
+    });
+    if let Some(case) = other {
+        let why = format!(
+            "the record has runs on {case}, and the study has no such case: give the study that made it"
+        );
+        return Err(Failure::input(why));
+    }
     let wrong = |error| named(out, &error);
     let staging = Staging::beside(out).map_err(wrong)?;
     let place = staging.path();

@@ -44,6 +44,10 @@ fn experiment(groups: &Groups, name: &str) -> Table {
         let counted = group.typical.counters.get(counter);
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
     };
+    let of_base = |group: &Group, value: f64| match groups.has_reference(group) {
+        true => format!("{value:.3}"),
+        false => "–".to_owned(),
+    };
     let table = Table::of(
         name.to_owned(),
         &of,
@@ -65,8 +69,8 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("serialisation", &|(_, e)| format!("{:.3}", e.serialisation)),
             ("transfer", &|(_, e)| format!("{:.3}", e.transfer)),
             ("parallel efficiency", &|(_, e)| format!("{:.3}", e.parallel())),
-            ("computation scaling", &|(_, e)| format!("{:.3}", e.computation_scaling)),
-            ("global efficiency", &|(_, e)| format!("{:.3}", e.global())),
+            ("computation scaling", &|(g, e)| of_base(g, e.computation_scaling)),
+            ("global efficiency", &|(g, e)| of_base(g, e.global())),
             ("10⁶ cells / s / rank", &|(g, _)| format!("{:.2}", g.rate() / 1e6)),
             ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],
