@@ -102,8 +102,11 @@ pub fn grow<F: Borrow<[Facet]>>(
         let facets = facets.borrow();
         let leaks =
             leaks::find(regions, sides.summary.inside > 0, &tree, &ownership, facets, &rules, comm);
-        let bounds_nothing = (is_closed, sides.summary.inside, leaks.0.len()) == (false, 0, 0)
-            && !openness::is_sheet(facets, comm);
+        let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
+            && match is_closed {
+                true => openness::is_doubled(facets, comm),
+                false => !openness::is_sheet(facets, comm),
+            };
         (leaks, bounds_nothing)
     });
     drop(facets);

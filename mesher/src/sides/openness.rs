@@ -5,9 +5,8 @@
 //! a component have that parity: so a closed surface does not leak.
 //!
 //! A surface that closes the openings of consistently oriented facets has at least the area of the sum of their normals. If that is a
-//! large part of their own area, an opening is no tear: the facets are a sheet. Facets that are oriented at random may have such a sum without
-//! any opening. But a boundary of length L is closed by an area of at most L^2 / 4 pi, which must be as large, too; for consistently oriented
-//! facets it is.
+//! large part of their own area, an opening is no tear: the facets are a sheet. Facets that are turned may have such a sum without any
+//! large opening. So the loops of the boundary must enclose as much, too, which they do if the facets are oriented consistently.
 //!
 //! Both are sums over the facets, to which each rank contributes those of its slice.
 
@@ -15,8 +14,12 @@ use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
 use bricks::widest;
 use ranks::{Comm, MessageBuffer, uncounted};
-use std::f64::consts::PI;
+use std::collections::{BTreeMap, BTreeSet};
 
+type Vertex = [i32; 3];
+
+/// A boundary of more words than this is not searched for loops: a soup of facets without common edges.
+const WORDS_MAX: u64 = 1 << 23;
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
 
@@ -75,31 +78,87 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
         std::array::from_fn(|i| sum[i] + of_rank[i])
     });
     let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
-    // Normals are twice as long as the areas.
-    let closed_by_boundary = boundary_length(mine, comm).powi(2) / (2.0 * PI);
-    closing.min(closed_by_boundary) >= SHEET * area as f64
+    closing.min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
 }
 
-/// Length of the boundary of the facets of all ranks. Collective.
-fn boundary_length(mine: &[Facet], comm: &dyn Comm) -> f64 {
+/// Twice the area that the boundary of the facets of all ranks encloses: of each of its loops, the vector area. Collective.
+fn enclosed_by_boundary(mine: &[Facet], comm: &dyn Comm) -> f64 {
     let edges = mine.iter().flat_map(|f| [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|i| f.v[i])));
-    let entry = |mut ends: [[i32; 3]; 2]| {
+    let entry = |mut ends: [Vertex; 2]| {
         ends.sort_unstable();
         let words: [u64; 3] = bytemuck::cast(ends);
         // All ranks send an edge to the same rank.
-        let of_all = words.iter().fold(0, |sum, &word| mix(sum ^ word) as u64);
-        ((of_all % comm.size() as u64) as usize, words)
+        let hash = words.iter().fold(0, |sum, &word| mix(sum ^ word) as u64);
+        ((hash % comm.size() as u64) as usize, words)
     };
-    let out = MessageBuffer::of_entries(edges.map(entry).collect());
-    let received = uncounted(comm, || comm.sparse_all_to_all(out));
+    let out = edges.filter(|[from, to]| from != to).map(entry).collect();
+    let received = uncounted(comm, || comm.sparse_all_to_all(MessageBuffer::of_entries(out)));
     let mut edges: Vec<[u64; 3]> = received.values().collect();
     edges.sort_unstable();
-    let on_boundary = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
-    let length = |same: &[[u64; 3]]| {
-        let [from, to]: [[i32; 3]; 2] = bytemuck::cast(same[0]);
-        (0..3).map(|a| (f64::from(to[a]) - f64::from(from[a])).powi(2)).sum::<f64>().sqrt() as u64
+    let odd = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
+    let odd: Vec<u64> = odd.flat_map(|same| same[0]).collect();
+    if uncounted(comm, || comm.sum(odd.len() as u64)) > WORDS_MAX {
+        return f64::INFINITY;
+    }
+    let all = uncounted(comm, || comm.all_gather(&odd));
+    let edges = all.words().as_chunks::<3>().0.iter().map(|words| bytemuck::cast(*words));
+    loops(edges).iter().map(|of| vector_area(of)).sum()
+}
+
+/// The closed loops of some edges, an even number of which meet in every vertex.
+fn loops(edges: impl Iterator<Item = [Vertex; 2]>) -> Vec<Vec<Vertex>> {
+    let mut ends: BTreeMap<Vertex, BTreeSet<Vertex>> = BTreeMap::new();
+    for [from, to] in edges {
+        ends.entry(from).or_default().insert(to);
+        ends.entry(to).or_default().insert(from);
+    }
+    let mut found = Vec::new();
+    let vertices: Vec<Vertex> = ends.keys().copied().collect();
+    for start in vertices {
+        while let Some(mut to) = ends.get_mut(&start).and_then(BTreeSet::pop_first) {
+            let mut path = vec![start];
+            while to != start {
+                let from = *path.last().expect("it has the start");
+                path.push(to);
+                let of = ends.get_mut(&to).expect("every end is a vertex");
+                of.remove(&from);
+                to = of.pop_first().expect("an even number of edges meets in a vertex");
+            }
+            let last = path.last().expect("it has the start");
+            ends.get_mut(&start).expect("it is a vertex").remove(last);
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Length of the sum of the cross products of a loop: twice the area, if it is plane.
+fn vector_area(of: &[Vertex]) -> f64 {
+    let from_start = |v: Vertex| [0, 1, 2].map(|a| f64::from(v[a]) - f64::from(of[0][a]));
+    let mut sum = [0.0; 3];
+    for pair in of.windows(2) {
+        let [p, q] = [from_start(pair[0]), from_start(pair[1])];
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            sum[a] += p[b] * q[c] - p[c] * q[b];
+        }
+    }
+    sum.iter().map(|n| n * n).sum::<f64>().sqrt()
+}
+
+/// Whether every facet of all ranks, of which `mine` are this rank's, appears an even number of times, so that no ray finds an inside.
+/// Collective.
+pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
+    let hash = |f: &Facet| {
+        let mut v = f.v;
+        v.sort_unstable();
+        v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
     };
-    uncounted(comm, || comm.sum(on_boundary.map(length).sum())) as f64
+    let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
+    let all = uncounted(comm, || comm.all_gather(&words));
+    let add = |[count, xor]: [u64; 2], [n, of]: &[u64; 2]| [count + n, xor ^ of];
+    let [count, xor] = all.words().as_chunks().0.iter().fold([0; 2], add);
+    count > 0 && xor == 0
 }
 
 #[cfg(test)]
@@ -167,5 +226,9 @@ mod tests {
         torn[0][1] = Facet { v: [[0; 3]; 3] };
         torn[2].iter_mut().for_each(|f| f.v.swap(0, 1));
         assert_eq!(kind(&torn), OPEN, "a side is turned, and the tear is small");
+        let twice = [&cube[..], &turned].concat();
+        let facets: Vec<Facet> = twice.concat();
+        assert!(is_doubled(&facets, &Solo) && !is_doubled(&facets[1..], &Solo));
+        assert!(!is_doubled(&cube.concat(), &Solo));
     }
 }
