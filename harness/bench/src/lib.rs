@@ -1,7 +1,7 @@
 //! Measurements of meshers and their analysis.
 //!
 //! - [`study`]: series of runs and targets, declared in a file; [`experiments`]: the runs, their record and its analysis;
-//! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit; [`statistics`] for all of them;
+//! - [`gate`](mod@gate): candidate against baseline; [`track`]: metrics by commit;
 //! - [`shrink`](mod@shrink): the smallest case that still fails; [`replay`]: what a repetition elsewhere must give.
 
 pub mod experiments;
@@ -11,7 +11,6 @@ pub mod order;
 pub mod origin;
 pub mod replay;
 pub mod shrink;
-pub mod statistics;
 pub mod study;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -7,10 +7,10 @@
 
 use crate::experiments::entry::{Entry, Line, Setup};
 use crate::experiments::group::{Group, Groups};
-use crate::statistics::Median;
 use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
 use serde::Serialize;
+use statistics::Median;
 use std::collections::{BTreeMap, HashMap};
 
 /// Name and version of the schema.

@@ -13,8 +13,8 @@ use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{by_key, distinct};
 use crate::origin::Origins;
-use crate::statistics::{Median, median};
 use run::engine::lacks::EQUAL_RUNS;
+use statistics::{Median, median};
 use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.

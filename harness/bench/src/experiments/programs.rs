@@ -7,7 +7,7 @@
 use super::entry::{Comm, Setup};
 use super::group::{Group, Groups};
 use crate::order::by_key;
-use crate::statistics::Median;
+use statistics::Median;
 
 impl Group {
     /// Returns the CPU time of the whole process, in seconds; `None` if a run does not have it.

@@ -2,7 +2,7 @@
 //! memory, instructions, time.
 //!
 //! `rules` defines cases, ranks and tolerances; `subject` finds or builds the two programs; [`measures`] holds the exact
-//! measures of one; `correctness`, [`numbers`] and `time` compare, the last with [`crate::statistics::comparison`];
+//! measures of one; `correctness`, [`numbers`] and `time` compare, the last with [`statistics::comparison`];
 //! [`report`] is the result, which cannot hold without a comparison of every case.
 //!
 //! Invariant: times of different sessions are never compared.

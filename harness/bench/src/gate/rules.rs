@@ -2,13 +2,13 @@
 
 use super::measures::LayerName;
 use crate::refuse;
-use crate::statistics::comparison::rounds_min;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::launcher::Launcher;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use serde::Deserialize;
+use statistics::comparison::rounds_min;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

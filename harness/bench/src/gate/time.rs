@@ -13,14 +13,14 @@ use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
 use super::subject::Baseline;
-use crate::statistics::comparison::{Comparison, Round, compare};
-use crate::statistics::false_discovery::adjusted;
-use crate::statistics::random::Random;
-use crate::statistics::trimmed_mean::trimmed_mean;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
 use run::engine::runner::{Completed, Engine};
+use statistics::comparison::{Comparison, Round, compare};
+use statistics::false_discovery::adjusted;
+use statistics::random::Random;
+use statistics::trimmed_mean::trimmed_mean;
 use std::path::Path;
 
 /// CPU time of the whole process.

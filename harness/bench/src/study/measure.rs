@@ -4,9 +4,9 @@ use crate::experiments::entry::Audited;
 use crate::experiments::group::Group;
 use crate::experiments::number::grouped;
 use crate::experiments::pop;
-use crate::statistics::median_of;
 use Input::{Against, Alone, Audit, Phases, Series};
 use serde::de::{Deserialize, Deserializer, Error};
+use statistics::median_of;
 
 /// A quantity. Times are wall times by the program's own clock, or projected times for simulated ranks.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! `harness track`: a history of metrics by commit, and the commits at which they changed.
 //!
-//! [`history`] is the file; [`crate::statistics::change_points`] finds steps in one metric, and
-//! [`crate::statistics::false_discovery`] controls how many of all of them are false.
+//! [`history`] is the file; [`statistics::change_points`] finds steps in one metric, and
+//! [`statistics::false_discovery`] controls how many of all of them are false.
 //!
 //! Invariant: the same history and options give the same result on every machine.
 //!
@@ -14,10 +14,10 @@ mod summary;
 
 pub use summary::summary;
 
-use crate::statistics::change_points::{Change as Found, Rules, change_points};
-use crate::statistics::false_discovery::adjusted;
 use history::Record;
 use serde::Serialize;
+use statistics::change_points::{Change as Found, Rules, change_points};
+use statistics::false_discovery::adjusted;
 
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];

@@ -3,7 +3,6 @@
 use super::files::put_forms;
 use super::values::{Input, Output, percentage, probability};
 use bench::jsonl;
-use bench::statistics::change_points::Rules;
 use bench::track::history::{self, History, Record};
 use bench::track::{analyse, summary};
 use clap::Args;
@@ -11,6 +10,7 @@ use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use report::json::pretty;
 use report::track::{export, page};
+use statistics::change_points::Rules;
 use std::path::{Path, PathBuf};
 
 /// `harness track`.

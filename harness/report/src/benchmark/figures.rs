@@ -6,8 +6,8 @@ use super::{balance, scaling};
 use crate::figure::{Axis, Body, Figure, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
-use bench::statistics::Median;
 use contract::paper::number;
+use statistics::Median;
 
 /// The name of the paper's runs.
 const PAPER: &str = "the paper: 1, 2, 32 and 64 ranks";

@@ -5,7 +5,7 @@ use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::order::{by_key, distinct};
-use bench::statistics::Median;
+use statistics::Median;
 use std::fmt;
 
 /// How the times of a group were obtained.

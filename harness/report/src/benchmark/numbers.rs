@@ -7,7 +7,7 @@
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
-use bench::statistics::Median;
+use statistics::Median;
 use std::fmt::Write;
 
 /// A result, as it is printed.

@@ -57,9 +57,9 @@ pub fn junit(all: &[Series], recent: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
+    use statistics::change_points::Rules;
 
     #[test]
     fn exports_have_the_documented_formats() {

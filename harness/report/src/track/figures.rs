@@ -99,8 +99,8 @@ fn commits(count: usize) -> Axis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::statistics::change_points::Rules;
     use bench::track::analyse;
+    use statistics::change_points::Rules;
 
     #[test]
     fn an_outlier_does_not_squash_the_plot() {

@@ -87,9 +87,9 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::statistics::change_points::Rules;
     use bench::testing::history as sample;
     use bench::track::analyse;
+    use statistics::change_points::Rules;
 
     #[test]
     fn the_page_is_self_contained_and_has_every_change_point() {

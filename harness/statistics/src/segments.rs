@@ -147,7 +147,7 @@ fn intervals(n: usize, least: usize) -> impl Iterator<Item = (usize, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::random::Random;
+    use crate::random::Random;
 
     fn values(count: usize) -> Vec<f64> {
         let mut random = Random(count as u64);

@@ -19,7 +19,7 @@ pub fn adjusted(p_values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::random::Random;
+    use crate::random::Random;
 
     #[test]
     fn the_published_example_has_four_discoveries() {

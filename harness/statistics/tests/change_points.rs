@@ -1,7 +1,7 @@
 //! False alarms and power of the change point detector on simulated series. All seeds are fixed.
 
-use bench::statistics::change_points::{Change, Rules, change_points};
-use bench::statistics::random::Random;
+use statistics::change_points::{Change, Rules, change_points};
+use statistics::random::Random;
 
 /// Series per kind of noise.
 const SERIES: u64 = 200;

@@ -1,4 +1,4 @@
-//! Statistics of the whole harness.
+//! Statistics of the whole harness. They know nothing of meshes and files.
 //!
 //! - [`mod@median`]: medians with intervals that assume no distribution;
 //! - [`comparison`]: candidate against baseline by a permutation test, for the gate;
