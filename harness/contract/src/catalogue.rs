@@ -3,6 +3,7 @@
 use crate::files;
 use serde::{Deserialize, Serialize};
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -162,7 +163,12 @@ fn from_path(argument: &str) -> Result<Selected, String> {
 
 fn read(path: &Path) -> Result<Vec<Selected>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
-    let text = files::read_text(path).map_err(|error| wrong(error.to_string()))?;
+    let text = files::read_text(path).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => {
+            wrong("the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository".to_owned())
+        }
+        _ => wrong(error.to_string()),
+    })?;
     let file: CatalogueFile = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let directory = path.parent().unwrap_or(Path::new("."));
     let selected = |entry: Entry| {

@@ -215,8 +215,11 @@ impl Groups {
                     o.spacing_min == s.spacing_min && is_base
                 }
             };
+            // A measured time has no projected base.
+            let is_measured = s.comm == Comm::Sim || o.comm != Comm::Sim;
             let is_of_series = !weak || o.series_cells == s.series_cells;
-            size && is_of_series
+            size && is_measured
+                && is_of_series
                 && (&o.case, o.layer_cells_min, &o.engine)
                     == (&s.case, s.layer_cells_min, &s.engine)
         };

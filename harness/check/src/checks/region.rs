@@ -3,7 +3,8 @@
 //! The region is found from the geometry, never from the mesh's own sides: [`Truth`] is the base tree of the surface,
 //! and seeds or exact rays give the side of each of its components. Places within a band around the geometry are not
 //! judged, because programs differ on the side of a cell that the geometry crosses; neither are places whose six rays
-//! contradict each other or their component, which exist around a body that is not watertight. A leaf that is labelled
+//! contradict each other or their component, which exist around a body that is not watertight. A leaf coarser than the surface level that
+//! no facet crosses is judged by its parts beyond the band. A leaf that is labelled
 //! crossing is wrong anywhere beyond the band. If the band has no width, every crossed leaf must be labelled so. If it has
 //! none, or `crossing` is promised, crossed leaves are kept or deleted as the case says, without a band.
 
@@ -175,7 +176,8 @@ impl<'a> Survey<'a> {
         if kind.is_some() || handle == Handle::HOLE && octant.level >= surface {
             let (low, high) = octant.bounds();
             let crossed = self.facets.first_meeting(&near, low, high).is_some();
-            let beyond = if crossed { None } else { self.beyond_band(octant, &near) };
+            let may_be_coarse = !crossed && octant.level < surface;
+            let beyond = may_be_coarse.then(|| self.beyond_band(octant, &near)).flatten();
             return visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
         }
         for digit in 0..8 {

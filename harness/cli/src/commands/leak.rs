@@ -125,6 +125,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             case.name
         );
     }
+    if ends.is_empty() && arguments.closed {
+        println!("not proven to be closed: {START}");
+    }
     print!("{answers}");
     let holds = |report: &geometry::leak::report::Report| {
         !report.is_leak && (report.is_separated || !arguments.closed)

@@ -1,8 +1,8 @@
 //! The results of a record as LaTeX macros, so that no number of a text is copied by hand: `\result{KEY}` is a median,
 //! `\result[interval]{KEY}` its confidence interval, `\result[unit]{KEY}` its unit.
 //!
-//! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. The same
-//! setup with another partition or n has a number at its end: `speedup-2`.
+//! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. A partition that
+//! was chosen follows the experiment, as in `weights-metis-unit`. The same setup with another n has a number at its end: `speedup-2`.
 
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
@@ -32,7 +32,11 @@ pub fn numbers(groups: &Groups) -> Vec<Number> {
 
 fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     let s = &group.setup;
-    let names = [&s.engine, &s.case, &s.experiment].map(|name| file_name(name)).join("/");
+    let experiment = match s.division().as_str() {
+        "default" => s.experiment.clone(),
+        division => format!("{} {division}", s.experiment),
+    };
+    let names = [&s.engine, &s.case, &experiment].map(|name| file_name(name)).join("/");
     let setup = format!("{names}/{}/{}/{}", group.cells(), s.ranks, group.how());
     let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
     let base = groups.reference(group);

@@ -217,3 +217,41 @@ fn projections_are_compared_with_the_same_mesh_on_equally_many_ranks() {
     let [sim, measured] = pairs[0].map(|group| group.time_s.value);
     assert!((sim / measured - 1.1).abs() < 1e-9);
 }
+
+#[test]
+fn the_time_of_efficiencies_is_the_median_of_an_even_number_of_runs() {
+    let of = |time_s: f64| {
+        let mut run = run(Comm::Mpi, 9, &[("a", &[1.0, 1.0])]);
+        run.time_wall_s = time_s;
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(2.0), of(4.0)]);
+    assert_eq!(groups.all[0].time_s.value, 3.0);
+    assert_eq!(groups.efficiency(&groups.all[0]).parallel(), 1.0 / 3.0);
+}
+
+#[test]
+fn two_series_of_a_case_have_bases_of_their_own() {
+    let of = |ranks: usize, cells: u64, size: f64| {
+        let mut run = run(Comm::Sim, cells, &[("a", &vec![size; ranks])]);
+        run.setup.experiment = "weak".into();
+        run.setup.series_cells = Some(size);
+        line_of(run)
+    };
+    let groups = Groups::of(&[of(1, 10, 10.0), of(2, 20, 10.0), of(1, 40, 40.0), of(2, 80, 40.0)]);
+    for group in &groups.all {
+        assert_eq!(groups.reference(group).setup.series_cells, group.setup.series_cells);
+        assert_eq!(groups.efficiency(group).global(), 1.0);
+    }
+}
+
+#[test]
+fn a_speedup_is_over_one_rank_and_a_measured_one_has_no_projected_base() {
+    let of = |comm: Comm, times: &[f64]| line_of(run(comm, 9, &[("a", times)]));
+    let groups = Groups::of(&[free(), of(Comm::Sim, &[4.0; 2]), of(Comm::Sim, &[2.5; 4])]);
+    let speedups: Vec<f64> = groups.all.iter().map(|g| groups.speedup(g).value).collect();
+    assert_eq!(speedups, [2.0, 3.2]);
+    assert_eq!([0, 1].map(|i| groups.has_reference(&groups.all[i])), [false, true]);
+    let groups = Groups::of(&[free(), of(Comm::Sim, &[4.0]), of(Comm::Mpi, &[2.0; 2])]);
+    assert!(!groups.has_reference(&groups.all[1]));
+}

@@ -110,6 +110,31 @@ fn places_within_the_band_are_not_judged() {
     }
 }
 
+#[test]
+fn a_leaf_coarser_than_the_surface_level_is_judged_by_its_parts_beyond_the_band() {
+    let case = Case { level_surface: 5, ..tetrahedron(4, "[]") };
+    let (geometry, none) = (Geometry::of(&case), Tree::default());
+    let Geometry { facets, .. } = &geometry;
+    let survey = geometry.survey(&none, 1.0);
+    let meets = |octant: &Octant, by: i64| {
+        let (low, high) = octant.bounds();
+        let (low, high) = (low.map(|c| c - by), high.map(|c| c + by));
+        facets.first_meeting(&facets.all(), low, high).is_some()
+    };
+    let band = UNITS_PER_EDGE / 32;
+    let words = contract::testing::words_of(|o| o.level < 3);
+    let octants = words.iter().map(|&w| word::octant(w));
+    let free = octants.filter(|leaf| !meets(leaf, 0));
+    let wrong: Vec<Octant> = free
+        .filter(|leaf| survey.position(*leaf) == Position::On(Side::Outside, false))
+        .filter(|leaf| (0..64).any(|p| !meets(&leaf.child(p >> 3).child(p & 7), band)))
+        .collect();
+    let at_band = wrong.iter().filter(|leaf| meets(leaf, band)).count();
+    assert!(0 < at_band && at_band < wrong.len(), "{at_band} of {}", wrong.len());
+    let result = geometry.complete(&Tree::of_words(&words), 1.0);
+    assert_eq!(result.findings_total, wrong.len() as u64, "{result}");
+}
+
 /// Leaves of edge 1 with the sides of the components, and of which kind they are.
 fn labelled(space: &Survey) -> Vec<u64> {
     let side = |octant: &Octant| match space.position(*octant) {
