@@ -2,6 +2,7 @@
 
 Needs target/debug/{harness,reference}, which `cargo test --workspace` builds, and `cgnscheck` for one test (Debian's cgns-convert)."""
 
+import itertools
 import re
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ import numpy as np
 import pyvista
 
 from built import InDirectory, needs
+from export_cgns import shortened
 from test_import import ROOT, run
 from test_vtu import decode
 
@@ -43,6 +45,11 @@ class CgnsTest(InDirectory):
         expected = {name: int(count) for name, count in map(str.split, printed) if count != "0"}
         self.assertIn("xMin", expected)
         self.assertEqual({name: patches[name].n_cells for name in patches.keys()}, expected)
+
+    def test_names_that_share_32_characters_stay_apart(self):
+        name = 30 * "a" + "bcd"
+        names = list(itertools.islice(shortened(name), 11))
+        self.assertEqual(names[:2] + names[-1:], [name[:32], 30 * "a" + "_2", 29 * "a" + "_11"])
 
     @unittest.skipUnless(shutil.which("cgnscheck"), "cgnscheck is not installed: it is in Debian's package cgns-convert")
     def test_cgns_finds_no_error(self):

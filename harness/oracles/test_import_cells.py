@@ -2,6 +2,7 @@
 python -m unittest discover harness/oracles"""
 
 import itertools
+import json
 import pathlib
 import random
 import shutil
@@ -182,6 +183,7 @@ class CellsTest(unittest.TestCase):
             "0 0 0 0.5": "cell 0 has the level 0.5",
             "0 0 0 1\n0 0 0 20": "cell 1 has the level 20",
             "0 0 0 nan": "has the level nan",
+            "x,y,z,level,edge\n0,0,0,1,0.5\n.5,0,0,1,1": "cell 1 has the level 1, which is an edge of 0.5, and the edge 1.0",
         }
         for text, sentence in sentences.items():
             self.assertIn(sentence, self.refused(self.table(text), root=root))
@@ -266,6 +268,20 @@ class CellsTest(unittest.TestCase):
 
         why = self.refused(self.edited("foam-ascii", "neighbour", lengthen))
         self.assertIn("960 faces with 960 owners and 961 neighbours: its files belong to different meshes", why)
+
+    def test_cells_of_discretize_have_whole_numbers_within_the_mesh(self):
+        def changed(change):
+            mesh = json.loads((SAMPLES / "cube.json").read_text())
+            change(mesh)
+            path = self.at / "changed.json"
+            path.write_text(json.dumps(mesh))
+            return self.refused(path)
+
+        for name in ("indexes", "levels"):
+            why = changed(lambda mesh: mesh["cell_state"].update({name: (np.array(mesh["cell_state"][name]) + 0.6).tolist()}))
+            self.assertIn("must be whole numbers", why)
+        why = changed(lambda mesh: mesh.update(h=[along[: len(along) // 2] for along in mesh["h"]]))
+        self.assertIn("smallest cells along the axes", why)
 
     def test_widths_that_vary_are_an_error(self):
         for width in (b"0.25", b"0.1250005"):

@@ -7,6 +7,8 @@
 const TOLERANCE: f64 = 0.02;
 /// Up to this number of cells, the answer is the spacing of a mesh that was made: levels make small meshes grow unevenly.
 const MADE_MAX: f64 = 1e7;
+/// Maximum number of meshes for one answer.
+const MESHES_MAX: usize = 16;
 /// Two meshes within this factor of the requested size determine the exponent.
 const NEAR: f64 = 4.0;
 /// Size of the next mesh as a fraction of the requested size: an overshooting mesh would cost more than the requested one.
@@ -37,13 +39,13 @@ impl Sizes {
         if let Some(answer) = self.answers.iter().find(|a| a.0 == cells) {
             return Ok(answer.1);
         }
-        for _ in 0..10 {
+        for _ in 0..MESHES_MAX {
             if self.is_known(cells) {
                 break;
             }
             let next = match self.finest_below(cells) {
                 None => coarse,
-                Some(_) if self.has_two_near(cells) => self.guess(cells),
+                Some(_) if self.has_two_near(cells) => self.between(cells),
                 Some((spacing, count)) => {
                     let more = AIM * cells / count;
                     let more = if count < cells { more.clamp(1.5, STEP) } else { more.min(0.8) };
@@ -74,6 +76,20 @@ impl Sizes {
     fn nearest(&self, cells: f64) -> Option<(f64, f64)> {
         let meshes = self.meshes.iter().copied();
         meshes.min_by(|a, b| off(*a, cells).total_cmp(&off(*b, cells)))
+    }
+
+    /// The spacing to try next. The number of cells jumps, so extrapolation alone may return to the same meshes: every second time, the middle
+    /// between the nearest meshes with fewer and with more cells.
+    fn between(&self, cells: f64) -> f64 {
+        let nearest = |of: fn(f64, f64) -> bool| {
+            let meshes = self.meshes.iter().filter(|m| of(m.1, cells));
+            meshes.min_by(|a, b| off(**a, cells).total_cmp(&off(**b, cells)))
+        };
+        let ends = nearest(|count, cells| count < cells).zip(nearest(|count, cells| count > cells));
+        match ends.filter(|_| self.meshes.len() % 2 == 1) {
+            Some((below, above)) => (below.0 * above.0).sqrt(),
+            None => self.guess(cells),
+        }
     }
 
     fn guess(&self, cells: f64) -> f64 {

@@ -40,7 +40,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     };
     result.examined = found.splits + found.leaves;
     let faults = [
-        ("a layer or the balance requires the split of", &found.missing),
+        ("a facet, a box, a layer or the balance requires the split of", &found.missing),
         ("nothing requires the split of", &found.unneeded),
     ];
     for (what, octant) in

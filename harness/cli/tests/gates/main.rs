@@ -42,6 +42,34 @@ fn a_passing_case_is_not_shrunk() {
 }
 
 #[test]
+fn shrinking_replaces_no_file() {
+    let fixture = Fixture::new();
+    let before = fs::read(fixture.path("case.toml")).unwrap();
+    let outcome = fixture.harness(&format!("{SHRINK} --out ."));
+    assert_eq!(outcome.code, 2, "{}", outcome.printed);
+    assert!(outcome.printed.contains("case.toml would be replaced"), "{}", outcome.printed);
+    assert_eq!(fs::read(fixture.path("case.toml")).unwrap(), before);
+}
+
+#[test]
+fn a_program_without_times_is_named() {
+    let fixture = Fixture::new();
+    fixture.write("gate.toml", "[[case]]\nname = \"case.toml\"\nlayers = [\"time\"]\n");
+    fixture.program("broken", "#!/bin/sh\necho no >&2\nexit 1\n");
+    let gate = "gate --engine engine.toml --rules gate.toml --layers time";
+    for (baseline, candidate, code, who) in [
+        ("engine", "broken", 1, "the candidate has no result"),
+        ("broken", "engine", 3, "the baseline has no result"),
+        ("broken", "broken", 3, "the baseline has no result"),
+    ] {
+        let outcome =
+            fixture.harness(&format!("{gate} --baseline {baseline} --candidate {candidate}"));
+        assert_eq!(outcome.code, code, "{}", outcome.printed);
+        assert!(outcome.printed.contains(who), "{}", outcome.printed);
+    }
+}
+
+#[test]
 fn a_counter_that_grows_fails_the_gate_and_one_that_shrinks_does_not() {
     let fixture = Fixture::new();
     fixture.engine("more", 1);

@@ -14,11 +14,11 @@ use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use crate::word;
 
-/// The root of most forests, whatever the size of the body.
-const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
-
 use std::ops::Range;
 use std::path::Path;
+
+/// The root of most forests, whatever the size of the body.
+const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 
 /// Value of `--sides` that takes the sides from the data of the quadrants.
 const SIDES: &str = "data";

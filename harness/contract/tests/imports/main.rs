@@ -93,3 +93,14 @@ fn refusal(name: &str, change: impl FnOnce(&mut Vec<u8>)) -> String {
     assert!(why.len() > 10 && !why.contains('\n'), "{why}");
     why
 }
+
+#[test]
+fn the_root_of_a_case_moves_forests_in_the_unit_cube_only() {
+    let root = Some(root([-1.0, 2.0, 0.5, 4.0]));
+    let request = Request { root, is_root_of_case: true, ..Request::default() };
+    assert!(imported(&sample("unitcube.p8est"), &request).is_ok());
+    let why = imported(&sample("brick.p8est"), &request).unwrap_err().to_string();
+    assert!(why.contains("give --root to move the forest"), "{why}");
+    let given = Request { is_root_of_case: false, ..request };
+    assert!(imported(&sample("brick.p8est"), &given).is_ok());
+}

@@ -1,6 +1,7 @@
 //! Directories: patches, processors, regions, and what is refused.
 
 use super::*;
+use crate::foam::patches::Patches;
 
 /// The patches in `boundary`: name, number of faces, first face.
 fn boundary_in(dir: &Path) -> Vec<(String, usize, usize)> {
@@ -236,6 +237,18 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
     options.foam.case = Some(&other);
     let error = write(&mesh, &Selection::default(), &target, &options).unwrap_err().to_string();
     assert!(error.contains("not of the case"), "{error}");
+}
+
+#[test]
+fn different_solids_have_patches_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let names = ["a b", "a_b", "a b", "xMin", "body_xMin"];
+    let solids = names.map(|name| solid(name, [1.0; 3], 1.0));
+    fs::write(dir.path().join("body.stl"), solids.concat()).unwrap();
+    let case = dir.path().join("case.toml");
+    fs::write(&case, "geometry = \"body.stl\"\nspacing_min = 1.0\n").unwrap();
+    let patches = Patches::new(Some(&Case::read(&case).unwrap()), false).unwrap();
+    assert_eq!(patches.names[6..], ["a_b", "a_b_2", "body_xMin", "body_xMin_2"]);
 }
 
 #[test]
