@@ -15,7 +15,6 @@ import unittest
 
 import numpy as np
 
-import import_cells
 from built import PROGRAMS, ROOT, needs
 
 TEMPLATE = ROOT / "harness/solvers/openfoam/case"
@@ -56,11 +55,13 @@ class FoamTest(unittest.TestCase):
         (self.at / "case.toml").write_text(text)
         call(self.at, PROGRAMS / "reference", "case.toml", "--out", "mesh")
 
+    def decompose(self, ranks):
+        dictionary = (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(ranks))
+        (self.at / "case/system/decomposeParDict").write_text(dictionary)
+        call(self.at / "case", "decomposePar")
+
     def check_mesh(self, ranks=1):
         """The output of checkMesh, which must find all topology in order."""
-        (self.at / "case/system/decomposeParDict").write_text(
-            (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(ranks))
-        )
         parallel = ["mpirun", "-n", ranks] if ranks > 1 else []
         options = ["-allTopology"] + ["-parallel"] * (ranks > 1)
         output = call(self.at / "case", *parallel, "checkMesh", *options)
@@ -121,16 +122,17 @@ class FoamTest(unittest.TestCase):
             for test in TOPOLOGY:
                 self.assertIn(f"{test} OK.", output)
 
-    def test_processors_agree_with_each_other_and_with_the_serial_solver(self):
+    def test_a_decomposed_mesh_is_in_order_and_is_solved_like_the_whole(self):
         sphere = (ROOT / "geometries/sphere-small.toml").read_text()
         self.mesh("keep_crossing = false\n" + sphere)
         self.export("--case", self.at / "case.toml")
-        self.export("--processors", "3")
+        self.decompose(3)
         self.assertIn("\nMesh OK.", self.check_mesh(ranks=3))
         solver = [("laplacianFoam", "T"), ("potentialFoam", "Phi")]
         for program, name in solver:
-            for part in ("", "processor0", "processor1", "processor2"):
-                shutil.copytree(TEMPLATE.parent / program, self.at / "case" / part / "0", dirs_exist_ok=True)
+            shutil.rmtree(self.at / "case/0", ignore_errors=True)
+            shutil.copytree(TEMPLATE.parent / program, self.at / "case/0")
+            call(self.at / "case", "decomposePar", "-fields")
             outputs = [
                 call(self.at / "case", program),
                 call(self.at / "case", "mpirun", "-n", 3, program, "-parallel"),
@@ -141,66 +143,6 @@ class FoamTest(unittest.TestCase):
             np.testing.assert_allclose(serial[:4], parallel[:4], rtol=1e-2)
             # The explicit correction converges, which it does only if geometry and interpolation are right.
             self.assertLess(serial[-1], 1e-4)
-
-    @unittest.skipUnless(shutil.which("reconstructPar"), "reconstructPar is not installed: run ci/peers snappy")
-    def test_fields_of_processors_are_reconstructed_on_the_whole_mesh(self):
-        """The whole mesh and the processors are two exports, and the addressing joins them: values of cells, faces of patches and
-        points arrive where the serial program has them, whatever the labels are and whatever part of the mesh each has."""
-        self.mesh("keep_crossing = false\n" + (ROOT / "geometries/sphere-small.toml").read_text())
-        case = self.at / "case"
-        for count, options in ((2, []), (5, []), (3, ["--label", "64"])):
-            with self.subTest(count=count, options=options):
-                shutil.rmtree(case)
-                shutil.copytree(TEMPLATE, case)
-                self.export(*options)
-                self.export("--processors", count, *options)
-                (case / "system/decomposeParDict").write_text(
-                    (TEMPLATE / "system/decomposeParDict").read_text().replace("RANKS", str(count))
-                )
-                for part in ["", *(f"processor{processor}" for processor in range(count))]:
-                    shutil.copytree(TEMPLATE.parent / "potentialFoam", case / part / "0")
-                control = case / "system/controlDict"
-                control.write_text(re.sub(r"(writeFormat +)\w+", r"\1ascii", control.read_text()))
-                centres = ["postProcess", "-func", "writeCellCentres", "-time", "0"]
-                call(case, "mpirun", "-n", count, *centres, "-parallel")
-                # Positions of the cells and of the faces of patches, by the serial program.
-                call(case, *centres)
-                expected = positions(case / "0/C")
-                (case / "0/C").unlink()
-                call(case, "reconstructPar", "-withZero", "-fields", "(C)")
-                found = positions(case / "0/C")
-                self.assertEqual(len(found), len(expected))
-                np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5)
-
-    def test_the_addressing_of_processors_is_that_of_the_mesh(self):
-        """Points, faces with their direction, and owners of each processor are those of the whole mesh that the addressing names."""
-        self.mesh("keep_crossing = false\n" + (ROOT / "geometries/sphere-small.toml").read_text())
-        self.export()
-        self.export("--processors", "4")
-        whole = {name: lists(self.at / "case/constant/polyMesh" / name) for name in ("points", "faces", "owner", "cellLevel")}
-        cells, seen = [], np.zeros(len(whole["faces"]), int)
-        for processor in range(4):
-            part = self.at / f"case/processor{processor}/constant/polyMesh"
-            own = {path.name: lists(path) for path in part.iterdir() if path.name != "boundary"}
-            numbers = {name: np.array([int(n) for [n] in own[f"{name}ProcAddressing"]]) for name in ("point", "cell", "face", "boundary")}
-            self.assertEqual([whole["points"][n] for n in numbers["point"]], own["points"])
-            self.assertEqual([whole["cellLevel"][n] for n in numbers["cell"]], own["cellLevel"])
-            cells.extend(numbers["cell"])
-            self.assertEqual(len(numbers["face"]), len(own["faces"]))
-            for number, face, [owner] in zip(numbers["face"], own["faces"], own["owner"]):
-                index = abs(number) - 1
-                seen[index] += 1
-                vertices = [str(numbers["point"][int(v)]) for v in face]
-                turned = whole["faces"][index][:1] + whole["faces"][index][:0:-1]
-                self.assertEqual(vertices, whole["faces"][index] if number > 0 else turned)
-                is_owner = int(whole["owner"][index][0]) == numbers["cell"][int(owner)]
-                self.assertEqual(is_owner, number > 0)
-            patches = re.findall(r"^    (\w+)\n    {", (part / "boundary").read_text(), re.M)
-            expected = [-1 if name.startswith("procBoundary") else i for i, name in enumerate(patches)]
-            self.assertEqual(list(numbers["boundary"]), expected)
-        self.assertEqual(sorted(cells), list(range(len(cells))))
-        self.assertEqual(len(cells), len(whole["cellLevel"]))
-        self.assertTrue(((seen == 1) | (seen == 2)).all())
 
 
 @needs("harness", "mesher")
@@ -323,23 +265,6 @@ def duct():
     vertices = lambda facet: "".join(f"vertex {x} {y} {z}\n" for x, y, z in facet)
     text = "".join(f"facet normal 0 0 0\nouter loop\n{vertices(f)}endloop\nendfacet\n" for f in facets)
     return f"solid duct\n{text}endsolid duct\n"
-
-
-def lists(path):
-    """The items of a list, each as words."""
-    file = import_cells.Foam(path)
-    if path.name == "points":
-        return [list(map(str, point)) for point in file.points()]
-    if path.name == "faces":
-        begins, vertices = file.faces(2**31)
-        return [list(map(str, vertices[begin:end])) for begin, end in zip(begins, begins[1:])]
-    return [[str(label)] for label in file.labels()]
-
-
-def positions(path):
-    """The vectors in a field in ASCII, those of the cells first and then those of the patches."""
-    vectors = re.findall(r"^\(([-+.e\d]+) ([-+.e\d]+) ([-+.e\d]+)\)$", path.read_text(), re.M)
-    return np.array(vectors, float)
 
 
 def call_any(directory, *command):

@@ -93,18 +93,16 @@ class GeometryTest(unittest.TestCase):
                 count = {kind: finding["count"] for kind, finding in findings.items()}
                 uses = np.unique(mesh.edges_unique_inverse, return_counts=True)[1]
                 self.assertEqual(diagnosis["facets"], facets)
-                self.assertEqual(findings["openings"]["edges"], (uses == 1).sum())
+                self.assertEqual(diagnosis["edges"]["open"], (uses == 1).sum())
                 self.assertEqual(count["non_manifold_odd"], ((uses > 2) & (uses % 2 == 1)).sum())
-                self.assertEqual(count["non_manifold_even"], ((uses > 2) & (uses % 2 == 0)).sum())
+                self.assertEqual(diagnosis["edges"]["even"], ((uses > 2) & (uses % 2 == 0)).sum())
                 self.assertEqual(count["duplicates"], (~mesh.unique_faces()).sum())
-                self.assertGreaterEqual(count["degenerate"], repeats)
+                self.assertEqual(diagnosis["facets"] - diagnosis["shells"]["facets"], repeats)
 
     def test_watertight_means_two_facets_at_every_edge(self):
-        for name, _, findings, mesh, _, _ in self.cases:
+        for name, diagnosis, _, mesh, _, _ in self.cases:
             with self.subTest(name):
-                other = findings["openings"]["edges"] + sum(
-                    findings[kind]["count"] for kind in ("non_manifold_odd", "non_manifold_even")
-                )
+                other = sum(diagnosis["edges"][kind] for kind in ("open", "odd", "even"))
                 self.assertEqual(other == 0, mesh.is_watertight)
 
     def test_winding_agrees_where_every_edge_has_two_facets(self):
@@ -114,9 +112,9 @@ class GeometryTest(unittest.TestCase):
                     self.assertEqual(findings["winding"]["count"] == 0, mesh.is_winding_consistent)
 
     def test_shells_agree_where_no_edge_has_more_than_two_facets(self):
-        for name, diagnosis, findings, mesh, _, _ in self.cases:
+        for name, diagnosis, _, mesh, _, _ in self.cases:
             with self.subTest(name):
-                if not findings["non_manifold_odd"]["count"] + findings["non_manifold_even"]["count"]:
+                if not diagnosis["edges"]["odd"] + diagnosis["edges"]["even"]:
                     self.assertEqual(diagnosis["shells"]["count"], components(mesh))
 
     @unittest.skipIf(pymeshlab is None, "pymeshlab is not installed")
@@ -125,15 +123,15 @@ class GeometryTest(unittest.TestCase):
         there are edges with more than two facets is compared."""
         for path in sorted(REPO.glob("geometries/*.stl")) + sorted(REPO.glob("geometries/fetched/*.stl")):
             with self.subTest(path.name):
-                _, diagnosis, findings, _, facets, repeats = next(c for c in self.cases if c[0] == path.name)
+                _, diagnosis, _, _, facets, repeats = next(c for c in self.cases if c[0] == path.name)
                 meshes = pymeshlab.MeshSet()
                 meshes.load_new_mesh(str(path))
                 measures = meshes.get_topological_measures()
                 self.assertEqual(facets - repeats, measures["faces_number"])
-                self.assertEqual(findings["openings"]["edges"], measures["boundary_edges"])
+                self.assertEqual(diagnosis["edges"]["open"], measures["boundary_edges"])
                 self.assertEqual(diagnosis["shells"]["count"], measures["connected_components_number"])
-                odd_and_even = (findings[kind]["count"] for kind in ("non_manifold_odd", "non_manifold_even"))
-                self.assertEqual(sum(odd_and_even) > 0, measures["non_two_manifold_edges"] > 0)
+                odd_and_even = diagnosis["edges"]["odd"] + diagnosis["edges"]["even"]
+                self.assertEqual(odd_and_even > 0, measures["non_two_manifold_edges"] > 0)
 
 
 if __name__ == "__main__":

@@ -48,20 +48,13 @@ class TreeTest(unittest.TestCase):
         self.assertTrue((side[order] == sides[expected]).all())
         self.assertEqual(stated["origin"], root["origin"])
         self.assertAlmostEqual(stated["edge"], root["edge"])
-        return grid, nodes
+        return grid
 
     def test_the_mesher_writes_the_leaves_of_its_words(self):
         for keep in ["outside", "inside", "all"]:
             at = self.meshed(keep)
-            grid, _ = self.check(at, at / "mesh/mesh.vtkhdf")
+            grid = self.check(at, at / "mesh/mesh.vtkhdf")
             self.assertEqual(grid.HasMask(), keep != "all")
-
-    def test_cells_have_the_ranks_that_own_them(self):
-        at = self.meshed("all", "--cell-ranks", "--comm", "sim:3")
-        grid, nodes = self.check(at, at / "mesh/mesh.vtkhdf")
-        ranks = vtk_to_numpy(grid.GetCellData().GetArray("rank"))[nodes]
-        parts = [len(np.load(path)) for path in sorted((at / "mesh").glob("leaves-*.npy"))]
-        self.assertEqual(np.bincount(ranks).tolist(), parts)
 
     def test_the_harness_writes_the_leaves_of_any_mesh(self):
         at = self.meshed("outside", "--comm", "sim:2")

@@ -123,7 +123,7 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
     let (counts, digests, heaviest) = job.phase("leaves", |comm| leaves::emit(mesh, out, comm))?;
     job.check(|comm| check::leaves(mesh, &counts, comm));
     if let Some(out) = out.filter(|out| out.output.tree) {
-        job.phase("tree file", |comm| htg::write(mesh, out, out.output.cell_ranks, comm))?;
+        job.phase("tree file", |comm| htg::write(mesh, out, comm))?;
     }
 
     // 10. Finish: sums over the ranks, and the manifest.

@@ -45,8 +45,6 @@ pub enum Command {
     Leak(Box<commands::leak::Arguments>),
     /// Write a mesh, or part of it, for ParaView and other programs
     Export(commands::export::Arguments),
-    /// Measure the surface that a mesh hands over to a near-body mesher, its gap to the wall, and its distribution to ranks
-    NearBody(commands::near_body::Arguments),
     /// Draw a slice of a mesh, or a view in three dimensions
     Picture(Box<commands::picture::Arguments>),
     /// Make a leaf-set directory from a mesh in another program's format

@@ -103,7 +103,6 @@ fn dispatch(arguments: Arguments) -> Result<u8, Failure> {
         Command::Geometry(arguments) => commands::geometry::run(&arguments),
         Command::Leak(arguments) => commands::leak::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
-        Command::NearBody(arguments) => commands::near_body::run(&arguments),
         Command::Picture(arguments) => commands::picture::run(&arguments),
         Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),

@@ -5,7 +5,7 @@ use serde_json::json;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 16] = [
     "verify",
     "selftest",
     "gate",
@@ -17,7 +17,6 @@ const COMMANDS: [&str; 17] = [
     "leak",
     "picture",
     "export",
-    "near-body",
     "import",
     "diff",
     "why",

@@ -78,7 +78,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         (
             "mesh.png",
             &[][..],
-            "mesh.png: no format has such a name: choose one that ends in .vtu, .pvtu",
+            "mesh.png: no format has such a name: choose one that ends in .vtu, .p8est",
         ),
         ("none/mesh.vtu", &[], "none/mesh.vtu: none is not a directory: create it"),
         (
@@ -91,14 +91,20 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
             &["--side", "outside", "--level-max", "2"],
             "no leaf satisfies all conditions",
         ),
-        ("part.pvtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
+        ("part.vtu", &["--clip", "9,9,9,10,10,10"], "no leaf satisfies all conditions"),
         ("part.vtu", &["--slice", "y=-1"], "the mesh extends from y=0 to y=8"),
-        ("part.vtu", &["--rank", "2"], "the mesh has 2 ranks, counted from 0"),
+        ("part.vtu", &["--rank", "2"], "--rank 2: the mesh has ranks 0 to 1"),
         ("part.vtu", &["--label", "64"], "--label has no effect on .vtu"),
         ("part.vtu", &["--case", "cube-small"], "--case has no effect on .vtu"),
-        ("polyMesh", &[], "one that ends in .vtu, .pvtu, .p8est, /polyMesh"),
-        ("case/polyMesh", &["--processors", "2"], "choose a path CASE/constant/polyMesh"),
-        ("case/constant/polyMesh", &["--processors", "149"], "148 cells are too few"),
+        ("polyMesh", &[], "one that ends in .vtu, .p8est, /polyMesh"),
+        ("front.stl", &["--case", "cube-small"], "--case has no effect on .stl"),
+        ("front.stl", &["--side", "crossing"], "no selected cell borders a crossing cell"),
+        ("front.vtp", &["--case", "absent.toml"], "absent.toml"),
+        (
+            "front.vtp",
+            &["--case", "cube-small"],
+            "the mesh has a root of edge 8 at (0, 0, 0) and surface level",
+        ),
         (
             "case/constant/polyMesh",
             &["--side", "inside", "--level-max", "0"],
@@ -115,25 +121,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
 }
 
 #[test]
-fn a_pvtu_replaces_only_files_of_an_earlier_export() {
-    let place = mesh();
-    let [all, pieces] = ["all.pvtu", "all_pieces"].map(|name| place.path().join(name));
-    for options in [&[][..], &["--level-max", "1"]] {
-        assert_eq!(export(&place, "all.pvtu", options).0, 0);
-        assert_eq!(names(place.path()), ["all.pvtu", "all_pieces", "mesh"]);
-        assert_eq!(names(&pieces), ["all_0000.vtu"]);
-    }
-    let before = fs::read(&all).unwrap();
-    fs::write(pieces.join("notes.txt"), "mine").unwrap();
-    let (code, _, error) = export(&place, "all.pvtu", &[]);
-    assert_eq!((code, error.matches('\n').count()), (2, 1), "{error}");
-    assert!(error.contains("all_pieces/notes.txt: was not written by harness export"), "{error}");
-    assert_eq!(names(&pieces), ["all_0000.vtu", "notes.txt"]);
-    assert!(fs::read(&all).unwrap() == before);
-}
-
-#[test]
-fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
+fn a_poly_mesh_is_a_directory_of_a_case() {
     let place = mesh();
     let (code, output, error) = export(&place, "case/constant/polyMesh", &["--label", "64"]);
     assert_eq!((code, error.as_str()), (0, ""));
@@ -141,15 +129,6 @@ fn a_poly_mesh_is_a_directory_of_a_case_or_one_per_processor() {
     assert!(output.contains("faces of each patch: xMin "), "{output}");
     let files = ["boundary", "cellLevel", "faces", "neighbour", "owner", "points", "rank", "side"];
     assert_eq!(names(&place.path().join("case/constant/polyMesh")), files);
-    let (code, ..) = export(&place, "case/constant/polyMesh/", &["--processors", "ranks"]);
-    assert_eq!(code, 0);
-    let addressing = ["boundary", "cell", "face", "point"].map(|of| format!("{of}ProcAddressing"));
-    let mut of_processor = [&files.map(str::to_owned)[..], &addressing].concat();
-    of_processor.sort();
-    for processor in ["processor0", "processor1"] {
-        let dir = place.path().join("case").join(processor).join("constant/polyMesh");
-        assert_eq!(names(&dir), of_processor);
-    }
     assert_eq!(names(place.path()), ["case", "mesh"]);
 }
 
@@ -159,20 +138,18 @@ fn an_interrupted_export_leaves_no_file() {
     // Several pieces, so that the first is written before the last is encoded.
     let words = words_with_sides(|o| o.level < 7, |_| Some(Side::Outside));
     leaf_set(vec![words]).create(&place.path().join("mesh")).unwrap();
-    for file in ["all.vtu", "all.pvtu"] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-        command.current_dir(place.path()).args(["export", "mesh", file, "--jobs", "2"]);
-        let child = command.stderr(Stdio::piped()).spawn().unwrap();
-        while names(place.path()).len() == 1 {
-            std::thread::yield_now();
-        }
-        let interrupt = ["-INT".to_owned(), child.id().to_string()];
-        assert!(Command::new("kill").args(interrupt).status().unwrap().success());
-        let output = child.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(130), "{file}");
-        assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted\n");
-        assert_eq!(names(place.path()), ["mesh"], "{file}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+    command.current_dir(place.path()).args(["export", "mesh", "all.vtu", "--jobs", "2"]);
+    let child = command.stderr(Stdio::piped()).spawn().unwrap();
+    while names(place.path()).len() == 1 {
+        std::thread::yield_now();
     }
+    let interrupt = ["-INT".to_owned(), child.id().to_string()];
+    assert!(Command::new("kill").args(interrupt).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "harness: interrupted\n");
+    assert_eq!(names(place.path()), ["mesh"]);
 }
 
 /// The tree of a mesh is a mesh itself: it is exported, audited and imported without VTK, and damage is one sentence.
@@ -200,20 +177,19 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     fs::copy(place.path().join("mesh.vtkhdf"), place.path().join("tree/mesh.vtkhdf")).unwrap();
     let mut manifest = contract::leafset::read_manifest(&place.path().join("mesh")).unwrap();
     (manifest.parts, manifest.hyper_tree_grid) = (Vec::new(), Some("mesh.vtkhdf".to_owned()));
-    // It has the ranks of the parts.
-    fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(&manifest).unwrap()).unwrap();
-    for (rank, cells) in [("0", 49), ("1", 99)] {
-        let (code, output, error) = harness(&["export", "tree", "tree.vtu", "--rank", rank]);
-        assert_eq!((code, error.as_str()), (0, ""));
-        assert!(output.starts_with(&format!("tree.vtu: {cells} cells, ")), "{output}");
-    }
-    assert!(harness(&["export", "tree", "tree.vtu", "--rank", "2"]).2.contains("has 2 ranks"));
-    fs::remove_file(place.path().join("tree.vtu")).unwrap();
     let write = |manifest: &contract::manifest::Manifest| {
         fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(manifest).unwrap())
             .unwrap();
     };
     write(&manifest);
+    // Its ranks are unknown.
+    let (code, _, error) = harness(&["export", "tree", "tree.vtu", "--rank", "0"]);
+    assert!(code == 2 && error.contains("that has only a tree are unknown"), "{error}");
+    assert_eq!(harness(&["export", "tree", "tree.vtu"]).0, 0);
+    let vtu = fs::read(place.path().join("tree.vtu")).unwrap();
+    let header = String::from_utf8_lossy(&vtu[..4096]);
+    assert!(header.contains("\"side\"") && !header.contains("\"rank\""), "{header}");
+    fs::remove_file(place.path().join("tree.vtu")).unwrap();
     let (code, output, _) = harness(&["diff", "mesh", "tree"]);
     assert_eq!(code, 0, "{output}");
     assert!(output.ends_with("the leaves are the same (148 compared)\n"), "{output}");
@@ -245,4 +221,52 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
         }
     }
     assert_eq!(names(place.path()), ["again", "mesh", "mesh.vtkhdf", "other", "tree"]);
+}
+
+#[test]
+fn the_surface_towards_the_body_is_polygons_or_triangles() {
+    let place = tempfile::tempdir().unwrap();
+    // A body of edge 2 in the middle of a root of edge 8.
+    let is_body = |c: u32| (3..5).contains(&(c >> 16));
+    let words = words_with_sides(
+        |o| o.level < 3,
+        |o| (!o.corner.iter().all(|&c| is_body(c))).then_some(Side::Outside),
+    );
+    leaf_set(vec![words]).create(&place.path().join("mesh")).unwrap();
+    let case = "spacing_min = 8.0\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n[generator]\nshape = \"sphere\"\nfacets = 20\n";
+    fs::write(place.path().join("case.toml"), case).unwrap();
+    let (code, output, error) = export(&place, "front.stl", &[]);
+    assert_eq!((code, error.as_str()), (0, ""));
+    assert_eq!(
+        output,
+        "front.stl: 24 faces, 2484 bytes (103.5 per face)\n  a surface of area 24.0, closed\n"
+    );
+    assert_eq!(export(&place, "front.vtp", &["--case", "case.toml"]).0, 0);
+    let (code, output, _) = export(&place, "part.vtp", &["--clip", "0,0,0,8,8,4"]);
+    assert!(
+        code == 0 && output.contains("12 faces") && output.contains("open at 8 edges"),
+        "{output}"
+    );
+    fs::write(place.path().join("other.toml"), case.replace("8.0", "4.0")).unwrap();
+    // The geometry was replaced after the mesh was made.
+    let manifest = place.path().join("mesh/mesh.json");
+    let stated = fs::read_to_string(&manifest).unwrap();
+    let geometry = format!(r#"{{"geometry": {{"facets": 7, "digest": "{}"}},"#, "0".repeat(32));
+    let replaced = stated.replacen('{', &geometry, 1);
+    let digest = stated.split("\"digest\":\"").nth(1).unwrap()[..32].to_owned();
+    for (manifest_text, case, why) in [
+        (stated.clone(), "other.toml", "the case a root of edge 4 at"),
+        (replaced, "case.toml", "7 facets of the digest 000"),
+        (
+            stated.replacen("\"digest\":\"", "\"digest\":\"0", 1),
+            "case.toml",
+            "a digest is 32 lower-case",
+        ),
+        (stated.replace(&digest, &"1".repeat(32)), "case.toml", "and its manifest states 1111"),
+    ] {
+        fs::write(&manifest, manifest_text).unwrap();
+        let (code, output, error) = export(&place, "front.vtp", &["--case", case]);
+        assert_eq!((code, output.as_str(), error.lines().count()), (2, "", 1), "{error}");
+        assert!(error.contains(why), "{error}");
+    }
 }

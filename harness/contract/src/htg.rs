@@ -2,34 +2,28 @@
 //! order.
 //!
 //! The file has the nodes level by level ([`vtkhdf::tree`] describes it). Its bits, of which nodes are split and which leaves are not in the mesh,
-//! are in memory, at most 0.3 bytes per leaf. Sides and ranks are not: a walk from the root down reads those of each level once from its begin to its
+//! are in memory, at most 0.3 bytes per leaf. Sides are not: a walk from the root down reads those of each level once from its begin to its
 //! end, because the children of a level's split nodes are the next level. So one chunk of them is in memory for each level.
 //!
-//! Opening a file verifies the whole structure: every node but the root has a parent, and masked nodes are leaves. Sides and ranks are verified as they are
+//! Opening a file verifies the whole structure: every node but the root has a parent, and masked nodes are leaves. Sides are verified as they are
 //! read. Damage to the file itself shows in its checksums.
 
 mod bits;
-mod bytes;
 #[cfg(test)]
 mod tests;
 
 use crate::lattice::Root;
 use crate::word;
 use bits::Bits;
-use bytes::Bytes;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use vtkhdf::format::Chunked;
 pub use vtkhdf::format::ReadError as TreeError;
 use vtkhdf::read::TreeReader;
 use vtkhdf::tree::Shape;
 
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
-
-/// The least number that is no rank, so that counting leaves by rank takes little memory whatever a file contains.
-const RANKS_MAX: u32 = 1 << 24;
 
 /// The cell data with the sides.
 pub use vtkhdf::tree::SIDE;
@@ -104,69 +98,46 @@ impl TreeFile {
         &self.path
     }
 
-    /// Whether its leaves have ranks.
-    pub fn has_ranks(&self) -> bool {
-        self.file.ranks.is_some()
-    }
-
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        self.walk(None, &mut |words, _| run(words))
-    }
-
-    /// The same with the ranks of the leaves, if the file has them.
-    ///
-    /// # Errors
-    /// If the file is damaged.
-    pub fn words_and_ranks(&self, run: &mut Run) -> Result<()> {
-        self.walk(self.file.ranks.as_ref(), run)
-    }
-
-    fn walk(&self, ranks: Option<&Chunked>, run: &mut Run) -> Result<()> {
-        let mut walk = Walk::new(self, ranks);
+        let level = |nodes: &Range<u64>| Level { next: nodes.start, ..Level::default() };
+        let levels = self.levels.iter().map(level).collect();
+        let mut walk = Walk { tree: self, levels, words: Vec::with_capacity(RUN + 8) };
         if walk.siblings(0, 0, 1, run)? {
-            walk.flush(run);
+            run(&walk.words);
         }
         Ok(())
     }
 }
 
-/// What is given the words of leaves, and their ranks if the walk reads ranks. A walk ends when it returns false.
-type Run<'r> = dyn FnMut(&[u64], &[u32]) -> bool + 'r;
-
 /// The position of a walk on a level.
-struct Level<'a> {
+#[derive(Default)]
+struct Level {
     next: u64,
-    sides: Option<Bytes<'a>>,
-    ranks: Option<Bytes<'a>>,
+    /// The chunk of sides in memory, and the number of its first node.
+    sides: Vec<u8>,
+    first: u64,
 }
 
 /// A walk in Morton order.
 struct Walk<'a> {
     tree: &'a TreeFile,
-    levels: Vec<Level<'a>>,
+    levels: Vec<Level>,
     words: Vec<u64>,
-    ranks: Vec<u32>,
 }
 
-impl<'a> Walk<'a> {
-    /// A walk from the root, with ranks if they are given.
-    fn new(tree: &'a TreeFile, ranks: Option<&'a Chunked>) -> Self {
-        let bytes = |array| Bytes::new(&tree.file, array);
-        let level = |nodes: &Range<u64>| Level {
-            next: nodes.start,
-            sides: tree.with_sides.then(|| bytes(&tree.file.sides)),
-            ranks: ranks.map(bytes),
-        };
-        let levels = tree.levels.iter().map(level).collect();
-        Self { tree, levels, words: Vec::with_capacity(RUN + 8), ranks: Vec::new() }
-    }
-
+impl Walk<'_> {
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.
-    fn siblings(&mut self, level: usize, key: u64, count: u32, run: &mut Run) -> Result<bool> {
+    fn siblings(
+        &mut self,
+        level: usize,
+        key: u64,
+        count: u32,
+        run: &mut dyn FnMut(&[u64]) -> bool,
+    ) -> Result<bool> {
         let first = self.levels[level].next;
         self.levels[level].next += u64::from(count);
         let [split, masked] =
@@ -178,34 +149,34 @@ impl<'a> Walk<'a> {
                     return Ok(false);
                 }
             } else if masked >> i & 1 == 0 {
-                self.leaf(level, key, first + u64::from(i))?;
+                let side = self.side(level, first + u64::from(i))?;
+                self.words.push(key << 7 | (level as u64) << 2 | u64::from(side));
             }
         }
-        Ok(self.words.len() < RUN || self.flush(run))
-    }
-
-    /// Adds a leaf.
-    fn leaf(&mut self, level: usize, key: u64, node: u64) -> Result<()> {
-        let Level { sides, ranks, .. } = &mut self.levels[level];
-        let side = sides.as_mut().map_or(Ok(0), |sides| sides.at(node))?;
-        if side > 2 {
-            return nodes(format!("node {node} has the side {side}"));
+        if self.words.len() < RUN {
+            return Ok(true);
         }
-        self.words.push(key << 7 | (level as u64) << 2 | u64::from(side));
-        if let Some(ranks) = ranks {
-            let found = ranks.int(node)?;
-            match u32::try_from(found).ok().filter(|&rank| rank < RANKS_MAX) {
-                Some(rank) => self.ranks.push(rank),
-                None => return nodes(format!("node {node} has the rank {found}")),
-            }
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self, run: &mut Run) -> bool {
-        let goes_on = run(&self.words, &self.ranks);
+        let goes_on = run(&self.words);
         self.words.clear();
-        self.ranks.clear();
-        goes_on
+        Ok(goes_on)
+    }
+
+    /// The side of a node.
+    fn side(&mut self, level: usize, node: u64) -> Result<u8> {
+        if !self.tree.with_sides {
+            return Ok(0);
+        }
+        let Level { sides, first, .. } = &mut self.levels[level];
+        let mut at = node.wrapping_sub(*first) as usize;
+        if at >= sides.len() {
+            let array = &self.tree.file.sides;
+            let length = u64::from(array.chunk_len);
+            self.tree.file.read_chunk(array, (node / length) as usize, sides)?;
+            (*first, at) = (node / length * length, (node % length) as usize);
+        }
+        match sides[at] {
+            side @ 0..=2 => Ok(side),
+            side => nodes(format!("node {node} has the side {side}")),
+        }
     }
 }

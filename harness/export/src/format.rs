@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::foam;
+use crate::front;
 use crate::htg;
 use crate::options::Write;
 use crate::scripted;
@@ -16,46 +17,68 @@ pub struct Format {
     pub ending: &'static str,
     /// What it contains and which programs read it, for the user.
     pub purpose: &'static str,
+    /// Those of the options `--case`, `--label` and `--regions` that have an effect.
+    pub options: &'static [&'static str],
     /// Writes the selected leaves of a mesh.
     pub write: Write,
+}
+
+impl Format {
+    /// Whether it has the faces towards the body, not cells.
+    pub fn is_surface(&self) -> bool {
+        [".vtp", ".stl"].contains(&self.ending)
+    }
 }
 
 /// All formats.
 pub const FORMATS: &[Format] = &[
     Format {
         ending: ".vtu",
-        purpose: "cells for ParaView, VisIt and pyvista, in one file",
-        write: vtu::write_file,
-    },
-    Format {
-        ending: ".pvtu",
-        purpose: "the same in files of some million cells each, which many processes can read",
-        write: vtu::write_files,
+        purpose: "cells for ParaView, VisIt and pyvista",
+        options: &[],
+        write: vtu::write,
     },
     Format {
         ending: ".p8est",
         purpose: "a forest for p8est_load of p4est, deal.II, t8code and ForestClaw",
+        options: &[],
         write: p8est::write,
     },
     Format {
         ending: "/polyMesh",
         purpose: "polyhedra for OpenFOAM, a directory: CASE/constant/polyMesh",
+        options: &["--case", "--label", "--regions"],
         write: foam::write,
     },
     Format {
         ending: ".cgns",
         purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
+        options: &["--case", "--regions"],
         write: scripted::cgns,
     },
     Format {
         ending: ".mfem",
         purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
+        options: &[],
         write: scripted::mfem,
     },
     Format {
         ending: ".vtkhdf",
         purpose: "the tree, a hyper-tree grid of 0.05 bytes per cell, for ParaView and VTK; other leaves are masked",
+        options: &[],
         write: htg::write,
+    },
+    Format {
+        ending: ".vtp",
+        purpose: "the surface towards the body, for a near-body mesher: polygons for VTK, with --case the gap to the wall",
+        options: &["--case"],
+        write: front::vtp,
+    },
+    Format {
+        ending: ".stl",
+        purpose: "the same surface as triangles",
+        options: &[],
+        write: front::stl,
     },
 ];
 
@@ -86,15 +109,14 @@ mod tests {
     #[test]
     fn the_name_of_the_file_decides() {
         assert_eq!(of(Path::new("a/mesh.vtu")).unwrap().ending, ".vtu");
-        assert_eq!(of(Path::new("mesh.pvtu")).unwrap().ending, ".pvtu");
         for name in ["constant/polyMesh", "case/constant/polyMesh/"] {
             assert_eq!(of(Path::new(name)).unwrap().ending, "/polyMesh");
         }
         for name in
-            ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".pvtu", "vtu", "mesh.VTU", "polyMesh", ""]
+            ["mesh.png", "mesh", "a.vtu/mesh", "a/.vtu", ".vtu", "vtu", "mesh.VTU", "polyMesh", ""]
         {
             let error = of(Path::new(name)).unwrap_err().to_string();
-            assert!(error.contains(".vtu, .pvtu, .p8est"), "{name}: {error}");
+            assert!(error.contains(".vtu, .p8est"), "{name}: {error}");
         }
     }
 }

@@ -10,7 +10,7 @@ pub struct Leaf {
     pub octant: Octant,
     /// Its side.
     pub side: Side,
-    /// The rank that owns it: that of the tree, or the index of its part; 0 if it is unknown.
+    /// The rank that owns it: the index of its part; 0 in a tree.
     pub rank: u32,
     /// Index among all leaves of the mesh, in Morton order.
     pub index: u64,

@@ -3,22 +3,24 @@
 //!
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
-//! - [`vtu`]: cells for VTK, in one file or several;
+//! - [`vtu`]: cells for VTK; [`front`]: the surface towards a near-body mesh;
 //! - [`foam`]: meshes for OpenFOAM; [`scripted`]: CGNS and MFEM, made of other formats by scripts;
 
 #![deny(missing_docs)]
 
 pub mod foam;
 pub mod format;
+pub mod front;
 pub mod htg;
 pub mod leaf;
+mod leaves;
 pub mod mesh;
-pub mod near_body;
 pub mod options;
 pub mod p8est;
 pub mod polydata;
 pub mod scripted;
 pub mod selection;
+mod squares;
 #[cfg(test)]
 mod testing;
 pub mod vtu;

@@ -2,15 +2,12 @@
 
 use std::ops::Deref;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::htg::TreeFile;
 use contract::lattice::Root;
 use contract::manifest::{Geometry, Sides};
 use contract::mesh::{self, Order};
-use contract::npy::PartFile;
 use contract::word;
 
 use crate::leaf::Leaf;
@@ -19,10 +16,7 @@ use contract::failure::Failure;
 
 /// A mesh on disk, opened for reading.
 #[derive(Debug)]
-pub struct Mesh {
-    files: mesh::Mesh,
-    leaves_by_rank: OnceLock<Vec<u64>>,
-}
+pub struct Mesh(mesh::Mesh);
 
 /// Asks whether to continue; its error ends a visit.
 pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
@@ -31,7 +25,7 @@ impl Deref for Mesh {
     type Target = mesh::Mesh;
 
     fn deref(&self) -> &mesh::Mesh {
-        &self.files
+        &self.0
     }
 }
 
@@ -41,7 +35,7 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(path: &Path) -> Result<Self, Failure> {
-        Ok(Self { files: mesh::Mesh::open(path)?, leaves_by_rank: OnceLock::new() })
+        Ok(Self(mesh::Mesh::open(path)?))
     }
 
     /// Refuses a case that was not meshed here, by its root, its surface level and its facets.
@@ -77,44 +71,21 @@ impl Mesh {
         match self.manifest.sides {
             Sides::Known => Ok(()),
             Sides::Unknown => Err(Failure::input(
-                "the sides of this mesh are unknown, and this needs them: only .vtu, .pvtu and polyMesh can be written without",
+                "the sides of this mesh are unknown, and this needs them: only .vtu and polyMesh can be written without",
             )),
         }
     }
 
-    /// Whether the rank of each leaf is known: a tree may have been written without ranks.
+    /// Whether the rank of each leaf is known: words have a file for each rank, and a tree has none.
     pub fn has_ranks(&self) -> bool {
-        self.tree_file.as_ref().is_none_or(TreeFile::has_ranks)
+        self.tree_file.is_none()
     }
 
     /// The error of a request that needs them.
     pub fn ranks_unknown(&self) -> Failure {
         Failure::input(
-            "the ranks of this mesh are unknown, because its tree was written without --cell-ranks"
-                .to_owned(),
+            "the ranks of a mesh that has only a tree are unknown: mesh with --write words",
         )
-    }
-
-    /// Number of leaves of each rank; nothing if the ranks are unknown. All leaves of a tree are read, the first time.
-    ///
-    /// # Errors
-    /// If the tree cannot be read.
-    pub fn leaves_by_rank(&self) -> Result<&[u64], Failure> {
-        if let Some(known) = self.leaves_by_rank.get() {
-            return Ok(known);
-        }
-        let mut leaves = Vec::new();
-        match &self.tree_file {
-            None => leaves.extend(self.parts.iter().map(PartFile::len)),
-            Some(tree) if !tree.has_ranks() => {}
-            Some(_) => self.visit(&Selection::default(), &|| Ok(()), &mut |leaf| {
-                let rank = leaf.rank as usize;
-                leaves.resize(leaves.len().max(rank + 1), 0);
-                leaves[rank] += 1;
-                Ok(())
-            })?,
-        }
-        Ok(self.leaves_by_rank.get_or_init(|| leaves))
     }
 
     /// Number of selected leaves, which is not 0.
@@ -167,9 +138,8 @@ impl Mesh {
             if selection.has(&leaf) { visit(leaf) } else { Ok(()) }
         };
         let mut visited = Ok(());
-        self.stream_ranked(&mut |part, words, ranks| {
-            let rank = |i: usize| ranks.get(i).copied().unwrap_or(part as u32);
-            visited = words.iter().enumerate().try_for_each(|(i, &word)| one(word, rank(i)));
+        self.stream(&mut |part, words| {
+            visited = words.iter().try_for_each(|&word| one(word, part as u32));
             visited.is_ok()
         })?;
         visited?;

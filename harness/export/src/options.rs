@@ -17,23 +17,14 @@ pub struct Options<'a> {
     pub jobs: NonZero<usize>,
     /// Whoever waits for the export.
     pub watch: &'a dyn Watch,
-    /// What only meshes for OpenFOAM need.
-    pub foam: Foam<'a>,
+    /// The case of the mesh: its solids become patches of OpenFOAM, and its facets are those to which a surface has gaps.
+    pub case: Option<&'a Case>,
+    /// Width of OpenFOAM's labels.
+    pub label: Label,
+    /// The regions that are exported to OpenFOAM.
+    pub regions: Regions,
     /// Runs the script that makes a file of this format: its source and the file.
     pub script: fn(&str, &Path, &Path) -> Result<(), Failure>,
-}
-
-/// Options of meshes for OpenFOAM.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Foam<'a> {
-    /// Width of labels.
-    pub label: Label,
-    /// The regions that are exported.
-    pub regions: Regions,
-    /// Processor directories in place of one mesh.
-    pub processors: Option<Processors>,
-    /// The case of the mesh, whose solids become patches.
-    pub case: Option<&'a Case>,
 }
 
 /// Width of the numbers of cells, faces and points.
@@ -56,15 +47,6 @@ pub enum Regions {
     All,
     /// They are left out: most solvers accept only one region
     Largest,
-}
-
-/// How cells are distributed to processors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Processors {
-    /// As many intervals of the Morton curve, with equally many cells.
-    Equal(u32),
-    /// By the rank that wrote the leaf.
-    Ranks,
 }
 
 impl Options<'_> {

@@ -146,7 +146,7 @@ fn counted(
     selection: &Selection,
     options: &Options<'_>,
 ) -> Result<(u64, Vec<u64>), Failure> {
-    let mut ends = vec![0; mesh.leaves_by_rank()?.len().max(1)];
+    let mut ends = vec![0; mesh.parts.len().max(1)];
     let mut leaves = 0;
     quadrants(mesh, selection, options, &mut |quadrant| {
         leaves += u64::from(quadrant.data != FILLER);
@@ -210,26 +210,15 @@ fn pad(bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Foam;
-    use crate::testing::{Unwatched, no_script, stored};
+    use crate::testing::{options, stored};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
     use contract::testing::{random_words, words_of};
     use contract::word::Side;
     use proptest::prelude::*;
     use std::fs;
-    use std::num::NonZero;
 
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
-
-    fn options() -> Options<'static> {
-        Options {
-            jobs: NonZero::<usize>::MIN,
-            watch: &Unwatched,
-            foam: Foam::default(),
-            script: no_script,
-        }
-    }
 
     fn mesh_of(parts: Vec<Vec<u64>>) -> Mesh {
         // The files remain open.

@@ -1,11 +1,13 @@
 //! Meshes on disk, for tests.
 
 use crate::mesh::Mesh;
+use crate::options::{Label, Options, Regions};
 use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
 use contract::watch::Watch;
+use std::num::NonZero;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -13,7 +15,7 @@ use tempfile::TempDir;
 const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 
 /// Nobody waits.
-pub struct Unwatched;
+struct Unwatched;
 
 impl Watch for Unwatched {
     fn is_interrupted(&self) -> bool {
@@ -22,8 +24,15 @@ impl Watch for Unwatched {
 }
 
 /// A script that is not expected.
-pub fn no_script(_: &str, _: &Path, _: &Path) -> Result<(), Failure> {
+fn no_script(_: &str, _: &Path, _: &Path) -> Result<(), Failure> {
     unreachable!("no other format asks for it")
+}
+
+/// The default options.
+pub fn options<'a>() -> Options<'a> {
+    let (label, regions) = (Label::default(), Regions::default());
+    let (jobs, watch, script) = (NonZero::<usize>::MIN, &Unwatched, no_script);
+    Options { jobs, watch, case: None, label, regions, script }
 }
 
 /// A mesh of these parts in a directory, which lasts as long as the first value.

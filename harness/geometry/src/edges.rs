@@ -4,7 +4,6 @@
 //! that they have, and no ray counts them.
 
 use contract::case::Facet;
-use contract::lattice::FacetLattice;
 use serde::Serialize;
 
 use super::finding::{Finding, Kind, Place};
@@ -53,16 +52,7 @@ impl Edges {
     /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets.
     pub fn new(facets: &[Facet]) -> Self {
         // Adding zero turns -0 into 0.
-        Self::of(facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits())))
-    }
-
-    /// The same of facets on the lattice.
-    pub fn on_lattice(facets: &[FacetLattice]) -> Self {
-        Self::of(facets.as_flattened().iter().copied())
-    }
-
-    /// The edges of facets whose corners are given one by one.
-    fn of(corners: impl Iterator<Item = impl Ord>) -> Self {
+        let corners = facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits()));
         let (corners, vertices) = number(corners);
         let mut packed = Vec::with_capacity(3 * corners.len());
         for (facet, &[a, b, c]) in corners.iter().enumerate() {
@@ -117,8 +107,8 @@ impl Edges {
 }
 
 /// Numbers the distinct vertices, in their order. Returns the numbers of every facet's corners, and the number of vertices.
-fn number<T: Ord>(corners: impl Iterator<Item = T>) -> (Vec<[u32; 3]>, u32) {
-    let mut sorted: Vec<(T, u32)> = corners.zip(0..).collect();
+fn number(corners: impl Iterator<Item = [u32; 3]>) -> (Vec<[u32; 3]>, u32) {
+    let mut sorted: Vec<([u32; 3], u32)> = corners.zip(0..).collect();
     sorted.sort_unstable();
     let mut numbers = vec![[0; 3]; sorted.len() / 3];
     let mut vertices = 0;
@@ -129,20 +119,16 @@ fn number<T: Ord>(corners: impl Iterator<Item = T>) -> (Vec<[u32; 3]>, u32) {
     (numbers, vertices)
 }
 
-/// Non-manifold edges, even and odd, and pairs of neighbours with inconsistent winding.
-pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 3] {
-    let kinds = [Kind::NonManifoldOdd, Kind::NonManifoldEven, Kind::Winding];
-    let mut findings = kinds.map(Finding::new);
+/// Edges with an odd number of facets, more than one, and pairs of neighbours with inconsistent winding.
+pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
+    let mut findings = [Kind::NonManifoldOdd, Kind::Winding].map(Finding::new);
     for (ends, uses) in edges.iter() {
-        let at = match uses.len() {
-            0..=1 => continue,
-            2 => 2,
-            n => usize::from(n % 2 == 0),
-        };
         let uses: Vec<Use> = uses.collect();
-        if at == 2 && uses[0].is_down != uses[1].is_down {
-            continue;
-        }
+        let at = match uses[..] {
+            [a, b] if a.is_down == b.is_down => 1,
+            [_, _, _, ..] if uses.len() % 2 == 1 => 0,
+            _ => continue,
+        };
         findings[at].add(first, || {
             let [p, q] = ends.map(|v| edges.position(input, uses[0].facet, v));
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
@@ -150,6 +136,28 @@ pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 3] {
         });
     }
     findings
+}
+
+/// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.
+pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
+    let key = |(facet, corners): (usize, &[u32; 3])| {
+        let mut sorted = *corners;
+        sorted.sort_unstable();
+        let [a, b, c] = sorted.map(u128::from);
+        (a != b && b != c).then_some(a << 96 | b << 64 | c << 32 | facet as u128)
+    };
+    let mut keys: Vec<u128> = edges.corners.iter().enumerate().filter_map(key).collect();
+    keys.sort_unstable();
+    let mut pairs: Vec<(u32, u32)> = Vec::new();
+    for same in keys.chunk_by(|a, b| a >> 32 == b >> 32) {
+        pairs.extend(same[1..].iter().map(|&copy| (copy as u32, same[0] as u32)));
+    }
+    pairs.sort_unstable();
+    let mut finding = Finding::new(Kind::Duplicates);
+    for (copy, original) in pairs {
+        finding.add(first, || Place::new(vec![original, copy], input.centroid(copy)));
+    }
+    finding
 }
 
 #[cfg(test)]

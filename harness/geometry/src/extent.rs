@@ -15,8 +15,6 @@ pub struct Extent {
     pub high: [f64; 3],
     /// Least distance to a face of the root, negative if the body extends beyond it, in the user's units.
     pub margin: f64,
-    /// The same in cells.
-    pub margin_cells: Option<f64>,
 }
 
 /// The extent of at least one facet.
@@ -31,7 +29,7 @@ pub fn extent(input: &Input) -> Extent {
     let root = &input.root;
     let margin = |a: usize| (low[a] - root.origin[a]).min(root.origin[a] + root.edge - high[a]);
     let margin = (0..3).map(margin).fold(f64::INFINITY, f64::min);
-    Extent { low, high, margin, margin_cells: input.in_cells(margin) }
+    Extent { low, high, margin }
 }
 
 /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.

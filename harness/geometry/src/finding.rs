@@ -8,12 +8,8 @@ use serde::Serialize;
 pub enum Kind {
     /// Connected sets of edges with one facet, apart from T-junctions.
     Openings,
-    /// Edges with one facet that run along others, at a vertex on an edge, so that no opening exists.
-    Junctions,
     /// Edges with three, five, ... facets.
     NonManifoldOdd,
-    /// Edges with four, six, ... facets.
-    NonManifoldEven,
     /// Pairs of facets that traverse their common edge, which has no other facet, in the same direction.
     Winding,
     /// Closed shells of consistent winding that enclose a negative volume, and cannot lie in another closed shell.
@@ -23,8 +19,6 @@ pub enum Kind {
     Nested,
     /// Facets with the three vertices of an earlier facet, in any order.
     Duplicates,
-    /// Facets without area on the lattice.
-    Degenerate,
     /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
     Intersections,
     /// Facets with an opposite facet less than one cell away, on the inner side, but not of another solid; by rays.
@@ -44,18 +38,8 @@ pub struct Place {
     pub facets: Vec<u32>,
     /// A point nearby, in the user's units.
     pub at: [f64; 3],
-    /// Openings: number of edges.
-    pub edges: Option<u64>,
-    /// Openings: largest distance of two vertices, in the user's units.
-    pub diameter: Option<f64>,
-    /// The same in cells.
-    pub diameter_cells: Option<f64>,
-    /// Thin walls and gaps: part of their area that is narrower.
-    pub quantile: Option<f64>,
-    /// Openings: free width; thin walls and gaps: distance of the facets. In the user's units.
+    /// Openings: free width; thin walls and gaps: distance of the facets, which a twentieth of their area undercuts. In the user's units.
     pub width: Option<f64>,
-    /// The same in cells.
-    pub width_cells: Option<f64>,
 }
 
 impl Place {
@@ -79,20 +63,17 @@ pub struct Finding {
     pub count_changing: u64,
     /// Whether the search ended before all were counted, so that `count` is a lower bound.
     pub is_lower_bound: bool,
-    /// Openings: number of edges with one facet in all, those of T-junctions included.
-    pub edges: Option<u64>,
     /// The effect on the mesh; empty where nothing was found.
     pub meaning: String,
-    /// The first places: widest openings, quantiles of sheets, deep before shallow intersections, lowest facet numbers.
+    /// The first places: widest openings, one of a sheet, deep before shallow intersections, lowest facet numbers.
     pub places: Vec<Place>,
 }
 
 impl Finding {
     /// A finding that has not occurred yet.
     pub fn new(kind: Kind) -> Self {
-        let (count, count_changing) = (0, 0);
-        let (edges, meaning, places) = (None, String::new(), Vec::new());
-        Self { kind, count, count_changing, is_lower_bound: false, edges, meaning, places }
+        let (meaning, places) = (String::new(), Vec::new());
+        Self { kind, count: 0, count_changing: 0, is_lower_bound: false, meaning, places }
     }
 
     /// Counts one occurrence and lists its place if it is among the first.

@@ -99,11 +99,6 @@ impl Input {
         })
     }
 
-    /// A length in cells; none if no spacing was given.
-    pub fn in_cells(&self, length: f64) -> Option<f64> {
-        self.cell.map(|cell| length / cell)
-    }
-
     /// The centroid of a facet, in the user's units.
     pub fn centroid(&self, facet: u32) -> [f64; 3] {
         let corners = self.facets[facet as usize].map(|v| v.map(f64::from));

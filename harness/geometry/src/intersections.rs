@@ -7,7 +7,6 @@
 use contract::lattice::FacetLattice;
 use contract::parity::normal;
 
-use super::facets::is_degenerate;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::FacetTree;
@@ -42,6 +41,11 @@ pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
         places: pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect(),
         ..Finding::new(Kind::Intersections)
     }
+}
+
+/// Whether a facet is a segment or a point.
+fn is_degenerate(facet: &FacetLattice) -> bool {
+    normal(facet) == [0; 3]
 }
 
 /// Whether the interiors of two triangles with area, as sets of their planes, have a common point.

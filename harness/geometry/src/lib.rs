@@ -2,7 +2,7 @@
 //!
 //! - [`input`]: the file, its root and the cell's edge length;
 //! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
-//! - [`facets`]: defects of single facets, and duplicates; [`extent`]: the body's position in the root;
+//! - [`extent`]: the body's position in the root;
 //! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
 //! - [`finding`] and [`report`]: the result as data; [`meaning`](mod@meaning): a table of their kinds; [`text`]: the result for a terminal.
 //!
@@ -11,7 +11,6 @@
 
 mod edges;
 mod extent;
-mod facets;
 pub mod finding;
 pub mod input;
 mod intersections;
@@ -38,11 +37,10 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let edges = Edges::new(&input.facets);
     let shells = Shells::new(&edges, &input.lattice);
     let mut findings: Vec<Finding> = Vec::new();
-    findings.extend(openings::openings(input, &edges, first));
+    findings.push(openings::openings(input, &edges, first));
     findings.extend(edges::findings(input, &edges, first));
     findings.extend(shells.findings(input, first));
-    findings.push(facets::duplicates(input, &edges, first));
-    findings.push(facets::degenerate(input, first));
+    findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.lattice);
     findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {

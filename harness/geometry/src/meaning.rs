@@ -29,12 +29,8 @@ impl Kind {
         match self {
             Self::Openings => ("openings",
                 "Inside and outside become one component where a cell fits through."),
-            Self::Junctions => ("edges at T-junctions",
-                "No effect: a vertex lies on the edge of another facet, and the crack is far narrower than the finest cell."),
             Self::NonManifoldOdd => ("edges with 3, 5, ... facets",
                 "Rays on either side of such an edge disagree about the inside, so a component's side may be wrong or ambiguous."),
-            Self::NonManifoldEven => ("edges with 4, 6, ... facets",
-                "No effect: neither crossing leaves nor rays depend on how facets are connected."),
             Self::Winding => ("neighbours, opposite winding",
                 "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
             Self::InsideOut => ("closed shells inside out",
@@ -43,8 +39,6 @@ impl Kind {
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
             Self::Duplicates => ("duplicate facets",
                 "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
-            Self::Degenerate => ("facets without area",
-                "No effect: a facet without area crosses the octants that it touches, and no ray counts it."),
             Self::Intersections => ("intersecting pairs of facets",
                 "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
             Self::ThinWalls => ("facets of thin walls",
@@ -174,14 +168,11 @@ mod tests {
     fn every_kind_has_a_meaning_of_its_own() {
         let kinds = [
             Kind::Openings,
-            Kind::Junctions,
             Kind::NonManifoldOdd,
-            Kind::NonManifoldEven,
             Kind::Winding,
             Kind::InsideOut,
             Kind::Nested,
             Kind::Duplicates,
-            Kind::Degenerate,
             Kind::Intersections,
             Kind::ThinWalls,
             Kind::ThinGaps,
@@ -191,8 +182,8 @@ mod tests {
         let text = |kind, changing| of_width(kind, 3.0, changing, true);
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
-        assert!(meanings[14].starts_with("No effect: the facets overlap within one plane"));
-        assert!(meanings[9].starts_with("Where two closed shells overlap"));
+        assert!(meanings[11].starts_with("No effect: the facets overlap within one plane"));
+        assert!(meanings[6].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();
         assert_eq!(meanings.len(), kinds.len() + 1);

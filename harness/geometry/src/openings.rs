@@ -20,36 +20,21 @@ struct Rims {
     points: Vec<[f64; 3]>,
 }
 
-/// T-junctions, and all openings, widest first: a hole, the rim of a sheet, or several that share a vertex.
-pub fn openings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
+/// All openings, widest first: a hole, the rim of a sheet, or several that share a vertex.
+pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
     let open = rims(input, edges);
-    let edges_open = open.segments.len() as u64;
     let tolerance = TOLERANCE * input.root.edge / UNITS_PER_EDGE as f64;
-    let segments = uncancelled(open.segments.clone(), &open.points, tolerance);
-    let mut junctions = Finding::new(Kind::Junctions);
-    let mut kept: Vec<Segment> = segments.clone();
-    kept.sort_unstable_by_key(|s| (s.ends, s.facet));
-    for segment in &open.segments {
-        if kept.binary_search_by_key(&(segment.ends, segment.facet), |s| (s.ends, s.facet)).is_err()
-        {
-            let [p, q] = segment.ends.map(|v| open.points[v as usize]);
-            let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
-            junctions.add(first, || Place::new(vec![segment.facet], middle));
-        }
-    }
-    let rims = Rims { segments, ..open };
+    let segments = uncancelled(open.segments, &open.points, tolerance);
+    let rims = Rims { segments, points: open.points };
     let mut places: Vec<Place> =
-        components(&rims).iter().map(|component| place(input, &rims, component)).collect();
-    places.sort_by(|a, b| {
-        order(b.width, a.width).then(order(b.diameter, a.diameter)).then(a.facets.cmp(&b.facets))
-    });
+        components(&rims).iter().map(|component| place(&rims, component)).collect();
+    places.sort_by(|a, b| order(b.width, a.width).then(a.facets.cmp(&b.facets)));
     let mut finding = Finding::new(Kind::Openings);
-    finding.edges = Some(edges_open);
     finding.count = places.len() as u64;
     finding.count_changing = places.iter().filter(|p| is_leak(input, p)).count() as u64;
     places.truncate(first);
     finding.places = places;
-    [finding, junctions]
+    finding
 }
 
 /// Whether cells may fit through the opening.
@@ -89,7 +74,7 @@ fn components(rims: &Rims) -> Vec<Vec<Segment>> {
     labelled.chunk_by(|a, b| a.0 == b.0).map(component).collect()
 }
 
-fn place(input: &Input, rims: &Rims, component: &[Segment]) -> Place {
+fn place(rims: &Rims, component: &[Segment]) -> Place {
     let ends = |s: &Segment| s.ends.map(|v| rims.points[v as usize]);
     let points: Vec<[f64; 3]> = component.iter().flat_map(ends).collect();
     let centre =
@@ -98,15 +83,7 @@ fn place(input: &Input, rims: &Rims, component: &[Segment]) -> Place {
     facets.sort_unstable();
     facets.dedup();
     facets.truncate(Place::FACETS_MAX);
-    let size = width::size(&points);
-    Place {
-        edges: Some(component.len() as u64),
-        diameter: Some(size.diameter),
-        diameter_cells: input.in_cells(size.diameter),
-        width: Some(size.width),
-        width_cells: input.in_cells(size.width),
-        ..Place::new(facets, centre)
-    }
+    Place { width: Some(width::width(&points)), ..Place::new(facets, centre) }
 }
 
 fn order(a: Option<f64>, b: Option<f64>) -> std::cmp::Ordering {

@@ -4,7 +4,7 @@
 //! vertex in common with the first one and their normals differ by at least 120 degrees. They are a wall on the inner side and a gap on
 //! the outer side, by the winding of the file; facets of two solids that overlap have inner sides that face each other, but no wall.
 //!
-//! Widths are quantiles by area, so a point where two surfaces touch does not stand for a whole wall.
+//! The width is a quantile by area, so a point where two surfaces touch does not stand for a whole wall.
 
 use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::query::Ray;
@@ -21,8 +21,8 @@ const OPPOSITE: f64 = -0.5;
 /// Facets that touch are no sheet: a nearer one, in lattice units, is there by rounding.
 const TOUCHING: f64 = 2.0;
 
-/// Quantiles of the width that are reported, by area.
-const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
+/// The quantile of the width that is reported, by area.
+const QUANTILE: f64 = 0.05;
 
 /// Weights of the corners in the points where rays start: the centroid, and three more in a facet that is larger than a cell.
 const STARTS: [[f64; 3]; 4] = [
@@ -43,7 +43,7 @@ struct Hit {
     middle: Point,
 }
 
-/// Thin walls and thin gaps, with the places at the quantiles of their widths.
+/// Thin walls and thin gaps, each with the place at the quantile of its width.
 pub fn sheets(
     input: &Input,
     tree: &FacetTree,
@@ -62,20 +62,13 @@ pub fn sheets(
         let mut of_sheets: Vec<u32> = hits.iter().map(|hit| hit.from).collect();
         of_sheets.sort_unstable();
         of_sheets.dedup();
-        let place = |(quantile, hit): (f64, &Hit)| {
-            let width = hit.width * unit;
-            Place {
-                quantile: Some(quantile),
-                width: Some(width),
-                width_cells: input.in_cells(width),
-                ..Place::new(
-                    hit.facets.into(),
-                    input.root.to_user(hit.middle.round().to_array().map(|c| c as i64)),
-                )
-            }
+        let place = |hit: &Hit| {
+            let middle = hit.middle.round().to_array().map(|c| c as i64);
+            let place = Place::new(hit.facets.into(), input.root.to_user(middle));
+            Place { width: Some(hit.width * unit), ..place }
         };
-        let places = QUANTILES.iter().filter_map(|&q| Some((q, quantile(&hits, q)?))).map(place);
-        Finding { count: of_sheets.len() as u64, places: places.collect(), ..Finding::new(kind) }
+        let places = quantile(&hits).map(place).into_iter().collect();
+        Finding { count: of_sheets.len() as u64, places, ..Finding::new(kind) }
     })
 }
 
@@ -121,9 +114,9 @@ fn hits(
     hits
 }
 
-/// The hit below whose width lies this part of the area of all, which are sorted by width.
-fn quantile(hits: &[Hit], part: f64) -> Option<&Hit> {
-    let mut rest = part * hits.iter().map(|hit| hit.area).sum::<f64>();
+/// The hit below whose width lies [`QUANTILE`] of the area of all, which are sorted by width.
+fn quantile(hits: &[Hit]) -> Option<&Hit> {
+    let mut rest = QUANTILE * hits.iter().map(|hit| hit.area).sum::<f64>();
     let found = hits.iter().find(|hit| {
         rest -= hit.area;
         rest <= 0.0

@@ -9,19 +9,6 @@ use contract::number::number;
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.header(f)?;
-        writeln!(f, "\n{:<31}{:>10}  effect on the mesh's region", "finding", "count")?;
-        for finding in &self.findings {
-            let effect = match (finding.count, finding.count_changing) {
-                (0, _) => String::new(),
-                (_, 0) => "none".into(),
-                (all, changing) if all == changing => "POSSIBLE".into(),
-                (_, changing) => format!("POSSIBLE for {changing}"),
-            };
-            let count =
-                format!("{}{}", if finding.is_lower_bound { ">=" } else { "" }, finding.count);
-            let row = format!("{:<31}{count:>10}  {effect}", finding.kind.title());
-            writeln!(f, "{}", row.trim_end())?;
-        }
         for finding in self.findings.iter().filter(|finding| finding.count > 0) {
             self.details(finding, f)?;
         }
@@ -70,41 +57,33 @@ impl Diagnosis {
     }
 
     fn details(&self, finding: &Finding, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "\n{}: {}", finding.kind.title(), finding.meaning)?;
-        for place in &finding.places {
-            writeln!(f, "  {}", line(place))?;
+        let Finding { kind, count, count_changing, places, meaning, .. } = finding;
+        let least = if finding.is_lower_bound { "at least " } else { "" };
+        let effect = match count_changing {
+            0 => String::new(),
+            changing => format!("; {changing} can change the mesh's region"),
+        };
+        writeln!(f, "\n{}: {least}{count}{effect}\n  {meaning}", kind.title())?;
+        places.iter().try_for_each(|place| writeln!(f, "  {}", self.line(place)))?;
+        match count - places.len() as u64 {
+            // Two facets of a thin sheet are listed once.
+            more if more > 0 && !matches!(kind, Kind::ThinWalls | Kind::ThinGaps) => {
+                writeln!(f, "  and {more} more (--limit)")
+            }
+            _ => Ok(()),
         }
-        // Two facets of a thin sheet are listed once.
-        let is_sheet = matches!(finding.kind, Kind::ThinWalls | Kind::ThinGaps);
-        if is_sheet { Ok(()) } else { more(f, finding.places.len() as u64, finding.count) }
     }
-}
 
-fn more(f: &mut fmt::Formatter<'_>, listed: u64, count: u64) -> fmt::Result {
-    if listed > 0 && listed < count {
-        writeln!(f, "          and {} more (--limit)", count - listed)?;
+    fn line(&self, place: &Place) -> String {
+        let mut text = format!("at {}", point(&place.at));
+        if let Some(width) = place.width {
+            let cells = in_cells(self.cell.map(|cell| width / cell));
+            text += &format!(": {} wide{cells}", number(width));
+        }
+        let facets: Vec<String> = place.facets.iter().map(ToString::to_string).collect();
+        let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
+        format!("{text}; facets {}{dots}", facets.join(", "))
     }
-    Ok(())
-}
-
-fn line(place: &Place) -> String {
-    let mut text = format!("at {}", point(&place.at));
-    if let Some(width) = place.width {
-        text += &format!(": {} wide{}", number(width), in_cells(place.width_cells));
-    }
-    if let Some(quantile) = place.quantile {
-        text += &format!(", wider than {:.0} % of the area", 100.0 * quantile);
-    }
-    if let Some(diameter) = place.diameter {
-        text += &format!(", {} across{}", number(diameter), in_cells(place.diameter_cells));
-    }
-    if let Some(edges) = place.edges {
-        text += &format!(", {edges} edges");
-    }
-    let facets: Vec<String> = place.facets.iter().map(ToString::to_string).collect();
-    let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
-    let noun = if facets.len() == 1 { "facet" } else { "facets" };
-    format!("{text}; {noun} {}{dots}", facets.join(", "))
 }
 
 fn in_cells(cells: Option<f64>) -> String {
@@ -136,16 +115,8 @@ mod tests {
     /// A body of one open and two closed shells, with findings of every form.
     fn diagnosis() -> Diagnosis {
         let at = [0.1, 2.0, -3.5];
-        let hole = Place {
-            edges: Some(4),
-            diameter: Some(2.5),
-            diameter_cells: Some(10.0),
-            width: Some(0.5),
-            width_cells: Some(2.0),
-            ..Place::new(vec![1, 2], at)
-        };
-        let sheet =
-            Place { quantile: Some(0.05), width: Some(0.125), ..Place::new(vec![1, 2], at) };
+        let hole = Place { width: Some(0.5), ..Place::new(vec![1, 2], at) };
+        let sheet = Place { width: Some(0.125), ..Place::new(vec![1, 2], at) };
         let one = |facets: std::ops::Range<u32>| vec![Place::new(facets.collect(), at)];
         let solid = |name: Option<&str>, facets| Solid {
             name: name.map(str::to_owned),
@@ -163,19 +134,13 @@ mod tests {
             shells: Shells { count: 3, closed: 2, facets: 30 },
             root: Root { origin: [-8.0; 3], edge: 16.0 },
             cell: Some(0.25),
-            extent: Extent {
-                low: [-1.0; 3],
-                high: [1.0, 1.0, 2.5],
-                margin: 5.5,
-                margin_cells: Some(22.0),
-            },
+            extent: Extent { low: [-1.0; 3], high: [1.0, 1.0, 2.5], margin: 5.5 },
             findings: vec![
                 finding(Kind::Openings, 2, 1, vec![hole]),
-                finding(Kind::Junctions, 3, 0, one(4..5)),
                 finding(Kind::Winding, 0, 0, vec![]),
                 lower_bound,
                 finding(Kind::ThinWalls, 4, 4, vec![sheet]),
-                finding(Kind::Degenerate, 1, 0, one(0..7)),
+                finding(Kind::InsideOut, 1, 0, one(0..7)),
             ],
             changes_region: true,
         }
@@ -189,21 +154,13 @@ mod tests {
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
             cell      0.250 at the surface\n\n\
-            finding                             count  effect on the mesh's region\n\
-            openings                                2  POSSIBLE for 1\n\
-            edges at T-junctions                    3  none\n\
-            neighbours, opposite winding            0\n\
-            intersecting pairs of facets          >=2  POSSIBLE\n\
-            facets of thin walls                    4  POSSIBLE\n\
-            facets without area                     1  none\n\n\
-            openings: Meaning of Openings.\n  \
-            at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells), 2.50 across (10.0 cells), 4 edges; facets 1, 2\n          \
-            and 1 more (--limit)\n\n\
-            edges at T-junctions: Meaning of Junctions.\n  at (0.1, 2.0, -3.5); facet 4\n          and 2 more (--limit)\n\n\
-            intersecting pairs of facets: Meaning of Intersections.\n  \
-            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n          and 1 more (--limit)\n\n\
-            facets of thin walls: Meaning of ThinWalls.\n  at (0.1, 2.0, -3.5): 0.125 wide, wider than 5 % of the area; facets 1, 2\n\n\
-            facets without area: Meaning of Degenerate.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            openings: 2; 1 can change the mesh's region\n  Meaning of Openings.\n  \
+            at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells); facets 1, 2\n  and 1 more (--limit)\n\n\
+            intersecting pairs of facets: at least 2; 2 can change the mesh's region\n  Meaning of Intersections.\n  \
+            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n  and 1 more (--limit)\n\n\
+            facets of thin walls: 4; 4 can change the mesh's region\n  Meaning of ThinWalls.\n  \
+            at (0.1, 2.0, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
+            closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
             findings that can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
     }
@@ -218,12 +175,7 @@ mod tests {
             extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
             root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
             cell      not known; --spacing-min reports sizes in cells and thin sheets\n\n\
-            finding                             count  effect on the mesh's region\n\n\
             no finding that changes the mesh's region";
         assert_eq!(plain.to_string(), expected);
-        // Without places, nothing is left unlisted.
-        plain.shells = Shells { count: 2, closed: 0, facets: 2 };
-        plain.findings = vec![finding(Kind::Degenerate, 3, 0, Vec::new())];
-        assert!(!plain.to_string().contains("more"));
     }
 }

@@ -1,27 +1,18 @@
-//! The size of an opening: its widest diameter and its free width.
+//! The free width of an opening: the least width of the convex hull of its points, projected on the plane that they span. A ball that is
+//! wider does not pass through a flat opening.
 
 use super::tree::Point;
-
-/// Diameter and width of a set of points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Size {
-    /// The largest distance of two points.
-    pub diameter: f64,
-    /// The least width of the convex hull of the points, projected on the plane that they span: a ball that is
-    /// wider does not pass through a flat opening.
-    pub width: f64,
-}
 
 /// Of more vertices of a hull, only some are used, evenly spread.
 const VERTICES_MAX: usize = 1024;
 
-/// The size of a set of at least one point.
-pub fn size(points: &[[f64; 3]]) -> Size {
+/// The width of a set of at least one point.
+pub fn width(points: &[[f64; 3]]) -> f64 {
     let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
     let (from, to) = farthest(&points);
     let diameter = from.distance(to);
     if diameter == 0.0 {
-        return Size { diameter, width: 0.0 };
+        return 0.0;
     }
     let u = (to - from) / diameter;
     let across = |p: &Point| (*p - from) - (*p - from).dot(u) * u;
@@ -30,11 +21,11 @@ pub fn size(points: &[[f64; 3]]) -> Size {
     let height = far.length();
     // Rounding leaves points of one line at a distance from it.
     if height <= 1e-12 * diameter {
-        return Size { diameter, width: 0.0 };
+        return 0.0;
     }
     let v = far / height;
     let flat = points.iter().map(|p| [(*p - from).dot(u), (*p - from).dot(v)]).collect();
-    size_of_hull(&hull(flat), diameter)
+    width_of_hull(&hull(flat), diameter)
 }
 
 /// Two points neither of which has a farther one than the other.
@@ -75,24 +66,21 @@ fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// The largest distance of two vertices of a convex polygon, which is at least `diameter`, and the least distance of two parallel lines
-/// that enclose it; one of them contains an edge.
-fn size_of_hull(hull: &[[f64; 2]], diameter: f64) -> Size {
+/// The least distance of two parallel lines that enclose a convex polygon of this diameter; one of them contains an edge.
+fn width_of_hull(hull: &[[f64; 2]], diameter: f64) -> f64 {
     let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(VERTICES_MAX)).collect();
-    let mut size = Size { diameter, width: f64::INFINITY };
-    for (i, &p) in vertices.iter().enumerate() {
-        let q = vertices[(i + 1) % vertices.len()];
+    let across = |i: usize| {
+        let (p, q) = (vertices[i], vertices[(i + 1) % vertices.len()]);
         let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-        let across = vertices.iter().map(|r| (r[0] - p[0]).hypot(r[1] - p[1]));
-        size.diameter = across.fold(size.diameter, f64::max);
         // The direction of a shorter edge is a rounding error.
-        if length > 1e-9 * diameter {
-            let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
-            let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
-            size.width = size.width.min(high - low);
+        if length <= 1e-9 * diameter {
+            return f64::INFINITY;
         }
-    }
-    size
+        let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
+        let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    };
+    (0..vertices.len()).map(across).fold(f64::INFINITY, f64::min)
 }
 
 /// Twice the signed area of a triangle.
@@ -115,17 +103,14 @@ mod tests {
 
     #[test]
     fn a_slit_is_as_wide_as_its_short_side() {
-        let slit = size(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
-        assert!(
-            (slit.width - 0.5).abs() < 1e-12 && (slit.diameter - 100.25f64.sqrt()).abs() < 1e-12
-        );
+        let slit = width(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
+        assert!((slit - 0.5).abs() < 1e-12, "{slit}");
     }
 
     #[test]
     fn a_circle_is_as_wide_as_its_diameter_for_few_and_many_points() {
         for n in [64, 1000, 5000] {
-            let Size { diameter, width } = size(&circle(n, 2.0));
-            assert!((3.96..=4.0 + 1e-12).contains(&diameter), "{n}: {diameter}");
+            let width = width(&circle(n, 2.0));
             assert!((3.96..=4.0 + 1e-12).contains(&width), "{n}: {width}");
         }
     }
@@ -133,16 +118,14 @@ mod tests {
     proptest! {
         /// The least distance of two parallel lines, one through two of the points, with all points between them.
         #[test]
-        fn the_size_of_flat_points_is_that_of_a_search_among_all_pairs(
+        fn the_width_of_flat_points_is_that_of_a_search_among_all_pairs(
             flat in prop::collection::vec(prop::array::uniform2(-9i32..9), 1..14), turn in 0usize..3,
         ) {
             let flat: Vec<[f64; 2]> = flat.into_iter().map(|p| p.map(f64::from)).collect();
             let mut least = f64::INFINITY;
-            let mut farthest = 0.0f64;
             for (i, &p) in flat.iter().enumerate() {
                 for &q in &flat[i + 1..] {
                     let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-                    farthest = farthest.max(length);
                     let heights: Vec<f64> = flat.iter().map(|&r| turn_of(p, q, r) / length).collect();
                     let (low, high) = heights.iter().fold((0.0f64, 0.0f64), |(l, h), &x| (l.min(x), h.max(x)));
                     if length > 0.0 && low.abs().min(high) < 1e-9 {
@@ -155,10 +138,9 @@ mod tests {
                 at.rotate_left(turn);
                 at
             }).collect();
-            let found = size(&points);
-            prop_assert!((found.diameter - farthest).abs() < 1e-9);
+            let found = width(&points);
             let expected = if least.is_finite() { least } else { 0.0 };
-            prop_assert!((found.width - expected).abs() < 1e-9, "{} instead of {}", found.width, expected);
+            prop_assert!((found - expected).abs() < 1e-9, "{} instead of {}", found, expected);
         }
     }
 
@@ -169,15 +151,15 @@ mod tests {
     #[test]
     fn a_rim_with_three_points_on_a_line_is_as_wide_as_the_others_are_far_from_it() {
         let flat = [[-3, -6], [-8, 4], [-2, -8], [4, 4], [6, -8], [-7, 2]];
-        let rim = size(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0]));
+        let rim = width(&flat.map(|[x, y]| [f64::from(x), f64::from(y), 3.0]));
         // Of (-8, 4), (-7, 2) and (-2, -8), from (4, 4).
-        assert!((rim.width - 24.0 / 5.0f64.sqrt()).abs() < 1e-9, "{rim:?}");
+        assert!((rim - 24.0 / 5.0f64.sqrt()).abs() < 1e-9, "{rim:?}");
     }
 
     #[test]
     fn points_of_one_line_have_no_width() {
-        let line = size(&[[0.0; 3], [0.1, 0.2, 0.3], [0.3, 0.6, 0.9]]);
-        assert_eq!(line.width, 0.0);
-        assert_eq!(size(&[[7.0; 3]; 2]), Size { diameter: 0.0, width: 0.0 });
+        let line = width(&[[0.0; 3], [0.1, 0.2, 0.3], [0.3, 0.6, 0.9]]);
+        assert_eq!(line, 0.0);
+        assert_eq!(width(&[[7.0; 3]; 2]), 0.0);
     }
 }

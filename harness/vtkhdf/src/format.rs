@@ -37,45 +37,14 @@ pub(crate) const FILTER_DEFLATE: u16 = 1;
 pub(crate) const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];
 pub(crate) const ALLOCATED_BY_CHUNK: [u8; 2] = [3, 0b1011];
 
-/// The type of an array's elements. All are little-endian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// u8.
-    Byte,
-    /// i32.
-    Int32,
-    /// i64.
-    Int64,
-    /// f64.
-    Double,
-}
-
-impl Kind {
-    /// Bytes of an element.
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::Byte => 1,
-            Self::Int32 => 4,
-            Self::Int64 | Self::Double => 8,
-        }
-    }
-
-    /// The datatype message.
-    pub(crate) fn encode(self) -> Vec<u8> {
-        let bytes = self.bytes() as u8;
-        let mut code = match self {
-            Self::Byte => vec![0x10, 0, 0, 0],
-            Self::Int32 | Self::Int64 => vec![0x10, 0x08, 0, 0],
-            // An implied leading bit of the mantissa; the sign is bit 63.
-            Self::Double => vec![0x11, 0x20, 63, 0],
-        };
-        code.extend([bytes, 0, 0, 0, 0, 0, 8 * bytes, 0]);
-        if self == Self::Double {
-            // Exponent at bit 52 with 11 bits, mantissa at bit 0 with 52 bits, bias 1023.
-            code.extend([52, 11, 0, 52, 0xff, 0x03, 0, 0]);
-        }
-        code
-    }
+/// The types of an array's elements. All are little-endian.
+pub(crate) mod datatype {
+    pub(crate) const BYTE: &[u8] = &[0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0];
+    pub(crate) const INT32: &[u8] = &[0x10, 8, 0, 0, 4, 0, 0, 0, 0, 0, 32, 0];
+    pub(crate) const INT64: &[u8] = &[0x10, 8, 0, 0, 8, 0, 0, 0, 0, 0, 64, 0];
+    /// An implied leading bit of the mantissa, the sign at bit 63; exponent at bit 52 with 11 bits, mantissa at bit 0 with 52 bits, bias 1023.
+    pub(crate) const DOUBLE: &[u8] =
+        &[0x11, 0x20, 63, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xff, 3, 0, 0];
 }
 
 /// Where some bytes of a file are.
@@ -87,14 +56,12 @@ pub struct Extent {
     pub bytes: u64,
 }
 
-/// A one-dimensional array in compressed chunks of equal length.
+/// A one-dimensional array of bytes in compressed chunks of equal length.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chunked {
-    /// Type of the elements.
-    pub kind: Kind,
-    /// Number of elements.
+    /// Number of bytes.
     pub len: u64,
-    /// Elements of a chunk; the last one is padded.
+    /// Bytes of a chunk before compression; the last one is padded.
     pub chunk_len: u32,
     /// The compressed chunks. One that is not stored has zeros only.
     pub chunks: Vec<Option<Extent>>,
@@ -104,27 +71,22 @@ impl Chunked {
     /// An array of zeros.
     ///
     /// # Panics
-    /// If the array or a chunk has no elements.
-    pub fn new(kind: Kind, len: u64, chunk_len: u32) -> Self {
+    /// If the array or a chunk is empty.
+    pub fn new(len: u64, chunk_len: u32) -> Self {
         // The library refuses chunks that are longer than the array.
         let chunk_len = u64::from(chunk_len).min(len) as u32;
         let chunks = len.div_ceil(u64::from(chunk_len)) as usize;
-        Self { kind, len, chunk_len, chunks: vec![None; chunks] }
+        Self { len, chunk_len, chunks: vec![None; chunks] }
     }
 
-    /// Bytes of a chunk before compression.
-    pub fn chunk_bytes(&self) -> usize {
-        self.chunk_len as usize * self.kind.bytes()
-    }
-
-    /// Bytes that encode a chunk's length and an element's size: as few as suffice for both, which the library verifies.
+    /// Bytes that encode the length of a chunk: as few as suffice, which the library verifies.
     pub(crate) fn dim_bytes(&self) -> usize {
-        1 + self.chunk_len.max(self.kind.bytes() as u32).ilog2() as usize / 8
+        1 + self.chunk_len.ilog2() as usize / 8
     }
 
     /// Bytes that encode the compressed size of a chunk in the table: the library's rule.
     pub(crate) fn size_bytes(&self) -> usize {
-        1 + (self.chunk_bytes().ilog2() as usize + 8) / 8
+        1 + (self.chunk_len.ilog2() as usize + 8) / 8
     }
 }
 

@@ -5,15 +5,14 @@
 //! count before the file has been seen to be long enough for it.
 
 use crate::format::{
-    Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED, message,
+    Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED,
 };
 use crate::tree::{
-    CELL_DATA, COORDINATES, EDGE, GROUP, MASK, NODES, RANK, SIDE, SPLIT, Shape, arrays, group,
-    has_chunks,
+    CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays,
+    has_chunks, metadata,
 };
-use crate::write::metadata;
+use crate::write::{Value, attribute, link};
 use flate2::{Decompress, FlushDecompress, Status};
-use std::collections::HashMap;
 use std::fs;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
@@ -22,6 +21,8 @@ type Result<T> = std::result::Result<T, ReadError>;
 
 /// Bytes of an object header before its messages.
 const HEADER_BYTES: u64 = 10;
+/// Bytes of the filters, the last message in the header of an array of chunks.
+const FILTERS_BYTES: usize = 16;
 /// Bytes of a table of chunks before its entries.
 const TABLE_BYTES: u64 = 14;
 
@@ -42,8 +43,6 @@ pub struct TreeReader {
     pub masked: Option<Chunked>,
     /// The sides of all nodes.
     pub sides: Chunked,
-    /// The ranks of all nodes, if they are known.
-    pub ranks: Option<Chunked>,
 }
 
 impl TreeReader {
@@ -67,7 +66,7 @@ impl TreeReader {
             return Err(ReadError::Damaged(format!("it has {found} bytes instead of {end}")));
         }
         let (shape, arrays, start) = source.tree(root)?;
-        let expected = metadata(&group(&shape, &arrays), start);
+        let expected = metadata(&shape, &arrays, start);
         let found = (source.bytes_at(start, end.saturating_sub(start))?, head);
         if expected != found {
             let what = "its metadata are not those of its tree".to_owned();
@@ -76,19 +75,17 @@ impl TreeReader {
             return Err(error(what));
         }
         let bytes = source.bytes;
-        let mut arrays = arrays.into_iter();
-        let mut next = || arrays.next().expect("three arrays or more");
-        let (split, masked, sides) = (next(), Some(next()).filter(has_chunks), next());
-        Ok(Self { file, bytes, shape, split, masked, sides, ranks: arrays.next() })
+        let [split, masked, sides] = arrays;
+        Ok(Self { file, bytes, shape, split, masked: Some(masked).filter(has_chunks), sides })
     }
 
-    /// The elements of a chunk, little-endian; `into` gets as many bytes as a chunk has.
+    /// The bytes of a chunk, as many as every chunk has.
     ///
     /// # Errors
     /// If the chunk is damaged.
     pub fn read_chunk(&self, array: &Chunked, index: usize, into: &mut Vec<u8>) -> Result<()> {
         into.clear();
-        into.resize(array.chunk_bytes(), 0);
+        into.resize(array.chunk_len as usize, 0);
         let Some(Extent { address, bytes }) = array.chunks[index] else { return Ok(()) };
         let stored = Source { file: &self.file, bytes: self.bytes }.bytes_at(address, bytes)?;
         let mut inflater = Decompress::new(true);
@@ -122,21 +119,18 @@ impl Source<'_> {
     }
 
     /// The tree below the root group: its shape, its arrays, and where the metadata begin.
-    fn tree(&self, root: u64) -> Result<(Shape, Vec<Chunked>, u64)> {
+    fn tree(&self, root: u64) -> Result<(Shape, [Chunked; 3], u64)> {
+        let member = |header: &[u8], name: &str| last_number(header, &link(name, 0));
         let missing = || unknown("it has no tree");
-        let grid = *self.links(root)?.get(GROUP).ok_or_else(missing)?;
-        let links = self.links(grid)?;
-        let link = |name: &str| links.get(name).copied().ok_or_else(missing);
-        let data = self.links(link(CELL_DATA)?)?;
-        let nodes = self.numbers(link(NODES)?)?;
+        let grid = self.header(member(&self.header(root)?, GROUP).ok_or_else(missing)?)?;
+        let of_grid = |name: &str| member(&grid, name).ok_or_else(missing);
+        let nodes = self.numbers(of_grid(NODES)?)?;
         let mut origin = [0.0; 3];
         for (low, name) in origin.iter_mut().zip(COORDINATES) {
-            *low = f64::from_bits(*self.numbers(link(name)?)?.first().ok_or_else(missing)?);
+            *low = f64::from_bits(*self.numbers(of_grid(name)?)?.first().ok_or_else(missing)?);
         }
-        // The edge is the last attribute.
-        let attribute = self.last(grid, message::ATTRIBUTE)?;
-        let edge = f64::from_bits(tail(&attribute).ok_or_else(missing)?);
-        let shape = Shape { origin, edge, nodes };
+        let edge = last_number(&grid, &attribute(EDGE, &Value::doubles(&[0.0])));
+        let shape = Shape { origin, edge: f64::from_bits(edge.ok_or_else(missing)?), nodes };
         if !shape.is_tree() {
             return Err(unknown("its nodes are not those of an oct-tree"));
         }
@@ -144,61 +138,45 @@ impl Source<'_> {
         if shape.windows().saturating_mul(12) > self.bytes {
             return Err(missing());
         }
-        let mut arrays = arrays(&shape, data.contains_key(RANK));
-        let sources = [links.get(SPLIT), links.get(MASK), data.get(SIDE), data.get(RANK)];
-        for (array, address) in arrays.iter_mut().zip(sources) {
-            address.map_or(Ok(()), |address| self.fill(array, *address))?;
+        let mut arrays = arrays(&shape);
+        let data = self.header(of_grid(CELL_DATA)?)?;
+        let places = [Some(of_grid(SPLIT)?), member(&grid, MASK), member(&data, SIDE)];
+        for (array, address) in arrays.iter_mut().zip(places) {
+            address.map_or(Ok(()), |address| self.fill(array, address))?;
         }
-        Ok((shape, arrays, *links.values().min().ok_or_else(missing)?))
+        if member(&data, "rank").is_some() {
+            return Err(unknown("its cells have ranks, which only earlier versions wrote"));
+        }
+        Ok((shape, arrays, of_grid(FIRST)?))
     }
 
-    /// The messages of the object header at an address: code and content.
-    fn messages(&self, address: u64) -> Result<Vec<(u8, Vec<u8>)>> {
+    /// The messages of the object header at an address.
+    fn header(&self, address: u64) -> Result<Vec<u8>> {
         let head = self.bytes_at(address, HEADER_BYTES)?;
-        let block = self.bytes_at(address + HEADER_BYTES, number(&head[6..]))?;
-        let (mut messages, mut rest) = (Vec::new(), &block[..]);
-        while let [code, low, high, _, after @ ..] = rest {
-            let size = usize::from(u16::from_le_bytes([*low, *high]));
-            let split = after.split_at_checked(size);
-            let (body, next) =
-                split.ok_or_else(|| unknown("a message is longer than its header"))?;
-            messages.push((*code, body.to_vec()));
-            rest = next;
-        }
-        Ok(messages)
+        self.bytes_at(address + HEADER_BYTES, number(&head[6..]))
     }
 
-    /// The members of a group: addresses by name.
-    fn links(&self, address: u64) -> Result<HashMap<String, u64>> {
-        let link = |(code, body): (u8, Vec<u8>)| {
-            let (name, address) = body.get(3..)?.split_last_chunk::<8>()?;
-            let name = String::from_utf8(name.to_vec()).ok()?;
-            (code == message::LINK).then_some((name, u64::from_le_bytes(*address)))
-        };
-        Ok(self.messages(address)?.into_iter().filter_map(link).collect())
-    }
-
-    /// The last message with a code.
-    fn last(&self, address: u64, code: u8) -> Result<Vec<u8>> {
-        let found = self.messages(address)?.into_iter().rfind(|(other, _)| *other == code);
-        found.map(|(_, body)| body).ok_or_else(|| unknown("a message is missing"))
-    }
-
-    /// The numbers of a small array, as bits.
+    /// The numbers of a small array, as bits: after its type and what else describes it.
     fn numbers(&self, address: u64) -> Result<Vec<u64>> {
-        let layout = self.last(address, message::LAYOUT)?;
-        Ok(layout.get(4..).unwrap_or_default().chunks_exact(8).map(number).collect())
+        let header = self.header(address)?;
+        let count =
+            header.get(8..16).map(number).and_then(|n| usize::try_from(n).ok()?.checked_mul(8));
+        let begin = count.and_then(|bytes| header.len().checked_sub(bytes));
+        let begin = begin.ok_or_else(|| unknown("an array is shorter than it states"))?;
+        Ok(header[begin..].chunks_exact(8).map(number).collect())
     }
 
     /// Sets the places of an array's chunks.
     fn fill(&self, array: &mut Chunked, address: u64) -> Result<()> {
         // The layout ends with the address of the table's header.
-        let layout = self.last(address, message::LAYOUT)?;
-        let header = tail(&layout).filter(|&header| header < self.bytes);
-        let header = header.ok_or_else(|| unknown("an array has no table of chunks"))?;
+        let header = self.header(address)?;
+        let layout = header.len().checked_sub(FILTERS_BYTES).map(|end| &header[..end]);
+        let table = layout.and_then(|layout| layout.last_chunk::<8>()).map(|at| number(at));
+        let table = table.filter(|&table| table < self.bytes);
+        let table = table.ok_or_else(|| unknown("an array has no table of chunks"))?;
         let size = 8 + array.size_bytes();
         let bytes = array.chunks.len() as u64 * (size as u64 + 4);
-        let entries = self.bytes_at(header + TABLE_HEAD_BYTES + TABLE_BYTES, bytes)?;
+        let entries = self.bytes_at(table + TABLE_HEAD_BYTES + TABLE_BYTES, bytes)?;
         for (slot, entry) in array.chunks.iter_mut().zip(entries.chunks_exact(size + 4)) {
             let extent = Extent { address: number(&entry[..8]), bytes: number(&entry[8..size]) };
             *slot = (extent.address != UNDEFINED).then_some(extent);
@@ -207,12 +185,14 @@ impl Source<'_> {
     }
 }
 
+/// The number at the end of a message of a header, which is otherwise like this one.
+fn last_number(header: &[u8], message: &[u8]) -> Option<u64> {
+    let (begin, _) = message.split_last_chunk::<8>()?;
+    let at = header.windows(begin.len()).position(|bytes| bytes == begin)? + begin.len();
+    header.get(at..at + 8).map(number)
+}
+
 /// The number in some bytes, little-endian.
 fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
-}
-
-/// The number in the last eight bytes.
-fn tail(bytes: &[u8]) -> Option<u64> {
-    bytes.last_chunk().map(|bytes| u64::from_le_bytes(*bytes))
 }

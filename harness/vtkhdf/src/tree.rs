@@ -6,8 +6,8 @@
 //! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
 //! are packed from the most significant one. Cell data have an element for every node.
 
-use crate::format::{Chunked, Extent, Kind, SUPERBLOCK_BYTES};
-use crate::write::{Deflater, Group, Member, Value, metadata};
+use crate::format::{Chunked, Extent, SUPERBLOCK_BYTES, datatype};
+use crate::write::{Deflater, Metadata, Value};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ use std::ops::Range;
 pub const WINDOW: u64 = 1 << 18;
 /// The cell data of sides: 0 outside, 1 inside, 2 crossing; 0 for nodes that are no leaves of the mesh.
 pub const SIDE: &str = "side";
-/// The cell data of ranks.
-pub(crate) const RANK: &str = "rank";
+/// The member that is written first.
+pub(crate) const FIRST: &str = "TreeIds";
 /// The group of the file.
 pub(crate) const GROUP: &str = "VTKHDF";
 /// Its group of cell data.
@@ -100,35 +100,33 @@ pub struct Window {
     split: Vec<u8>,
     deleted: Vec<u8>,
     sides: Vec<u8>,
-    ranks: Option<Vec<i32>>,
 }
 
+/// The compressed chunks of a window: split, deleted, side; none for one that is zero.
+pub type Chunks = [Option<Vec<u8>>; 3];
+
 impl Window {
-    /// The window with a number, all zero; `with_ranks` if its nodes have ranks.
-    pub fn new(index: u64, with_ranks: bool) -> Self {
+    /// The window with a number, all zero.
+    pub fn new(index: u64) -> Self {
         let bits = || vec![0; WINDOW as usize / 8];
         Self {
             first: index * WINDOW,
             split: bits(),
             deleted: bits(),
             sides: vec![0; WINDOW as usize],
-            ranks: with_ranks.then(|| vec![0; WINDOW as usize]),
         }
     }
 
     /// Sets the root, which is in the first window.
-    pub fn put_root(&mut self, root: Siblings, rank: i32) {
+    pub fn put_root(&mut self, root: Siblings) {
         self.split[0] |= (root.split & 1) << 7;
         self.deleted[0] |= (root.deleted & 1) << 7;
         self.sides[0] = (root.crossing & 1) << 1 | root.inside & 1;
-        if let Some(ranks) = &mut self.ranks {
-            ranks[0] = rank;
-        }
     }
 
     /// Sets those nodes of a group that are in the window.
     #[inline]
-    pub fn put(&mut self, group: u64, siblings: Siblings, sibling_ranks: [i32; 8]) {
+    pub fn put(&mut self, group: u64, siblings: Siblings) {
         // The first sibling is the second node of a byte.
         let first = first_node(group);
         let byte = (first / 8).wrapping_sub(self.first / 8) as usize;
@@ -154,72 +152,60 @@ impl Window {
                 }
             }
         }
-        if let Some(ranks) = &mut self.ranks {
-            for (i, rank) in (0..).zip(sibling_ranks) {
-                let at = (first + i).wrapping_sub(self.first) as usize;
-                if let Some(node) = ranks.get_mut(at) {
-                    *node = rank;
-                }
-            }
-        }
     }
 
-    /// The compressed chunks of all arrays, in the order in which [`TreeWriter::add`] takes them; none for one that is zero.
-    pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Vec<Option<Vec<u8>>> {
-        let arrays = arrays(shape, self.ranks.is_some());
-        let ranks: Option<Vec<u8>> =
-            self.ranks.as_ref().map(|ranks| ranks.iter().flat_map(|r| r.to_le_bytes()).collect());
-        let bytes = [&self.split, &self.deleted, &self.sides].into_iter().chain(&ranks);
+    /// The compressed chunks.
+    pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Chunks {
+        let [split, deleted, sides] = arrays(shape);
         // Arrays shorter than a window have one shorter chunk.
-        let chunk =
-            |(array, bytes): (&Chunked, &Vec<u8>)| deflater.compress(&bytes[..array.chunk_bytes()]);
-        arrays.iter().zip(bytes).map(chunk).collect()
+        [(&self.split, split), (&self.deleted, deleted), (&self.sides, sides)]
+            .map(|(bytes, array)| deflater.compress(&bytes[..array.chunk_len as usize]))
     }
 }
 
-/// The arrays that have a chunk per window: split, deleted, side, and rank if there are ranks.
-pub(crate) fn arrays(shape: &Shape, with_ranks: bool) -> Vec<Chunked> {
+/// The arrays that have a chunk per window: split, deleted, side.
+pub(crate) fn arrays(shape: &Shape) -> [Chunked; 3] {
     let (nodes, described) = (shape.nodes_total(), shape.nodes_described());
-    let bits = |nodes: u64| Chunked::new(Kind::Byte, nodes.div_ceil(8), WINDOW as u32 / 8);
-    let data = |kind| Chunked::new(kind, nodes, WINDOW as u32);
-    let mut arrays = vec![bits(described), bits(nodes), data(Kind::Byte)];
-    arrays.extend(with_ranks.then(|| data(Kind::Int32)));
-    arrays
+    let bits = |nodes: u64| Chunked::new(nodes.div_ceil(8), WINDOW as u32 / 8);
+    [bits(described), bits(nodes), Chunked::new(nodes, WINDOW as u32)]
 }
 
-/// The tree as a group of HDF5, with the arrays that have a chunk per window.
-pub(crate) fn group(shape: &Shape, arrays: &[Chunked]) -> Group {
-    let mut chunked = arrays.iter().map(|array| Member::Chunked(array.clone()));
-    let mut next = || chunked.next().expect("three arrays or more");
-    let one = |number: u64| Member::Small(Value::ints(&[number]));
+/// The metadata of a tree's file in which they begin at byte `start`; and the superblock.
+pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec<u8>, Vec<u8>) {
+    let [split, mask, side] = arrays;
     let levels = shape.nodes.len() as u64;
-    let mut members = vec![
-        ("TreeIds", one(0)),
-        ("NumberOfTrees", one(1)),
-        ("NumberOfDepths", one(levels)),
-        ("DepthPerTree", one(levels)),
-        (NODES, Member::Small(Value::ints(&shape.nodes))),
-        ("NumberOfCells", one(shape.nodes_total())),
-        ("DescriptorsSize", one(shape.nodes_described())),
-        (SPLIT, next()),
+    let numbers = [
+        (FIRST, &[0][..]),
+        ("NumberOfTrees", &[1]),
+        ("NumberOfDepths", &[levels]),
+        ("DepthPerTree", &[levels]),
+        (NODES, &shape.nodes),
+        ("NumberOfCells", &[shape.nodes_total()]),
+        ("DescriptorsSize", &[shape.nodes_described()]),
     ];
-    let mask = next();
+    let mut out = Metadata::new(start);
+    let mut members: Vec<_> =
+        numbers.iter().map(|(name, numbers)| (*name, out.small(&Value::ints(numbers)))).collect();
+    members.push((SPLIT, out.chunked(split)));
     // Without a mask, no leaf is missing.
-    members.extend(has_chunks(&arrays[1]).then_some((MASK, mask)));
-    for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
-        members.push((name, Member::Small(Value::doubles(&[low, low + shape.edge]))));
+    if has_chunks(mask) {
+        members.push((MASK, out.chunked(mask)));
     }
-    let data = [SIDE, RANK].into_iter().zip(arrays[2..].iter().map(|_| next())).collect();
-    members.push((CELL_DATA, Member::Group(Group { members: data, ..Group::default() })));
-    let attributes = vec![
-        ("Version", Value::array(Kind::Int64, &[2i64, 8].map(i64::to_le_bytes))),
+    for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
+        members.push((name, out.small(&Value::doubles(&[low, low + shape.edge]))));
+    }
+    let side = out.chunked(side);
+    members.push((CELL_DATA, out.group(&[], &[(SIDE, side)])));
+    let attributes = [
+        ("Version", Value::ints(&[2, 8])),
         ("Type", Value::text("HyperTreeGrid")),
         ("BranchFactor", Value::number(2)),
-        ("Dimensions", Value::array(Kind::Int32, &[2i32; 3].map(i32::to_le_bytes))),
+        ("Dimensions", Value::array(datatype::INT32, &[2i32; 3].map(i32::to_le_bytes))),
         (EDGE, Value::doubles(&[shape.edge])),
     ];
-    let grid = Member::Group(Group { attributes, members });
-    Group { members: vec![(GROUP, grid)], ..Group::default() }
+    let grid = out.group(&attributes, &members);
+    let root = out.group(&[], &[(GROUP, grid)]);
+    out.finish(root)
 }
 
 /// Whether an array has more than zeros.
@@ -233,7 +219,7 @@ pub struct TreeWriter<W> {
     out: W,
     end: u64,
     shape: Shape,
-    arrays: Vec<Chunked>,
+    arrays: [Chunked; 3],
 }
 
 impl<W: Write + Seek> TreeWriter<W> {
@@ -241,10 +227,10 @@ impl<W: Write + Seek> TreeWriter<W> {
     ///
     /// # Errors
     /// As `out` has.
-    pub fn new(mut out: W, shape: Shape, with_ranks: bool) -> io::Result<Self> {
+    pub fn new(mut out: W, shape: Shape) -> io::Result<Self> {
         // Without a superblock the file is invalid until it is finished.
         out.write_all(&[0; SUPERBLOCK_BYTES])?;
-        let arrays = arrays(&shape, with_ranks);
+        let arrays = arrays(&shape);
         Ok(Self { out, end: SUPERBLOCK_BYTES as u64, shape, arrays })
     }
 
@@ -252,11 +238,7 @@ impl<W: Write + Seek> TreeWriter<W> {
     ///
     /// # Errors
     /// As `out` has.
-    pub fn add<'c>(
-        &mut self,
-        window: u64,
-        chunks: impl IntoIterator<Item = Option<&'c [u8]>>,
-    ) -> io::Result<()> {
+    pub fn add(&mut self, window: u64, chunks: &Chunks) -> io::Result<()> {
         for (array, chunk) in self.arrays.iter_mut().zip(chunks) {
             // Descriptors end before the last windows.
             if let (Some(slot), Some(chunk)) = (array.chunks.get_mut(window as usize), chunk) {
@@ -273,7 +255,7 @@ impl<W: Write + Seek> TreeWriter<W> {
     /// # Errors
     /// As `out` has.
     pub fn finish(mut self) -> io::Result<W> {
-        let (metadata, superblock) = metadata(&group(&self.shape, &self.arrays), self.end);
+        let (metadata, superblock) = metadata(&self.shape, &self.arrays, self.end);
         self.out.write_all(&metadata)?;
         self.out.seek(SeekFrom::Start(0))?;
         self.out.write_all(&superblock)?;

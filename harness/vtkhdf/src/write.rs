@@ -2,9 +2,9 @@
 
 use crate::checksum::lookup3;
 use crate::format::{
-    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, FILTER_DEFLATE, INDEX_FIXED_ARRAY, Kind,
+    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, FILTER_DEFLATE, INDEX_FIXED_ARRAY,
     LAYOUT_CHUNKED, LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES,
-    UNDEFINED, message,
+    UNDEFINED, datatype, message,
 };
 use flate2::{Compress, Compression, FlushCompress, Status};
 
@@ -24,92 +24,69 @@ impl Value {
     }
 
     /// One number.
-    pub(crate) fn number(number: i64) -> Self {
-        Self { dataspace: vec![2, 0, 0, 0], ..Self::array(Kind::Int64, &[number.to_le_bytes()]) }
+    pub(crate) fn number(number: u64) -> Self {
+        Self { dataspace: vec![2, 0, 0, 0], ..Self::ints(&[number]) }
     }
 
-    /// A one-dimensional array of numbers of a kind, which has `N` bytes.
-    pub(crate) fn array<const N: usize>(kind: Kind, numbers: &[[u8; N]]) -> Self {
+    /// A one-dimensional array of numbers of a type, which has `N` bytes.
+    pub(crate) fn array<const N: usize>(datatype: &[u8], numbers: &[[u8; N]]) -> Self {
         let (dataspace, data) = (simple(numbers.len() as u64), numbers.as_flattened().to_vec());
-        Self { datatype: kind.encode(), dataspace, data }
+        Self { datatype: datatype.to_vec(), dataspace, data }
     }
 
     /// The same of whole numbers.
     pub(crate) fn ints(numbers: &[u64]) -> Self {
-        Self::array(Kind::Int64, &numbers.iter().map(|n| n.to_le_bytes()).collect::<Vec<_>>())
+        Self::array(datatype::INT64, &numbers.iter().map(|n| n.to_le_bytes()).collect::<Vec<_>>())
     }
 
     /// The same of floating-point numbers.
     pub(crate) fn doubles(numbers: &[f64]) -> Self {
-        Self::array(Kind::Double, &numbers.iter().map(|n| n.to_le_bytes()).collect::<Vec<_>>())
+        Self::array(datatype::DOUBLE, &numbers.iter().map(|n| n.to_le_bytes()).collect::<Vec<_>>())
     }
 }
 
-/// A member of a group.
-pub(crate) enum Member {
-    Group(Group),
-    /// A small array, stored in the object header.
-    Small(Value),
-    Chunked(Chunked),
-}
-
-/// A group: attributes, and members, by name.
-#[derive(Default)]
-pub(crate) struct Group {
-    pub(crate) attributes: Vec<(&'static str, Value)>,
-    pub(crate) members: Vec<(&'static str, Member)>,
-}
-
-/// The metadata of a file in which they begin at byte `start` and end with the file; and the superblock, which begins the file.
-pub(crate) fn metadata(root: &Group, start: u64) -> (Vec<u8>, Vec<u8>) {
-    let mut metadata = Metadata { bytes: Vec::new(), start };
-    let root = metadata.group(root);
-    let mut superblock = SIGNATURE.to_vec();
-    superblock.extend([3, 8, 8, 0]);
-    for address in [0, UNDEFINED, metadata.end(), root] {
-        superblock.extend(address.to_le_bytes());
-    }
-    close(&mut superblock);
-    (metadata.bytes, superblock)
-}
-
-/// Blocks that follow each other. What they refer to precedes them.
-struct Metadata {
+/// The metadata of a file: blocks that follow each other. What they refer to precedes them.
+pub(crate) struct Metadata {
     bytes: Vec<u8>,
     start: u64,
 }
 
 impl Metadata {
+    /// No metadata yet, which will begin at byte `start` and end with the file.
+    pub(crate) fn new(start: u64) -> Self {
+        Self { bytes: Vec::new(), start }
+    }
+
+    /// The metadata with this root group; and the superblock, which begins the file.
+    pub(crate) fn finish(self, root: u64) -> (Vec<u8>, Vec<u8>) {
+        let mut superblock = SIGNATURE.to_vec();
+        superblock.extend([3, 8, 8, 0]);
+        for address in [0, UNDEFINED, self.end(), root] {
+            superblock.extend(address.to_le_bytes());
+        }
+        close(&mut superblock);
+        (self.bytes, superblock)
+    }
+
     fn end(&self) -> u64 {
         self.start + self.bytes.len() as u64
     }
 
-    /// Adds a group after its members; returns its address.
-    fn group(&mut self, group: &Group) -> u64 {
+    /// Adds a group with the addresses of its members; returns its address.
+    pub(crate) fn group(
+        &mut self,
+        attributes: &[(&str, Value)],
+        members: &[(&'static str, u64)],
+    ) -> u64 {
         let mut header = Vec::new();
         // No index of links: all are in the header.
         add_message(&mut header, message::LINK_INFO, &[&[0, 0][..], &[0xff; 16]].concat());
         add_message(&mut header, message::GROUP_INFO, &[0, 0]);
-        for (name, Value { datatype, dataspace, data }) in &group.attributes {
-            let size = |bytes: usize| (bytes as u16).to_le_bytes();
-            let sizes =
-                [size(name.len() + 1), size(datatype.len()), size(dataspace.len())].concat();
-            let head = [&[3, 0], &sizes[..], &[0], name.as_bytes(), &[0]].concat();
-            add_message(
-                &mut header,
-                message::ATTRIBUTE,
-                &[&head, datatype, dataspace, data].map(Vec::as_slice).concat(),
-            );
+        for (name, value) in attributes {
+            add_message(&mut header, message::ATTRIBUTE, &attribute(name, value));
         }
-        for (name, member) in &group.members {
-            let address = match member {
-                Member::Group(group) => self.group(group),
-                Member::Small(value) => self.small(value),
-                Member::Chunked(array) => self.chunked(array),
-            };
-            let head = [1, 0, name.len() as u8];
-            let link = [&head, name.as_bytes(), &address.to_le_bytes()].concat();
-            add_message(&mut header, message::LINK, &link);
+        for (name, address) in members {
+            add_message(&mut header, message::LINK, &link(name, *address));
         }
         self.header(&header)
     }
@@ -128,7 +105,8 @@ impl Metadata {
         address
     }
 
-    fn small(&mut self, Value { datatype, dataspace, data }: &Value) -> u64 {
+    /// Adds a small array, which is stored in its object header.
+    pub(crate) fn small(&mut self, Value { datatype, dataspace, data }: &Value) -> u64 {
         let mut header = Vec::new();
         add_message(&mut header, message::DATASPACE, dataspace);
         add_message(&mut header, message::DATATYPE, datatype);
@@ -139,13 +117,14 @@ impl Metadata {
         self.header(&header)
     }
 
-    fn chunked(&mut self, array: &Chunked) -> u64 {
+    /// Adds an array in chunks.
+    pub(crate) fn chunked(&mut self, array: &Chunked) -> u64 {
         let table = self.table(array);
         let mut header = Vec::new();
         add_message(&mut header, message::DATASPACE, &simple(array.len));
-        add_message(&mut header, message::DATATYPE, &array.kind.encode());
+        add_message(&mut header, message::DATATYPE, datatype::BYTE);
         add_message(&mut header, message::FILL_VALUE, &ALLOCATED_BY_CHUNK);
-        let dims = [array.chunk_len, array.kind.bytes() as u32];
+        let dims = [array.chunk_len, 1];
         let bytes = array.dim_bytes();
         let mut layout = vec![LAYOUT_VERSION, LAYOUT_CHUNKED, 0, 2, bytes as u8];
         dims.iter().for_each(|dim| layout.extend(&dim.to_le_bytes()[..bytes]));
@@ -180,6 +159,19 @@ impl Metadata {
         self.block(table);
         header_at
     }
+}
+
+/// The message of an attribute, which ends with the value.
+pub(crate) fn attribute(name: &str, Value { datatype, dataspace, data }: &Value) -> Vec<u8> {
+    let size = |bytes: usize| (bytes as u16).to_le_bytes();
+    let sizes = [size(name.len() + 1), size(datatype.len()), size(dataspace.len())].concat();
+    let head = [&[3, 0], &sizes[..], &[0], name.as_bytes(), &[0]].concat();
+    [&head, datatype, dataspace, data].map(Vec::as_slice).concat()
+}
+
+/// The message of a group's member, which ends with the address.
+pub(crate) fn link(name: &str, address: u64) -> Vec<u8> {
+    [&[1, 0, name.len() as u8], name.as_bytes(), &address.to_le_bytes()].concat()
 }
 
 /// Appends a message of an object header.

@@ -11,22 +11,16 @@ use vtkhdf::tree::{Shape, Siblings, TreeWriter, WINDOW, Window, groups};
 use vtkhdf::write::Deflater;
 
 /// A file in which the siblings of group g have the numbers `of(g)`, and its shape.
-fn file_of(
-    nodes: Vec<u64>,
-    with_ranks: bool,
-    of: impl Fn(u64) -> (Siblings, [i32; 8]),
-) -> (Vec<u8>, Shape) {
+fn file_of(nodes: Vec<u64>, of: impl Fn(u64) -> Siblings) -> (Vec<u8>, Shape) {
     let shape = Shape { origin: [0.1, -2.0, 1e6], edge: 0.3, nodes };
-    let mut out = TreeWriter::new(Cursor::new(Vec::new()), shape.clone(), with_ranks).unwrap();
+    let mut out = TreeWriter::new(Cursor::new(Vec::new()), shape.clone()).unwrap();
     let mut deflater = Deflater::default();
     for index in 0..shape.windows() {
-        let mut window = Window::new(index, with_ranks);
+        let mut window = Window::new(index);
         for group in groups(index).take_while(|group| 8 * group + 1 < shape.nodes_total()) {
-            let (siblings, ranks) = of(group);
-            window.put(group, siblings, ranks);
+            window.put(group, of(group));
         }
-        let chunks = window.compress(&shape, &mut deflater);
-        out.add(index, chunks.iter().map(Option::as_deref)).unwrap();
+        out.add(index, &window.compress(&shape, &mut deflater)).unwrap();
     }
     (out.finish().unwrap().into_inner(), shape)
 }
@@ -34,14 +28,14 @@ fn file_of(
 /// A small file with all arrays.
 fn small() -> Vec<u8> {
     let siblings = Siblings { split: 1, deleted: 6, crossing: 0x30, inside: 8 };
-    file_of(vec![1, 8, 8], true, |_| (siblings, [7; 8])).0
+    file_of(vec![1, 8, 8], |_| siblings).0
 }
 
 /// The shape, and the bytes of all arrays.
 fn read(path: &Path) -> Result<(Shape, Vec<Vec<u8>>), ReadError> {
     let file = TreeReader::open(path)?;
     let mut all = Vec::new();
-    for array in [Some(&file.split), file.masked.as_ref(), Some(&file.sides), file.ranks.as_ref()] {
+    for array in [Some(&file.split), file.masked.as_ref(), Some(&file.sides)] {
         let (mut bytes, mut chunk) = (Vec::new(), Vec::new());
         for index in 0..array.map_or(0, |array| array.chunks.len()) {
             file.read_chunk(array.unwrap(), index, &mut chunk)?;
@@ -56,22 +50,21 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
-    fn trees_of_several_windows_are_read_back(seed in any::<u64>(), with_ranks in any::<bool>(), is_masked in any::<bool>()) {
+    fn trees_of_several_windows_are_read_back(seed in any::<u64>(), is_masked in any::<bool>()) {
         let nodes: Vec<u64> = (0..8).map(|level| if level < 7 { 1 << (3 * level) } else { 1 << 20 }).collect();
         let of = |group: u64| {
             let mixed = (group ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
             let deleted = if is_masked { mixed as u8 } else { 0 };
-            let siblings = Siblings { split: (mixed >> 8) as u8, deleted, crossing: 1, inside: 4 };
-            (siblings, [group as i32; 8])
+            Siblings { split: (mixed >> 8) as u8, deleted, crossing: 1, inside: 4 }
         };
-        let (content, shape) = file_of(nodes, with_ranks, of);
+        let (content, shape) = file_of(nodes, of);
         let place = tempfile::NamedTempFile::new().unwrap();
         fs::write(place.path(), content).unwrap();
-        let (found, [split, masked, sides, ranks]) = read(place.path()).map(|(shape, all)| (shape, <[_; 4]>::try_from(all).unwrap())).unwrap();
+        let (found, [split, masked, sides]) = read(place.path()).map(|(shape, all)| (shape, <[_; 3]>::try_from(all).unwrap())).unwrap();
         prop_assert!(shape.windows() > 4 && found == shape);
-        prop_assert_eq!((masked.is_empty(), ranks.is_empty()), (!is_masked, !with_ranks));
+        prop_assert_eq!(masked.is_empty(), !is_masked);
         for group in [0, 1, 77, WINDOW / 8 - 1, WINDOW / 8, (shape.nodes_total() - 9) / 8] {
-            let (siblings, _) = of(group);
+            let siblings = of(group);
             for i in 0..8 {
                 let node = (1 + 8 * group + i) as usize;
                 let bit = |bits: &[u8]| bits.get(node / 8).map_or(0, |byte| byte >> (7 - node % 8) & 1);
@@ -80,9 +73,6 @@ proptest! {
                 }
                 prop_assert_eq!(bit(&masked), siblings.deleted >> i & 1);
                 prop_assert_eq!(sides[node], [2, 0, 1, 0, 0, 0, 0, 0][i as usize]);
-                if with_ranks {
-                    prop_assert_eq!(&ranks[4 * node..][..4], &(group as i32).to_le_bytes());
-                }
             }
         }
     }
@@ -136,7 +126,7 @@ fn nodes_that_are_not_those_of_an_oct_tree_are_another_layout() {
         vec![1, 8, 72],
         [vec![1], vec![8; 20]].concat(),
     ] {
-        fs::write(place.path(), file_of(nodes.clone(), false, |_| Default::default()).0).unwrap();
+        fs::write(place.path(), file_of(nodes.clone(), |_| Default::default()).0).unwrap();
         let error = read(place.path()).unwrap_err();
         assert!(matches!(error, ReadError::Unknown(_)), "{nodes:?}: {error}");
     }

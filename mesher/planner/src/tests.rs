@@ -85,7 +85,7 @@ fn the_finer_pilot_has_a_64th_of_the_cells() {
         assert!(check.is_err(), "corruption {number}");
     }
     // What is written takes time.
-    let output = Output { directory: "m".into(), words: true, tree: true, cell_ranks: false };
+    let output = Output { directory: "m".into(), words: true, tree: true };
     let pilot = &mut |shift| Ok(amounts(ROUGH, 1.0, shift));
     let written = with_problem(13, &[], |problem| {
         of_case(&Problem { output: Some(&output), ..copy(problem) }, pilot)

@@ -35,9 +35,6 @@ pub struct Args {
     /// Files to write, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "words", requires = "out")]
     write: Vec<Files>,
-    /// Add the rank that owns each cell to the tree, as cell data
-    #[arg(long, requires = "out")]
-    cell_ranks: bool,
     /// Also write the report to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -302,17 +299,10 @@ pub fn division(args: &Args) -> Result<Division, Error> {
 }
 
 /// The files to write; none without --out.
-///
-/// # Errors
-/// If ranks are asked for, and no file that could have them.
-pub fn output(args: &Args) -> Result<Option<Output>, Error> {
+pub fn output(args: &Args) -> Option<Output> {
     let has = |files| args.write.contains(&files);
     let (words, tree) = (has(Files::Words), has(Files::Htg));
-    if args.cell_ranks && !tree {
-        return Err(Error::input("--cell-ranks is of the tree: add --write htg"));
-    }
-    let out = args.out.clone();
-    Ok(out.map(|directory| Output { directory, words, tree, cell_ranks: args.cell_ranks }))
+    args.out.clone().map(|directory| Output { directory, words, tree })
 }
 
 /// The case in advice to the user: only case files have a name.

@@ -335,7 +335,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     let options = Options {
         division: cli::division(args)?,
         ungraded: args.ungraded,
-        out: cli::output(args)?,
+        out: cli::output(args),
         check: args.check,
         weight_exposed: args.weight_exposed,
         strict: args.strict,

@@ -18,7 +18,7 @@ use siblings::{own_siblings, root};
 use std::io::{self, BufWriter};
 use std::iter::Peekable;
 use std::ops::Range;
-use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window, groups};
+use vtkhdf::tree::{Chunks, Shape, Siblings, TreeWriter, Window, groups};
 use vtkhdf::write::Deflater;
 
 type TreeFile = TreeWriter<BufWriter<Draft>>;
@@ -26,16 +26,16 @@ type TreeFile = TreeWriter<BufWriter<Draft>>;
 /// Greatest number of windows of a round. One rank may have to send all of their nodes, half a byte each.
 const WINDOWS_MAX: u64 = 256;
 
-/// Writes the file, with the ranks that own the cells if `with_ranks`. Collective.
+/// Writes the file. Collective.
 ///
 /// # Errors
 /// If the file cannot be written or the user interrupts the run; the same on all ranks.
-pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Result<(), Error> {
+pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let numbering = Numbering::new(mesh, comm);
     let (origin, edge) = (mesh.rules.root.origin, mesh.rules.root.edge);
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
     let is_first = comm.rank() == 0;
-    let begin = || TreeWriter::new(out.file(TREE)?, shape.clone(), with_ranks);
+    let begin = || TreeWriter::new(out.file(TREE)?, shape.clone());
     let failed = out.failed(TREE);
     let file = is_first.then(begin).transpose().map_err(&failed);
     let mut file = ranks::agree(comm, file)?;
@@ -49,7 +49,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, with_ranks: bool, comm: &dyn Comm) -> Re
         let mut chunks = MessageBuffer::default();
         let window = begin + comm.rank() as u64;
         if windows.contains(&window) {
-            let filled = fill(mesh, window, &mine, with_ranks);
+            let filled = fill(mesh, window, &mine);
             pack(window, &filled.compress(&shape, &mut deflater), &mut chunks);
         }
         let compressed = comm.sparse_all_to_all(chunks);
@@ -106,18 +106,18 @@ fn decode(code: u32) -> Siblings {
 }
 
 /// A window with the nodes that all ranks have sent for it.
-fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer, with_ranks: bool) -> Window {
-    let mut filled = Window::new(window, with_ranks);
+fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer) -> Window {
+    let mut filled = Window::new(window);
     if window == 0 {
         // All ranks hold the root.
-        filled.put_root(root(mesh), mesh.ownership.owner(0, 0) as i32);
+        filled.put_root(root(mesh));
     }
-    for (from, mut words) in messages.messages() {
+    for (_, mut words) in messages.messages() {
         while let [first, count, rest @ ..] = words {
             let (pairs, after) = rest.split_at(count.div_ceil(2) as usize);
             let codes = pairs.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]);
             for (group, code) in (*first..first + count).zip(codes) {
-                filled.put(group, decode(code), [from as i32; 8]);
+                filled.put(group, decode(code));
             }
             words = after;
         }
@@ -127,7 +127,7 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer, with_ranks: bool) ->
 
 /// Appends a window's chunks to the message to rank 0: its number, then for each array the bytes of its chunk, none for no
 /// chunk.
-fn pack(window: u64, chunks: &[Option<Vec<u8>>], messages: &mut MessageBuffer) {
+fn pack(window: u64, chunks: &Chunks, messages: &mut MessageBuffer) {
     messages.append(0, |words| {
         words.extend([window, chunks.len() as u64]);
         chunks.iter().for_each(|c| pack_bytes(c.as_deref().unwrap_or_default(), words));
@@ -140,13 +140,12 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> io::Result<()> {
     messages.sort_by_key(|words| words[0]);
     for words in messages {
         let mut rest = &words[2..];
-        let chunks = (0..words[1]).map(|_| {
+        let chunks: Chunks = std::array::from_fn(|_| {
             let (chunk, after) = unpack_bytes(rest);
             rest = after;
-            (!chunk.is_empty()).then_some(chunk)
+            (!chunk.is_empty()).then(|| chunk.to_vec())
         });
-        let chunks: Vec<_> = chunks.collect();
-        file.add(words[0], chunks.iter().map(Option::as_deref))?;
+        file.add(words[0], &chunks)?;
     }
     Ok(())
 }

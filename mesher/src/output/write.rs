@@ -29,8 +29,6 @@ pub struct Output {
     pub words: bool,
     /// Whether to write the tree.
     pub tree: bool,
-    /// Whether the tree has the rank that owns each cell.
-    pub cell_ranks: bool,
 }
 
 /// A rank on another machine than rank 0, if the directory lies on a disk of that one alone.
@@ -191,7 +189,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         for n in [0usize, 1, 9, 10, 4097, 1_000_000] {
             let directory = root.path().join(n.to_string());
-            let files = Output { directory, words: true, tree: false, cell_ranks: false };
+            let files = Output { directory, words: true, tree: false };
             let out = OutDir::claim(&files, &Solo).unwrap();
             let words: Vec<u64> = (0..n as u64).map(|i| i << 7).collect();
             let mut part = Part::new(out.file(&part_name(3)).unwrap()).unwrap();

@@ -1,14 +1,13 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
-use super::foam::FoamArguments;
 use super::selection::SelectionArguments;
-use super::values::Input;
+use super::values::{Input, read_case};
 use clap::Args;
 use contract::failure::EXIT_HOLDS;
 use contract::failure::Failure;
-use export::format::{self, FORMATS};
+use export::format::{self, FORMATS, Format};
 use export::mesh::Mesh;
-use export::options::{Options, Summary};
+use export::options::{Label, Options, Regions, Summary};
 use run::engine::paths::Paths;
 use run::engine::python;
 use run::progress::Progress;
@@ -28,15 +27,21 @@ pub struct Arguments {
     mesh: Input,
     /// The file to write; its name decides the format. An existing file is replaced, an existing polyMesh is not
     file: PathBuf,
-    /// Number of threads [default: all cores]
+    /// The case that was meshed: its named solids become patches (polyMesh, .cgns), and .vtp has the gap to the wall; name in geometries/catalogue.toml or path of a case file
+    #[arg(long, value_name = "CASE")]
+    case: Option<String>,
+    /// Bits of a label of OpenFOAM [default: 32]
+    #[arg(long, value_name = "BITS")]
+    label: Option<Label>,
+    /// Regions of cells that no face connects, for OpenFOAM and CGNS [default: all]
+    #[arg(long)]
+    regions: Option<Regions>,
+    /// Number of threads, for .vtu [default: all cores]
     #[arg(short, long, value_name = "N")]
     jobs: Option<NonZero<usize>>,
     /// Which cells are written.
     #[command(flatten)]
     selection: SelectionArguments,
-    /// What meshes for OpenFOAM need.
-    #[command(flatten)]
-    foam: FoamArguments,
 }
 
 fn after_help() -> String {
@@ -47,8 +52,9 @@ fn after_help() -> String {
          harness export mesh mesh.vtu                           the whole mesh\n  \
          harness export mesh slice.vtu --slice z=0              the cells at a plane, read without the others\n  \
          harness export mesh nose.vtu --clip -1,-1,-1,0,1,1     the cells in a box\n  \
-         harness export mesh far.pvtu --level-max 7             coarse cells only\n  \
-         harness export mesh case/constant/polyMesh             an OpenFOAM mesh\n\n\
+         harness export mesh far.vtu --level-max 7              coarse cells only\n  \
+         harness export mesh case/constant/polyMesh             an OpenFOAM mesh\n  \
+         harness export mesh front.vtp --case body.toml         the surface towards the body, with the gap of every face\n\n\
          Exit codes: 0 success; 2 invalid input, an unknown format, or a selection without cells; 130 interrupted, after \
          which no file remains.",
         formats.collect::<String>()
@@ -60,11 +66,13 @@ fn after_help() -> String {
 /// # Errors
 /// If the mesh cannot be read, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Summary { leaves, files, bytes, notes } = write(arguments)?;
+    let format = format::of(&arguments.file)?;
+    let Summary { leaves, files, bytes, notes } = write(format, arguments)?;
     let file = arguments.file.display();
-    let per_cell = bytes as f64 / leaves as f64;
+    let what = if format.is_surface() { "face" } else { "cell" };
+    let per_cell = brief(bytes as f64 / leaves as f64);
     let files = if files == 1 { String::new() } else { format!(" in {files} files") };
-    println!("{file}: {leaves} cells, {bytes} bytes{files} ({} per cell)", brief(per_cell));
+    println!("{file}: {leaves} {what}s, {bytes} bytes{files} ({per_cell} per {what})");
     notes.iter().for_each(|note| println!("  {note}"));
     Ok(EXIT_HOLDS)
 }
@@ -75,16 +83,31 @@ fn brief(number: f64) -> String {
     format!("{number:.decimals$}")
 }
 
-fn write(arguments: &Arguments) -> Result<Summary, Failure> {
-    let Arguments { mesh, file, jobs, selection, foam } = arguments;
-    let format = format::of(file)?;
-    let case = foam.case(format.ending)?;
+fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
+    let Arguments { mesh, file, case, label, regions, jobs, selection } = arguments;
+    let given = [
+        ("--case", case.is_some()),
+        ("--label", label.is_some()),
+        ("--regions", regions.is_some()),
+    ];
+    let has_no_effect =
+        |(name, is_given): &&(&str, bool)| *is_given && !format.options.contains(name);
+    if let Some((name, _)) = given.iter().find(has_no_effect) {
+        let ending = format.ending;
+        return Err(Failure::input(format!("{name} has no effect on {ending}: omit it")));
+    }
+    let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
     let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
-    let foam = foam.options(case.as_ref());
-    let options = Options { jobs, watch: &progress, foam, script };
+    let options = Options {
+        jobs: jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN),
+        watch: &progress,
+        case: case.as_ref(),
+        label: label.unwrap_or_default(),
+        regions: regions.unwrap_or_default(),
+        script,
+    };
     let written = (format.write)(&mesh, &selection, file, &options);
     progress.finish();
     written

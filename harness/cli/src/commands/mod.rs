@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `foam`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
+//! The commands, one file each with its arguments; `files`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
 
 pub mod archive;
 pub mod audit;
@@ -7,14 +7,12 @@ pub mod completions;
 pub mod diff;
 pub mod export;
 mod files;
-mod foam;
 pub mod gate;
 pub mod geometry;
 pub mod import;
 pub mod leak;
 pub mod man;
 mod meshed;
-pub mod near_body;
 mod paper;
 pub mod picture;
 pub mod planted;

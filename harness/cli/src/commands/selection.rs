@@ -54,16 +54,15 @@ impl SelectionArguments {
     /// Refuses conditions on what the mesh does not have.
     fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
         if let Some(rank) = self.rank {
-            let ranks = mesh.leaves_by_rank()?.len();
             if !mesh.has_ranks() {
                 return Err(mesh.ranks_unknown());
             }
+            let ranks = mesh.parts.len();
             if rank as usize >= ranks {
-                let why = match ranks {
-                    1 => format!("--rank {rank}: the mesh has one rank, number 0"),
-                    _ => format!("--rank {rank}: the mesh has {ranks} ranks, counted from 0"),
-                };
-                return Err(Failure::input(why));
+                return Err(Failure::input(format!(
+                    "--rank {rank}: the mesh has ranks 0 to {}",
+                    ranks - 1
+                )));
             }
         }
         if self.side.is_some() && mesh.manifest.sides == Sides::Unknown {

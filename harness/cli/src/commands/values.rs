@@ -55,12 +55,6 @@ fn writable(path: &Path) -> io::Result<()> {
     files::name_output(path).and_then(|()| files::check_writable(path))
 }
 
-/// Parses a number of cells, such as `1e9`.
-pub fn cell_count(text: &str) -> Result<u64, String> {
-    let cells = text.trim().parse::<f64>().ok().filter(|c| (1e3..=1e12).contains(c));
-    cells.map(|c| c as u64).ok_or_else(|| "give a number of cells from 1e3 to 1e12".to_owned())
-}
-
 /// Parses a probability that is not 0.
 pub fn probability(text: &str) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= 1.0);

@@ -201,10 +201,6 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             )
         },
         new("export .vtu", Harness, "export mesh a.vtu", &["a.vtu"]),
-        Program {
-            leaves: Leaves::NoOutput,
-            ..new("export .pvtu", Harness, "export mesh a.pvtu", &["a.pvtu", "a_pieces"])
-        },
         new("export .vtkhdf", Harness, "export mesh a.vtkhdf", &["a.vtkhdf"]),
         new("export .p8est", Harness, "export mesh a.p8est", &["a.p8est"]),
         new(
@@ -256,12 +252,8 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             &["p.svg", "p.csv"],
         ),
         new("picture .html", Harness, "picture mesh --case case.toml --out p.html", &["p.html"]),
-        new(
-            "near-body",
-            Harness,
-            "near-body mesh --case case.toml -o n.stl -o n.vtp --json n.json",
-            &["n.stl", "n.vtp", "n.json"],
-        ),
+        new("export .vtp", Harness, "export mesh n.vtp --case case.toml", &["n.vtp"]),
+        new("export .stl", Harness, "export mesh n.stl", &["n.stl"]),
         Program {
             varying: &["a.json"],
             refusals: &[1, 2],

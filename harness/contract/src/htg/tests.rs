@@ -16,8 +16,6 @@ struct Nodes {
     split: Vec<bool>,
     masked: Vec<bool>,
     sides: Vec<u8>,
-    /// One for each node, or none.
-    ranks: Vec<i32>,
 }
 
 fn nodes_of(words: &[u64]) -> Nodes {
@@ -44,9 +42,7 @@ fn nodes_of(words: &[u64]) -> Nodes {
 fn file_of(nodes: &Nodes) -> NamedTempFile {
     let file = NamedTempFile::new().unwrap();
     let shape = Shape { origin: ROOT.origin, edge: ROOT.edge, nodes: nodes.by_level.clone() };
-    let with_ranks = !nodes.ranks.is_empty();
-    let mut out =
-        TreeWriter::new(fs::File::create(file.path()).unwrap(), shape.clone(), with_ranks).unwrap();
+    let mut out = TreeWriter::new(fs::File::create(file.path()).unwrap(), shape.clone()).unwrap();
     let siblings = |first: usize| {
         let bits = |is_set: &dyn Fn(usize) -> bool| {
             (0..8).map(|i| u8::from(nodes.sides.len() > first + i && is_set(first + i)) << i).sum()
@@ -58,18 +54,15 @@ fn file_of(nodes: &Nodes) -> NamedTempFile {
             inside: bits(&|node| nodes.sides[node] & 1 != 0),
         }
     };
-    let rank = |node: usize| nodes.ranks.get(node).copied().unwrap_or(0);
     for index in 0..shape.windows() {
-        let mut window = Window::new(index, with_ranks);
+        let mut window = Window::new(index);
         if index == 0 {
-            window.put_root(siblings(0), rank(0));
+            window.put_root(siblings(0));
         }
         for group in groups(index).take_while(|group| 8 * group + 1 < shape.nodes_total()) {
-            let first = first_node(group) as usize;
-            window.put(group, siblings(first), std::array::from_fn(|i| rank(first + i)));
+            window.put(group, siblings(first_node(group) as usize));
         }
-        let chunks = window.compress(&shape, &mut Deflater::default());
-        out.add(index, chunks.iter().map(Option::as_deref)).unwrap();
+        out.add(index, &window.compress(&shape, &mut Deflater::default())).unwrap();
     }
     out.finish().unwrap();
     file
@@ -128,48 +121,12 @@ fn trees_of_one_leaf_and_without_leaves_are_read() {
 }
 
 #[test]
-fn ranks_are_read_with_the_words_if_there_is_one_for_each_node() {
-    let words = words(5);
-    let ranked = |with_ranks: bool, rank: fn(usize) -> i32| {
-        let mut nodes = nodes_of(&words);
-        nodes.ranks = (0..if with_ranks { nodes.split.len() } else { 0 }).map(rank).collect();
-        let file = file_of(&nodes);
-        (TreeFile::open(file.path(), true).unwrap(), nodes, file)
-    };
-    let read = |tree: &TreeFile| {
-        let (mut found, mut ranks) = (Vec::new(), Vec::new());
-        let read = tree.words_and_ranks(&mut |words, of_words| {
-            found.extend_from_slice(words);
-            ranks.extend_from_slice(of_words);
-            true
-        });
-        read.map(|()| (found, ranks))
-    };
-    let (tree, nodes, _file) = ranked(true, |node| node as i32 % 77);
-    let (found, ranks) = read(&tree).unwrap();
-    assert!(tree.has_ranks() && found == words && ranks.len() == words.len());
-    // Nodes are counted level by level, so the rank of the first leaf of a level is known.
-    for by_level in [3, 4, 5] {
-        let first: u64 = nodes.by_level[..by_level].iter().sum();
-        let is_leaf = |&i: &usize| !nodes.split[i] && !nodes.masked[i];
-        let node = (first as usize..nodes.split.len()).find(is_leaf).unwrap();
-        let leaf = words.iter().position(|&w| usize::from(level(w)) == by_level);
-        assert_eq!(leaf.map(|leaf| ranks[leaf]), Some(node as u32 % 77), "level {by_level}");
-    }
-    let (tree, _, _file) = ranked(false, |_| 0);
-    assert!(!tree.has_ranks());
-    assert_eq!(read(&tree).unwrap(), (words.clone(), vec![]));
-    let (tree, _, _file) = ranked(true, |_| -1);
-    assert!(read(&tree).unwrap_err().to_string().ends_with("has the rank -1"));
-}
-
-#[test]
 fn a_root_that_is_no_cube_is_another_layout() {
     for edge in [0.0, -4.0, f64::NAN, f64::INFINITY] {
         let shape = Shape { origin: ROOT.origin, edge, nodes: vec![1] };
         let file = NamedTempFile::new().unwrap();
         let out = fs::File::create(file.path()).unwrap();
-        TreeWriter::new(out, shape, false).unwrap().finish().unwrap();
+        TreeWriter::new(out, shape).unwrap().finish().unwrap();
         let error = TreeFile::open(file.path(), true).unwrap_err();
         assert!(matches!(&error, TreeError::Unknown(why) if why.contains("no cube")), "{error}");
     }

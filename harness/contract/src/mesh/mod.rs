@@ -76,19 +76,6 @@ impl Mesh {
         }
     }
 
-    /// The same with the ranks of the words, if a tree has them. Those of a part have its index as their rank.
-    ///
-    /// # Errors
-    /// As [`Mesh::stream`].
-    pub fn stream_ranked(&self, run: &mut RankedRun) -> Result<(), Unusable> {
-        match &self.tree_file {
-            Some(tree) => tree
-                .words_and_ranks(&mut |words, ranks| run(0, words, ranks))
-                .map_err(|why| of_tree(tree, &why)),
-            None => merge::merge(&self.parts, &mut |part, words| run(part, words, &[])),
-        }
-    }
-
     /// Visits all leaf words in ascending order.
     ///
     /// # Errors
@@ -150,9 +137,6 @@ impl Mesh {
         Unusable::at(&self.dir, why)
     }
 }
-
-/// What is given the words of a part, with its number, and their ranks.
-pub type RankedRun<'r> = dyn FnMut(usize, &[u64], &[u32]) -> bool + 'r;
 
 /// The end of the leaves so far, as a Morton code.
 #[derive(Clone, Copy, Debug, Default)]

@@ -9,11 +9,11 @@
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
-use super::leaves::{Leaves, Point};
 use super::patches::Patches;
 use super::points::Points;
-use super::squares::squares;
+use crate::leaves::{Leaves, Point};
 use crate::options::Options;
+use crate::squares::squares;
 use contract::failure::Failure;
 
 /// The faces.
@@ -87,6 +87,11 @@ impl Faces {
     /// Number of faces.
     pub fn count(&self) -> usize {
         self.owner.len()
+    }
+
+    /// The vertices of all faces.
+    pub fn all(&self) -> impl Iterator<Item = &[u32]> {
+        (0..self.count()).map(|face| self.vertices(face))
     }
 
     /// The vertices of a face.

@@ -8,8 +8,8 @@ use contract::octant::UNITS_PER_CELL;
 use contract::stl;
 use geometry::tree::{FacetTree, Point};
 
-use super::leaves::Content;
-use super::squares::Square;
+use crate::leaves::Content;
+use crate::squares::Square;
 
 /// Patches of the root's sides.
 pub const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];

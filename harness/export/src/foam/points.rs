@@ -6,10 +6,10 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word::{self, KEY_END};
 use rustc_hash::FxHashMap;
 
-use super::leaves::{Leaves, Point};
-use super::squares::{Square, squares};
-use crate::near_body::polygons::hanging;
+use crate::front::polygons::hanging;
+use crate::leaves::{Leaves, Point};
 use crate::options::Options;
+use crate::squares::{Square, squares};
 use contract::failure::Failure;
 
 /// Number of points that can be distinguished.

@@ -1,42 +1,28 @@
-//! The XML of `.vtu` and `.pvtu` files.
+//! The XML of a `.vtu` file.
 
 use std::fmt::Write;
 
 use contract::digest::Digest;
 use contract::lattice::Root;
+use contract::manifest::Sides;
 
-/// The line that marks files of this program, which it may replace.
-pub const MARK: &str = "<!-- Written by harness export. -->\n";
+use crate::mesh::Mesh;
 
-/// An array of a piece.
-#[derive(Debug)]
-pub struct Array {
-    /// Its section in the XML.
-    section: &'static str,
-    /// Its name.
-    name: &'static str,
-    /// VTK's name of its type.
-    kind: &'static str,
-}
-
-const fn array(section: &'static str, name: &'static str, kind: &'static str) -> Array {
-    Array { section, name, kind }
-}
-
-/// The arrays of a piece, in the order in which they are written. Ranks or sides are missing if they are unknown.
-const ARRAYS: [Array; 9] = [
-    array("Points", "Points", "Float64"),
-    array("Cells", "connectivity", "Int64"),
-    array("Cells", "offsets", "Int64"),
-    array("Cells", "types", "UInt8"),
-    array("CellData", "level", "UInt8"),
-    array("CellData", "rank", "UInt32"),
-    array("CellData", "spacing", "Float64"),
-    array("CellData", "id", "Int64"),
-    array("CellData", "side", "UInt8"),
+/// The arrays of a piece, in the order in which they are written: section in the XML, name, and VTK's name of the type. Ranks or sides
+/// are missing if they are unknown.
+const ARRAYS: [(&str, &str, &str); 9] = [
+    ("Points", "Points", "Float64"),
+    ("Cells", "connectivity", "Int64"),
+    ("Cells", "offsets", "Int64"),
+    ("Cells", "types", "UInt8"),
+    ("CellData", "level", "UInt8"),
+    ("CellData", "rank", "UInt32"),
+    ("CellData", "spacing", "Float64"),
+    ("CellData", "id", "Int64"),
+    ("CellData", "side", "UInt8"),
 ];
 
-/// What a file states about itself.
+/// What a file states about itself before it has leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct Content {
     /// The root of the mesh.
@@ -45,8 +31,6 @@ pub struct Content {
     pub with_ranks: bool,
     /// Whether cells have sides.
     pub with_sides: bool,
-    /// Digest of the leaves in the file.
-    pub digest: Digest,
 }
 
 /// Place and size of a piece in its file.
@@ -68,87 +52,64 @@ impl Place {
 }
 
 impl Content {
-    fn arrays(&self) -> impl Iterator<Item = &'static Array> {
-        let Self { with_ranks, with_sides, .. } = *self;
-        ARRAYS.iter().filter(move |array| match array.name {
-            "rank" => with_ranks,
-            "side" => with_sides,
-            _ => true,
-        })
+    /// What files of this mesh state.
+    pub fn of(mesh: &Mesh) -> Self {
+        Self {
+            root: mesh.manifest.root,
+            with_ranks: mesh.has_ranks(),
+            with_sides: mesh.manifest.sides == Sides::Known,
+        }
     }
 
-    /// A `.vtu` file up to the appended data, filled up with blanks to `length` bytes.
-    pub fn vtu(&self, places: &[Place], length: usize) -> String {
-        let mut xml = self.start("UnstructuredGrid", "");
-        for Place { points, cells, offsets } in places {
-            let counts = format!("NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\"");
-            xml += &format!("    <Piece {counts}>\n");
-            xml += &self.sections("", |index| {
-                format!(" format=\"appended\" offset=\"{}\"", offsets[index])
-            });
-            xml += "    </Piece>\n";
+    /// The file up to the appended data, with the digest of its leaves, filled up with blanks to `length` bytes.
+    pub fn header(&self, places: &[Place], digest: Digest, length: usize) -> String {
+        let Root { origin: [x, y, z], edge } = self.root;
+        // VTK reads text as the codes of its characters.
+        let codes = digest.to_string().bytes().fold(String::new(), |mut codes, byte| {
+            let _ = write!(codes, "{byte} ");
+            codes
+        });
+        let mut xml = format!(
+            "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
+             <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+             compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n    <FieldData>\n      \
+             <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
+             {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
+             <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
+             </FieldData>\n"
+        );
+        for place in places {
+            self.piece(place, &mut xml);
         }
         let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
         let blanks = length.saturating_sub(xml.len() + end.len());
         xml + &" ".repeat(blanks) + end
     }
 
-    /// A `.pvtu` file with the pieces in these files, whose names are relative to its directory.
-    pub fn pvtu(&self, files: &[String]) -> String {
-        let mut xml = self.start("PUnstructuredGrid", " GhostLevel=\"0\"");
-        xml += &self.sections("P", |_| String::new());
-        for file in files {
-            xml += &format!("    <Piece Source=\"{}\"/>\n", escaped(file));
-        }
-        xml + "  </PUnstructuredGrid>\n</VTKFile>\n"
-    }
-
-    fn start(&self, grid: &str, attributes: &str) -> String {
-        let Root { origin: [x, y, z], edge } = self.root;
-        // VTK reads text as the codes of its characters.
-        let digest = self.digest.to_string().bytes().fold(String::new(), |mut codes, byte| {
-            let _ = write!(codes, "{byte} ");
-            codes
-        });
-        format!(
-            "<?xml version=\"1.0\"?>\n{MARK}\
-             <VTKFile type=\"{grid}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
-             compressor=\"vtkZLibDataCompressor\">\n  <{grid}{attributes}>\n    <FieldData>\n      \
-             <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
-             {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
-             <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{digest}0</DataArray>\n    \
-             </FieldData>\n"
-        )
-    }
-
-    /// The arrays in their sections; `attributes` returns further attributes of an array.
-    fn sections(&self, prefix: &str, attributes: impl Fn(usize) -> String) -> String {
-        let mut xml = String::new();
-        for section in ["Points", "Cells", "CellData"] {
-            // The cells of parts are not described in the file that names the parts.
-            if section == "Cells" && prefix == "P" {
-                continue;
+    fn piece(&self, Place { points, cells, offsets }: &Place, xml: &mut String) {
+        let is_known = |name: &str| match name {
+            "rank" => self.with_ranks,
+            "side" => self.with_sides,
+            _ => true,
+        };
+        *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
+        let arrays = ARRAYS.iter().filter(|(_, name, _)| is_known(name)).zip(offsets);
+        let arrays: Vec<_> = arrays.collect();
+        for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {
+            let section = arrays[0].0.0;
+            let (scalars, components) = match section {
+                "CellData" => (" Scalars=\"level\"", ""),
+                "Points" => ("", " NumberOfComponents=\"3\""),
+                _ => ("", ""),
+            };
+            *xml += &format!("      <{section}{scalars}>\n");
+            for ((_, name, kind), offset) in arrays {
+                *xml += &format!(
+                    "        <DataArray type=\"{kind}\" Name=\"{name}\"{components} format=\"appended\" offset=\"{offset}\"/>\n"
+                );
             }
-            let scalars = if section == "CellData" { " Scalars=\"level\"" } else { "" };
-            xml += &format!("      <{prefix}{section}{scalars}>\n");
-            for (index, array) in self.arrays().enumerate() {
-                if array.section == section {
-                    let Array { name, kind, .. } = array;
-                    let components =
-                        if section == "Points" { " NumberOfComponents=\"3\"" } else { "" };
-                    let attributes = attributes(index);
-                    xml += &format!(
-                        "        <{prefix}DataArray type=\"{kind}\" Name=\"{name}\"{components}{attributes}/>\n"
-                    );
-                }
-            }
-            xml += &format!("      </{prefix}{section}>\n");
+            *xml += &format!("      </{section}>\n");
         }
-        xml
+        *xml += "    </Piece>\n";
     }
-}
-
-/// Text as the value of an attribute.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -1,60 +1,70 @@
-//! Cells as VTK's unstructured grids: `.vtu`, and `.pvtu` with files of its own.
+//! Cells as VTK's unstructured grid, in one `.vtu` file.
 //!
 //! Each leaf is a hexahedron. The mesh is written in pieces of at most [`PIECE`] leaves, one per thread at a time, so memory does
 //! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
-//! - `header`: the XML, and which arrays exist; `piece`: the arrays; `points`: their numbers; `zlib`: their compression;
-//! - `file`: one `.vtu` file; `parallel`: the files of a `.pvtu`.
+//! - `header`: the XML, and which arrays exist; `piece`: the arrays; `points`: their numbers; `zlib`: their compression.
 
-mod file;
 mod header;
-mod parallel;
 mod piece;
 mod points;
 mod zlib;
 
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 use std::thread;
 
 use contract::digest::Digest;
 use contract::files;
-use contract::manifest::Sides;
 
 use crate::mesh::Mesh;
 use crate::options::{Options, Summary};
 use crate::selection::Selection;
 use crate::written::Written;
 use contract::failure::Failure;
-use file::VtuFile;
-use header::Content;
+use header::{Content, Place};
 use piece::{Encoded, Encoder};
-
-pub use parallel::write_files;
 
 /// Maximum number of leaves in a piece.
 pub const PIECE: u64 = 1 << 19;
 
-/// Writes one `.vtu` file.
+/// What follows the data.
+const END: &str = "\n  </AppendedData>\n</VTKFile>\n";
+
+/// Writes the file. The XML precedes the data that it describes. Its place is reserved for as many pieces as there will be, and it is
+/// written last.
 ///
 /// # Errors
 /// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
-pub fn write_file(
+pub fn write(
     mesh: &Mesh,
     selection: &Selection,
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, Failure> {
     let leaves = mesh.count(selection, &|| options.check())?;
+    let content = Content::of(mesh);
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
-        let file = file.try_clone().map_err(named)?;
-        let mut file =
-            VtuFile::begin(file, content(mesh), leaves.div_ceil(PIECE) as usize).map_err(named)?;
-        encode(mesh, selection, leaves, options, &mut |piece| file.append(&piece).map_err(named))?;
-        let bytes = file.finish().map_err(named)?;
+        let (mut places, mut digest, mut data_bytes) = (Vec::new(), Digest::default(), 0);
+        let longest = vec![Place::longest(); leaves.div_ceil(PIECE) as usize];
+        let header_bytes = content.header(&longest, digest, 0).len();
+        file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
+        encode(mesh, selection, leaves, &content, options, &mut |piece| {
+            // The user's interrupt waits for a flush to end, so none may have much to flush.
+            file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
+            places.push(piece.place(data_bytes));
+            data_bytes += piece.bytes.len() as u64;
+            digest.merge(piece.digest);
+            Ok(())
+        })?;
+        let header = content.header(&places, digest, header_bytes);
+        file.write_all(END.as_bytes()).map_err(named)?;
+        file.seek(SeekFrom::Start(0)).map_err(named)?;
+        file.write_all(header.as_bytes()).map_err(named)?;
         options.check()?;
-        Ok(bytes)
+        Ok(header_bytes as u64 + data_bytes + END.len() as u64)
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
@@ -65,10 +75,10 @@ fn encode(
     mesh: &Mesh,
     selection: &Selection,
     leaves: u64,
+    content: &Content,
     options: &Options<'_>,
     take: &mut dyn FnMut(Encoded) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let content = &content(mesh);
     let (mut written, check) = (Written::default(), || options.check());
     let mut flush = |encoders: &mut [Encoder]| {
         check()?;
@@ -103,14 +113,4 @@ fn encode(
     flush(&mut encoders[..=filling])?;
     written.check_invariants(mesh, selection, leaves);
     Ok(())
-}
-
-/// What files of this mesh state about themselves before they have leaves.
-fn content(mesh: &Mesh) -> Content {
-    Content {
-        root: mesh.manifest.root,
-        with_ranks: mesh.has_ranks(),
-        with_sides: mesh.manifest.sides == Sides::Known,
-        digest: Digest::default(),
-    }
 }

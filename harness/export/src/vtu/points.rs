@@ -1,12 +1,8 @@
 //! The points of a piece: the corners of its leaves without duplicates.
 
-use contract::octant::LEVEL_MAX;
 use rustc_hash::FxHashMap;
 
 use crate::leaf::Leaf;
-
-/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
-type Point = [u32; 3];
 
 /// Corners of a hexahedron in VTK's order, in cell edges.
 const CORNERS: [[u32; 3]; 8] =
@@ -15,16 +11,12 @@ const CORNERS: [[u32; 3]; 8] =
 /// Points and cells of a piece.
 #[derive(Debug, Default)]
 pub struct Points {
-    /// The points in order of their numbers, packed: 20 bits per axis, because coordinates range from 0 to 2^19 inclusive.
+    /// The points in order of their numbers, packed: 20 bits per axis, because coordinates range from 0 to 2^19 level-19 cells inclusive.
     pub packed: Vec<u64>,
     /// Eight numbers for each leaf, in VTK's order.
     pub connectivity: Vec<u32>,
-    /// Index of each brick by its key: four by four by four points of the coarsest grid that has them.
-    index: FxHashMap<u64, usize>,
-    /// One more than the number of each point of a brick, or 0. Points that are searched one after the other are near each other in memory.
-    bricks: Vec<[u32; 64]>,
-    /// Key and index of the brick that was searched last.
-    last: (u64, usize),
+    /// The number of each point by its packed coordinates.
+    numbers: FxHashMap<u64, u32>,
 }
 
 impl Points {
@@ -32,13 +24,14 @@ impl Points {
     pub fn set(&mut self, leaves: &[Leaf]) {
         self.packed.clear();
         self.connectivity.clear();
-        self.index.clear();
-        self.bricks.clear();
-        self.last = (u64::MAX, 0);
+        self.numbers.clear();
         for Leaf { octant, .. } in leaves {
             for corner in CORNERS {
-                let at = [0, 1, 2].map(|a| octant.corner[a] + octant.edge() * corner[a]);
-                let number = self.number(at);
+                let at = packed([0, 1, 2].map(|a| octant.corner[a] + octant.edge() * corner[a]));
+                let number = *self.numbers.entry(at).or_insert(self.packed.len() as u32);
+                if number as usize == self.packed.len() {
+                    self.packed.push(at);
+                }
                 self.connectivity.push(number);
             }
         }
@@ -59,32 +52,6 @@ impl Points {
         let last = self.connectivity.iter().max().map_or(0, |last| *last as usize + 1);
         assert_eq!(last, self.packed.len(), "points of cells and all points");
     }
-
-    /// The number of a point, which is a new one if the point is new.
-    fn number(&mut self, point: Point) -> u32 {
-        let (key, at) = place(point);
-        if self.last.0 != key {
-            let brick = *self.index.entry(key).or_insert(self.bricks.len());
-            if brick == self.bricks.len() {
-                self.bricks.push([0; 64]);
-            }
-            self.last = (key, brick);
-        }
-        let brick = self.last.1;
-        if self.bricks[brick][at] == 0 {
-            self.packed.push(packed(point));
-            self.bricks[brick][at] = self.packed.len() as u32;
-        }
-        self.bricks[brick][at] - 1
-    }
-}
-
-/// The key of a point's brick, and the point's index there, below 64.
-fn place(point: Point) -> (u64, usize) {
-    let zeros = (point[0] | point[1] | point[2]).trailing_zeros().min(u32::from(LEVEL_MAX));
-    let [x, y, z] = point.map(|c| (u64::from(c >> zeros >> 2), (c >> zeros & 3) as usize));
-    let key = x.0 | y.0 << 18 | z.0 << 36 | u64::from(zeros) << 54;
-    (key, x.1 | y.1 << 2 | z.1 << 4)
 }
 
 /// A corner as one number.

@@ -6,7 +6,7 @@
 //! - No facet is nearer to a leg that counts than half of the least width, and none meets any leg.
 //! - The narrowest place is a point of the path; its width lies between its bounds, is no more than that of any point that counts, and is
 //!   twice the distance to the nearest facet, which is one of the rim.
-//! - Levels that join the ends, the level that closes or opens, and the existence of a path agree.
+//! - A path exists iff there is a leak; only a leak closes, at a level coarser than that of the path, which is no finer than the case's.
 
 use super::ends::{Target, is_free, leaf_at};
 use super::report::{Passage, Report};
@@ -25,33 +25,16 @@ const GROUP: usize = 32;
 impl Report {
     /// Asserts the invariants, with the sorted words of the base tree that the path leads through.
     pub fn check_invariants(&self, case: &Case, words: &[u64]) {
-        let (own, is_leak) = (self.spacing.level, self.is_leak);
-        let [answer, other] = match is_leak {
-            true => [self.closes, self.opens],
-            false => [self.opens, self.closes],
-        };
-        let last = self.levels.len() - 1;
-        for (i, meshed) in self.levels.iter().enumerate() {
-            let level = if is_leak { own.checked_sub(i as u8) } else { own.checked_add(i as u8) };
-            let is_joined = is_leak != (i == last && answer.is_some());
-            let found = (Some(meshed.spacing.level), meshed.is_joined);
-            assert_eq!(found, (level, is_joined), "level {i} of {:?}", self.levels);
-        }
-        let is_last = |level| last > 0 && self.levels[last].spacing.level == level;
-        assert!(
-            other.is_none() && answer.is_none_or(|answer| is_last(answer.level)),
-            "{answer:?} and {other:?} of {:?}",
-            self.levels
-        );
-        let known = [self.opens.is_some(), self.is_separated, self.limit.is_some()];
-        let reasons = known.iter().filter(|&&is| is).count();
-        assert_eq!(reasons, usize::from(!is_leak), "reasons to end a search: {known:?}");
-        let is_joined = is_leak || self.opens.is_some();
-        assert_eq!(self.passage.is_some(), is_joined, "a path exists iff a level joins the ends");
+        let Self { is_leak, closes, .. } = *self;
+        assert_eq!(self.passage.is_some(), is_leak, "a path exists iff the ends are joined");
+        assert!(is_leak || closes.is_none(), "{closes:?} closes no leak");
         if let Some(passage) = &self.passage {
+            let coarsest = closes.map_or(0, |closes| closes.spacing.level + 1);
             let level = passage.spacing.level;
-            let is_joined = self.levels.iter().any(|m| m.is_joined && m.spacing.level == level);
-            assert!(is_joined, "no path leads through level {level}");
+            assert!(
+                (coarsest..=self.spacing.level).contains(&level),
+                "a path through level {level} with {closes:?}"
+            );
             passage.check_invariants(case, words, self.from, self.to);
         }
     }
@@ -145,7 +128,7 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use super::super::Leaks;
-    use super::super::report::Spacing;
+    use super::super::report::{Closes, Spacing};
     use super::*;
     use contract::failure::Failure;
     use contract::testing::base_tree;
@@ -169,7 +152,7 @@ mod tests {
         let text = "spacing_min = 0.015625\n[root]\norigin = [-0.99, -1.03, -1.01]\nedge = 2.0";
         let case = Case::from_parts(text, facets).unwrap();
         let tree = |level| Ok::<_, Failure>(base_tree(&case.facets_lattice, level));
-        let mut leaks = Leaks::new(&case, tree, 1_000_000, &Silent).unwrap();
+        let mut leaks = Leaks::new(&case, tree, &Silent).unwrap();
         let report = leaks.answers(&[([0.01; 3], Target::Far)]).unwrap().examined.remove(0);
         let level = report.passage.as_ref().unwrap().spacing.level;
         let words = leaks.trees[&level].clone();
@@ -191,7 +174,7 @@ mod tests {
             p.points.push(end);
             (p.inner.1, p.narrowest.index) = (p.points.len() - 1, p.inner.0);
         };
-        let plants: [Plant; 14] = [
+        let plants: [Plant; 13] = [
             ("a point outside the root", &|_, p| p.points[1].at[0] = 1398.0),
             ("another start", &|_, p| p.points[0].at[1] += 0.1),
             ("an end off the boundary", &|_, p| p.points.truncate(p.points.len() - 1)),
@@ -208,11 +191,9 @@ mod tests {
             ("an end that is wider", &|_, p| p.narrowest.is_end = true),
             ("a path through another tree", &|_, p| p.spacing = Spacing { level: 1, ..p.spacing }),
             ("no leak with a path", &|r, _| r.is_leak = false),
-            ("a level that closes and is open", &|r, _| {
-                r.closes = Some(r.levels[1].spacing);
-                r.levels[1].is_joined = true;
+            ("a level that closes and has the path", &|r, p| {
+                r.closes = Some(Closes { spacing: p.spacing, is_end_crossed: false });
             }),
-            ("a leak of separated places", &|r, _| r.is_separated = true),
         ];
         for (what, plant) in plants {
             let mut wrong = right.clone();

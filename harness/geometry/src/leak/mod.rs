@@ -1,8 +1,8 @@
 //! Leaks: does a path of free leaves of the base tree join two places, how wide is it, and at which spacing does it
-//! close or open?
+//! close?
 //!
 //! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
-//! - [`regions`]: where paths start and end if the user does not say; [`ends`]: the ends of the path; [`surface`]: whether the facets form a closed surface between them;
+//! - [`ends`]: where paths start and end;
 //! - [`report`]: the answer as data; [`invariants`]: what it satisfies; [`text`]: the answer for a terminal.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
@@ -12,10 +12,8 @@
 pub mod ends;
 mod invariants;
 mod passage;
-mod regions;
 pub mod report;
 mod space;
-mod surface;
 mod text;
 
 use std::collections::BTreeMap;
@@ -23,10 +21,9 @@ use std::collections::BTreeMap;
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::Failure;
-use contract::octant::LEVEL_MAX;
 use contract::watch::Watch;
 use ends::Target;
-use report::{Answers, Meshed, Report, SCHEMA, Spacing};
+use report::{Answers, Closes, Report, SCHEMA, Spacing};
 use space::{Goal, Space};
 
 /// A case whose openings are searched.
@@ -37,8 +34,6 @@ pub struct Leaks<'a, F> {
     make: F,
     /// Those that were made.
     trees: BTreeMap<u8, Vec<u64>>,
-    /// Refinement ends before a base tree that would have more leaves than this.
-    leaves_max: u64,
     watch: &'a dyn Watch,
 }
 
@@ -47,17 +42,12 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     ///
     /// # Errors
     /// If the case has no facets.
-    pub fn new(
-        case: &'a Case,
-        make: F,
-        leaves_max: u64,
-        watch: &'a dyn Watch,
-    ) -> Result<Self, Failure> {
+    pub fn new(case: &'a Case, make: F, watch: &'a dyn Watch) -> Result<Self, Failure> {
         if case.facets.is_empty() {
             return Err(Failure::input("the case has no facets, so nothing separates places"));
         }
         let facets = FacetTree::new(&case.facets_lattice);
-        Ok(Self { case, facets, make, trees: BTreeMap::new(), leaves_max, watch })
+        Ok(Self { case, facets, make, trees: BTreeMap::new(), watch })
     }
 
     /// Answers for pairs of places, with their invariants checked.
@@ -81,48 +71,24 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         };
         let ends = (start, end);
         self.make_tree(level)?;
-        let mut levels = vec![self.search(level, ends)?];
-        if levels[0].why.is_some() {
+        let Some(is_leak) = self.search(level, ends)? else {
             return Err(Failure::input(self.crossed_end(level, ends)));
-        }
-        let spacing = |level| Spacing::of(level, root);
-        let mut report = Report {
-            from,
-            to,
-            spacing: spacing(level),
-            is_leak: levels[0].is_joined,
-            closes: None,
-            opens: None,
-            is_separated: false,
-            limit: None,
-            passage: None,
-            levels: Vec::new(),
         };
-        let mut measured = None;
-        if report.is_leak {
+        let spacing = Spacing::of(level, root);
+        let mut report = Report { from, to, spacing, is_leak, closes: None, passage: None };
+        if is_leak {
             // A leaf of the level that joins the ends is free, so the opening is at least as wide, or 4 times the leaves two levels
             // below. There the widest ball's centre lies in free leaves: no finer tree has a wider path.
             const DEEPER: u8 = 2;
-            report.closes = self.coarsen(ends, &mut levels)?.map(spacing);
-            let open = report.closes.map_or(0, |closes| closes.level + 1);
-            measured = Some(level.min(open + DEEPER));
-        } else if self.is_separated(level, ends) {
-            report.is_separated = true;
-        } else {
-            match self.refine(ends, &mut levels)? {
-                Ok(open) => (report.opens, measured) = (Some(spacing(open)), Some(open)),
-                Err(limit) => report.limit = Some(limit),
-            }
-        }
-        report.levels = levels;
-        if let Some(level) = measured {
+            report.closes = self.coarsen(ends)?;
+            let open = report.closes.map_or(0, |closes| closes.spacing.level + 1);
+            let measured = level.min(open + DEEPER);
             self.watch.step("measuring the width");
             let stop = || self.watch.is_interrupted();
-            let tree = (level, &self.trees[&level][..]);
+            let tree = (measured, &self.trees[&measured][..]);
             report.passage = Some(passage::widest((self.case, &self.facets), tree, ends, &stop)?);
+            report.check_invariants(self.case, &self.trees[&measured]);
         }
-        let words = measured.map_or(&[][..], |level| &self.trees[&level]);
-        report.check_invariants(self.case, words);
         Ok(report)
     }
 
@@ -135,24 +101,24 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         Ok(())
     }
 
-    /// Whether free leaves of a base tree join the ends. The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, (from, to): (Point, Option<Point>)) -> Result<Meshed, Failure> {
+    /// Whether free leaves of a base tree join the ends; `None` if facets cross the leaf of one. The coarsest leaves are searched first: few
+    /// of them lead far.
+    fn search(
+        &self,
+        level: u8,
+        (from, to): (Point, Option<Point>),
+    ) -> Result<Option<bool>, Failure> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let words = &self.trees[&level];
-        let mut space = Space::new(words, &self.facets)?;
         let is_crossed = |at: Point| !ends::is_free(ends::leaf_at(words, at));
-        let why = match (is_crossed(from), to.is_some_and(is_crossed)) {
-            (true, _) => Some("facets cross the leaf of the start"),
-            (_, true) => Some("facets cross the leaf of the end"),
-            _ => None,
-        };
+        if is_crossed(from) || to.is_some_and(is_crossed) {
+            return Ok(None);
+        }
+        let mut space = Space::new(words, &self.facets)?;
         let stop = || self.watch.is_interrupted();
         let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
         let edge = |space: &mut Space, cell| space.edge(cell);
-        let is_joined =
-            why.is_none() && space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some();
-        let spacing = Spacing::of(level, &self.case.root);
-        Ok(Meshed { spacing, leaves: words.len() as u64, is_joined, why })
+        Ok(Some(space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some()))
     }
 
     /// Why an end is not in a free leaf, for the user.
@@ -164,56 +130,16 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
             .expect("an end is crossed")
     }
 
-    /// Whether a closed surface separates the centres of the leaves at the ends.
-    fn is_separated(&self, level: u8, (from, to): (Point, Option<Point>)) -> bool {
-        let centre = |at| ends::centre(ends::leaf_at(&self.trees[&level], at));
-        surface::separates(&self.case.facets_lattice, centre(from), to.map(centre))
-    }
-
-    /// Coarsens the surface until the ends are not joined. Returns that level.
-    fn coarsen(
-        &mut self,
-        ends: (Point, Option<Point>),
-        levels: &mut Vec<Meshed>,
-    ) -> Result<Option<u8>, Failure> {
+    /// Coarsens the surface until the ends are not joined.
+    fn coarsen(&mut self, ends: (Point, Option<Point>)) -> Result<Option<Closes>, Failure> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
-            levels.push(self.search(level, ends)?);
-            if !levels[levels.len() - 1].is_joined {
-                return Ok(Some(level));
+            let found = self.search(level, ends)?;
+            if found != Some(true) {
+                let spacing = Spacing::of(level, &self.case.root);
+                return Ok(Some(Closes { spacing, is_end_crossed: found.is_none() }));
             }
         }
         Ok(None)
-    }
-
-    /// Meshes finer until the ends are joined. Returns that level, or the limit that was met before.
-    fn refine(
-        &mut self,
-        ends: (Point, Option<Point>),
-        levels: &mut Vec<Meshed>,
-    ) -> Result<Result<u8, String>, Failure> {
-        // Halving the spacing of a surface multiplies its leaves by four.
-        const GROWTH: u64 = 4;
-        for level in self.case.level_surface + 1..=LEVEL_MAX {
-            let expected = levels[levels.len() - 1].leaves * GROWTH;
-            if expected > self.leaves_max {
-                let max = self.leaves_max;
-                return Ok(Err(format!(
-                    "level {level} would have about {expected} leaves, more than the limit of {max} (--leaves-max)"
-                )));
-            }
-            match self.make_tree(level) {
-                Err(failure) if !self.watch.is_interrupted() => {
-                    return Ok(Err(format!("level {level} could not be meshed: {failure}")));
-                }
-                made => made?,
-            }
-            levels.push(self.search(level, ends)?);
-            if levels[levels.len() - 1].is_joined {
-                return Ok(Ok(level));
-            }
-            self.trees.remove(&level);
-        }
-        Ok(Err(format!("level {LEVEL_MAX} is the finest")))
     }
 }

@@ -1,4 +1,4 @@
-//! The answer as data; JSON of the schema `octree-leak/3` when serialised. Lengths are in the user's units.
+//! The answer as data; JSON of the schema `octree-leak/4` when serialised. Lengths are in the user's units.
 //!
 //! Its invariants are in [`super::invariants`].
 
@@ -7,7 +7,7 @@ use contract::lattice::Root;
 use serde::Serialize;
 
 /// Name and version of the JSON form.
-pub const SCHEMA: &str = "octree-leak/3";
+pub const SCHEMA: &str = "octree-leak/4";
 
 /// A surface level and its spacing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -25,19 +25,14 @@ impl Spacing {
     }
 }
 
-/// A base tree that was searched.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Meshed {
+/// The coarser base tree that does not join the ends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Closes {
     /// Its surface level and spacing.
     #[serde(flatten)]
     pub spacing: Spacing,
-    /// Number of its leaves.
-    pub leaves: u64,
-    /// Whether free leaves join the ends.
-    pub is_joined: bool,
-    /// Why not, if an end is in a crossing leaf.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub why: Option<&'static str>,
+    /// Whether facets cross the leaf of an end there.
+    pub is_end_crossed: bool,
 }
 
 /// A point of a path.
@@ -97,18 +92,9 @@ pub struct Report {
     /// Whether free leaves of the case's base tree join the ends.
     pub is_leak: bool,
     /// The coarser level, the nearest to the case's, whose base tree does not join the ends.
-    pub closes: Option<Spacing>,
-    /// The finer level, the nearest to the case's, whose base tree joins the ends.
-    pub opens: Option<Spacing>,
-    /// Whether the facets are proven to form a closed surface between the ends, so that no spacing joins them. Not examined if
-    /// there is a leak.
-    pub is_separated: bool,
-    /// The limit at which refinement ended without joining the ends.
-    pub limit: Option<String>,
-    /// The widest path, at the case's level or a coarser one that joins the ends; if none does, at the level that opens.
+    pub closes: Option<Closes>,
+    /// The widest path if there is a leak, at the case's level or a coarser one that joins the ends.
     pub passage: Option<Passage>,
-    /// Every base tree that was searched, in this order.
-    pub levels: Vec<Meshed>,
 }
 
 /// The answers for one case.

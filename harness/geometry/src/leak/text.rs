@@ -3,11 +3,12 @@
 use std::fmt;
 
 use super::ends::Target;
-use super::report::{Answers, Meshed, Passage, Report, Spacing};
+use super::report::{Answers, Closes, Passage, Report, Spacing};
 use contract::number::number;
 
 /// Facets at the rim that are printed.
 const FACETS_MAX: usize = 24;
+const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
 
 impl fmt::Display for Answers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -30,67 +31,34 @@ impl fmt::Display for Report {
         writeln!(f, "from      {}", point(&self.from))?;
         writeln!(f, "to        {to}")?;
         writeln!(f, "spacing   {}", spacing(&self.spacing))?;
-        writeln!(f, "\n{:>5} {:>12} {:>12}  path", "level", "spacing", "leaves")?;
-        self.levels.iter().try_for_each(|level| row(level, f))?;
-        match (self.is_leak, &self.closes, &self.opens, &self.limit) {
-            (true, Some(closes), ..) => {
-                let why = self.levels.last().and_then(|level| level.why);
-                let why = why.map_or(String::new(), |why| format!(", where {why}"));
-                writeln!(f, "\n{}; closed at spacing {}{why}", self.verdict(), spacing(closes))?;
-            }
-            (true, None, ..) => writeln!(f, "\n{}, at every spacing", self.verdict())?,
-            (false, _, Some(opens), _) => {
-                writeln!(
-                    f,
-                    "\nno leak at this spacing; it would open at spacing {}",
-                    spacing(opens)
-                )?;
-            }
-            (false, ..) if self.is_separated => {
-                writeln!(
-                    f,
-                    "\nno leak at any spacing: the facets form a closed surface between start and end"
-                )?;
-            }
-            (false, _, _, limit) => {
-                let limit = limit.as_deref().unwrap_or_default();
-                writeln!(
-                    f,
-                    "\nno leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: {limit}"
-                )?;
+        match (&self.passage, &self.closes) {
+            (None, _) => writeln!(f, "\nno leak at this spacing"),
+            (Some(passage), closes) => {
+                let verdict = match passage.narrowest.is_end {
+                    true => {
+                        "JOINED: start and end lie in one space, or one of them within the opening"
+                    }
+                    false => "LEAK: free leaves join start and end",
+                };
+                let closed = match closes {
+                    None => ", at every spacing".to_owned(),
+                    Some(Closes { spacing: at, is_end_crossed }) => {
+                        let crossed = if *is_end_crossed { ENDS_CROSSED } else { "" };
+                        format!("; closed at spacing {}{crossed}", spacing(at))
+                    }
+                };
+                writeln!(f, "\n{verdict}{closed}")?;
+                describe(passage, f)
             }
         }
-        self.passage.iter().try_for_each(|passage| describe(passage, f))
     }
-}
-
-impl Report {
-    /// What it means that free leaves join start and end.
-    fn verdict(&self) -> &'static str {
-        match &self.passage {
-            Some(passage) if passage.narrowest.is_end => {
-                "JOINED: start and end lie in one space, or one of them within the opening"
-            }
-            _ => "LEAK: free leaves join start and end",
-        }
-    }
-}
-
-fn row(meshed: &Meshed, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let path = match (meshed.is_joined, meshed.why) {
-        (true, _) => "open".to_owned(),
-        (false, None) => "closed".to_owned(),
-        (false, Some(why)) => format!("closed: {why}"),
-    };
-    let Spacing { level, spacing } = meshed.spacing;
-    writeln!(f, "{level:>5} {:>12} {:>12}  {path}", rounded_up(spacing), meshed.leaves)
 }
 
 fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let narrowest = &passage.narrowest;
     let [min, width, max] = [narrowest.width_min, narrowest.width, narrowest.width_max].map(number);
     let cells = number(narrowest.width_cells);
-    writeln!(f, "\nThe narrowest place of the widest path (level {})", passage.spacing.level)?;
+    writeln!(f, "\nThe narrowest place of the widest path")?;
     writeln!(
         f,
         "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}"
@@ -161,35 +129,24 @@ mod tests {
         let root = Root { origin: [0.0; 3], edge: 8.0 };
         let point = |i: usize| Point { at: [i as f64, 0.0, 1.0], width: 0.5 + i as f64 };
         let spacing = Spacing::of(4, &root);
-        let meshed = |level, is_joined, why| Meshed {
-            spacing: Spacing::of(level, &root),
-            leaves: 100 * u64::from(level),
-            is_joined,
-            why,
-        };
         let points: Vec<Point> = (0..points).map(point).collect();
         Report {
             from: [0.0, 0.25, 1.0],
             to: Target::Far,
             spacing,
             is_leak: true,
-            closes: Some(Spacing::of(2, &root)),
-            opens: None,
-            is_separated: false,
-            limit: None,
+            closes: Some(Closes { spacing: Spacing::of(2, &root), is_end_crossed: true }),
             passage: Some(Passage { spacing, narrowest, inner: (0, points.len() - 1), points }),
-            levels: vec![meshed(4, true, None), meshed(2, false, Some("the end is in a wall"))],
         }
     }
 
-    const HEAD: &str = "from      (0, 0.25, 1)\nto        the far field\nspacing   0.500 (level 4)\n\n\
-        level      spacing       leaves  path\n    4        0.500          400  open\n    \
-        2         2.00          200  closed: the end is in a wall\n\n";
+    const HEAD: &str =
+        "from      (0, 0.25, 1)\nto        the far field\nspacing   0.500 (level 4)\n\n";
 
     #[test]
     fn a_leak_is_described_with_its_opening_and_its_path() {
-        let expected = "LEAK: free leaves join start and end; closed at spacing 2.00 (level 2), where the end is in a wall\n\
-            \nThe narrowest place of the widest path (level 4)\n\
+        let expected = "LEAK: free leaves join start and end; closed at spacing 2.00 (level 2), where facets cross the leaf of the start or the end\n\
+            \nThe narrowest place of the widest path\n\
             width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
             Spacings above 0.128 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
             at        (0.5, 0, -1.25)\nfacets    3, 4\n";
@@ -218,22 +175,10 @@ mod tests {
     }
 
     #[test]
-    fn without_a_leak_the_answer_states_what_is_known_of_finer_spacings() {
+    fn without_a_leak_the_answer_is_one_line() {
         let mut report = leak(1, narrowest(3..4, 0, false));
         (report.is_leak, report.closes, report.passage) = (false, None, None);
-        let verdict = |report: &Report| report.to_string().split_off(HEAD.len());
-        report.limit = Some("the limit".to_owned());
-        let unknown = "no leak at this spacing, nor at any finer one that was tried; whether one leaks is not known: the limit\n";
-        assert_eq!(verdict(&report), unknown);
-        report.is_separated = true;
-        let never =
-            "no leak at any spacing: the facets form a closed surface between start and end\n";
-        assert_eq!(verdict(&report), never);
-        report.opens = Some(Spacing::of(5, &Root { origin: [0.0; 3], edge: 8.0 }));
-        assert_eq!(
-            verdict(&report),
-            "no leak at this spacing; it would open at spacing 0.250 (level 5)\n"
-        );
+        assert_eq!(report.to_string(), format!("{HEAD}no leak at this spacing\n"));
     }
 
     #[test]

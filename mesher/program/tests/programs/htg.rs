@@ -15,8 +15,7 @@ use std::path::Path;
 /// The file of a case that is meshed with a run configuration.
 fn tree_of(case: &Small, run: &Run, ungraded: bool, place: &Path) -> Vec<u8> {
     let directory = place.join("mesh");
-    let output =
-        Output { directory: directory.clone(), words: false, tree: true, cell_ranks: false };
+    let output = Output { directory: directory.clone(), words: false, tree: true };
     let options = Options { out: Some(output), ..crate::support::options(run.division, ungraded) };
     let case = case.mesher_case();
     let reports = sim::run(run.ranks, run.seed, |comm| {
@@ -88,7 +87,7 @@ fn a_tree_of_many_windows_does_not_depend_on_ranks_and_partitioner() {
 }
 
 #[test]
-fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
+fn the_command_writes_words_or_the_tree_or_both() {
     let workspace = Workspace::new();
     workspace.write("body.stl", crate::process::tetrahedron());
     let mesher = |args: &[&str]| {
@@ -107,7 +106,7 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
     assert_eq!(names("words"), ["leaves-00000.npy", "mesh.json"]);
     mesher(&["--out", "tree", "--write", "htg"]);
     assert_eq!(names("tree"), ["mesh.json", "mesh.vtkhdf"]);
-    mesher(&["--out", "both", "--write", "htg,words", "--cell-ranks", "--comm", "sim:3"]);
+    mesher(&["--out", "both", "--write", "htg,words", "--comm", "sim:3"]);
     assert_eq!(names("both").len(), 5);
     let read = |folder: &str| {
         let tree = TreeFile::open(&workspace.path().join(folder).join(TREE), true);
@@ -122,12 +121,8 @@ fn the_command_writes_words_or_the_tree_or_both_and_ranks_on_request() {
     };
     let [tree, both] = ["tree", "both"].map(|folder| read(folder).expect("a tree"));
     assert_eq!(tree, both);
-    for args in [&["--write", "htg"][..], &["--cell-ranks"]] {
-        let all = [&["body.stl", "--spacing-min=0.1"], args].concat();
-        run(workspace.mesher(&all)).refuses(INPUT, &["--out"]);
-    }
-    let args = ["body.stl", "--spacing-min=0.1", "--cell-ranks", "--out=words"];
-    refused(&workspace, &args, INPUT, &["--write htg"]);
+    let args = ["body.stl", "--spacing-min=0.1", "--write", "htg"];
+    run(workspace.mesher(&args)).refuses(INPUT, &["--out"]);
     fs::create_dir(workspace.path().join("full")).expect("a directory");
     workspace.write("full/kept.txt", "kept");
     let args = ["body.stl", "--spacing-min=0.1", "--write=htg", "--out=full"];

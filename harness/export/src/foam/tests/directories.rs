@@ -1,4 +1,4 @@
-//! Directories: patches, processors, regions, and what is refused.
+//! The directory: patches, regions, and what is refused.
 
 use super::*;
 use crate::foam::patches::Patches;
@@ -63,52 +63,6 @@ fn patches_follow_the_internal_faces_and_lie_where_their_names_say() {
     assert_eq!(next, complex.faces.len());
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
-
-    #[test]
-    fn processors_have_their_cells_and_the_same_faces_between_them(
-        words in random_words(3), parts in 2usize..5, run in 1usize..30, by_rank in any::<bool>()
-    ) {
-        prop_assume!(words.len() > 4 * 30);
-        let by_part: Vec<Vec<u64>> = (0..parts)
-            .map(|p| words.iter().enumerate().filter(|(i, _)| i / run % parts == p).map(|(_, &w)| w).collect())
-            .collect();
-        let (dir, mesh) = on_disk(&leaf_set(by_part));
-        let case = dir.path().join("case");
-        let processors = if by_rank { Processors::Ranks } else { Processors::Equal(parts as u32) };
-        let mut options = options();
-        options.foam.processors = Some(processors);
-        write(&mesh, &Selection::default(), &case.join("constant/polyMesh"), &options).unwrap();
-        let dirs: Vec<_> = (0..parts).map(|p| case.join(format!("processor{p}/constant/polyMesh"))).collect();
-        let mut cells = 0;
-        let mut between = BTreeMap::new();
-        for (here, dir) in dirs.iter().enumerate() {
-            let complex = complex_in(dir);
-            complex.assert_ordered();
-            let count = complex.owner.iter().max().unwrap() + 1;
-            complex.assert_closed(count);
-            cells += count;
-            for (name, faces, start) in boundary_in(dir) {
-                if let Some((_, there)) = name.split_once("to") {
-                    let there: usize = there.parse().unwrap();
-                    let polygon = |face: usize| complex.faces[face].iter().map(|&v| complex.points[v]).collect();
-                    let polygons: Vec<Vec<[f64; 3]>> = (start..start + faces).map(polygon).collect();
-                    prop_assert!(between.insert((here, there), polygons).is_none());
-                }
-            }
-        }
-        prop_assert_eq!(cells, words.len());
-        for (&(here, there), polygons) in &between {
-            let opposite: Vec<Vec<[f64; 3]>> = polygons.iter().cloned().map(|mut polygon| {
-                polygon[1..].reverse();
-                polygon
-            }).collect();
-            prop_assert_eq!(&between[&(there, here)], &opposite);
-        }
-    }
-}
-
 #[test]
 fn regions_that_no_face_connects_can_be_left_out() {
     // Two octants that touch in a corner: 64 small cells in one and a large cell in the other, which is the largest region.
@@ -120,12 +74,12 @@ fn regions_that_no_face_connects_can_be_left_out() {
     let (dir, mesh) = on_disk(&leaf_set(vec![words]));
     let mut options = options();
     for (regions, cells) in [(options::Regions::All, 64), (options::Regions::Largest, 1)] {
-        options.foam.regions = regions;
+        options.regions = regions;
         let target = dir.path().join(format!("{cells}/constant/polyMesh"));
         let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
         assert_eq!(summary.leaves, cells);
         assert!(
-            summary.notes[1].starts_with("2 regions that no face connects, of 1, 63 cells"),
+            summary.notes[1].starts_with("2 regions that no face connects: "),
             "{:?}",
             summary.notes
         );
@@ -143,22 +97,16 @@ fn what_exists_is_not_replaced_and_what_fails_leaves_nothing() {
         write(&mesh, selection, &target, options).unwrap_err().to_string()
     };
     let everything = Selection::default();
-    let mut parallel = options();
-    parallel.foam.processors = Some(Processors::Equal(65));
-    assert!(refused(&parallel, &everything).contains("64 cells are too few for 65 processors"));
     let none = Selection { level_max: Some(1), ..Selection::default() };
     assert!(refused(&options(), &none).contains("no leaf satisfies all conditions"));
     assert!(!case.exists());
 
     write(&mesh, &everything, &case.join("constant/polyMesh"), &options()).unwrap();
     assert!(refused(&options(), &everything).contains("constant/polyMesh exists"));
-    fs::create_dir(case.join("processor7")).unwrap();
-    parallel.foam.processors = Some(Processors::Equal(2));
-    assert!(refused(&parallel, &everything).contains("processor7 exists"));
     let names = |dir: &Path| {
         fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name()).collect::<BTreeSet<_>>()
     };
-    assert_eq!(names(&case).len(), 2);
+    assert_eq!(names(&case).len(), 1);
 
     let empty = dir.path().join("other/constant/polyMesh");
     fs::create_dir_all(&empty).unwrap();
@@ -215,26 +163,14 @@ fn faces_belong_to_the_patch_of_the_nearest_named_solid() {
     };
     let (case, other) = (case(8.0), case(16.0));
     let mut options = options();
-    options.foam.case = Some(&case);
+    options.case = Some(&case);
     let target = dir.path().join("case/constant/polyMesh");
     write(&mesh, &Selection::default(), &target, &options).unwrap();
     let faces: Vec<_> =
         boundary_in(&target).into_iter().map(|(name, faces, _)| (name, faces)).collect();
     let expected = [("left_wing", 6), ("body", 24 - 4 - 4), ("tail", 6)];
     assert_eq!(faces[6..], expected.map(|(name, faces)| (name.to_owned(), faces)));
-    options.foam.processors = Some(Processors::Equal(5));
-    write(&mesh, &Selection::default(), &dir.path().join("parallel/constant/polyMesh"), &options)
-        .unwrap();
-    for (patch, faces) in expected {
-        let of_processor = |p: i32| {
-            let boundary =
-                boundary_in(&dir.path().join(format!("parallel/processor{p}/constant/polyMesh")));
-            boundary.into_iter().find(|(name, ..)| name == patch).unwrap().1
-        };
-        assert_eq!((0..5).map(of_processor).sum::<usize>(), faces);
-    }
-    options.foam.processors = None;
-    options.foam.case = Some(&other);
+    options.case = Some(&other);
     let error = write(&mesh, &Selection::default(), &target, &options).unwrap_err().to_string();
     assert!(error.contains("not of the case"), "{error}");
 }

@@ -5,7 +5,6 @@ mod directories;
 mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::num::NonZero;
 use std::path::Path;
 
 use contract::case::Case;
@@ -16,12 +15,13 @@ use contract::testing::{leaf_set, random_words, words_with_sides};
 use contract::word::{self, Side};
 use proptest::prelude::*;
 
-use super::leaves::{Around, Point};
-use super::squares::{Square, squares};
 use super::*;
+use crate::leaves::CUT;
+use crate::leaves::{Around, Point};
 use crate::mesh::Mesh as OnDisk;
-use crate::options::{Foam, Label};
-use crate::testing::{Unwatched, no_script};
+use crate::options::Label;
+use crate::squares::{Square, squares};
+pub use crate::testing::options;
 
 /// Faces with their points, and the cells on both sides of each.
 #[derive(Debug, Default)]
@@ -30,11 +30,6 @@ struct Complex {
     faces: Vec<Vec<usize>>,
     owner: Vec<usize>,
     neighbour: Vec<usize>,
-}
-
-pub fn options<'a>() -> Options<'a> {
-    let foam = Foam::default();
-    Options { jobs: NonZero::<usize>::MIN, watch: &Unwatched, foam, script: no_script }
 }
 
 fn on_disk(set: &LeafSet) -> (tempfile::TempDir, OnDisk) {
@@ -93,7 +88,7 @@ pub fn mesh_of<'a>(
 ) -> Mesh<'a> {
     let root = Root { origin: [0.0; 3], edge: 1.0 };
     let patches = Patches::new(None, true).unwrap();
-    build(leaves_of(words, is_cut), Mesh::empty(patches, None, root, options)).unwrap().0
+    build(leaves_of(words, is_cut), Mesh::empty(patches, None, root, options)).unwrap()
 }
 
 impl Mesh<'_> {
@@ -231,7 +226,7 @@ proptest! {
         let target = dir.path().join("case/constant/polyMesh");
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
         let mut options = options();
-        options.foam.label = label;
+        options.label = label;
         let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);

@@ -3,12 +3,14 @@
 //! Where a large square borders smaller ones, their corners on its edges become corners of its polygon, as in a mesh of polyhedra: then
 //! every edge belongs to an even number of polygons, except where the front ends at the root's boundary or at the limits of
 //! a selection.
+//!
+//! Invariants: every polygon is the square of its face with points on its edges, and faces the leaf; the areas of a closed front cancel.
 
 use std::collections::hash_map::Entry;
 
 use rustc_hash::FxHashMap;
 
-use super::front::Face;
+use super::faces::Face;
 
 /// The polygons of a front.
 #[derive(Debug, Default)]
@@ -49,6 +51,50 @@ impl Polygons {
         let begins = std::iter::once(&0).chain(&self.ends);
         begins.zip(&self.ends).map(|(&begin, &end)| &self.corners[begin as usize..end as usize])
     }
+
+    /// Number of edges that belong to an odd number of polygons: 0 if the front is closed.
+    pub fn edges_open(&self) -> u64 {
+        let mut edges = Vec::with_capacity(self.corners.len());
+        for corners in self.iter() {
+            let next = corners.iter().cycle().skip(1);
+            edges.extend(corners.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b))));
+        }
+        edges.sort_unstable();
+        edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1).count() as u64
+    }
+
+    /// Asserts the invariants of the polygons of these faces.
+    ///
+    /// # Panics
+    /// If one is violated.
+    pub fn check_invariants(&self, faces: &[Face], is_closed: bool) {
+        assert_eq!(self.ends.len(), faces.len(), "a polygon for every face");
+        let mut sum = [0i64; 3];
+        for (face, corners) in faces.iter().zip(self.iter()) {
+            let area = area(corners.iter().map(|&c| self.points[c as usize]));
+            let edge = i64::from(face.edge());
+            let mut expected = [0; 3];
+            expected[face.square.axis] =
+                if face.is_leaf_above() { 2 * edge * edge } else { -2 * edge * edge };
+            assert_eq!(area, expected, "twice the area of {face:?}");
+            (0..3).for_each(|a| sum[a] += area[a]);
+        }
+        assert!(!is_closed || sum == [0; 3], "a closed front of areas that add up to {sum:?}");
+    }
+}
+
+/// Twice the area vector of a polygon, in level-19 cells.
+fn area(corners: impl Iterator<Item = [u32; 3]>) -> [i64; 3] {
+    let corners: Vec<[i64; 3]> = corners.map(|c| c.map(i64::from)).collect();
+    let next = corners.iter().cycle().skip(1);
+    let mut area = [0; 3];
+    for (p, q) in corners.iter().zip(next) {
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            area[a] += p[b] * q[c] - p[c] * q[b];
+        }
+    }
+    area
 }
 
 /// Adds the points within an edge, in order: those that bisect it, or bisect a half of it, and so on. Squares are aligned with the
@@ -73,10 +119,10 @@ pub(crate) fn hanging(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::front::faces::front;
     use crate::mesh::Mesh;
-    use crate::near_body::front::front;
     use crate::selection::Selection;
-    use crate::testing::on_disk;
+    use crate::testing::{on_disk, options};
     use contract::octant::Octant;
     use contract::testing::words_with_sides;
     use contract::word::{self, KEY_END, Side};
@@ -106,7 +152,7 @@ mod tests {
 
     fn front_of(words: &[u64]) -> (Vec<Face>, Polygons) {
         let (_dir, mesh): (_, Mesh) = on_disk(words, 1, |_| 0);
-        let faces = front(&mesh, &Selection::default(), &|| Ok(())).unwrap();
+        let faces = front(&mesh, &Selection::default(), &options()).unwrap();
         let polygons = Polygons::new(&faces);
         (faces, polygons)
     }
@@ -148,6 +194,33 @@ mod tests {
     }
 
     #[test]
+    fn planted_wrong_surfaces_are_noticed() {
+        // The cells around a hole, of two levels.
+        let words = words_with_sides(
+            |o| o.level < 2 || o.level < 3 && o.corner[0] == 0,
+            |o| (o.ancestor(2).corner.map(|c| c >> 17) != [1, 2, 1]).then_some(Side::Outside),
+        );
+        let noticed = |why: &str, change: &dyn Fn(&mut Vec<Face>, &mut Polygons)| {
+            let (mut faces, mut polygons) = front_of(&words);
+            assert_eq!(polygons.edges_open(), 0);
+            polygons.check_invariants(&faces, true);
+            change(&mut faces, &mut polygons);
+            let check = std::panic::AssertUnwindSafe(|| polygons.check_invariants(&faces, true));
+            let caught = std::panic::catch_unwind(check).unwrap_err();
+            let message = caught.downcast_ref::<String>().expect("a message with values");
+            assert!(message.contains(why), "{message}");
+        };
+        noticed("a polygon for every face", &|faces, _| faces.truncate(3));
+        noticed("twice the area", &|faces, _| faces[0].square.is_high ^= true);
+        noticed("twice the area", &|_, polygons| polygons.corners.swap(0, 1));
+        noticed("that add up to", &|faces, polygons| {
+            faces.pop();
+            polygons.ends.pop();
+            polygons.corners.truncate(*polygons.ends.last().unwrap() as usize);
+        });
+    }
+
+    #[test]
     fn an_edge_may_be_divided_more_than_once() {
         let half = Octant::ROOT.edge() / 2;
         // The lower half of the root is filled: one child with leaves of level 4, three leaves of level 1.
@@ -157,7 +230,8 @@ mod tests {
             |o| (o.corner[2] < half).then_some(Side::Outside),
         ));
         let corners_of = |level| {
-            let of_level = faces.iter().zip(polygons.iter()).filter(move |(f, _)| f.level == level);
+            let of_level =
+                faces.iter().zip(polygons.iter()).filter(move |(f, _)| f.square.level == level);
             let mut counts: Vec<usize> = of_level.map(|(_, corners)| corners.len()).collect();
             counts.sort_unstable();
             counts

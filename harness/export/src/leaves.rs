@@ -7,7 +7,10 @@
 use contract::octant::Octant;
 use contract::word;
 
+use crate::leaf::Leaf;
+use crate::mesh::Mesh;
 use crate::options::Options;
+use crate::selection::Selection;
 use contract::failure::Failure;
 
 /// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
@@ -16,7 +19,7 @@ pub type Point = [u32; 3];
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
 /// Number of cells that can be distinguished.
-pub const CELLS_MAX: u64 = u32::MAX as u64;
+const CELLS_MAX: u64 = u32::MAX as u64;
 
 /// The leaves.
 #[derive(Debug, Default)]
@@ -50,6 +53,35 @@ impl Content {
 }
 
 impl Leaves {
+    /// The leaves of a mesh that `takes` accepts, given each and whether it is selected; those that are not selected are [`CUT`].
+    ///
+    /// # Errors
+    /// If the mesh cannot be read, if there are too many cells, or if the user interrupts.
+    pub fn read(
+        mesh: &Mesh,
+        selection: &Selection,
+        options: &Options<'_>,
+        takes: &mut dyn FnMut(&Leaf, bool) -> bool,
+    ) -> Result<Self, Failure> {
+        let (mut words, mut cells) = (Vec::new(), 0);
+        mesh.visit(&Selection::default(), &|| options.check(), &mut |leaf| {
+            let is_selected = selection.has(&leaf);
+            if takes(&leaf, is_selected) {
+                cells += u64::from(is_selected);
+                let Octant { corner, level } = leaf.octant;
+                let side = if is_selected { leaf.side as u64 } else { CUT };
+                words.push(word::key_of(corner) << 7 | u64::from(level) << 2 | side);
+            }
+            match cells {
+                ..=CELLS_MAX => Ok(()),
+                _ => Err(Failure::input(format!(
+                    "more than {CELLS_MAX} cells, which is the limit here: select fewer leaves"
+                ))),
+            }
+        })?;
+        Ok(Self::new(words))
+    }
+
     /// Leaves with these words, of which there are at most [`CELLS_MAX`].
     pub fn new(words: Vec<u64>) -> Self {
         let mut cells = 0;

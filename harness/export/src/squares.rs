@@ -7,7 +7,7 @@
 
 use contract::octant::CELLS_PER_EDGE;
 
-use super::leaves::{Around, Content, Leaves, Point};
+use crate::leaves::{Around, Content, Leaves, Point};
 
 /// A square that a cell shares with another cell or with a boundary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

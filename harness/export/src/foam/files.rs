@@ -1,0 +1,161 @@
+//! The files of a mesh in OpenFOAM's binary format: the dictionary `FoamFile`, then one list, or two.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+use contract::octant::UNITS_PER_CELL;
+use contract::word;
+
+use super::Mesh;
+use crate::options::{Label, Options};
+use contract::failure::Failure;
+
+impl Mesh<'_> {
+    /// Writes the files into a directory.
+    ///
+    /// # Errors
+    /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
+    pub fn write(&self, dir: &Path) -> Result<(), Failure> {
+        let Self { faces, options, .. } = self;
+        let (points, cells) = (self.points.count(), self.leaves.count());
+        let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
+        if vertices.max(points.into()) > label_max(options.label) {
+            return Err(Failure::input(
+                "the mesh has more faces than 32-bit labels can number: choose --label 64",
+            ));
+        }
+        let (count, internal) = (faces.count(), faces.neighbour.len());
+        let note =
+            format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");
+        let labels = |object: &str, note: &str, labels: &mut dyn ExactSizeIterator<Item = i64>| {
+            let mut file = ListFile::create(dir, options, "labelList", object, note)?;
+            file.labels(labels.len() as u64, labels)?;
+            file.finish()
+        };
+        labels("owner", &note, &mut faces.owner.iter().map(|&cell| cell.into()))?;
+        labels("neighbour", &note, &mut faces.neighbour.iter().map(|&cell| cell.into()))?;
+        let words: Vec<u64> = self.leaves.cells().collect();
+        labels("cellLevel", "", &mut words.iter().map(|&word| word::level(word).into()))?;
+        if self.has_sides {
+            labels("side", "", &mut words.iter().map(|word| (word & 3) as i64))?;
+        }
+        if let Some(ranks) = &self.ranks {
+            labels("rank", "", &mut ranks.iter().map(|&rank| rank.into()))?;
+        }
+        let mut position = 0;
+        let ends = faces.all().map(|vertices| {
+            position += vertices.len() as i64;
+            position
+        });
+        let mut file = ListFile::create(dir, options, "faceCompactList", "faces", "")?;
+        file.labels(count as u64 + 1, std::iter::once(0).chain(ends))?;
+        file.labels(vertices, faces.all().flatten().map(|&point| point.into()))?;
+        file.finish()?;
+        let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
+        let place =
+            |point| self.root.to_user(self.points.at(point).map(|c| i64::from(c) * UNITS_PER_CELL));
+        file.points(points.into(), (0..points).map(place))?;
+        file.finish()?;
+        self.write_boundary(dir)
+    }
+
+    fn write_boundary(&self, dir: &Path) -> Result<(), Failure> {
+        let Self { patches, faces, options, .. } = self;
+        let mut text = header("ascii", options.label, "polyBoundaryMesh", "boundary", "");
+        let _ = writeln!(text, "{}\n(", patches.names.len());
+        for ((patch, name), ends) in patches.names.iter().enumerate().zip(faces.starts.windows(2)) {
+            let (kind, start, count) = (patches.type_of(patch), ends[0], ends[1] - ends[0]);
+            let _ = writeln!(
+                text,
+                "    {name}\n    {{\n        type {kind};\n        nFaces {count};\n        startFace {start};\n    }}"
+            );
+        }
+        text.push_str(")\n");
+        let mut file = File::create(dir.join("boundary"))?;
+        file.write_all(text.as_bytes())?;
+        Ok(file.sync_all()?)
+    }
+}
+
+/// Greatest label.
+fn label_max(label: Label) -> u64 {
+    match label {
+        Label::Bits32 => i32::MAX as u64,
+        Label::Bits64 => i64::MAX as u64,
+    }
+}
+
+/// The dictionary at the beginning of a file.
+fn header(format: &str, label: Label, class: &str, object: &str, note: &str) -> String {
+    let bits = if label == Label::Bits32 { 32 } else { 64 };
+    let note = if note.is_empty() { String::new() } else { format!("    note \"{note}\";\n") };
+    format!(
+        "FoamFile\n{{\n    version 2.0;\n    format {format};\n    arch \"LSB;label={bits};scalar=64\";\n{note}    \
+         class {class};\n    location \"constant/polyMesh\";\n    object {object};\n}}\n\n"
+    )
+}
+
+/// A file with lists.
+struct ListFile<'a> {
+    out: BufWriter<File>,
+    options: &'a Options<'a>,
+}
+
+impl<'a> ListFile<'a> {
+    /// Begins a file.
+    fn create(
+        dir: &Path,
+        options: &'a Options<'a>,
+        class: &str,
+        object: &str,
+        note: &str,
+    ) -> Result<Self, Failure> {
+        let mut out = BufWriter::with_capacity(1 << 16, File::create(dir.join(object))?);
+        out.write_all(header("binary", options.label, class, object, note).as_bytes())?;
+        Ok(Self { out, options })
+    }
+
+    /// Adds a list of `count` labels.
+    fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<(), Failure> {
+        match self.options.label {
+            Label::Bits32 => self.list(count, labels.map(|label| (label as i32).to_le_bytes())),
+            Label::Bits64 => self.list(count, labels.map(i64::to_le_bytes)),
+        }
+    }
+
+    /// Adds a list of `count` points.
+    fn points(
+        &mut self,
+        count: u64,
+        points: impl Iterator<Item = [f64; 3]>,
+    ) -> Result<(), Failure> {
+        let bytes = |point: [f64; 3]| -> [u8; 24] {
+            let all = point.map(f64::to_le_bytes);
+            std::array::from_fn(|i| all[i / 8][i % 8])
+        };
+        self.list(count, points.map(bytes))
+    }
+
+    /// A list without items has no parentheses.
+    fn list<const N: usize>(
+        &mut self,
+        count: u64,
+        items: impl Iterator<Item = [u8; N]>,
+    ) -> Result<(), Failure> {
+        let [begin, end] = if count == 0 { [""; 2] } else { ["(", ")"] };
+        write!(self.out, "{count}\n{begin}")?;
+        for (item, number) in items.zip(0..) {
+            self.options.check_at(number)?;
+            self.out.write_all(&item)?;
+        }
+        Ok(writeln!(self.out, "{end}")?)
+    }
+
+    /// Waits until the file is on disk.
+    fn finish(self) -> Result<(), Failure> {
+        let file = self.out.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+        Ok(file.sync_all()?)
+    }
+}

@@ -1,0 +1,181 @@
+//! The surface that a mesh hands over to a near-body mesher: the faces at which its cells end at crossing leaves, deleted or not, as
+//! polygons for VTK (`.vtp`) or triangles (`.stl`), whose normals point away from the body.
+//!
+//! - [`faces`](mod@faces): squares; [`polygons`]: the same with hanging nodes, so that they fit together.
+//!
+//! The *gap* of a face is the least distance of any of its points from a facet of the case. Distances are those of the facets on the lattice, on which
+//! the mesh was made; a vertex is at most half a lattice unit along each axis from where the user put it.
+//!
+//! Invariants, which are executed before a file has its name: those of [`Polygons::check_invariants`]; a gap is that of a face that no facet enters,
+//! and not greater than the distance of the face's centre.
+
+pub mod faces;
+pub mod polygons;
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use contract::case::Case;
+use contract::files::fill_atomically;
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::number::number;
+use contract::octant::UNITS_PER_CELL;
+use contract::word;
+use geometries::{Facet, write_stl_binary};
+use geometry::tree::{FacetTree, Point};
+use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
+
+use crate::mesh::Mesh;
+use crate::options::{Options, Summary};
+use crate::polydata::{self, array};
+use crate::selection::Selection;
+use contract::failure::Failure;
+use faces::{Face, front};
+use polygons::Polygons;
+
+/// A front: its root, faces and polygons.
+type Front = (Root, Vec<Face>, Polygons);
+
+/// Writes the polygons, with the cell data `level` and `side` of the leaf, its `spacing`, and with a case the `gap` of each face.
+///
+/// # Errors
+/// If the mesh cannot be read, is not of the case, or has no such faces, if the file cannot be written, or if the user interrupts.
+pub fn vtp(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+) -> Result<Summary, Failure> {
+    options.case.iter().try_for_each(|case| mesh.require_case(case))?;
+    write(mesh, selection, path, options, &|(root, faces, polygons), out| {
+        let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
+        let point = |at: &[u32; 3]| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
+        let spacing = |face: &Face| edge_of_level(root, word::level(face.leaf));
+        let mut cell = vec![
+            array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
+            array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
+            array("spacing", faces.iter().map(spacing).collect::<Vec<f64>>()),
+        ];
+        cell.extend(gaps.map(|gaps| array("gap", gaps)));
+        let piece = PolyDataPiece {
+            points: polygons.points.iter().flat_map(point).collect::<Vec<f64>>().into(),
+            polys: Some(VertexNumbers::XML {
+                connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
+                offsets: polygons.ends.clone(),
+            }),
+            data: Attributes { point: Vec::new(), cell },
+            ..PolyDataPiece::default()
+        };
+        Ok(polydata::write("front towards the body", piece, out)?)
+    })
+}
+
+/// Writes the polygons as triangles. Coordinates have single precision.
+///
+/// # Errors
+/// As [`vtp`], and if there are more than 2^32 triangles, or if single precision does not resolve one.
+pub fn stl(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+) -> Result<Summary, Failure> {
+    write(mesh, selection, path, options, &|front, out| {
+        Ok(write_stl_binary(&triangles(front)?, out)?)
+    })
+}
+
+/// Finds the front, and writes the file that `fill` makes of it.
+fn write(
+    mesh: &Mesh,
+    selection: &Selection,
+    path: &Path,
+    options: &Options<'_>,
+    fill: &dyn Fn(&Front, &mut dyn Write) -> Result<(), Failure>,
+) -> Result<Summary, Failure> {
+    mesh.require_sides()?;
+    let faces = front(mesh, selection, options)?;
+    if faces.is_empty() {
+        return Err(Failure::input(
+            "no selected cell borders a crossing cell, deleted or not, so there is no surface",
+        ));
+    }
+    let (root, polygons) = (mesh.manifest.root, Polygons::new(&faces));
+    let open = polygons.edges_open();
+    polygons.check_invariants(&faces, *selection == Selection::default() && open == 0);
+    let area: f64 = faces.iter().map(|face| edge_of_level(&root, face.square.level).powi(2)).sum();
+    let front = (root, faces, polygons);
+    let failed = |error| Failure::at(path, error);
+    let bytes = fill_atomically(path, failed, |file| {
+        let mut out = BufWriter::new(file);
+        fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
+        out.flush().map_err(failed)?;
+        options.check()?;
+        Ok::<_, Failure>(out.get_ref().metadata().map_err(failed)?.len())
+    })?;
+    let closed = match open {
+        0 => "closed".to_owned(),
+        _ => format!(
+            "open at {open} edges, where it reaches the root's boundary or a selection cuts it"
+        ),
+    };
+    let notes = vec![format!("a surface of area {}, {closed}", number(area))];
+    Ok(Summary { leaves: front.1.len() as u64, files: 1, bytes, notes })
+}
+
+/// The polygons as triangles.
+fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
+    let single = |at: [i64; 3]| root.to_user(at).map(|c| c as f32);
+    let point =
+        |index: &u32| polygons.points[*index as usize].map(|c| i64::from(c) * UNITS_PER_CELL);
+    let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
+    for (face, corners) in faces.iter().zip(polygons.iter()) {
+        let corner = |i: usize| single(point(&corners[i % corners.len()]));
+        if corners.len() == 4 {
+            triangles.extend([[0, 1, 2], [0, 2, 3]].map(|ids| ids.map(corner)));
+            continue;
+        }
+        // A fan from a corner could have triangles without area.
+        let half = i64::from(face.edge()) * UNITS_PER_CELL / 2;
+        let middle = std::array::from_fn(|a| {
+            let along = if a == face.square.axis { 0 } else { half };
+            i64::from(face.square.corner[a]) * UNITS_PER_CELL + along
+        });
+        triangles.extend((0..corners.len()).map(|i| [single(middle), corner(i), corner(i + 1)]));
+    }
+    match triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
+        None => Ok(triangles),
+        Some([at, ..]) => {
+            let why = format!(
+                "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
+                 origin, or write a .vtp file"
+            );
+            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
+        }
+    }
+}
+
+/// The gap of each face in the user's units; infinite if the case has no facets.
+fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, Failure> {
+    let facets = FacetTree::new(&case.facets_lattice);
+    let unit = case.root.edge / UNITS_PER_EDGE as f64;
+    let gap = |(index, face): (u64, &Face)| {
+        options.check_at(index)?;
+        let units = |c| (i64::from(c) * UNITS_PER_CELL) as f64;
+        let corners = face.corners().map(|corner| Point::from(corner.map(units)));
+        let centre = facets.distance(corners[0].midpoint(corners[2]));
+        let gap = facets.distance_of_square(&corners);
+        // One unit for rounding.
+        assert!(0.0 <= gap && gap <= centre + 1.0, "gap {gap} of {face:?}, {centre} of its centre");
+        Ok(gap * unit)
+    };
+    (0..).zip(faces).map(gap).collect()
+}
+
+/// Edge of the cells of a level, in the user's units.
+fn edge_of_level(root: &Root, level: u8) -> f64 {
+    root.edge / f64::from(1u32 << level)
+}
+
+#[cfg(test)]
+mod tests;
