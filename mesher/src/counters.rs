@@ -29,9 +29,6 @@ pub struct Counters {
     pub leaves: u64,
     /// Leaves in the rank's heaviest base leaf.
     pub base_leaf_cells_max: u64,
-    /// Faces exposed to crossing leaves; only on request.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub exposed_faces: Option<u64>,
 }
 
 impl Counters {

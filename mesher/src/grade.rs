@@ -44,8 +44,6 @@
 //! part of the segment may then begin in a crossing leaf coarser than `l`: a whole group would act
 //! through a deleted body. Hence only leaves are sources there.
 
-pub mod exposed;
-
 use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};

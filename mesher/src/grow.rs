@@ -2,7 +2,7 @@
 
 use crate::check;
 use crate::error::Error;
-use crate::grade::{self, exposed};
+use crate::grade;
 use crate::input::lattice::{Bounds, Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
 use crate::job::Job;
@@ -153,25 +153,15 @@ pub fn grow<F: Borrow<[Facet]>>(
     });
     drop(base);
 
-    // 8. Repartition after gradation: by the number of leaves, and of exposed faces on request.
-    let exposed = options.weight_exposed.map(|weight| {
-        let faces = job.phase("exposed", |comm| exposed::faces(&mesh, comm));
-        (faces, weight)
-    });
+    // 8. Repartition after gradation: by the number of leaves.
     if is_parallel && division.repartitions() {
-        job.phase("rebalance", |comm| {
-            repartition_by_leaves(&mut mesh, exposed.as_ref(), comm);
-        });
+        job.phase("rebalance", |comm| repartition_by_leaves(&mut mesh, comm));
         job.check(|comm| {
             check::ownership(&mesh.ownership, comm);
             check::graded(&mesh, comm);
             let moved = check::fingerprint(&mesh, comm);
             assert_eq!(moved, fingerprint, "moving octants must not change the mesh");
         });
-    }
-    if let Some((faces, _)) = exposed {
-        let owned = job.phase("exposed", |comm| exposed::owned(&faces, &mesh.ownership, comm));
-        job.counters.exposed_faces = Some(owned);
     }
     Ok(mesh)
 }
@@ -211,19 +201,12 @@ fn of_base_mesh(
     initial::of_base_mesh(leaves, depth, comm)
 }
 
-/// Repartitions by the numbers of leaves, with the exposed faces and the weight of each if given. Collective.
-fn repartition_by_leaves(
-    mesh: &mut Mesh,
-    weighted: Option<&(Vec<exposed::InBrick>, u32)>,
-    comm: &dyn Comm,
-) {
+/// Repartitions by the numbers of leaves. Collective.
+fn repartition_by_leaves(mesh: &mut Mesh, comm: &dyn Comm) {
     let gone = [mesh.sides.deleted(), &mesh.crossing];
     let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
-    let exposed = weighted.iter().flat_map(|(faces, weight)| {
-        faces.iter().map(|b| (b.level, b.key, u64::from(b.faces) * u64::from(*weight)))
-    });
     let (split, before) = (&mesh.split, &mesh.ownership);
-    let new = repartition::after_gradation(split, gone, exposed, before, mesh.level_base, comm);
+    let new = repartition::after_gradation(split, gone, before, mesh.level_base, comm);
     let sets = &mut [&mut mesh.split, &mut mesh.crossing, &mut mesh.sides.stored];
     repartition::migrate(sets, &mesh.ownership, &new, comm);
     mesh.ownership = new;

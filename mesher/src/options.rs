@@ -14,8 +14,6 @@ pub struct Options {
     pub out: Option<Output>,
     /// Check invariants after each phase, which debug builds do in any case.
     pub check: bool,
-    /// Count the [exposed faces](crate::grade::exposed), each of which weighs as much as this many leaves in the last repartition.
-    pub weight_exposed: Option<u32>,
     /// Fail if the geometry leaks.
     pub strict: bool,
     /// What to call the case in advice to the user.

@@ -235,8 +235,7 @@ fn pilot(
     options: &Options,
     comm: &dyn Comm,
 ) -> Result<Amounts, Error> {
-    let options =
-        Options { check: false, out: None, weight_exposed: None, strict: false, ..options.clone() };
+    let options = Options { check: false, out: None, strict: false, ..options.clone() };
     let run = |rules: Rules| {
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, comm, &mut record);

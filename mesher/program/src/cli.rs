@@ -47,9 +47,6 @@ pub struct Args {
     /// Weights of the partition [default: rebalance; unit with --preset paper]
     #[arg(long, value_enum)]
     weights: Option<Weights>,
-    /// Count the faces exposed to crossing leaves, deleted or not, and weigh each like W leaves in the last repartition: 0 counts them only
-    #[arg(long, value_name = "W", conflicts_with = "ungraded", value_parser = value_parser!(u32).range(0..=1000))]
-    pub weight_exposed: Option<u32>,
     /// Level of the base leaves: 0 to 19, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
     pub level_base: LevelBase,
@@ -60,7 +57,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "plan")]
     pub check: bool,
     /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
-    #[arg(long, conflicts_with = "weight_exposed")]
+    #[arg(long)]
     pub plan: bool,
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]

@@ -337,7 +337,6 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         ungraded: args.ungraded,
         out: cli::output(args),
         check: args.check,
-        weight_exposed: args.weight_exposed,
         strict: args.strict,
         case_name: cli::case_name(args),
     };

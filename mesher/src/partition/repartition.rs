@@ -44,19 +44,16 @@ pub fn after_refinement(
     work.repartition(TOLERANCE_WORK, comm)
 }
 
-/// The partition with nearly equal numbers of leaves of a tree, without those that are `gone`, where some bricks that this rank owns,
-/// given by level and key, weigh as much as further leaves. Collective.
+/// The partition with nearly equal numbers of leaves of a tree, without those that are `gone`. Collective.
 pub fn after_gradation(
     split: &PerLevel,
     gone: &[&PerLevel],
-    heavier: impl Iterator<Item = (Level, u64, u64)>,
     ownership: &Ownership,
     level: Level,
     comm: &dyn Comm,
 ) -> Ownership {
     let mut leaves = Loads::new(ownership, level);
     leaves.add_leaves(split, gone);
-    heavier.for_each(|(l, key, weight)| leaves.add(brick_start(l, key), weight as i64));
     leaves.repartition(TOLERANCE_LEAVES, comm)
 }
 

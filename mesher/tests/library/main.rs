@@ -8,7 +8,6 @@ mod support;
 mod candidates;
 mod digest_vectors;
 mod equals_reference;
-mod exposed;
 mod leaks;
 mod metamorphic;
 mod orders;

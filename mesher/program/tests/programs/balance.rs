@@ -118,10 +118,10 @@ fn splits_of_gradation_are_counted_once() {
 /// on the machine.
 const RECORDED: [(&str, &str, &str); 11] = [
     ("1", "false", "--comm solo"),
-    ("4", "true", "--comm solo --weight-exposed 0"),
+    ("4", "true", "--comm solo"),
     ("2", "true", "--comm sim:2 --ungraded"),
     ("1", "false", "--comm sim:3"),
-    ("3", "true", "--comm sim:5 --weight-exposed 7"),
+    ("3", "true", "--comm sim:5"),
     ("3", "true", "--comm sim:5 --weights area"),
     ("2", "false", "--comm sim:6 --weights unit"),
     ("2", "false", "--comm sim:4 --weights unit --level-base 3"),

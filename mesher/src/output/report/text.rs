@@ -38,10 +38,6 @@ impl fmt::Display for Report {
             f,
             "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}{partitioned}"
         )?;
-        if let Some(faces) = self.counters.get("exposed_faces") {
-            let (all, lambda) = (grouped(faces.iter().sum()), by_rank(faces));
-            writeln!(f, "exposed faces  {all}, max/mean {lambda:.3}")?;
-        }
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
         for PhaseEntry { name, time_wall_s, time_cpu_s, .. } in &self.phases {
             let wall = time_wall_s.iter().copied().fold(0.0, f64::max);
@@ -166,11 +162,9 @@ mod tests {
         (report.components_enclosed, report.enclosed_leaves) = (1000, 2000);
         report.enclosed_example = Some([1.0, 2.0, 0.5]);
         (report.components_ambiguous, report.ambiguous_example) = (7, Some([0.0, 1.0, 4.0]));
-        report.counters.insert("exposed_faces".into(), vec![1000, 3000]);
         let added = [
             "outside 1,500, inside 1; 1,000 outside deleted as enclosed (2,000 leaves of the base tree, one at (1, 2, 0.5)); \
              7 decided by majority, one at (0, 1, 4)\n",
-            "\nexposed faces  4,000, max/mean 1.500\n",
         ];
         let text = report.to_string();
         assert!(added.iter().all(|line| text.contains(line)), "{text}");
