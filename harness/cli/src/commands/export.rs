@@ -82,7 +82,7 @@ fn write(arguments: &Arguments) -> Result<Summary, Failure> {
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
     let jobs = jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN);
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
+    let progress = Progress::new();
     let foam = foam.options(case.as_ref());
     let options = Options { jobs, watch: &progress, foam, script };
     let written = (format.write)(&mesh, &selection, file, &options);
