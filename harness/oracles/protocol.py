@@ -3,8 +3,8 @@
     python <oracle>.py
 
 An oracle stays, because its packages take seconds to import. Each line of its standard input is a question, a JSON array of three
-paths: POINTS.npy contains float64 coordinates of shape (N, 3), and BODY.stl is a binary STL file. The oracle writes N bytes to
-SIDES.npy, 1 for each point that it finds inside the body and 0 for each point outside, and answers with a line: 0, or 1 if it failed,
+paths: POINTS contains three float64 coordinates for each of N points, and BODY.stl is a binary STL file. The oracle writes N bytes to
+SIDES, 1 for each point that it finds inside the body and 0 for each point outside, and answers with a line: 0, or 1 if it failed,
 with the reason on the standard error. It ends with its input, or with exit code 3 if its package is missing.
 
 An oracle is a function sides(points, facets) -> array of N bools. Points and facets are translated so that the
@@ -34,13 +34,13 @@ def read_facets(path):
 
 def answer(sides, points, body, out):
     """Answers one question with the function `sides`."""
-    points = np.load(points)
+    points = np.fromfile(points, "<f8").reshape(-1, 3)
     facets = read_facets(body)
     centre = (facets.min(axis=(0, 1)) + facets.max(axis=(0, 1))) / 2 if len(facets) else np.zeros(3)
     inside = np.zeros(len(points), np.uint8)
     if len(facets) and len(points):
         inside[:] = sides(points - centre, facets - centre)
-    np.save(out, inside)
+    inside.tofile(out)
 
 
 def run(sides):

@@ -69,8 +69,6 @@ pub enum Independence {
     Ranks,
     /// The partitioner, and the level of the partition.
     Partitioner,
-    /// The number of threads.
-    Threads,
 }
 
 impl Promises {
@@ -162,16 +160,15 @@ mod tests {
 
     #[test]
     fn the_definition_includes_determinism_and_every_independence() {
-        use Independence::{Partitioner, Ranks, Threads};
-        let independent = |promises: &Promises| {
-            [Ranks, Partitioner, Threads].map(|c| promises.is_independent_of(c))
-        };
+        use Independence::{Partitioner, Ranks};
+        let independent =
+            |promises: &Promises| [Ranks, Partitioner].map(|c| promises.is_independent_of(c));
         let definition = Promises::of_definition();
-        assert!(definition.is_deterministic() && independent(&definition) == [true; 3]);
+        assert!(definition.is_deterministic() && independent(&definition) == [true; 2]);
         let none = Promises::default();
-        assert!(!none.is_deterministic() && independent(&none) == [false; 3]);
-        let some = Promises { deterministic: true, independent_of: vec![Ranks, Threads], ..none };
-        assert!(some.is_deterministic() && independent(&some) == [true, false, true]);
+        assert!(!none.is_deterministic() && independent(&none) == [false; 2]);
+        let some = Promises { deterministic: true, independent_of: vec![Ranks], ..none };
+        assert!(some.is_deterministic() && independent(&some) == [true, false]);
     }
 
     #[test]

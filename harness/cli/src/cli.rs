@@ -2,6 +2,7 @@
 
 use crate::commands;
 use clap::{Parser, Subcommand};
+use clap_complete::Shell;
 
 /// Verifies and benchmarks oct-tree meshers.
 ///
@@ -54,12 +55,13 @@ pub enum Command {
     /// Explain the size and the side of the leaf at a point
     Why(commands::why::Arguments),
     /// Print a completion script for a shell
-    Completions(commands::completions::Arguments),
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
     /// End with a fault, for the tests of the exit codes
     #[command(hide = true)]
     Planted(commands::planted::Arguments),
-    /// Print the manual page, or write one page per command into a directory
-    Man(commands::man::Arguments),
 }
 
 #[cfg(test)]

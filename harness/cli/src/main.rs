@@ -107,10 +107,12 @@ fn dispatch(arguments: Arguments) -> Result<u8, Failure> {
         Command::Import(arguments) => commands::import::run(&arguments),
         Command::Diff(arguments) => commands::diff::run(&arguments),
         Command::Why(arguments) => commands::why::run(&arguments),
-        Command::Completions(arguments) => {
-            Ok(commands::completions::run(&arguments, &mut Arguments::command()))
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "harness", &mut script);
+            print!("{}", String::from_utf8_lossy(&script));
+            Ok(EXIT_HOLDS)
         }
         Command::Planted(arguments) => Ok(commands::planted::run(&arguments)),
-        Command::Man(arguments) => commands::man::run(&arguments, Arguments::command()),
     }
 }

@@ -5,28 +5,23 @@ use crate::engine::layout::SERIAL;
 use crate::engine::options::RunOptions;
 use crate::engine::runner::Engine;
 use contract::case::Case;
-use contract::files::read_text;
-use contract::lattice::Root;
 use contract::leafset::LeafSet;
+use contract::plain::{PlainCase, StlForm};
 use std::fs;
-use std::os::unix::fs::symlink;
-use std::path::{Path, absolute};
+use std::path::Path;
 use std::time::Duration;
 use tempfile::TempDir;
-use toml::{Table, Value};
-
-/// The link to the geometry file. Its own path need not be representable in a case file.
-const BODY: &str = "body.stl";
+use toml::Value;
 
 /// A case whose base tree is made at several surface levels. Files are in a temporary directory, which is removed with
 /// it.
 #[derive(Debug)]
 pub struct BaseTrees<'a> {
     engine: &'a Engine,
-    /// The case file with an explicit root and without seeds.
-    table: Table,
+    /// The case without seeds.
+    case: PlainCase,
     seeds: Option<Value>,
-    root: Root,
+    edge: f64,
     place: TempDir,
     limit: Duration,
 }
@@ -45,14 +40,11 @@ impl<'a> BaseTrees<'a> {
         let place = tempfile::Builder::new().prefix("harness-base-").tempdir();
         let place =
             place.map_err(|error| format!("no temporary directory can be made: {error}"))?;
-        if let Some(geometry) = &case.geometry {
-            let linked = absolute(geometry).and_then(|stl| symlink(stl, place.path().join(BODY)));
-            linked.map_err(|error| format!("{}: {error}", geometry.display()))?;
-        }
-        let mut table = table(path, case)?;
+        let edge = case.root.edge;
+        let mut case = PlainCase::read(path)?;
         // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
-        let seeds = table.remove("seeds");
-        Ok(Self { engine, table, seeds, root: case.root, place, limit })
+        let seeds = case.table.remove("seeds");
+        Ok(Self { engine, case, seeds, edge, place, limit })
     }
 
     /// The base tree of the case, with the sides that its seeds give to leaves.
@@ -61,10 +53,10 @@ impl<'a> BaseTrees<'a> {
     /// As [`Self::at`].
     pub fn with_seeds(&mut self, level: u8) -> Result<LeafSet, Failure> {
         if let Some(seeds) = self.seeds.clone() {
-            self.table.insert("seeds".into(), seeds);
+            self.case.table.insert("seeds".into(), seeds);
         }
         let tree = self.at(level);
-        self.table.remove("seeds");
+        self.case.table.remove("seeds");
         tree
     }
 
@@ -73,11 +65,10 @@ impl<'a> BaseTrees<'a> {
     /// # Errors
     /// If the engine fails, or its mesh cannot be read.
     pub fn at(&mut self, level: u8) -> Result<LeafSet, Failure> {
-        let spacing = self.root.edge / f64::from(1u32 << level);
-        self.table.insert("spacing_min".into(), Value::Float(spacing));
+        let spacing = self.edge / f64::from(1u32 << level);
+        self.case.table.insert("spacing_min".into(), Value::Float(spacing));
         let place = self.place.path();
-        let case = place.join("case.toml");
-        fs::write(&case, self.table.to_string()).map_err(|error| {
+        let case = self.case.write(place, StlForm::Binary).map_err(|error| {
             Failure::new("the harness", End::Unusable(format!("cannot write a case: {error}")))
         })?;
         let mesh = place.join("mesh");
@@ -88,27 +79,8 @@ impl<'a> BaseTrees<'a> {
             ..RunOptions::new(place, self.limit)
         };
         let completed = self.engine.run(&case, &SERIAL, &options)?;
-        let read = completed.read_mesh();
+        let tree = self.engine.read_mesh(&completed);
         let _ = fs::remove_dir_all(&mesh);
-        let mesh = read.map_err(|why| {
-            self.engine.unusable(format!("wrote a base tree that cannot be read: {why}"))
-        })?;
-        mesh.ok_or_else(|| self.engine.unusable("wrote no base tree".to_owned()))
+        tree
     }
-}
-
-/// The keys of a case file for a copy in another directory and with another spacing.
-fn table(path: &Path, case: &Case) -> Result<Table, String> {
-    let text = read_text(path).map_err(|error| error.to_string())?;
-    let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    table.remove("root_scale");
-    let Root { origin, edge } = case.root;
-    let origin = origin.map(Value::Float).to_vec();
-    let root = [("origin", Value::Array(origin)), ("edge", Value::Float(edge))];
-    let root: Table = root.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
-    table.insert("root".into(), Value::Table(root));
-    if case.geometry.is_some() {
-        table.insert("geometry".into(), Value::String(BODY.into()));
-    }
-    Ok(table)
 }

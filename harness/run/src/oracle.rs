@@ -8,91 +8,52 @@ use crate::engine::python;
 use crate::engine::service::Services;
 use check::oracle::vote::Answer;
 use contract::case::Facet;
-use contract::{files, npy};
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::panic::resume_unwind;
-use std::path::{Path, PathBuf};
+use contract::files;
+use std::fs;
+use std::io;
+use std::path::Path;
 use std::process::Command;
-use std::thread::{self, ScopedJoinHandle};
 use std::time::Duration;
 
 /// The oracles, in the order in which they run.
 pub const ORACLES: [&str; 3] = ["trimesh", "open3d", "pyvista"];
 
-/// Points and a body, as files that every oracle reads.
-#[derive(Debug)]
-pub struct Question {
-    points: PathBuf,
-    body: PathBuf,
-    place: PathBuf,
-    count: usize,
-}
-
-impl Question {
-    /// Writes points and body into the directory.
-    ///
-    /// # Errors
-    /// If they cannot be written.
-    pub fn write(points: &[[f64; 3]], body: &[Facet], place: &Path) -> io::Result<Self> {
-        let question = Self {
-            points: place.join("points.npy"),
-            body: place.join("body.stl"),
-            place: place.to_owned(),
-            count: points.len(),
-        };
-        let mut file = BufWriter::new(File::create(&question.points)?);
-        file.write_all(&npy::header("<f8", &format!("({}, 3)", points.len())))?;
-        for coordinate in points.iter().flatten() {
-            file.write_all(&coordinate.to_le_bytes())?;
-        }
-        file.flush()?;
-        let mut file = BufWriter::new(File::create(&question.body)?);
-        geometries::write_stl_binary(body, &mut file)?;
-        file.flush()?;
-        Ok(question)
-    }
-
-    /// Asks several oracles at the same time, in services that stay.
-    ///
-    /// # Errors
-    /// For each oracle: [`End::Missing`] if it or Python is missing; another end if it fails or does not give one side per point.
-    pub fn ask<'o>(
-        &self,
-        oracles: &[&'o str],
-        services: &Services,
-        paths: &Paths,
-        limit: Duration,
-    ) -> Vec<(&'o str, Result<Answer, Failure>)> {
-        thread::scope(|scope| {
-            let asked = oracles.iter().map(|&oracle| {
-                (oracle, scope.spawn(|| self.ask_one(oracle, services, paths, limit)))
-            });
-            let asked: Vec<_> = asked.collect();
-            let answer = |asked: ScopedJoinHandle<_>| {
-                asked.join().unwrap_or_else(|panic| resume_unwind(panic))
-            };
-            asked.into_iter().map(|(oracle, asked)| (oracle, answer(asked))).collect()
-        })
-    }
-
-    fn ask_one(
-        &self,
-        oracle: &str,
-        services: &Services,
-        paths: &Paths,
-        limit: Duration,
-    ) -> Result<Answer, Failure> {
-        let sides = self.place.join(format!("{oracle}.npy"));
-        let files = [&self.points, &self.body, &sides];
+/// Asks several oracles at the same time on which side of a body the points lie, in services that stay. Files are written to `place`.
+/// For each oracle, the error is [`End::Missing`] if it or Python is missing, and another end if it fails or does not give one side per
+/// point.
+///
+/// # Errors
+/// If points and body cannot be written.
+pub fn ask(
+    oracles: &[&str],
+    (points, body): (&[[f64; 3]], &[Facet]),
+    place: &Path,
+    services: &Services,
+    paths: &Paths,
+    limit: Duration,
+) -> io::Result<Vec<Result<Answer, Failure>>> {
+    let [points_file, body_file] = ["points", "body.stl"].map(|name| place.join(name));
+    let coordinates = points.as_flattened().iter().flat_map(|c| c.to_le_bytes());
+    fs::write(&points_file, coordinates.collect::<Vec<u8>>())?;
+    let mut stl = Vec::new();
+    geometries::write_stl_binary(body, &mut stl)?;
+    fs::write(&body_file, stl)?;
+    let send = |&oracle: &&str| {
+        let files = [&points_file, &body_file, &place.join(oracle)];
         let words = files.map(|file| file.to_string_lossy().into_owned());
-        let watch = Watch::new(oracle, limit, &self.place);
         let command = command(oracle, paths)?;
-        services.request(oracle, || (command, None), &words, &watch).map_err(python::explained)?;
-        let inside = read_sides(&sides, self.count);
-        let unusable = |why| Failure::new(oracle, End::Unusable(why));
-        Ok(Answer { name: oracle.to_owned(), inside: inside.map_err(unusable)? })
-    }
+        services.send(oracle, || (command, None), &words).map_err(python::explained)
+    };
+    let sent: Vec<Result<(), Failure>> = oracles.iter().map(send).collect();
+    let answer = |(&oracle, sent): (&&str, Result<(), Failure>)| {
+        sent?;
+        let watch = Watch::new(oracle, limit, place);
+        services.answer(oracle, &watch).map_err(python::explained)?;
+        let inside = read_sides(&place.join(oracle), points.len());
+        let inside = inside.map_err(|why| Failure::new(oracle, End::Unusable(why)))?;
+        Ok(Answer { name: oracle.to_owned(), inside })
+    };
+    Ok(oracles.iter().zip(sent).map(answer).collect())
 }
 
 /// Starts an oracle, unless it runs.
@@ -109,19 +70,7 @@ fn command(oracle: &str, paths: &Paths) -> Result<Command, Failure> {
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
-    let bytes = files::read(path).map_err(|error| format!("wrote no answer: {error}"))?;
-    let array = || {
-        let (header, offset) = npy::read_header(&bytes).map_err(|error| error.to_string())?;
-        let sides = &bytes[offset as usize..];
-        match (header.descr.as_str(), &header.shape[..]) {
-            ("|u1", &[length]) if length == sides.len() as u64 => Ok(sides),
-            (dtype, shape) => {
-                Err(format!("{} bytes of type {dtype} and shape {shape:?}", sides.len()))
-            }
-        }
-    };
-    let sides =
-        array().map_err(|why| format!("wrote an answer that is not an array of bytes: {why}"))?;
+    let sides = files::read(path).map_err(|error| format!("wrote no answer: {error}"))?;
     if sides.len() != count {
         return Err(format!("classified {} of {count} points", sides.len()));
     }
@@ -134,7 +83,6 @@ fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
     use std::os::unix::fs::PermissionsExt;
 
     const POINTS: [[f64; 3]; 2] = [[0.5, -1.0, 1e300], [2.0, 3.0, 4.0]];
@@ -148,35 +96,21 @@ mod tests {
         fs::write(&python, format!("#!/bin/sh\n{words}\n{script}\necho 0\n")).unwrap();
         fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
         let paths = Paths { python, ..Paths::find() };
-        let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let limit = Duration::from_millis(2000);
-        let (_, answer) = question.ask(&["trimesh"], &Services::default(), &paths, limit).remove(0);
-        answer.map(|answer| answer.inside)
+        let (services, limit) = (Services::default(), Duration::from_millis(2000));
+        let answers =
+            super::ask(&["trimesh"], (&POINTS, &BODY), place.path(), &services, &paths, limit);
+        answers.unwrap().remove(0).map(|answer| answer.inside)
     }
 
     fn answering(bytes: &[u8]) -> String {
-        let header = npy::header("|u1", &format!("({},)", bytes.len()));
-        format!("printf '{}' > \"$3\"", octal(&[&header, bytes].concat()))
-    }
-
-    fn octal(bytes: &[u8]) -> String {
-        bytes.iter().map(|byte| format!("\\{byte:03o}")).collect()
+        let octal: String = bytes.iter().map(|byte| format!("\\{byte:03o}")).collect();
+        format!("printf '{octal}' > \"$3\"")
     }
 
     #[test]
     fn points_body_and_sides_are_exchanged_through_files() {
-        let check = "[ $(wc -c < \"$1\") = 176 ] && [ $(wc -c < \"$2\") = 134 ] || exit 9";
+        let check = "[ $(wc -c < \"$1\") = 48 ] && [ $(wc -c < \"$2\") = 134 ] || exit 9";
         assert_eq!(ask(&format!("{check}\n{}", answering(&[1, 0]))), Ok(vec![true, false]));
-    }
-
-    #[test]
-    fn points_are_written_in_numpys_format() {
-        let place = tempfile::tempdir().unwrap();
-        Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let bytes = fs::read(place.path().join("points.npy")).unwrap();
-        let file = npyz::NpyFile::new(&bytes[..]).unwrap();
-        assert_eq!(file.shape(), [2, 3]);
-        assert_eq!(file.into_vec::<f64>().unwrap(), POINTS.as_flattened());
     }
 
     #[test]
@@ -194,23 +128,17 @@ mod tests {
         assert_eq!(sentence("echo bang >&2; echo 1; exit"), "trimesh ended with code 1: bang");
         assert_eq!(sentence("echo well; exit"), "trimesh gave no exit code");
         assert!(sentence("").contains("wrote no answer"));
-        assert!(sentence("echo x > \"$3\"").contains("not an array"));
         assert!(sentence("mkfifo \"$3\"").contains("a pipe"));
-        let promising = answering(&[1]).replace(
-            &octal(&npy::header("|u1", "(1,)")),
-            &octal(&npy::header("|u1", "(999999999999,)")),
-        );
-        assert!(sentence(&promising).contains("1 bytes of type |u1 and shape [999999999999]"));
     }
 
     #[test]
     fn without_python_the_oracle_is_missing() {
         let place = tempfile::tempdir().unwrap();
         let paths = Paths { python: "/nowhere/python".into(), ..Paths::find() };
-        let question = Question::write(&POINTS, &BODY, place.path()).unwrap();
-        let limit = Duration::from_secs(1);
-        let (_, answer) = question.ask(&["open3d"], &Services::default(), &paths, limit).remove(0);
-        let failure = answer.map(drop).unwrap_err();
+        let (services, limit) = (Services::default(), Duration::from_secs(1));
+        let answers =
+            super::ask(&["open3d"], (&POINTS, &BODY), place.path(), &services, &paths, limit);
+        let failure = answers.unwrap().remove(0).map(drop).unwrap_err();
         assert!(matches!(failure.end, End::Missing(why) if why.contains("/nowhere/python")));
     }
 }

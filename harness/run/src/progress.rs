@@ -2,48 +2,45 @@
 
 use crate::engine::interrupt;
 use contract::watch::Watch;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::time::Duration;
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The line.
 #[derive(Debug)]
-pub struct Progress(ProgressBar);
+pub struct Progress {
+    is_shown: bool,
+    percent: AtomicU64,
+}
 
 impl Progress {
-    /// A line of this template of `indicatif`, for this number of cases if it counts them.
-    pub fn new(template: &str, cases: Option<usize>) -> Self {
-        let cases = cases.map(|count| count as u64);
-        let bar = ProgressBar::with_draw_target(cases, ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template(template);
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        if !bar.is_hidden() {
-            bar.enable_steady_tick(Duration::from_millis(200));
-        }
-        Self(bar)
+    /// An empty line.
+    #[expect(clippy::new_without_default, reason = "it depends on the terminal")]
+    pub fn new() -> Self {
+        Self { is_shown: stderr().is_terminal(), percent: AtomicU64::new(0) }
     }
 
-    /// Shows that a case begins.
-    pub fn case(&self, name: &str) {
-        if !self.0.prefix().is_empty() {
-            self.0.inc(1);
+    fn show(&self, text: &str) {
+        if self.is_shown {
+            let _ = write!(stderr().lock(), "\r\x1b[K{text}");
         }
-        self.0.set_prefix(name.to_owned());
     }
 
     /// Removes the line.
     pub fn finish(&self) {
-        self.0.finish_and_clear();
+        self.show("");
     }
 }
 
 impl Watch for Progress {
     fn step(&self, what: &str) {
-        self.0.set_message(what.to_owned());
+        self.show(what);
     }
 
     fn progress(&self, done: u64, total: u64) {
-        self.0.set_length(total);
-        self.0.set_position(done);
+        let percent = 100 * done / total.max(1);
+        if self.percent.swap(percent, Ordering::Relaxed) != percent {
+            self.show(&format!("{percent} %"));
+        }
     }
 
     fn is_interrupted(&self) -> bool {

@@ -13,7 +13,7 @@ use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{by_key, distinct};
 use crate::origin::Origins;
-use run::engine::lacks::EQUAL_RUNS;
+use run::engine::takes::EQUAL_RUNS;
 use statistics::{Median, median};
 use std::collections::{BTreeMap, HashMap};
 

@@ -184,8 +184,7 @@ impl Probe {
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
         let completed = engine.run(case, &Layout::on(ranks), &options)?;
-        let read = completed.read_mesh().and_then(|mesh| mesh.ok_or("no mesh".to_owned()));
-        read.map_err(|why| engine.unusable(format!("wrote a mesh that cannot be read: {why}")))
+        engine.read_mesh(&completed)
     }
 }
 

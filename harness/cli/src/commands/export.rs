@@ -99,7 +99,7 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_bar} {percent} %", None);
+    let progress = Progress::new();
     let options = Options {
         jobs: jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN),
         watch: &progress,

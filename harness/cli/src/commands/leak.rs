@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
     let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
-    let progress = Progress::new("{spinner} [{elapsed}] {wide_msg}", None);
+    let progress = Progress::new();
     let (mut first, leaked) = match (arguments.from, arguments.to) {
         (None, None) => {
             progress.step("meshing the base tree of the case");

@@ -3,7 +3,6 @@
 pub mod archive;
 pub mod audit;
 pub mod bench;
-pub mod completions;
 pub mod diff;
 pub mod export;
 mod files;
@@ -11,7 +10,6 @@ pub mod gate;
 pub mod geometry;
 pub mod import;
 pub mod leak;
-pub mod man;
 mod meshed;
 mod paper;
 pub mod picture;

@@ -19,7 +19,6 @@ here=$(dirname "$0"); mesh=$(cat "$here/now")
 case "$mesh" in
 repetition) mesh=right; [ ! -e "$here/seen" ] || mesh=layers; touch "$here/seen" ;;
 ranks) mesh=right; [ "$FAKE_RANKS" != 3 ] || mesh=layers ;;
-threads) mesh=right; [ "$OMP_NUM_THREADS" != 4 ] || mesh=layers ;;
 partitioner) mesh=right; [ "$3" != metis ] || mesh=layers ;;
 esac
 mkdir -p "$2" && cp "$here/$mesh.npy" "$2/leaves-00000.npy"
@@ -30,7 +29,6 @@ const RUN: &str = r#"
 serial = ["{here}/engine", "{case}", "{out}"]
 parallel = ["{launcher}", "{here}/engine", "{case}", "{out}"]
 partitioner = ["{partitioner}"]
-environment = { OMP_NUM_THREADS = "{threads}" }
 "#;
 
 const CASE: &str = "geometry = \"body.stl\"\nspacing_min = 1.0\nlayer_cells_min = 3\nkeep = \"all\"\n\

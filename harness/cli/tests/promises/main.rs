@@ -20,7 +20,7 @@ const BROKEN: [(&str, &str, &str); 9] = [
 /// Everything that the right mesh keeps.
 const ALL: &str = "complete = true\nsurface = { tolerance_cells = 0.0 }\nboxes = true\n\
                    sides = { band_cells = 6.0 }\nbalance = 'corner'\nlayers = true\ndeterministic = true\n\
-                   independent_of = ['ranks', 'partitioner', 'threads']";
+                   independent_of = ['ranks', 'partitioner']";
 
 fn failed(outcome: &Outcome, check: &str) -> bool {
     outcome.code == 1 && outcome.printed.contains(check)
@@ -33,8 +33,8 @@ fn a_mesh_that_keeps_every_promise_passes_every_command() {
     let verified = fixture.verify("--ranks 2,3 --out out --keep --require mpi,checks");
     assert_eq!(verified.code, 0, "{}", verified.printed);
     assert!(verified.printed.contains("0 fail, 0 left out"), "{}", verified.printed);
-    // Two partitioners on two rank counts, two numbers of threads; the base level cannot be chosen.
-    for layout in ["ranks-2-metis", "ranks-3-morton", "ranks-1-threads-4"] {
+    // Two partitioners on two rank counts; the base level cannot be chosen.
+    for layout in ["ranks-2-metis", "ranks-3-morton"] {
         assert!(fixture.path("out/case").join(layout).is_dir(), "{layout}");
     }
     let mesh = "out/case/serial/mesh";
@@ -93,8 +93,7 @@ fn a_mesh_that_depends_on_what_it_must_not_is_reported() {
     assert!(failed(&repeated, "deterministic: two serial runs differ"), "{}", repeated.printed);
     let command = format!(" --engine {} ", fixture.path("foreign.toml").display());
     assert!(repeated.printed.contains(&command), "{}", repeated.printed);
-    for (of, subject) in [("threads", "4 threads"), ("ranks", "3 ranks"), ("partitioner", "metis")]
-    {
+    for (of, subject) in [("ranks", "3 ranks"), ("partitioner", "metis")] {
         fixture.engine(of, &format!("independent_of = ['{of}', 'ranks']"));
         let verified = fixture.verify("--ranks 2,3");
         let reported = failed(&verified, "identical: first difference");

@@ -5,11 +5,10 @@
 //! unknown placeholders are errors when the file is read.
 
 use super::paths::Paths;
-use super::placeholders::Values;
 use super::takes::{Limits, Takes};
-use super::templates::Templates;
+use super::templates::{Templates, Values};
 use check::promises::Promises;
-use contract::case::{Case, explain};
+use contract::case::explain;
 use serde::Deserialize;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -137,13 +136,6 @@ impl Description {
         Ok(description)
     }
 
-    /// Why the engine is not run on a case; `None` if it is.
-    pub fn declines(&self, case: &Case) -> Option<String> {
-        let lacks = || self.takes.lacks(case).map(|feature| format!("does not support {feature}"));
-        let why = self.limits.exceeded_by(case).or_else(lacks)?;
-        Some(format!("{} {why}", self.name))
-    }
-
     /// Values of the placeholders for paths on this machine.
     pub fn places(&self, paths: &Paths) -> Values<'static> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -211,36 +203,11 @@ mod tests {
                 "{LEAST_FILE}{more}[promises]\nindependent_of = ['{of}']\n"
             ))
         };
-        for of in ["ranks", "partitioner", "threads"] {
+        for of in ["ranks", "partitioner"] {
             assert!(with(of, "").unwrap_err().contains("with which to vary it"), "{of}");
         }
-        assert!(with("threads", "environment = { OMP_NUM_THREADS = '{threads}' }\n").is_ok());
         assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
         let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err();
         assert!(empty.contains("[promises] is empty"), "{empty}");
-    }
-
-    #[test]
-    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
-        let text = format!(
-            "{LEAST_FILE}[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n"
-        );
-        let engine = Description::parse(&text).unwrap();
-        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
-        let declines = |case: &str| {
-            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
-        };
-        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
-        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
-        assert!(deep.contains("levels up to 3 (level_max in [limits])"), "{deep}");
-        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
-        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
-        assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
-        let enclosed =
-            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
-        assert!(enclosed.ends_with("enclosed = keep (keep_enclosed in [takes])"), "{enclosed}");
-        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
-                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
-        assert!(declines(boxed).unwrap().contains("boxes"));
     }
 }

@@ -70,25 +70,6 @@ impl Failure {
     }
 }
 
-/// The activity of each rank. Ranks with the same activity share a clause.
-pub(super) fn describe_activity(status: &[(usize, String)]) -> String {
-    let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
-    for (rank, activity) in status {
-        match groups.iter_mut().find(|(other, _)| other == activity) {
-            Some((_, ranks)) => ranks.push(rank.to_string()),
-            None => groups.push((activity, vec![rank.to_string()])),
-        }
-    }
-    if groups.is_empty() {
-        return "no rank had reported its phase".to_owned();
-    }
-    let clause = |(activity, ranks): (&str, Vec<String>)| match ranks.len() {
-        1 => format!("rank {} was in: {activity}", ranks[0]),
-        _ => format!("ranks {} were in: {activity}", ranks.join(", ")),
-    };
-    groups.into_iter().map(clause).collect::<Vec<_>>().join("; ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,18 +83,9 @@ mod tests {
         let limit = Duration::from_secs(5);
         let hang = "mesher did not end within 5 s and was killed";
         assert_eq!(sentence(End::TimedOut { limit, activity: None }), hang);
-        let activity = Some(describe_activity(&[(0, "balance".to_owned())]));
-        let with_activity = format!("{hang}; rank 0 was in: balance");
+        let activity = Some("its ranks were in balance".to_owned());
+        let with_activity = format!("{hang}; its ranks were in balance");
         assert_eq!(sentence(End::TimedOut { limit, activity }), with_activity);
         assert_eq!(sentence(End::Missing("cannot be started".into())), "mesher cannot be started");
-    }
-
-    #[test]
-    fn ranks_with_the_same_activity_share_a_clause() {
-        let status =
-            [(0, "layer 7".to_owned()), (1, "balance".to_owned()), (2, "layer 7".to_owned())];
-        let expected = "ranks 0, 2 were in: layer 7; rank 1 was in: balance";
-        assert_eq!(describe_activity(&status), expected);
-        assert_eq!(describe_activity(&[]), "no rank had reported its phase");
     }
 }

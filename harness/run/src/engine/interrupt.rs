@@ -41,8 +41,6 @@ static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
 struct Leftovers {
     /// Leaders of the sessions of child processes.
     children: Vec<u32>,
-    /// Those of them that stay while others come and go.
-    services: Vec<u32>,
     /// Directories; those that were removed already may remain in the list.
     directories: Vec<PathBuf>,
     /// The directory of all temporary files.
@@ -111,15 +109,11 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Starts a child process that leads a session, and that may stay while others come and go. It is noted under the same lock, so that a run
-/// that ends on another thread does not take it for a process that was adopted.
-pub(super) fn spawn(command: &mut Command, stays: bool) -> io::Result<Child> {
+/// Starts a child process that leads a session.
+pub(super) fn spawn(command: &mut Command) -> io::Result<Child> {
     let mut leftovers = leftovers();
     let child = command.spawn()?;
     leftovers.children.push(child.id());
-    if stays {
-        leftovers.services.push(child.id());
-    }
     Ok(child)
 }
 
@@ -127,11 +121,7 @@ pub(super) fn spawn(command: &mut Command, stays: bool) -> io::Result<Child> {
 pub(super) fn forget_child(id: u32) {
     let mut leftovers = leftovers();
     leftovers.children.retain(|&child| child != id);
-    leftovers.services.retain(|&service| service != id);
-    // Those of a run on another thread are ended after that.
-    if leftovers.children == leftovers.services {
-        session::end_adopted(&leftovers.services);
-    }
+    session::end_adopted(&leftovers.children);
 }
 
 /// Notes a directory that must not outlive the harness.

@@ -66,29 +66,21 @@ impl Launcher {
         command
     }
 
-    /// A directory for the run's shared memory. `None` if the launcher may start ranks on other machines, where the
-    /// directory would not exist, or if this machine has no `/dev/shm`; OpenMPI then uses its own default.
-    pub fn shared_memory(&self) -> Option<SharedMemory> {
+    /// Prepares the environment of a run, and makes a directory for its shared memory. `None` if the launcher may start ranks on other
+    /// machines, where the directory would not exist, or if this machine has no `/dev/shm`; OpenMPI then uses its own default.
+    pub fn prepare(&self, command: &mut Command) -> Option<TempDir> {
+        set_environment(command);
         let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
         // In a job of Slurm, mpirun starts ranks on all of its nodes.
         let nodes = std::env::var("SLURM_JOB_NUM_NODES").unwrap_or_else(|_| "1".to_owned());
-        let local = is_mpirun && self.words[1..] == ["-n", RANKS] && nodes == "1";
-        let directory = || tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok();
-        let made = local.then(directory).flatten()?;
+        if !is_mpirun || self.words[1..] != ["-n", RANKS] || nodes != "1" {
+            return None;
+        }
+        let made = tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok()?;
         interrupt::note_directory(made.path());
-        Some(SharedMemory(made))
-    }
-}
-
-/// A run's directory in shared memory, removed on drop with all remaining files.
-#[derive(Debug)]
-pub struct SharedMemory(TempDir);
-
-impl SharedMemory {
-    /// Makes OpenMPI use the directory.
-    pub fn add_to(&self, command: &mut Command) {
-        command.env("OMPI_MCA_btl_vader_backing_directory", self.0.path());
-        command.env("OMPI_MCA_orte_tmpdir_base", self.0.path());
+        command.env("OMPI_MCA_btl_vader_backing_directory", made.path());
+        command.env("OMPI_MCA_orte_tmpdir_base", made.path());
+        Some(made)
     }
 }
 
@@ -122,8 +114,9 @@ mod tests {
     #[test]
     fn only_a_run_on_this_machine_has_its_own_shared_memory() {
         let cluster = Launcher::parse("mpirun --hostfile hosts -n {ranks}").unwrap();
-        assert!(cluster.shared_memory().is_none());
+        let mut command = Command::new("true");
+        assert!(cluster.prepare(&mut command).is_none());
         let local = Launcher::mpirun(Path::new("/usr/bin/mpirun"));
-        assert_eq!(local.shared_memory().is_some(), Path::new("/dev/shm").is_dir());
+        assert_eq!(local.prepare(&mut command).is_some(), Path::new("/dev/shm").is_dir());
     }
 }

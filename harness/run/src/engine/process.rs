@@ -1,25 +1,27 @@
-//! Runs child processes under a time limit, ends them with all their descendants, and classifies the end.
+//! Runs child processes under a time limit, and classifies how they end.
 //!
 //! Invariants:
-//! - a child leads a session of its own, so that its descendants can be found even if they left its process group, as
-//!   the ranks of OpenMPI's `mpirun` do;
-//! - when [`run`] returns, no process of that session is left, however the child ended;
-//! - the child's output goes to files of bounded size, so that no pipe can fill, and neither can the disk, and no output is
-//!   lost with a hang.
+//! - when [`run`] returns, no process of the child's [`Session`] is left, however the child ended;
+//! - the child's output goes to files, so that no pipe can fill and no output is lost with a hang; a child that prints more than
+//!   [`OUTPUT_MAX`] is ended, so that the disk cannot fill either.
 
-use super::failure::{End, Failure, describe_activity};
+use super::failure::{End, Failure};
 use super::interrupt;
 use super::memory::MemorySampler;
-use super::output::Output;
-use super::reap::{Ending, try_reap};
-use super::session;
-use rustix::process::{Signal, setsid};
-use std::fs;
+use super::session::Session;
+use std::collections::BTreeSet;
+use std::fs::{self, File, OpenOptions};
 use std::io;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::os::unix::fs::FileExt;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
+
+/// Longest output of a child, in bytes.
+const OUTPUT_MAX: u64 = 64 << 20;
+/// Bytes at the end of a standard error in which the error is looked for.
+const ERROR_MAX: u64 = 1 << 20;
 
 /// A child that exited with code 0.
 #[derive(Debug)]
@@ -59,9 +61,30 @@ impl<'a> Watch<'a> {
         self.logs.join(format!("{}.{stream}", self.name))
     }
 
-    /// What the ranks are doing, if they report it.
-    pub(super) fn activity(&self) -> Option<String> {
-        self.status.map(|status| describe_activity(&read_status(status)))
+    /// Waits until `look` finds what it looks for. After an error the child may still run.
+    pub(super) fn until<T>(
+        &self,
+        session: &mut Session,
+        start: Instant,
+        outputs: &[&File],
+        mut look: impl FnMut(&mut Session) -> Result<Option<T>, End>,
+    ) -> Result<T, End> {
+        loop {
+            if let Some(found) = look(session)? {
+                return Ok(found);
+            }
+            if interrupt::requested() {
+                return Err(End::Interrupted);
+            }
+            if start.elapsed() >= self.limit {
+                let activity = self.status.map(activity);
+                return Err(End::TimedOut { limit: self.limit, activity });
+            }
+            if outputs.iter().any(|output| length(output) > OUTPUT_MAX) {
+                let mib = OUTPUT_MAX >> 20;
+                return Err(End::Unusable(format!("printed more than {mib} MiB and was killed")));
+            }
+        }
     }
 }
 
@@ -70,91 +93,81 @@ impl<'a> Watch<'a> {
 /// # Errors
 /// If the child cannot be started or does not exit with code 0.
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
-    let failure = |end| Failure::new(watch.name, end);
+    to_its_end(command, watch).map_err(|end| Failure::new(watch.name, end))
+}
+
+fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     if interrupt::requested() {
-        return Err(failure(End::Interrupted));
+        return Err(End::Interrupted);
     }
+    let mut start = || -> io::Result<_> {
+        let (stdout, stderr) = (log(&watch.log("stdout"))?, log(&watch.log("stderr"))?);
+        command.stdin(Stdio::null()).stdout(stdout.try_clone()?).stderr(stderr.try_clone()?);
+        let start = Instant::now();
+        Ok((start, Session::start(command)?.0, [stdout, stderr]))
+    };
+    let started = start();
+    let (start, mut session, outputs) =
+        started.map_err(|error| cannot_be_started(command, &error))?;
     let mut sampler = watch.sample_memory.then(MemorySampler::new);
-    let (start, child, mut outputs) = start(command, watch).map_err(|error| {
-        let program = Path::new(command.get_program()).display();
-        failure(End::Missing(format!("cannot be started: {program}: {error}")))
-    })?;
-    let end = wait(&child, start, watch, sampler.as_mut(), &mut outputs);
-    let time_wall_s = start.elapsed().as_secs_f64();
-    kill_session(child.id());
-    interrupt::forget_child(child.id());
-    let finished = outputs.into_iter().try_for_each(Output::finish);
-    finished.map_err(|error| failure(End::Unusable(format!("has no readable output: {error}"))))?;
-    match end {
-        Ok(Ok(time_cpu_s)) => Ok(Finished {
-            time_wall_s,
-            time_cpu_s,
-            stdout: watch.log("stdout"),
-            peak_rss_bytes: sampler.map(|sampler| sampler.peak_bytes()),
-        }),
-        Ok(Err(end)) => Err(failure(end)),
-        Err(error) => Err(failure(End::Unusable(format!("could not be waited for: {error}")))),
-    }
-}
-
-fn start(command: &mut Command, watch: &Watch) -> io::Result<(Instant, Child, [Output; 2])> {
-    let outputs = [Output::create(&watch.log("stdout"))?, Output::create(&watch.log("stderr"))?];
-    command.stdin(Stdio::null()).stdout(outputs[0].stdio()?).stderr(outputs[1].stdio()?);
-    lead_session(command);
-    let start = Instant::now();
-    let child = interrupt::spawn(command, false)?;
-    Ok((start, child, outputs))
-}
-
-/// Makes the child lead a session of its own.
-pub(super) fn lead_session(command: &mut Command) {
-    // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
-    unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
-}
-
-/// The CPU time of a child that exited with code 0, or how it ended otherwise.
-fn wait(
-    child: &Child,
-    start: Instant,
-    watch: &Watch,
-    mut sampler: Option<&mut MemorySampler>,
-    outputs: &mut [Output; 2],
-) -> io::Result<Result<f64, End>> {
-    let ending = Ending::of(child);
     let mut pause = Duration::from_millis(1);
-    loop {
-        if let Some((status, time_cpu_s)) = try_reap(child)? {
-            let errors = || outputs[1].since(0);
-            // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
-            let interrupted = interrupt::requested().then_some(End::Interrupted);
-            return Ok(interrupted.or_else(|| judge(status, errors)).map_or(Ok(time_cpu_s), Err));
+    // Samples of memory are taken between pauses, often enough in a run of any length.
+    let longest = Duration::from_millis(if sampler.is_some() { 5 } else { 20 });
+    let outputs = outputs.each_ref();
+    let ended = watch.until(&mut session, start, &outputs, |session| {
+        if let Some(ended) = session.reap()? {
+            return Ok(Some(ended));
         }
-        if interrupt::requested() {
-            end_child(child)?;
-            return Ok(Err(End::Interrupted));
-        }
-        if start.elapsed() >= watch.limit {
-            let activity = watch.activity();
-            end_child(child)?;
-            return Ok(Err(End::TimedOut { limit: watch.limit, activity }));
-        }
-        outputs.iter_mut().for_each(Output::discard_middle);
         if let Some(sampler) = &mut sampler {
-            sampler.sample(child.id());
+            sampler.sample(session.id());
         }
-        ending.wait(pause);
-        // Samples of memory are taken between pauses, often enough in a run of any length.
-        let longest = if sampler.is_some() { 5 } else { 20 };
-        pause = (pause * 2).min(Duration::from_millis(longest));
+        session.pause(pause);
+        pause = (pause * 2).min(longest);
+        Ok(None)
+    });
+    let time_wall_s = start.elapsed().as_secs_f64();
+    if ended.is_err() {
+        session.end();
     }
+    let (status, time_cpu_s) = ended?;
+    // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
+    if interrupt::requested() {
+        return Err(End::Interrupted);
+    }
+    judge(status, outputs[1])?;
+    let peak_rss_bytes = sampler.map(|sampler| sampler.peak_bytes());
+    Ok(Finished { time_wall_s, time_cpu_s, stdout: watch.log("stdout"), peak_rss_bytes })
 }
 
-/// How a child failed, from its status and its standard error.
-pub(super) fn judge(status: ExitStatus, errors: impl FnOnce() -> String) -> Option<End> {
+pub(super) fn cannot_be_started(command: &Command, error: &io::Error) -> End {
+    let program = Path::new(command.get_program()).display();
+    End::Missing(format!("cannot be started: {program}: {error}"))
+}
+
+/// An empty file that receives a child's output.
+pub(super) fn log(path: &Path) -> io::Result<File> {
+    File::create(path)?;
+    OpenOptions::new().read(true).append(true).open(path)
+}
+
+fn length(output: &File) -> u64 {
+    output.metadata().map_or(0, |metadata| metadata.len())
+}
+
+/// The end of a standard error.
+pub(super) fn end_of(errors: &File) -> String {
+    let start = length(errors).saturating_sub(ERROR_MAX);
+    let mut end = vec![0; (length(errors) - start) as usize];
+    let _ = errors.read_exact_at(&mut end, start);
+    String::from_utf8_lossy(&end).into_owned()
+}
+
+/// How a child failed, from its status and its standard error, unless it exited with code 0.
+pub(super) fn judge(status: ExitStatus, errors: &File) -> Result<(), End> {
     match status.code() {
-        Some(0) => None,
-        Some(code) => Some(End::Exited { code, error: last_lines(&errors()) }),
-        None => Some(End::Signalled(status.signal().unwrap_or(0))),
+        Some(0) => Ok(()),
+        Some(code) => Err(End::Exited { code, error: last_lines(&end_of(errors)) }),
+        None => Err(End::Signalled(status.signal().unwrap_or(0))),
     }
 }
 
@@ -193,47 +206,17 @@ fn start_of(line: &&str) -> String {
     }
 }
 
-/// Sends SIGTERM to the child and all its descendants, ranks included, and kills those that do not end in time.
-pub(super) fn end_child(child: &Child) -> io::Result<()> {
-    session::signal(child.id(), Signal::TERM);
-    let patience = Instant::now() + interrupt::PATIENCE;
-    while Instant::now() < patience {
-        if try_reap(child)?.is_some() {
-            return Ok(());
+/// What the ranks are doing, by the status files in a directory.
+fn activity(directory: &Path) -> String {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let texts = entries.filter_map(|entry| fs::read_to_string(entry.path()).ok());
+    let texts: BTreeSet<String> = texts.map(|text| text.trim().to_owned()).collect();
+    match texts.is_empty() {
+        true => "no rank had reported its phase".to_owned(),
+        false => {
+            format!("its ranks were in {}", texts.into_iter().collect::<Vec<_>>().join(", "))
         }
-        std::thread::sleep(Duration::from_millis(10));
     }
-    kill_session(child.id());
-    while try_reap(child)?.is_none() {
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    Ok(())
-}
-
-/// Kills every process of the session that `leader` led. Processes may be started while the session is being killed,
-/// so this repeats until none is found.
-pub(super) fn kill_session(leader: u32) {
-    for _ in 0..100 {
-        if session::members(leader).is_empty() {
-            return;
-        }
-        session::signal(leader, Signal::KILL);
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
-/// The activity in each rank's status file, in the order of ranks.
-fn read_status(directory: &Path) -> Vec<(usize, String)> {
-    let Ok(entries) = fs::read_dir(directory) else {
-        return Vec::new();
-    };
-    let of_file = |path: PathBuf| {
-        let rank = path.file_stem()?.to_str()?.strip_prefix("rank-")?.parse().ok()?;
-        Some((rank, fs::read_to_string(&path).ok()?.trim().to_owned()))
-    };
-    let mut status: Vec<_> = entries.flatten().filter_map(|entry| of_file(entry.path())).collect();
-    status.sort();
-    status
 }
 
 #[cfg(test)]
@@ -252,12 +235,13 @@ mod tests {
 
     /// `activity` are the texts of the ranks' status files.
     fn end_with_activity(script: &str, limit_ms: u64, activity: &[&str]) -> End {
-        let logs = tempfile::tempdir().unwrap();
+        let (logs, status) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         for (rank, text) in activity.iter().enumerate() {
-            fs::write(logs.path().join(format!("rank-{rank:05}.txt")), text).unwrap();
+            fs::write(status.path().join(format!("rank-{rank:05}.txt")), text).unwrap();
         }
         let limit = Duration::from_millis(limit_ms);
-        let watch = Watch { status: Some(logs.path()), ..Watch::new("child", limit, logs.path()) };
+        let watch =
+            Watch { status: Some(status.path()), ..Watch::new("child", limit, logs.path()) };
         shell(script, &watch).unwrap_err().end
     }
 
@@ -268,17 +252,6 @@ mod tests {
         let finished = shell("echo yes", &watch).unwrap();
         assert_eq!(fs::read_to_string(&finished.stdout).unwrap(), "yes\n");
         assert_eq!(finished.peak_rss_bytes, None);
-    }
-
-    /// A run that has just been started is not taken for one that another run has left running.
-    #[test]
-    fn runs_on_several_threads_do_not_end_each_other() {
-        let runs = || {
-            let logs = tempfile::tempdir().unwrap();
-            let watch = Watch::new("child", Duration::from_secs(60), logs.path());
-            (0..20).for_each(|_| _ = shell("exit 0", &watch).unwrap());
-        };
-        std::thread::scope(|scope| (0..8).for_each(|_| _ = scope.spawn(runs)));
     }
 
     #[test]
@@ -308,6 +281,21 @@ mod tests {
     }
 
     #[test]
+    fn a_flood_of_output_ends_the_child() {
+        let End::Unusable(why) = end_of("yes", 60_000) else { panic!() };
+        assert!(why.contains("64 MiB"), "{why}");
+    }
+
+    #[test]
+    fn ranks_with_the_same_activity_share_a_clause() {
+        let end = end_with_activity("sleep 600", 100, &["layer 7", "balance", "layer 7"]);
+        let End::TimedOut { activity: Some(activity), .. } = end else { panic!("{end:?}") };
+        assert_eq!(activity, "its ranks were in balance, layer 7");
+        let End::TimedOut { activity, .. } = end_of("sleep 600", 100) else { panic!() };
+        assert_eq!(activity.unwrap(), "no rank had reported its phase");
+    }
+
+    #[test]
     fn a_signal_is_not_an_exit_code() {
         assert_eq!(end_of("kill -9 $$", 60_000), End::Signalled(9));
     }
@@ -322,7 +310,7 @@ mod tests {
 
     #[test]
     fn a_hang_is_killed_and_reported_with_the_activity_of_the_ranks() {
-        let activity = Some("rank 0 was in: balance; rank 1 was in: layer".to_owned());
+        let activity = Some("its ranks were in balance, layer".to_owned());
         let limit = Duration::from_millis(300);
         let end = end_with_activity("sleep 600", 300, &["balance\n", "layer\n"]);
         assert_eq!(end, End::TimedOut { limit, activity });
@@ -342,7 +330,7 @@ mod tests {
         shell("exec bash -c 'set -m; sleep 600 & echo $! > id'", &watch).unwrap();
         let id = fs::read_to_string(logs.path().join("id")).unwrap();
         let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
-        assert!(!session::session_and_liveness(&stat).is_some_and(|(_, alive)| alive), "{stat}");
+        assert!(stat.is_empty() || stat.contains(") Z "), "{stat}");
     }
 
     #[test]

@@ -1,17 +1,15 @@
 //! An engine: any program that meshes a case, ours included, run as its engine file describes.
 
-use super::command;
 use super::description::{self, Description};
 use super::failure::{End, Failure};
-use super::interrupt;
-use super::launcher::{self, Launcher};
+use super::launcher::Launcher;
 use super::layout::{Layout, Ranks};
 use super::options::RunOptions;
 use super::paths::{Paths, on_path};
-use super::placeholders::{LAUNCHER, Values, fill};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use super::service::{self, Services};
+use super::templates::{LAUNCHER, Values, fill};
 use super::written;
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
@@ -117,16 +115,6 @@ impl Engine {
         })
     }
 
-    /// Whether the engine writes run reports.
-    pub fn writes_report(&self) -> bool {
-        self.description.run.json.is_some()
-    }
-
-    /// Whether the engine writes its mesh in a format that is imported.
-    fn is_imported(&self) -> bool {
-        self.description.run.format.is_some()
-    }
-
     /// The leaf-set directory of the mesh of a run, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let always = self.description.run.always_writes_mesh();
@@ -160,14 +148,17 @@ impl Engine {
     ) -> Result<Command, Failure> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut values = self.places.clone();
-        values.insert("program", text(&self.program));
-        let out = |mesh: PathBuf| match self.is_imported() {
-            true => written::foreign(options.place),
-            false => mesh,
-        };
-        values.extend(self.mesh_path(options).map(|mesh| ("out", text(&out(mesh)))));
-        command::assemble(&self.description.run, &self.launcher, values, case, layout, options)
-            .map_err(|end| self.failure(end))
+        values.extend([("program", text(&self.program)), ("case", text(case))]);
+        let templates = &self.description.run;
+        let out = self.mesh_path(options).map(|mesh| match templates.format {
+            Some(_) => text(&written::foreign(options.place)),
+            None => text(&mesh),
+        });
+        let words = templates.words(&self.launcher, layout, options, out, values);
+        let words = words.map_err(|end| self.failure(end))?;
+        let mut command = Command::new(&words[0]);
+        command.args(&words[1..]);
+        Ok(command)
     }
 
     /// Runs the engine on a case and reads its run report.
@@ -181,55 +172,60 @@ impl Engine {
         options: &RunOptions,
     ) -> Result<Completed, Failure> {
         let mut command = self.command(case, layout, options)?;
-        // An earlier run's report must not be mistaken for this run's.
+        let mesh = self.mesh_path(options);
+        // An earlier run's files must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
-        if let Some(mesh) = self.mesh_path(options).filter(|_| self.is_imported()) {
-            let cleared = written::clear(options.place, &mesh);
+        if let (Some(mesh), Some(_)) = (&mesh, self.description.run.format) {
+            let cleared = written::clear(options.place, mesh);
             cleared.map_err(|error| self.unusable(format!("has no place to write to: {error}")))?;
         }
         let finished = self.execute(&mut command, layout.ranks, options)?;
-        let mesh = self.mesh_path(options);
-        if let Some(mesh) = &mesh {
+        let written = mesh.as_deref().map(|mesh| {
             written::complete(&self.description, self.label(), &command, case, mesh, options)
-                .map_err(|end| self.failure(end))?;
-        }
-        let written =
-            mesh.as_deref().map(Mesh::open).transpose().map_err(|error| {
-                self.unusable(format!("wrote a mesh that cannot be read: {error}"))
-            })?;
-        let mut report = match &written {
-            Some(mesh) if !options.report || !self.writes_report() => {
-                RunReport::of_mesh(&mesh.manifest)
-            }
-            _ => RunReport::read(&options.report_path())
-                .map_err(|why| self.unusable(format!("ended, but {why}")))?,
-        };
-        // Limits apply to this number, so it must be one of leaves that exist.
-        if let Some(mesh) = written.as_ref().filter(|mesh| mesh.len() != report.cells) {
-            let (stated, found) = (report.cells, mesh.len());
-            return Err(self.unusable(format!("states {stated} cells, and its mesh has {found}")));
-        }
-        // A digest in the report is compared with that of the leaves by whoever reads them.
-        if let Some(mesh) = &written {
-            report.digest.get_or_insert_with(|| mesh.manifest.digest.to_string());
-        }
-        let (launched, reported) = (layout.ranks.count(), report.ranks);
-        if let Some(ranks) = reported.filter(|&ranks| ranks != launched) {
-            let why = match layout.ranks {
-                Ranks::Mpi(_) => {
-                    let launcher = self.launcher.program();
-                    format!(
-                        "was started on {launched} ranks by {}, but reports {ranks}: it was built without MPI, or for another MPI",
-                        launcher.display()
-                    )
-                }
-                _ => format!("was to run on {launched} ranks, but reports {ranks}"),
-            };
-            return Err(self.unusable(why));
+        });
+        let written = written.transpose().map_err(|end| self.failure(end))?;
+        let report = self.report(written.as_ref(), options).map_err(|why| self.unusable(why))?;
+        let launched = layout.ranks.count();
+        if let Some(reported) = report.ranks.filter(|&ranks| ranks != launched) {
+            let launcher = self.launcher.program();
+            return Err(self.unusable(format!(
+                "was to run on {launched} ranks, but reports {reported}: if on MPI, it was built without it, or for another than that of {}",
+                launcher.display()
+            )));
         }
         let report = completed(report, &finished, launched);
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
+    }
+
+    /// The report of a run, of which the mesh was written.
+    fn report(&self, written: Option<&Mesh>, options: &RunOptions) -> Result<RunReport, String> {
+        let is_written = options.report && self.description.run.json.is_some();
+        let mut report = match written {
+            Some(mesh) if !is_written => RunReport::of_mesh(&mesh.manifest),
+            _ => RunReport::read(&options.report_path())
+                .map_err(|why| format!("ended, but {why}"))?,
+        };
+        if let Some(mesh) = written {
+            // Limits apply to this number, so it must be one of leaves that exist.
+            if report.cells != mesh.len() {
+                let (stated, found) = (report.cells, mesh.len());
+                return Err(format!("states {stated} cells, and its mesh has {found}"));
+            }
+            // A digest in the report is compared with that of the leaves by whoever reads them.
+            report.digest.get_or_insert_with(|| mesh.manifest.digest.to_string());
+        }
+        Ok(report)
+    }
+
+    /// Reads the mesh of a run that was to write one.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be read.
+    pub fn read_mesh(&self, completed: &Completed) -> Result<LeafSet, Failure> {
+        let mesh = completed.mesh.as_ref().ok_or_else(|| self.unusable("wrote no mesh".into()))?;
+        let unreadable = |error| format!("wrote a mesh that cannot be read: {error}");
+        leafset::read(mesh).map_err(|error| self.unusable(unreadable(error)))
     }
 
     fn execute(
@@ -250,46 +246,29 @@ impl Engine {
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
-        let _alone = options.services.map(Services::ranks);
-        // While this thread waited for the others.
-        if interrupt::requested() {
-            return Err(self.failure(End::Interrupted));
-        }
-        let serving = options.services.and_then(|services| Some((services, self.serves()?)));
-        if let Some((services, serve)) = serving {
+        let serve = self.description.run.serve.as_deref();
+        if let (Some(services), Some(serve)) = (options.services, serve) {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
             let (name, start) = (self.name_of_ranks(count), || self.ranks(count, serve));
-            let time_wall_s = services.request(&name, start, &words, &watch)?;
+            services.send(&name, start, &words)?;
+            let time_wall_s = services.answer(&name, &watch)?;
             let stdout = watch.log("stdout");
-            // The CPU time of a request is not measured.
-            return Ok(Finished {
-                time_wall_s,
-                time_cpu_s: f64::NAN,
-                stdout,
-                peak_rss_bytes: None,
-            });
+            // The CPU time and the memory of a request are not measured.
+            let time_cpu_s = f64::NAN;
+            return Ok(Finished { time_wall_s, time_cpu_s, stdout, peak_rss_bytes: None });
         }
-        launcher::set_environment(command);
-        let shared = self.launcher.shared_memory();
-        shared.iter().for_each(|shared| shared.add_to(command));
+        let _shared = self.launcher.prepare(command);
         process::run(command, &watch)
     }
 
     /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none. What fails is found by
     /// the first run.
     pub fn start_ranks(&self, count: usize, services: &Services) {
-        if let Some(serve) = self.serves() {
+        if let Some(serve) = &self.description.run.serve {
             let _ = services.start(&self.name_of_ranks(count), || self.ranks(count, serve));
         }
-    }
-
-    /// The arguments with which ranks stay, if they can.
-    fn serves(&self) -> Option<&[String]> {
-        let templates = &self.description.run;
-        // The environment may depend on the run.
-        templates.serve.as_deref().filter(|_| templates.environment.is_empty())
     }
 
     fn name_of_ranks(&self, count: usize) -> String {
@@ -299,8 +278,7 @@ impl Engine {
     fn ranks(&self, count: usize, serve: &[String]) -> service::Start {
         let mut command = self.launcher.command(count, &self.program);
         command.args(serve);
-        let shared = self.launcher.shared_memory();
-        shared.iter().for_each(|shared| shared.add_to(&mut command));
+        let shared = self.launcher.prepare(&mut command);
         (command, shared)
     }
 
@@ -321,17 +299,6 @@ impl Engine {
             true => name.to_owned(),
             false => stem.into_owned(),
         }
-    }
-}
-
-impl Completed {
-    /// Reads the mesh, if it was written.
-    ///
-    /// # Errors
-    /// One sentence, if the mesh cannot be read.
-    pub fn read_mesh(&self) -> Result<Option<LeafSet>, String> {
-        let read = |mesh: &PathBuf| leafset::read(mesh).map_err(|error| error.to_string());
-        self.mesh.as_ref().map(read).transpose()
     }
 }
 

@@ -1,9 +1,15 @@
-//! The cases that an engine supports: the tables `[takes]` and `[limits]` of its file. No command runs it on any other.
+//! What an engine supports: the tables `[takes]` and `[limits]` of its file. No command runs it on any other case.
 
+use super::description::Description;
+use check::promises::{Independence, Touching};
 use contract::case::Case;
 use contract::manifest::{Enclosed, Keep};
+use contract::octant::LEVEL_MAX;
 use contract::plain::StlForm;
 use serde::Deserialize;
+
+/// What an engine lacks that is not deterministic.
+pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
 
 /// Features of a case file that an engine supports.
 #[derive(Clone, Debug, Deserialize)]
@@ -28,11 +34,10 @@ pub struct Takes {
 
 impl Default for Takes {
     fn default() -> Self {
-        let keep = vec![Keep::Outside, Keep::Inside, Keep::All];
         Self {
             generator: false,
             boxes: true,
-            keep,
+            keep: vec![Keep::Outside, Keep::Inside, Keep::All],
             drop_crossing: true,
             seeds: false,
             keep_enclosed: false,
@@ -53,47 +58,111 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { level_max: contract::octant::LEVEL_MAX, facets_max: u64::MAX }
+        Self { level_max: LEVEL_MAX, facets_max: u64::MAX }
     }
 }
 
-impl Limits {
-    /// What of a case is beyond the limits, as the rest of a sentence about the engine; `None` if nothing is.
-    pub fn exceeded_by(&self, case: &Case) -> Option<String> {
+impl Description {
+    /// Why the engine is not run on a case; `None` if it is.
+    pub fn declines(&self, case: &Case) -> Option<String> {
+        let (takes, limits) = (&self.takes, &self.limits);
         let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
-        if level > self.level_max {
-            return Some(format!(
-                "supports levels up to {} (level_max in [limits]), and the case needs {level}",
-                self.level_max
-            ));
-        }
-        (facets > self.facets_max).then(|| {
-            format!(
-                "supports {} facets (facets_max in [limits]), and the case has {facets}",
-                self.facets_max
-            )
-        })
+        let feature = |name: &str| format!("does not support {name} in [takes])");
+        let keep = format!("keep = {:?} (keep", case.keep).to_lowercase();
+        let beyond = [
+            (
+                level > limits.level_max,
+                format!(
+                    "supports levels up to {} (level_max in [limits]), and the case needs {level}",
+                    limits.level_max
+                ),
+            ),
+            (
+                facets > limits.facets_max,
+                format!(
+                    "supports {} facets (facets_max in [limits]), and the case has {facets}",
+                    limits.facets_max
+                ),
+            ),
+            (!case.boxes.is_empty() && !takes.boxes, feature("extent boxes (boxes")),
+            (
+                !case.keep_crossing && !takes.drop_crossing,
+                feature("keep_crossing = false (drop_crossing"),
+            ),
+            (!case.seeds.is_empty() && !takes.seeds, feature("seeds (seeds")),
+            (
+                case.enclosed == Enclosed::Keep && !takes.keep_enclosed,
+                feature("enclosed = keep (keep_enclosed"),
+            ),
+            (!takes.keep.contains(&case.keep), feature(&keep)),
+        ];
+        let (_, why) = beyond.into_iter().find(|(is_beyond, _)| *is_beyond)?;
+        Some(format!("{} {why}", self.name))
+    }
+
+    /// What the engine does not do or promise, in a few words each, for comparisons; empty if it keeps the whole definition on any
+    /// number of ranks.
+    pub fn lacks(&self) -> Vec<String> {
+        let (promises, takes) = (&self.promises, &self.takes);
+        let promised = |has: bool| has || promises.definition;
+        let parallel = self.run.parallel.is_some();
+        let of_ranks = promises.is_independent_of(Independence::Ranks);
+        let features = [
+            (promised(promises.complete), "meshes without holes"),
+            (promised(promises.surface.is_some()), "the asked level at the surface"),
+            (promised(promises.balance.is_some()), "2:1 balance over faces"),
+            (promised(promises.balance == Some(Touching::Corner)), "2:1 balance over corners"),
+            (promised(promises.layers), "layers"),
+            (takes.boxes && promised(promises.boxes), "extent boxes"),
+            (promised(promises.sides.is_some()), "inside and outside"),
+            (takes.keep.iter().any(|keep| *keep != Keep::All), "deletion of either side"),
+            (takes.seeds, "seeds"),
+            (promises.is_deterministic(), EQUAL_RUNS),
+            (parallel, "MPI"),
+            (!parallel || of_ranks, "equal meshes on any number of ranks"),
+        ];
+        let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
+        let level = self.limits.level_max;
+        missing.chain((level < LEVEL_MAX).then(|| format!("levels beyond {level}"))).collect()
     }
 }
 
-impl Takes {
-    /// A feature of a case that is not supported; `None` if there is none.
-    pub fn lacks(&self, case: &Case) -> Option<String> {
-        let features = [
-            (!case.boxes.is_empty() && !self.boxes, "extent boxes (boxes in [takes])"),
-            (
-                !case.keep_crossing && !self.drop_crossing,
-                "keep_crossing = false (drop_crossing in [takes])",
-            ),
-            (!case.seeds.is_empty() && !self.seeds, "seeds (seeds in [takes])"),
-            (
-                case.enclosed == Enclosed::Keep && !self.keep_enclosed,
-                "enclosed = keep (keep_enclosed in [takes])",
-            ),
-        ];
-        let keep = || format!("keep = {:?} (keep in [takes])", case.keep).to_lowercase();
-        let lacked =
-            features.into_iter().find(|(lacked, _)| *lacked).map(|(_, name)| name.to_owned());
-        lacked.or_else(|| (!self.keep.contains(&case.keep)).then(keep))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn our_mesher_lacks_nothing_and_a_simple_one_what_it_does_not_promise() {
+        let own = Description::parse(include_str!("../../../engines/mesher.toml")).unwrap();
+        assert_eq!(own.lacks(), [""; 0]);
+        let text = "[run]\nserial = ['m', '{case}', '{out}']\n[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 14\n\
+                    [promises]\ncomplete = true\nsurface = { tolerance_cells = 0.0 }\nbalance = 'edge'\ndeterministic = true\n";
+        let lacks = Description::parse(text).unwrap().lacks().join("; ");
+        let expected = "2:1 balance over corners; layers; extent boxes; inside and outside; deletion of either side; \
+                        seeds; MPI; levels beyond 14";
+        assert_eq!(lacks, expected);
+    }
+
+    #[test]
+    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
+        let text = "[run]\nserial = ['m', '{case}', '{out}']\n\
+                    [takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n";
+        let engine = Description::parse(text).unwrap();
+        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
+        let declines = |case: &str| {
+            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
+        };
+        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
+        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
+        assert!(deep.contains("levels up to 3 (level_max in [limits])"), "{deep}");
+        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
+        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
+        assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
+        let enclosed =
+            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
+        assert!(enclosed.ends_with("enclosed = keep (keep_enclosed in [takes])"), "{enclosed}");
+        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
+                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
+        assert!(declines(boxed).unwrap().contains("boxes"));
     }
 }

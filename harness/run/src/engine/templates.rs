@@ -1,10 +1,29 @@
-//! The command templates of an engine file: the table `[run]`.
+//! The table `[run]` of an engine file: command templates, and the command lines made of them.
 
-use super::placeholders::{LAUNCHER, placeholders};
+use super::failure::End;
+use super::launcher::Launcher;
+use super::layout::{Layout, Ranks};
+use super::options::RunOptions;
 use check::promises::{Independence, Promises};
 use contract::import::{Format, Position};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::{iter, slice};
+
+/// Values of placeholders, which are names between braces.
+pub type Values<'a> = BTreeMap<&'a str, String>;
+
+/// The word in `parallel` that stands for the launcher's words.
+pub(super) const LAUNCHER: &str = "{launcher}";
+
+/// Placeholders that have a value in every template.
+const COMMON: [&str; 8] =
+    ["program", "case", "ranks", "here", "root", "python", "mpirun", "target"];
+
+/// Those that have one in the template of the same name.
+const OWN: [&str; 7] =
+    ["out", "json", "status", "partitioner", "level_base", "weights", "weight_exposed"];
 
 /// Command templates, as lists of words. A missing template is a capability that the engine does not have.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -16,7 +35,7 @@ pub struct Templates {
     /// A run on `{ranks}` processes, started by `{launcher}`.
     pub parallel: Option<Vec<String>>,
     /// Appended to `{launcher} {program}` in place of a run's arguments, so that the ranks stay and run the command lines of their
-    /// standard input (`harness/engines/README.md`). Not with `environment`.
+    /// standard input (`harness/engines/README.md`).
     pub serve: Option<Vec<String>>,
     /// A run on `{ranks}` ranks within one process, scheduled by `{seed}`.
     pub simulated: Option<Vec<String>>,
@@ -44,23 +63,32 @@ pub struct Templates {
     pub weights: Option<Vec<String>>,
     /// Appended to count the exposed faces of every rank and to weigh each like `{weight_exposed}` leaves.
     pub weight_exposed: Option<Vec<String>>,
-    /// Appended to choose the number of `{threads}`.
-    pub threads: Option<Vec<String>>,
-    /// Variables to add to the environment.
-    #[serde(default)]
-    pub environment: BTreeMap<String, String>,
 }
 
 impl Templates {
-    /// The commands that start the engine.
-    fn commands(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let others = [self.parallel.as_mut(), self.simulated.as_mut()];
-        std::iter::once(&mut self.serial).chain(others.into_iter().flatten())
+    /// The templates of the file, by key.
+    fn all(&self) -> impl Iterator<Item = (&'static str, &Vec<String>)> {
+        let optional = [
+            ("parallel", &self.parallel),
+            ("serve", &self.serve),
+            ("simulated", &self.simulated),
+            ("out", &self.out),
+            ("json", &self.json),
+            ("status", &self.status),
+            ("ungraded", &self.ungraded),
+            ("partitioner", &self.partitioner),
+            ("level_base", &self.level_base),
+            ("weights", &self.weights),
+            ("weight_exposed", &self.weight_exposed),
+        ];
+        let optional = optional.into_iter().filter_map(|(key, of)| Some((key, of.as_ref()?)));
+        iter::once(("serial", &self.serial)).chain(optional)
     }
 
     /// Replaces the program in all commands by its placeholder, so that another one can be run.
     pub(super) fn name_program(&mut self, program: &str) {
-        for word in self.commands().flatten().filter(|word| *word == program) {
+        let commands = [Some(&mut self.serial), self.parallel.as_mut(), self.simulated.as_mut()];
+        for word in commands.into_iter().flatten().flatten().filter(|word| *word == program) {
             *word = "{program}".to_owned();
         }
     }
@@ -80,74 +108,49 @@ impl Templates {
                     .to_owned(),
             );
         }
-        let environment = self.environment.values();
-        let mut words = environment.chain(&self.serial).chain(self.threads.iter().flatten());
-        let threads = words.any(|word| word.contains("{threads}"));
         let ranks = self.parallel.is_some() || self.simulated.is_some();
         let choices = self.partitioner.is_some() || self.level_base.is_some();
-        let needs = [
-            (Independence::Ranks, ranks, "command for ranks (`parallel` or `simulated`)"),
-            (Independence::Partitioner, choices, "`partitioner` or `level_base`"),
-            (Independence::Threads, threads, "place for {threads}"),
-        ];
-        let lacks = |(of, has, _): &&(Independence, bool, &str)| {
-            promises.independent_of.contains(of) && !has
-        };
-        match needs.iter().find(lacks) {
-            Some((of, _, what)) => {
-                let of = format!("{of:?}").to_lowercase();
-                Err(format!(
-                    "`independent_of` names {of}, but [run] has no {what} with which to vary it"
-                ))
+        for (of, has, what) in [
+            (Independence::Ranks, ranks, "ranks, but [run] has neither `parallel` nor `simulated`"),
+            (
+                Independence::Partitioner,
+                choices,
+                "partitioner, but [run] has neither `partitioner` nor `level_base`",
+            ),
+        ] {
+            if promises.independent_of.contains(&of) && !has {
+                return Err(format!("`independent_of` names {what} with which to vary it"));
             }
-            None => Ok(()),
         }
+        Ok(())
     }
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
     pub(super) fn check_placeholders(&self) -> Result<(), String> {
-        let common =
-            ["program", "case", "ranks", "threads", "here", "root", "python", "mpirun", "target"];
-        let environment: Vec<String> = self.environment.values().cloned().collect();
-        // A command that contains {out} needs no template that appends it.
-        let (in_command, in_simulated): (&[&str], &[&str]) = match self.out {
-            None => (&["out"], &["seed", "out"]),
-            Some(_) => (&[], &["seed"]),
-        };
-        let templates: [(_, _, &[&str]); 14] = [
-            ("serial", Some(&self.serial), in_command),
-            ("parallel", self.parallel.as_ref(), in_command),
-            ("serve", self.serve.as_ref(), &[]),
-            ("simulated", self.simulated.as_ref(), in_simulated),
-            ("out", self.out.as_ref(), &["out"]),
-            ("json", self.json.as_ref(), &["json"]),
-            ("status", self.status.as_ref(), &["status"]),
-            ("ungraded", self.ungraded.as_ref(), &[]),
-            ("partitioner", self.partitioner.as_ref(), &["partitioner"]),
-            ("level_base", self.level_base.as_ref(), &["level_base"]),
-            ("weights", self.weights.as_ref(), &["weights"]),
-            ("weight_exposed", self.weight_exposed.as_ref(), &["weight_exposed"]),
-            ("threads", self.threads.as_ref(), &[]),
-            ("environment", Some(&environment), &[]),
-        ];
-        for (key, template, own) in templates {
-            let words = template.into_iter().flatten();
-            let words = words.filter(|word| key != "parallel" || *word != LAUNCHER);
-            let unknown = |name: &&str| !common.contains(name) && !own.contains(name);
-            if let Some(name) = words.flat_map(|word| placeholders(word)).find(unknown) {
-                let known = [&common[..], own].concat().join(" ");
+        for (key, template) in self.all() {
+            let has = |text: &str| template.iter().any(|word| word.contains(text));
+            let starts = ["serial", "parallel", "simulated"].contains(&key);
+            // A command that contains {out} needs no template that appends it.
+            let contains_out = starts && self.out.is_none();
+            let own: &[&str] = match key {
+                "simulated" => &["seed"],
+                _ if OWN.contains(&key) => slice::from_ref(&key),
+                _ => &[],
+            };
+            let out: &[&str] = if contains_out { &["out"] } else { &[] };
+            let known = [&COMMON, own, out].concat();
+            let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
+            let mut names = words.flat_map(|word| placeholders(word));
+            if let Some(name) = names.find(|name| !known.contains(name)) {
                 return Err(format!(
-                    "`{key}` has the unknown placeholder {{{name}}}; known there are {known}"
+                    "`{key}` has the unknown placeholder {{{name}}}; known there are {}",
+                    known.join(" ")
                 ));
             }
-            let is_named =
-                || template.is_some_and(|words| words.iter().any(|word| word == "{program}"));
-            if key == "parallel" && self.serve.is_some() && !is_named() {
+            if key == "parallel" && self.serve.is_some() && !has("{program}") {
                 return Err("`serve` needs the word {program} in `parallel`".to_owned());
             }
-            let starts = ["serial", "parallel", "simulated"].contains(&key);
-            let writes = |words: &Vec<String>| words.iter().any(|word| word.contains("{out}"));
-            if starts && self.out.is_none() && template.is_some_and(|words| !writes(words)) {
+            if contains_out && !has("{out}") {
                 return Err(format!(
                     "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
                      key `out`, as in out = [\"--out\", \"{{out}}\"]"
@@ -155,5 +158,90 @@ impl Templates {
             }
         }
         Ok(())
+    }
+
+    /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
+    /// placeholders of all runs. A run report, a status or a choice that the engine does not offer is omitted.
+    ///
+    /// # Errors
+    /// [`End::Missing`] if the engine has no template for it. The final mesh is no substitute for a base tree.
+    pub(super) fn words(
+        &self,
+        launcher: &Launcher,
+        layout: &Layout,
+        options: &RunOptions,
+        out: Option<String>,
+        mut values: Values,
+    ) -> Result<Vec<String>, End> {
+        let lacks = |what: &str, key: &str| {
+            End::Missing(format!("cannot be {what}: its engine file has no `{key}` in [run]"))
+        };
+        let template = match layout.ranks {
+            Ranks::Serial => &self.serial,
+            Ranks::Simulated { seed, .. } => {
+                values.insert("seed", seed.to_string());
+                let command = self.simulated.as_ref();
+                command.ok_or_else(|| lacks("run on simulated ranks", "simulated"))?
+            }
+            Ranks::Mpi(_) => {
+                self.parallel.as_ref().ok_or_else(|| lacks("run on MPI", "parallel"))?
+            }
+        };
+        if options.ungraded && self.ungraded.is_none() {
+            return Err(lacks("stopped at the base tree", "ungraded"));
+        }
+        let ranks = layout.ranks.count();
+        values.insert("ranks", ranks.to_string());
+        let expand = |word: &String| match word == LAUNCHER {
+            true => launcher.words(ranks).collect(),
+            false => vec![word.clone()],
+        };
+        let mut words: Vec<String> = template.iter().flat_map(expand).collect();
+        let text = |path: PathBuf| path.to_string_lossy().into_owned();
+        let weight_exposed = layout.weight_exposed.map(|weight| weight.to_string());
+        for (key, value, template) in [
+            ("out", out, &self.out),
+            ("json", options.report.then(|| text(options.report_path())), &self.json),
+            ("status", options.status.then(|| text(options.status_path())), &self.status),
+            ("ungraded", options.ungraded.then(String::new), &self.ungraded),
+            ("partitioner", layout.partitioner.clone(), &self.partitioner),
+            ("level_base", layout.level_base.clone(), &self.level_base),
+            ("weights", layout.weights.clone(), &self.weights),
+            ("weight_exposed", weight_exposed, &self.weight_exposed),
+        ] {
+            if let Some(value) = value {
+                values.insert(key, value);
+                words.extend(template.iter().flatten().cloned());
+            }
+        }
+        Ok(words.iter().map(|word| fill(word, &values)).collect())
+    }
+}
+
+/// The placeholders of a word, without their braces.
+fn placeholders(word: &str) -> impl Iterator<Item = &str> {
+    word.split('{').skip(1).filter_map(|rest| rest.split_once('}')).map(|(name, _)| name)
+}
+
+/// A word with its placeholders replaced by their values; those without a value are left as they are.
+pub fn fill(word: &str, values: &Values) -> String {
+    let mut filled = word.to_owned();
+    for name in placeholders(word) {
+        if let Some(value) = values.get(name) {
+            filled = filled.replace(&format!("{{{name}}}"), value);
+        }
+    }
+    filled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_not_searched_for_placeholders() {
+        let values = Values::from([("case", "{out}".to_owned()), ("out", "o".to_owned())]);
+        assert_eq!(fill("a{case}b", &values), "a{out}b");
+        assert_eq!(fill("{none}", &values), "{none}");
     }
 }

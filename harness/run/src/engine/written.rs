@@ -6,10 +6,12 @@ use super::options::RunOptions;
 use super::paths::Paths;
 use crate::import::{Imported, import};
 use contract::case::Case;
-use contract::failure::{EXIT_MISSING, Failure};
+use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING};
 use contract::import::{Format, Request};
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{self, Tree};
+use contract::mesh::Mesh;
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -38,8 +40,8 @@ fn path_in(command: &Command, out: &Path) -> PathBuf {
     PathBuf::from(format!("{out}{}", rest.split(ENDS).next().unwrap_or_default()))
 }
 
-/// Makes the mesh of a run that ended well a leaf-set directory, unless it is one. Its manifest has the inputs of the case, and names
-/// `label` as the program.
+/// Makes the mesh of a run that ended well a leaf-set directory, unless it is one, and opens it. Its manifest has the inputs of the
+/// case, and names `label` as the program.
 pub(super) fn complete(
     engine: &Description,
     label: String,
@@ -47,66 +49,75 @@ pub(super) fn complete(
     case: &Path,
     mesh: &Path,
     options: &RunOptions,
-) -> Result<(), End> {
-    let tree = if options.ungraded { Tree::Base } else { Tree::Final };
+) -> Result<Mesh, End> {
+    let unusable = |why: String| Err(End::Unusable(why));
     let unreadable =
-        |why: String| End::Unusable(format!("wrote a mesh that cannot be read: {why}"));
-    let read_case = || Case::read(case).map_err(|error| End::Unusable(error.to_string()));
+        |why: &dyn Display| End::Unusable(format!("wrote a mesh that cannot be read: {why}"));
+    let is_complete = mesh.join(manifest::FILE).exists();
     if let Some(format) = engine.run.format {
         let written = path_in(command, &foreign(options.place));
         if !written.exists() {
-            return Err(End::Unusable(format!(
+            return unusable(format!(
                 "wrote no {}, which {{out}} stands for in [run] of {}",
                 written.display(),
                 engine.name
-            )));
+            ));
         }
-        let mut imported = imported(engine, format, &written, &read_case()?, label, options)?;
-        imported.manifest().tree = tree;
-        return imported.link(mesh).map_err(|error| unreadable(error.to_string()));
-    }
-    if mesh.join(manifest::FILE).exists() {
-        return Ok(());
-    }
-    // Our programs write it last: without it their mesh is incomplete.
-    if description::is_own(&engine.name) {
-        return Err(End::Unusable(format!("wrote no {}", manifest::FILE)));
-    }
-    if !mesh.exists() {
-        return Err(End::Unusable(format!(
+        let imported = imported(engine, format, &written, case, label, options)?;
+        imported.link(mesh).map_err(|error| unreadable(&error))?;
+    } else if !is_complete && description::is_own(&engine.name) {
+        // Our programs write it last: without it their mesh is incomplete.
+        return unusable(format!("wrote no {}", manifest::FILE));
+    } else if !mesh.exists() {
+        return unusable(format!(
             "wrote no directory of leaf words {}: if it writes another format to a path that begins so, [run] of {} must state it, as in \
              format = \"vtk\"",
             mesh.display(),
             engine.name
-        )));
+        ));
+    } else if !is_complete {
+        let parts = leafset::read_parts(mesh).map_err(|error| unreadable(&error))?;
+        let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
+        let empty = read_case(case)?.manifest(tree_of(options), label);
+        let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
+        set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
+        let written = set.manifest.write(mesh);
+        written.map_err(|error| unreadable(&format!("{}: {error}", mesh.display())))?;
     }
-    let parts = leafset::read_parts(mesh).map_err(|error| unreadable(error.to_string()))?;
-    let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
-    let empty = read_case()?.manifest(tree, label);
-    let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
-    set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
-    set.manifest.write(mesh).map_err(|error| unreadable(format!("{}: {error}", mesh.display())))
+    Mesh::open(mesh).map_err(|error| unreadable(&error))
+}
+
+fn tree_of(options: &RunOptions) -> Tree {
+    if options.ungraded { Tree::Base } else { Tree::Final }
+}
+
+fn read_case(case: &Path) -> Result<Case, End> {
+    Case::read(case).map_err(|error| End::Unusable(error.to_string()))
 }
 
 fn imported(
     engine: &Description,
     format: Format,
     written: &Path,
-    case: &Case,
+    case: &Path,
     label: String,
     options: &RunOptions,
 ) -> Result<Imported, End> {
+    let case = read_case(case)?;
     let (sides, position) = (engine.run.sides.clone(), engine.run.position);
-    let root = Some(case.root);
-    let request = Request { sides, position, root, ..Request::default() };
-    let paths = Paths::find();
-    let read = import(written, Some(format), &request, Some(case), label, &paths, options.limit);
-    let why = |why: String| format!("wrote a mesh that cannot be imported: {why}");
-    read.map_err(|failure| match failure {
-        failure if failure.is_interrupt() => End::Interrupted,
-        Failure { code: EXIT_MISSING, why: missing } => End::Missing(why(missing)),
-        Failure { why: unusable, .. } => End::Unusable(why(unusable)),
-    })
+    let request = Request { sides, position, root: Some(case.root), ..Request::default() };
+    let (paths, limit) = (Paths::find(), options.limit);
+    let read = import(written, Some(format), &request, Some(&case), label, &paths, limit);
+    let mut imported = read.map_err(|failure| {
+        let why = format!("wrote a mesh that cannot be imported: {failure}");
+        match failure.code {
+            EXIT_INTERRUPTED => End::Interrupted,
+            EXIT_MISSING => End::Missing(why),
+            _ => End::Unusable(why),
+        }
+    })?;
+    imported.manifest().tree = tree_of(options);
+    Ok(imported)
 }
 
 #[cfg(test)]

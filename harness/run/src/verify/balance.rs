@@ -1,79 +1,67 @@
 //! The independent check of balance: with n = 1 and all leaves kept, the mesh equals the base tree as balanced by
 //! p4est.
 
-use super::case::{CaseRun, P4EST};
+use super::case::{BALANCE, CaseRun};
 use super::report::{Check, Outcome};
-use super::run::{Program, Request};
+use super::run::{MESHER, Makes};
 use super::serial::Base;
 use crate::engine::failure::{End, Failure};
+use crate::engine::launcher;
 use crate::engine::layout::SERIAL;
-use crate::engine::p4est::{self, EXIT_TOO_DEEP};
 use crate::engine::process::{self, Watch};
 use check::checks::{CheckResult, identical};
 use contract::npy::PartFile;
 use contract::plain::{PlainCase, StlForm};
-use contract::watch::Watch as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::process::Command;
 use toml::Value;
 
-/// Its subject.
-const SUBJECT: &str = P4EST.0;
-/// Name of the check.
-const NAME: &str = P4EST.1;
+/// p4est's exit code for a tree that is deeper than it supports.
+const EXIT_TOO_DEEP: i32 = 3;
 
 impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
-    pub fn verify_balance(&mut self, base: &Base) {
-        if let Some(why) = self.needs.p4est.clone() {
-            return self.add(Check::new(SUBJECT, NAME, Outcome::left_out(why)), None);
+    pub(super) fn verify_balance(&mut self, base: &Base) {
+        let (subject, name) = BALANCE;
+        if let Some(why) = &self.all.needs.p4est {
+            return self.add(Check::new(subject, name, Outcome::left_out(why)), None);
         }
-        self.progress.step("p4est");
+        self.step("p4est");
         let plain = match self.mesh_plainly() {
             Ok(words) => words,
             Err(failure) => return self.add_failure("p4est: n = 1, all kept", None, &failure),
         };
-        let failure = match self.balance_by_p4est(&base.place) {
+        let outcome = match self.balance_by_p4est(&base.place) {
             Ok(words) => {
                 let root = &base.tree.manifest.root;
                 let compared = identical::compare(&sideless(&plain), &words, root);
-                let result = CheckResult { name: NAME, ..compared };
-                return self.add_results(SUBJECT, None, vec![result]);
+                let result = CheckResult { name, ..compared };
+                return self.add_results(subject, None, vec![result]);
             }
-            Err(failure) => failure,
+            Err(failure) => match failure.end {
+                End::Interrupted => return,
+                End::Exited { code: EXIT_TOO_DEEP, .. } => {
+                    Outcome::left_out("the base tree has leaves of level 19, p4est stops at 18")
+                }
+                // A failure of p4est shows nothing about the mesh, and it must not count as agreement.
+                _ => Outcome::fail(failure.to_string()),
+            },
         };
-        let outcome = match failure.end {
-            End::Interrupted => return,
-            End::Exited { code: EXIT_TOO_DEEP, .. } => {
-                Outcome::left_out("the base tree has leaves of level 19, p4est stops at 18")
-            }
-            // A failure of p4est shows nothing about the mesh, and it must not count as agreement.
-            _ => Outcome::fail(failure.to_string()),
-        };
-        self.add(Check::new(SUBJECT, NAME, outcome), None);
+        self.add(Check::new(subject, name, outcome), None);
     }
 
     /// The leaf words of the same case with n = 1 and all leaves kept.
     fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
-        let case =
-            self.plain_case().map_err(|why| Failure::new("the harness", End::Unusable(why)))?;
-        let meshed = self.run(&Request {
-            program: Program::Mesher,
-            layout: &SERIAL,
-            case: &case,
-            name: "plain",
-            ungraded: false,
-            write: true,
-        })?;
-        Ok(meshed.mesh.map(|mesh| mesh.words).unwrap_or_default())
-    }
-
-    fn plain_case(&self) -> Result<PathBuf, String> {
         let place = self.place.join("plain-case");
-        let wrong = |error: std::io::Error| format!("cannot write a case with n = 1: {error}");
-        fs::create_dir_all(&place).map_err(wrong)?;
-        plain(PlainCase::read(&self.selected.path)?).write(&place, StlForm::Any).map_err(wrong)
+        let unusable = |why: String| Failure::new("the harness", End::Unusable(why));
+        let case = PlainCase::read(&self.file).map_err(unusable)?;
+        let written = fs::create_dir_all(&place)
+            .and_then(|()| plain(case).write(&place, StlForm::Any))
+            .map_err(|error| unusable(format!("cannot write a case with n = 1: {error}")))?;
+        let meshed = self.run(&written, "plain", MESHER, Makes::Mesh, &SERIAL)?;
+        Ok(meshed.mesh.map(|mesh| mesh.words).unwrap_or_default())
     }
 
     fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
@@ -81,8 +69,10 @@ impl CaseRun<'_> {
         let out = self.place.join("p4est");
         fs::create_dir_all(&out)
             .map_err(|error| unusable(format!("has no {}: {error}", out.display())))?;
-        let watch = Watch::new("p4est", self.options.limit(), &out);
-        process::run(&mut p4est::command(&self.programs.paths.p4est, base, &out), &watch)?;
+        let mut command = Command::new(&self.all.programs.paths.p4est);
+        command.arg(base).arg(&out);
+        launcher::set_environment(&mut command);
+        process::run(&mut command, &Watch::new("p4est", self.all.options.limit(), &out))?;
         let part = PartFile::open(&out.join("leaves-00000.npy"));
         let part = part.map_err(|error| unusable(format!("wrote no leaves: {error}")))?;
         part.read_all().map_err(|error| unusable(format!("wrote leaves in part: {error}")))

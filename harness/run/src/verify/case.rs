@@ -1,59 +1,47 @@
 //! The verification of one case: its steps in order, and the state that they share.
 
-use super::needs::Needs;
-use super::options::Options;
-pub use super::outcome::RUNS;
+use super::Verification;
+use super::options::TIMEOUT_S;
+pub use super::report::RUNS;
 use super::report::{CaseReport, Check, Outcome};
+use crate::engine::description::Description;
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
-use crate::engine::programs::Programs;
-use crate::progress::Progress;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
 use contract::catalogue::Selected;
-use std::path::Path;
+use contract::watch::Watch;
+use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.
 #[derive(Debug)]
-pub struct CaseRun<'a> {
-    /// The case.
+pub(super) struct CaseRun<'a> {
+    pub all: &'a Verification<'a>,
     pub selected: &'a Selected,
-    /// The options.
-    pub options: &'a Options,
-    /// The programs.
-    pub programs: &'a Programs,
-    /// Prerequisites that are missing on this machine.
-    pub needs: &'a Needs,
+    /// The case file, in a form that the engine can read.
+    pub file: PathBuf,
     /// The directory of the case.
     pub place: &'a Path,
-    /// The progress line.
-    pub progress: &'a Progress,
-    /// Oracles that gave no answer, although they exist.
-    pub oracles_silent: Vec<Failure>,
     /// The report so far.
-    report: CaseReport,
+    pub report: CaseReport,
 }
 
 impl<'a> CaseRun<'a> {
     /// A case before its first step.
     pub fn new(
+        all: &'a Verification,
         selected: &'a Selected,
-        options: &'a Options,
-        programs: &'a Programs,
-        needs: &'a Needs,
+        file: PathBuf,
         place: &'a Path,
-        progress: &'a Progress,
     ) -> Self {
         let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
-        let oracles_silent = Vec::new();
-        Self { selected, options, programs, needs, place, progress, oracles_silent, report }
+        Self { all, selected, file, place, report }
     }
 
-    /// Performs all steps: serial meshes and their checks, ranks and threads, oracles, p4est. Without serial meshes the
-    /// later steps are left out. An engine that promises less than the definition is not compared with T0, oracles and
-    /// p4est.
+    /// Performs all steps: serial meshes and their checks, ranks, oracles, p4est. Without serial meshes the later steps are left out.
+    /// An engine that promises less than the definition is not compared with T0, oracles and p4est.
     pub fn verify(&mut self) {
         self.verify_steps();
         self.leave_out_rest();
@@ -62,13 +50,10 @@ impl<'a> CaseRun<'a> {
     fn verify_steps(&mut self) {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
-        if let Some(why) = self.programs.engine.description().declines(&case) {
+        if let Some(why) = self.engine().declines(&case) {
             return self.add(Check::new("case", "engine", Outcome::left_out(why)), None);
         }
-        let Some(meshes) = self.verify_serial(&case) else {
-            return;
-        };
-        self.verify_threads(&case, &meshes.mesh);
+        let Some(meshes) = self.verify_serial(&case) else { return };
         self.verify_ranks(&case, &meshes.mesh);
         if let Some(base) = &meshes.base {
             self.verify_oracles(&case, base);
@@ -86,40 +71,36 @@ impl<'a> CaseRun<'a> {
             _ => "there is no serial mesh to compare with".to_owned(),
         };
         self.leave_out_ranks(&why);
-        for (subject, name) in steps(self.promises()) {
+        for (subject, name) in steps(self.engine()) {
             if !self.report.has(subject) {
                 self.add(Check::new(*subject, *name, Outcome::left_out(&why)), None);
             }
         }
     }
 
+    /// The description of the engine under test.
+    pub fn engine(&self) -> &'a Description {
+        self.all.programs.engine.description()
+    }
+
     /// What the engine under test promises.
     pub fn promises(&self) -> &'a Promises {
-        &self.programs.engine.description().promises
+        &self.engine().promises
     }
 
     /// Reads the case. If the harness cannot read it, a mesher that promises the definition must refuse it too, and no other sees it.
     fn read(&mut self) -> Option<Case> {
-        match Case::read(&self.selected.path) {
-            Ok(case) => Some(case),
-            Err(error) => {
-                match self.promises().definition {
-                    true => self.verify_refusal(&error.to_string()),
-                    false => self.report.input_error = Some(error.to_string()),
-                }
-                None
-            }
+        match Case::read(&self.file) {
+            Ok(case) => return Some(case),
+            Err(error) if self.promises().definition => self.verify_refusal(&error.to_string()),
+            Err(error) => self.report.input_error = Some(error.to_string()),
         }
+        None
     }
 
-    /// The report.
-    pub fn into_report(self) -> CaseReport {
-        self.report
-    }
-
-    /// The report so far, to be added to.
-    pub fn report(&mut self) -> &mut CaseReport {
-        &mut self.report
+    /// Shows what begins.
+    pub fn step(&self, what: &str) {
+        self.all.progress.step(&format!("{}: {what}", self.selected.name));
     }
 
     /// Adds a check, and with the first failed check the command that repeats it.
@@ -163,73 +144,52 @@ impl<'a> CaseRun<'a> {
 
     /// A shell command that repeats the run with this layout, or the serial one.
     fn command_for(&self, layout: Option<&Layout>) -> String {
-        let paths = &self.programs.paths;
-        let mut words = vec![paths.harness.to_string_lossy().into_owned(), "verify".into()];
-        words.push(self.selected.argument.clone());
-        let absolute = |path: &Path| {
-            let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-            path.to_string_lossy().into_owned()
-        };
-        match self.programs.engine.name() {
+        let (options, programs) = (self.all.options, self.all.programs);
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        let full = |path: &Path| text(&absolute(path).unwrap_or_else(|_| path.to_owned()));
+        let mut words: Vec<String> =
+            vec![text(&programs.paths.harness), "verify".into(), self.selected.argument.clone()];
+        let mut add = |option: &str, value: String| words.extend([option.to_owned(), value]);
+        match programs.engine.name() {
             "mesher" => {}
-            file if file.ends_with(".toml") => {
-                words.extend(["--engine".into(), absolute(Path::new(file))]);
-            }
-            name => words.extend(["--engine".into(), name.to_owned()]),
+            file if file.ends_with(".toml") => add("--engine", full(Path::new(file))),
+            name => add("--engine", name.to_owned()),
         }
-        let (chosen, usual) = (self.options, Options::of_leaves_alone(Vec::new()));
-        for (option, value, usual) in [
-            ("--timeout", chosen.timeout, usual.timeout),
-            ("--cells-max", chosen.cells_max, usual.cells_max),
-            ("--reference-cells-max", chosen.reference_cells_max, usual.reference_cells_max),
-        ] {
-            if value != usual {
-                words.extend([option.to_owned(), value.to_string()]);
-            }
+        for (option, engine) in
+            [("--mesher", &programs.engine), ("--reference", &programs.reference)]
+        {
+            engine.program_given().into_iter().for_each(|program| add(option, full(program)));
         }
-        let on_ranks = layout.filter(|layout| layout.rank_count().is_some());
-        words.extend(on_ranks.map_or(vec!["--no-mpi".to_owned()], options_of));
-        words.push("--keep".into());
-        let programs = [("mesher", &self.programs.engine), ("reference", &self.programs.reference)];
-        for (name, engine) in programs {
-            if let Some(program) = engine.program_given() {
-                words.push(format!("--{name}"));
-                words.push(absolute(program));
-            }
+        if options.timeout != TIMEOUT_S {
+            add("--timeout", options.timeout.to_string());
         }
+        if let Some(layout) = layout {
+            add("--ranks", layout.ranks.count().to_string());
+            layout.partitioner.iter().for_each(|of| add("--partitioners", of.clone()));
+            layout.level_base.iter().for_each(|of| add("--level-bases", of.clone()));
+        }
+        let left_out: &[&str] = match layout {
+            Some(_) => &["--no-oracles", "--no-p4est", "--no-proof", "--keep"],
+            None => &["--no-mpi", "--keep"],
+        };
+        words.extend(left_out.iter().map(|&word| word.to_owned()));
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
     }
 }
 
 /// Subject and name of the check of sides by the oracles.
-pub const ORACLES: (&str, &str) = ("sides", "oracles");
+pub(super) const SIDES: (&str, &str) = ("sides", "oracles");
 /// Subject and name of the check of the balance by p4est.
-pub const P4EST: (&str, &str) = ("p4est", "balance");
-
+pub(super) const BALANCE: (&str, &str) = ("p4est", "balance");
 /// Subject and name of the check by the proven checker.
 pub const PROOF: (&str, &str) = ("proof", "accepted");
 
 /// Subject and name of the checks by other programs, which need the definition.
-pub fn steps(promises: &Promises) -> &'static [(&'static str, &'static str)] {
-    match promises.definition {
-        true => &[PROOF, ORACLES, P4EST],
+pub(super) fn steps(engine: &Description) -> &'static [(&'static str, &'static str)] {
+    match engine.promises.definition {
+        true => &[PROOF, SIDES, BALANCE],
         false => &[],
     }
-}
-
-/// The options of `harness verify` that select this layout and nothing else.
-fn options_of(layout: &Layout) -> Vec<String> {
-    let mut words =
-        vec!["--no-oracles".to_owned(), "--no-p4est".to_owned(), "--no-proof".to_owned()];
-    let choices = [
-        ("--ranks", Some(layout.ranks.count().to_string())),
-        ("--partitioners", layout.partitioner.clone()),
-        ("--level-bases", layout.level_base.clone()),
-    ];
-    for (option, value) in choices {
-        words.extend(value.into_iter().flat_map(|value| [option.to_owned(), value]));
-    }
-    words
 }
 
 /// A word, quoted for a shell.

@@ -5,6 +5,7 @@ use crate::engine::layout::{Layout, Ranks};
 use check::promises::Independence;
 use clap::{Args, Parser};
 use contract::catalogue::Size;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -56,7 +57,7 @@ pub struct Options {
     #[arg(long)]
     pub keep: bool,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = TIMEOUT_S, value_parser = whole_seconds)]
     pub timeout: u64,
     /// Leave out the runs on MPI
     #[arg(long)]
@@ -73,20 +74,10 @@ pub struct Options {
     /// Required components: exit code 3 if one is missing
     #[arg(long, value_delimiter = ',')]
     pub require: Vec<Need>,
-    /// Maximum number of points for the oracles on cases that are not small
-    #[arg(long, value_name = "N", default_value_t = 20_000)]
-    pub oracle_points: usize,
-    /// Seed of the choice of points
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Maximum number of cells for checks; larger meshes are only measured (see `harness audit`)
-    #[arg(long, value_name = "CELLS", default_value_t = 100_000_000)]
-    pub cells_max: u64,
-    /// Maximum number of cells for the reference
-    #[arg(long, value_name = "CELLS", default_value_t = 3_000_000)]
-    pub reference_cells_max: u64,
 }
 
+/// Time limit without `--timeout`, in seconds.
+pub(super) const TIMEOUT_S: u64 = 600;
 /// Rank counts without `--ranks`.
 const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
 
@@ -119,29 +110,24 @@ impl Options {
     }
 
     /// Time limit of every single run.
-    pub fn limit(&self) -> Duration {
+    pub(super) fn limit(&self) -> Duration {
         Duration::from_secs(self.timeout)
     }
 
-    /// Whether runs on MPI are wanted: those that were asked for, and all of which the engine is capable.
-    pub fn wants_ranks(&self, engine: &Description) -> bool {
-        !self.no_mpi && (self.ranks.is_some() || engine.run.parallel.is_some())
-    }
-
-    /// Rank counts of the runs on MPI, each once: a run has one directory.
-    pub fn rank_counts(&self, engine: &Description) -> Vec<usize> {
-        let mut counts = Vec::new();
-        for &count in self.ranks.as_deref().unwrap_or(&RANKS) {
-            if self.wants_ranks(engine) && !counts.contains(&count) {
-                counts.push(count);
-            }
+    /// Rank counts of the runs on MPI, each once: a run has one directory. They are those that were asked for, or all of which the
+    /// engine is capable.
+    pub(super) fn rank_counts(&self, engine: &Description) -> Vec<usize> {
+        if self.no_mpi || (self.ranks.is_none() && engine.run.parallel.is_none()) {
+            return Vec::new();
         }
-        counts
+        let counts: BTreeSet<usize> =
+            self.ranks.as_deref().unwrap_or(&RANKS).iter().copied().collect();
+        counts.into_iter().collect()
     }
 
     /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice
     /// and promises that its mesh does not depend on it.
-    pub fn layouts(&self, engine: &Description) -> Vec<Layout> {
+    pub(super) fn layouts(&self, engine: &Description) -> Vec<Layout> {
         let templates = &engine.run;
         let independent = engine.promises.is_independent_of(Independence::Partitioner);
         let varied = |offered: bool, values: &[String]| match offered && independent {
@@ -151,15 +137,13 @@ impl Options {
         let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
         let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
         let mut layouts = Vec::new();
-        for ranks in self.rank_counts(engine) {
+        for ranks in self.rank_counts(engine).into_iter().map(Ranks::Mpi) {
             for partitioner in &partitioners {
-                for level_base in &level_bases {
-                    layouts.push(Layout {
-                        partitioner: partitioner.clone(),
-                        level_base: level_base.clone(),
-                        ..Layout::on(Ranks::Mpi(ranks))
-                    });
-                }
+                layouts.extend(level_bases.iter().map(|level_base| Layout {
+                    partitioner: partitioner.clone(),
+                    level_base: level_base.clone(),
+                    ..Layout::on(ranks)
+                }));
             }
         }
         layouts

@@ -1,85 +1,79 @@
 //! The sides of the base tree's leaves, compared with those that the oracles give.
 
-use super::case::{CaseRun, ORACLES};
+use super::case::{CaseRun, SIDES};
 use super::report::{Check, Outcome};
 use super::serial::Base;
 use crate::engine::failure::{End, Failure};
-use crate::oracle::Question;
+use crate::oracle::{self, ORACLES};
 use check::oracle::sample::{self, Sample};
 use check::oracle::vote::{self, Answer, Ballot};
 use check::oracle::watertight::{is_doubled, is_watertight};
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::parity::Parity;
-use contract::watch::Watch;
 use contract::word::{self, Side};
 use std::fs;
 use std::time::Instant;
 
-/// Name of the check.
-const NAME: &str = ORACLES.1;
-/// Its subject.
-const SUBJECT: &str = ORACLES.0;
-
 /// On a small case the oracles classify every leaf, up to this many.
 const POINTS_OF_SMALL: usize = 400_000;
+/// Most points of other cases.
+const POINTS: usize = 20_000;
+/// Seed of the choice of points.
+const SEED: u64 = 1;
 
 impl CaseRun<'_> {
     /// Chooses points, has the oracles classify them, and counts the votes.
-    pub fn verify_oracles(&mut self, case: &Case, base: &Base) {
-        let oracles = self.needs.oracles(self.options, &self.programs.paths);
-        if let Some(why) = &oracles.lacking {
-            return self.add(Check::new(SUBJECT, NAME, Outcome::left_out(why)), None);
+    pub(super) fn verify_oracles(&mut self, case: &Case, base: &Base) {
+        let needs = &self.all.needs;
+        let (subject, name) = SIDES;
+        if let Some(why) = &needs.oracles {
+            return self.add(Check::new(subject, name, Outcome::left_out(why)), None);
         }
         let start = Instant::now();
+        self.step("oracles");
+        let (gone, asked): (Vec<&str>, Vec<&str>) =
+            ORACLES.into_iter().partition(|of| needs.lacks_oracle(of).is_some());
         let most = match self.selected.size {
             Some(Size::Small) => POINTS_OF_SMALL,
-            _ => self.options.oracle_points,
+            _ => POINTS,
         };
-        let sample = sample::choose(case, &base.tree.words, most, self.options.seed);
-        let (answers, failures) = match self.ask(case, &sample, &oracles.found) {
-            Ok(answered) => answered,
-            Err(failure) if failure.is_interrupt() => return,
-            Err(failure) => {
-                let outcome = Outcome::left_out(failure.to_string());
-                self.oracles_silent.push(failure);
-                return self.add(Check::new(SUBJECT, NAME, outcome), None);
+        let sample = sample::choose(case, &base.tree.words, most, SEED);
+        let (mut answers, mut failures) = (Vec::new(), Vec::new());
+        for answer in self.ask(case, &sample, &asked) {
+            match answer {
+                Ok(answer) => answers.push(answer),
+                Err(failure) if failure.is_interrupt() => return,
+                Err(failure) => {
+                    needs.note_silent(&failure);
+                    failures.push(failure);
+                }
+            }
+        }
+        let mut check = match answers.is_empty() {
+            false => judge(case, &sample, &answers),
+            true => {
+                let first = gone.first().and_then(|of| needs.lacks_oracle(of));
+                let first = first.or_else(|| failures.first().cloned());
+                let why = first.map_or_else(String::new, |why| why.to_string());
+                Check::new(subject, name, Outcome::left_out(why))
             }
         };
-        let mut check = judge(case, &sample, &answers);
         check.notes.extend(failures.iter().map(|failure| format!("no answer: {failure}")));
         check.time_s = start.elapsed().as_secs_f64();
-        self.oracles_silent.extend(failures);
         self.add(check, None);
     }
 
-    /// The answers, and the failures of the oracles that gave none. At least one oracle answered.
-    fn ask(
-        &self,
-        case: &Case,
-        sample: &Sample,
-        oracles: &[&'static str],
-    ) -> Result<(Vec<Answer>, Vec<Failure>), Failure> {
+    fn ask(&self, case: &Case, sample: &Sample, oracles: &[&str]) -> Vec<Result<Answer, Failure>> {
         let place = self.place.join("oracles");
-        let question = fs::create_dir_all(&place)
-            .and_then(|()| Question::write(&sample.points, &case.facets, &place))
-            .map_err(|error| {
-                Failure::new("the oracles", End::Unusable(format!("have no input files: {error}")))
-            })?;
-        let (mut answers, mut failures) = (Vec::new(), Vec::new());
-        self.progress.step("oracles");
-        let (paths, limit) = (&self.programs.paths, self.options.limit());
-        for (_, answer) in question.ask(oracles, &self.needs.services, paths, limit) {
-            match answer {
-                Ok(answer) => answers.push(answer),
-                Err(failure) if failure.is_interrupt() => return Err(failure),
-                Err(failure) => failures.push(failure),
-            }
-        }
-        match (answers.is_empty(), failures.first()) {
-            (true, Some(failure)) => Err(failure.clone()),
-            _ => Ok((answers, failures)),
-        }
+        let (services, paths) = (&self.all.needs.services, &self.all.programs.paths);
+        let (question, limit) = ((&*sample.points, &*case.facets), self.all.options.limit());
+        let answers = fs::create_dir_all(&place)
+            .and_then(|()| oracle::ask(oracles, question, &place, services, paths, limit));
+        answers.unwrap_or_else(|error| {
+            let end = End::Unusable(format!("have no input files: {error}"));
+            vec![Err(Failure::new("the oracles", end))]
+        })
     }
 }
 
@@ -118,7 +112,7 @@ fn judge(case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
             ),
         );
     }
-    Check { notes, ..Check::new(SUBJECT, NAME, outcome) }
+    Check { notes, ..Check::new(SIDES.0, SIDES.1, outcome) }
 }
 
 /// Whether a leaf's centroid is inside by all exact rays; `None` if the rays disagree.

@@ -9,12 +9,17 @@
 //!   of the timed serial run if the check `deterministic` holds;
 //! - a green report has a check of a mesh that holds, of every case that was named, and misses nothing required.
 
-pub use super::outcome::{Check, Outcome, Tally};
-use super::outcome::{DETERMINISTIC, RUNS};
 use crate::engine::layout::Layout;
+pub use check::checks::Outcome;
 use check::checks::{identical, manifest};
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use serde::{Deserialize, Serialize};
+
+/// Name of the check that a program runs to its end and that its run report is true.
+pub const RUNS: &str = "runs";
+
+/// Name of the check that two serial runs give the same mesh.
+pub(super) const DETERMINISTIC: &str = "deterministic";
 
 /// Version of the JSON form; it changes when the meaning of a field changes or a field is removed.
 pub const SCHEMA: &str = "octree-verify/2";
@@ -50,6 +55,80 @@ impl Run {
     /// Peak memory per cell.
     pub fn bytes_per_cell(&self) -> f64 {
         self.peak_rss_bytes as f64 / (self.cells.max(1)) as f64
+    }
+}
+
+/// One check of one result.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Check {
+    /// The mesh that was checked: `serial`, `base tree`, `p4est` or the layout of a run on MPI.
+    pub subject: String,
+    /// Ranks of the run on MPI that was checked.
+    pub ranks: Option<usize>,
+    /// The check's name.
+    pub name: String,
+    /// The outcome.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+    /// Time of the check itself, in seconds.
+    pub time_s: f64,
+    /// Remarks that matter even if the check holds, such as points on which the oracles disagree.
+    pub notes: Vec<String>,
+    /// Figures of the check, as text.
+    pub figures: Option<String>,
+    /// Number of findings, if it counts them.
+    pub findings: u64,
+}
+
+impl Check {
+    /// A check without remarks.
+    pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
+        let (subject, name) = (subject.into(), name.into());
+        Self {
+            subject,
+            ranks: None,
+            name,
+            outcome,
+            time_s: 0.0,
+            notes: Vec::new(),
+            figures: None,
+            findings: 0,
+        }
+    }
+
+    /// A check of one run.
+    pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
+        Self { ranks: layout.rank_count(), ..Self::new(layout.to_string(), name, outcome) }
+    }
+
+    /// Whether it failed.
+    pub fn failed(&self) -> bool {
+        self.outcome.failed()
+    }
+}
+
+/// Numbers of checks by outcome.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Passed.
+    pub pass: usize,
+    /// Failed.
+    pub fail: usize,
+    /// Left out.
+    pub left_out: usize,
+}
+
+impl<'a> FromIterator<&'a Check> for Tally {
+    fn from_iter<I: IntoIterator<Item = &'a Check>>(checks: I) -> Self {
+        let mut tally = Self::default();
+        for check in checks {
+            match check.outcome {
+                Outcome::Pass { .. } => tally.pass += 1,
+                Outcome::Fail { .. } => tally.fail += 1,
+                Outcome::LeftOut { .. } => tally.left_out += 1,
+            }
+        }
+        tally
     }
 }
 
@@ -232,9 +311,6 @@ impl Report {
     pub fn verdict(&self) -> String {
         let Tally { pass, fail, left_out } = self.tally();
         let cases = self.cases.len();
-        let noun = if cases == 1 { "case" } else { "cases" };
-        let checks = if pass == 1 { "check holds" } else { "checks hold" };
-        let counts = format!("{cases} {noun}: {pass} {checks}, {fail} fail, {left_out} left out");
         let end = match self.exit_code() {
             EXIT_HOLDS => "all hold",
             EXIT_FAILED => "FAILED",
@@ -242,7 +318,10 @@ impl Report {
             EXIT_MISSING => "something required is missing",
             _ => "interrupted",
         };
-        format!("{counts}, in {:.1} s: {end}", self.time_s)
+        format!(
+            "cases: {cases}; checks: {pass} hold, {fail} fail, {left_out} left out; {:.1} s: {end}",
+            self.time_s
+        )
     }
 }
 

@@ -9,7 +9,6 @@ use contract::failure::Failure;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::TempDir;
 
 /// The file that marks the directory of a case.
@@ -17,10 +16,9 @@ const MARKER: &str = "made-by-harness-verify";
 
 /// The directory of all cases.
 #[derive(Debug)]
-pub struct Workplace {
+pub(super) struct Workplace {
     root: PathBuf,
     temporary: Option<TempDir>,
-    kept: AtomicBool,
 }
 
 impl Workplace {
@@ -28,26 +26,26 @@ impl Workplace {
     ///
     /// # Errors
     /// If it cannot be made.
-    pub fn new(options: &Options) -> Result<Self, Failure> {
+    pub(super) fn new(options: &Options) -> Result<Self, Failure> {
         let wrong = |error: io::Error| {
             Failure::input(format!("the directory for results cannot be made: {error}"))
         };
         if let Some(out) = &options.out {
             fs::create_dir_all(out).map_err(wrong)?;
             let root = fs::canonicalize(out).map_err(wrong)?;
-            return Ok(Self { root, temporary: None, kept: AtomicBool::new(false) });
+            return Ok(Self { root, temporary: None });
         }
         let temporary =
             tempfile::Builder::new().prefix("harness-verify-").tempdir().map_err(wrong)?;
         let root = temporary.path().to_owned();
-        Ok(Self { root, temporary: Some(temporary), kept: AtomicBool::new(false) })
+        Ok(Self { root, temporary: Some(temporary) })
     }
 
     /// Makes the directory of a case, and replaces one that an earlier verification left.
     ///
     /// # Errors
     /// If something else has that name, or the directory cannot be made.
-    pub fn enter(&self, case: &str) -> Result<PathBuf, Failure> {
+    pub(super) fn enter(&self, case: &str) -> Result<PathBuf, Failure> {
         let place = self.root.join(case);
         let shown = place.display();
         if place.join(MARKER).is_file() {
@@ -64,9 +62,8 @@ impl Workplace {
     }
 
     /// Removes the directory of a case, or keeps and returns it.
-    pub fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
+    pub(super) fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
         if keep {
-            self.kept.store(true, Ordering::Relaxed);
             interrupt::forget_directory(place);
             return Some(place.to_owned());
         }
@@ -76,13 +73,8 @@ impl Workplace {
     }
 
     /// Closes it. A temporary directory is kept only for the cases that were kept in it.
-    pub fn close(self, remove_all: bool) {
-        if let Some(temporary) = self.temporary
-            && self.kept.into_inner()
-            && !remove_all
-        {
-            let _ = temporary.keep();
-        }
+    pub(super) fn close(self, keep: bool) {
+        self.temporary.filter(|_| keep).map(TempDir::keep);
     }
 }
 
@@ -98,7 +90,7 @@ mod tests {
             let root = workplace.root.clone();
             let place = workplace.enter("cube").unwrap();
             assert_eq!(workplace.leave(&place, keep).is_some(), keep);
-            workplace.close(false);
+            workplace.close(keep);
             assert_eq!((root.exists(), place.exists()), (keep, keep));
             let _ = fs::remove_dir_all(root);
         }
