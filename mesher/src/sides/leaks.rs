@@ -14,8 +14,8 @@
 
 use super::global::Label;
 use super::vote::{self, Candidate};
-use super::{Components, seeds};
-use crate::input::lattice::{Keep, Rules, Seed};
+use super::{Components, flow};
+use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
@@ -44,8 +44,6 @@ pub struct Leak {
     pub first: Candidate,
     /// Whether the region is inside at the spacing of the mesh.
     pub is_inside: bool,
-    /// Whether it lies in a region that is still closed at a finer one of the spacings.
-    pub is_part: bool,
 }
 
 /// All leaks. The same on all ranks.
@@ -142,17 +140,8 @@ pub fn find(
                 if k > 1 || !skips || leaks.len() > before {
                     let level = rules.level_surface - k;
                     let coarse = region.tree(tree, level, ownership, comm);
-                    let coarser = &mut leaks[before..];
-                    let of_level = of_tree(
-                        &coarse,
-                        (level, region.is_inside),
-                        coarser,
-                        ownership,
-                        facets,
-                        rules,
-                        comm,
-                    );
-                    leaks.extend(of_level);
+                    let side = (level, region.is_inside);
+                    leaks.extend(of_tree(&coarse, side, ownership, facets, rules, comm));
                 }
             }
         }
@@ -171,11 +160,10 @@ fn crossing_leaves(tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn
     comm.all_gather(&[mine]).words().iter().sum()
 }
 
-/// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not. Marks the `coarser` leaks that they contain.
+/// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not.
 fn of_tree(
     tree: &Tree,
     (level, is_inside): (Level, bool),
-    coarser: &mut [Leak],
     ownership: &Ownership,
     facets: &[Facet],
     rules: &Rules,
@@ -183,14 +171,13 @@ fn of_tree(
 ) -> Vec<Leak> {
     let components = Components::new(tree, ownership, comm);
     let label = |c| components.label(c);
-    let find = |seeds: &[_]| seeds::find(seeds, tree, &components.nodes, ownership, label, comm);
-    let found = find(&rules.seeds);
+    let found = flow::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
     let seeded: HashSet<Label> = found.values().copied().flatten().collect();
     // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
     let verdict = if found.is_empty() || found.values().any(Option::is_none) {
         vote::decide(&components.all, &components.candidates, facets, comm)
     } else {
-        seeds::decide(&components.all, seeded.clone(), rules.keep)
+        flow::decide(&components.all, seeded.clone(), rules.keep)
     };
     let has_leaked =
         |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
@@ -198,17 +185,9 @@ fn of_tree(
     if leaked.is_empty() {
         return Vec::new();
     }
-    let places: Vec<_> =
-        coarser.iter().map(|leak| Seed::at(leak.first.centroid(), &rules.root)).collect();
-    for (number, label) in find(&places) {
-        coarser[number as usize].is_part = label.is_some_and(|label| has_leaked(&label));
-    }
     let volumes = components.volumes(tree, ownership, comm);
     let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
-    let leak = |&&(label, first): &&_| {
-        let volume = volume(label);
-        Leak { level, volume, first, is_inside, is_part: false }
-    };
+    let leak = |&&(label, first): &&_| Leak { level, volume: volume(label), first, is_inside };
     leaked.iter().map(leak).collect()
 }
 
@@ -271,7 +250,7 @@ mod tests {
     /// A leak between level 2 and the surface level, 3: two octants of level 2.
     fn leak() -> Leak {
         let volume = 2 << (3 * (LEVEL_MAX - 2));
-        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false, is_part: false }
+        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false }
     }
 
     fn check(leaks: &[Leak]) {

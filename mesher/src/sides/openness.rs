@@ -12,7 +12,6 @@
 
 use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
-use bricks::widest;
 use ranks::{Comm, MessageBuffer, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,35 +22,16 @@ const WORDS_MAX: u64 = 1 << 23;
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
 
-widest! {
-    /// Exclusive or of the hashes of all edges.
-    fn boundary(facets: &[Facet]) -> u128 = boundary_lanes;
-}
-
-/// Many facets at a time, as the digest of the geometry.
-#[inline(always)]
-fn boundary_lanes(facets: &[Facet]) -> u128 {
-    let (mut high, mut low) = (0, 0);
-    for chunk in facets.chunks(64) {
-        let mut vertices = [[0; 64]; 3];
-        for (i, words) in vertices.iter_mut().enumerate() {
-            for a in 0..3 {
-                for (w, f) in words.iter_mut().zip(chunk) {
-                    *w = chained(*w, f.v[i][a]);
-                }
-            }
-        }
-        for [from, to] in [[0, 1], [1, 2], [2, 0]] {
-            for (from, to) in vertices[from].iter().zip(&vertices[to]) {
-                let edge = mix(from.wrapping_add(*to));
-                // An edge without length is none; so are those beyond the last facet.
-                let is_edge = u64::from(from != to).wrapping_neg();
-                high ^= (edge >> 64) as u64 & is_edge;
-                low ^= edge as u64 & is_edge;
-            }
-        }
+/// Exclusive or of the hashes of all edges.
+fn boundary(facets: &[Facet]) -> u128 {
+    let mut all = 0;
+    for f in facets {
+        let [a, b, c] = f.v.map(|v| v.iter().fold(0, |sum, &c| chained(sum, c)));
+        // An edge without length is none.
+        let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to);
+        all = edges.fold(all, |all, (from, to)| all ^ mix(from.wrapping_add(to)));
     }
-    u128::from(high) << 64 | u128::from(low)
+    all
 }
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface. Collective.
@@ -185,7 +165,7 @@ mod tests {
         [0, 1, 2].into_iter().flat_map(face).collect()
     }
 
-    /// Whether some faces are closed, and whether they are a sheet; the same on any number of ranks and in all vector widths.
+    /// Whether some faces are closed, and whether they are a sheet; the same on any number of ranks.
     fn kind(faces: &[[Facet; 2]]) -> (bool, bool) {
         let facets = faces.as_flattened();
         let of = |mine: &[Facet], comm: &dyn Comm| (is_closed(mine, comm), is_sheet(mine, comm));
@@ -193,8 +173,6 @@ mod tests {
         let slice = |rank: usize| &facets[facets.len() * rank / 3..facets.len() * (rank + 1) / 3];
         let among = sim::run(3, 1, |comm| of(slice(comm.rank()), comm));
         assert_eq!(among, [alone; 3]);
-        let widths = bricks::wide::widths(|| boundary(facets));
-        assert!(widths.iter().all(|(_, found)| *found == widths[0].1));
         alone
     }
 
@@ -206,7 +184,7 @@ mod tests {
         let cube = cube();
         assert_eq!(kind(&cube), CLOSED);
         let mut many = cube.repeat(31);
-        assert_eq!(kind(&many), CLOSED, "more than fit into a chunk");
+        assert_eq!(kind(&many), CLOSED, "31 copies");
         many.pop();
         assert_eq!(kind(&many), OPEN);
         for missing in 0..6 {

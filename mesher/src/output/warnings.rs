@@ -1,43 +1,47 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
+use crate::Mesh;
 use crate::input::lattice::{ExtentBox, Keep};
-use crate::mesh::Mesh;
-use crate::output::report::leaks::LeakEntry;
+use crate::output::manifest::LeakEntry;
 use crate::sides::Summary;
 use bricks::octant::ROOT_EDGE;
+
+const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
+    leaks through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or enlarge the root";
+const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
+    to the far field, or set keep = inside if the flow is internal";
+const BOXES_WITHOUT_EFFECT: &str = "an extent box ([[box]]) has no volume within the root: nothing is refined there; correct its corners or their unit";
+const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the root unless the body is meant to \
+    extend beyond it";
 
 /// A sentence for each warning: what was found, and what to try.
 pub fn of(mesh: &Mesh) -> Vec<String> {
     if mesh.is_base {
         return Vec::new();
     }
-    let has_seeds = !mesh.rules.seeds.is_empty();
     let summary = &mesh.sides.summary;
     let empty = empty_region(mesh.rules.keep, summary);
     // These two already advise to enlarge the root.
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
-    let facets_cut = if explains_cut { 0 } else { mesh.facets.beyond_root };
-    let has_effect = |b: &&ExtentBox| b.meets([0; 3], ROOT_EDGE);
-    let without_effect = mesh.rules.boxes.iter().filter(|b| !has_effect(b)).count();
+    let has_effect = |b: &ExtentBox| b.meets([0; 3], ROOT_EDGE);
     let leaks = of_leaks(mesh);
     let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
-    let warnings = [
-        leaks,
-        (without_effect > 0).then(|| boxes_without_effect(without_effect)),
-        empty,
-        summary.inside_reaches_boundary.then(|| flow_at_boundary(has_seeds)),
-        summary.flow_misses_boundary.then(flow_without_far_field),
-        (facets_cut > 0).then(|| body_cut(facets_cut, mesh.facets.total)),
+    let others = [
+        (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),
+        (summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
+        (!mesh.rules.boxes.iter().all(has_effect), BOXES_WITHOUT_EFFECT),
+        (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
     ];
-    warnings.into_iter().flatten().collect()
+    let others = others.into_iter().filter(|other| other.0).map(|other| other.1.to_owned());
+    leaks.into_iter().chain(empty).chain(others).collect()
 }
 
 /// The warning of a geometry that leaks, or that is open and bounds nothing.
 pub fn of_leaks(mesh: &Mesh) -> Option<String> {
-    // Each region counts once, with the finest spacing that closes it: there it has the most of its volume.
+    // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
     let leaks = LeakEntry::of(mesh);
-    let regions = || leaks.iter().zip(&mesh.leaks.0).filter(|(_, of)| !of.is_part);
-    let Some((largest, of)) = regions().max_by_key(|(_, of)| of.volume) else {
+    let largest = (0..leaks.len()).rev().max_by_key(|&i| mesh.leaks.0[i].volume);
+    let Some(largest) = largest else {
         let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
         let is_inner = mesh.rules.keep == Keep::Inside;
         return match mesh.bounds_nothing {
@@ -45,19 +49,9 @@ pub fn of_leaks(mesh: &Mesh) -> Option<String> {
             false => empty.filter(|_| is_inner),
         };
     };
-    let (count, volume) =
-        regions().fold((0, 0.0), |sum, (leak, _)| (sum.0 + 1, sum.1 + leak.volume));
-    let number = if count == 1 { "a region".to_owned() } else { format!("{count} regions") };
-    // They are in the order of their spacings.
-    let mut spacings: Vec<f64> = regions().map(|(leak, _)| leak.spacing_coarse).collect();
-    spacings.dedup();
-    let coarse = match spacings[..] {
-        [finer, coarser] => format!("spacings of {finer} and {coarser}"),
-        _ => format!("a spacing of {}", spacings[0]),
-    };
-    let (case, [x, y, z], fine) = (&mesh.case_name, largest.point, largest.spacing_fine);
-    let has_seeds = !mesh.rules.seeds.is_empty();
-    let (before, after) = match of.is_inside {
+    let LeakEntry { spacing_coarse, spacing_fine, volume, point: [x, y, z] } = leaks[largest];
+    let (case, has_seeds) = (&mesh.case_name, !mesh.rules.seeds.is_empty());
+    let (before, after) = match mesh.leaks.0[largest].is_inside {
         _ if has_seeds && mesh.rules.keep != Keep::All => ("deleted", "kept"),
         true => ("outside", "inside"),
         false => ("inside", "outside"),
@@ -65,8 +59,8 @@ pub fn of_leaks(mesh: &Mesh) -> Option<String> {
     // A search starts in the flow if that is known.
     let end = if has_seeds { "to" } else { "from" };
     Some(format!(
-        "the geometry leaks: {number} with a volume of {volume:.4e}, the largest at ({x}, {y}, {z}), {before} at {coarse}, \
-         became {after} at {fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
+        "the geometry leaks: a region with a volume of {volume:.4e} at ({x}, {y}, {z}), {before} at a spacing of {spacing_coarse}, became \
+         {after} at {spacing_fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
     ))
 }
 
@@ -105,44 +99,6 @@ fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
     Some(warning.to_owned())
 }
 
-fn flow_at_boundary(has_seeds: bool) -> String {
-    let warning = match has_seeds {
-        true => {
-            "the flow reaches the root's boundary from its seeds: right if the root cuts an open end of a duct; otherwise it leaks \
-             through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or \
-             choose a root that cuts the open ends"
-        }
-        false => {
-            "a component that is inside by its rays reaches the root's boundary: right if the root cuts the geometry on purpose; \
-             otherwise close the openings that `harness leak` finds, increase spacing_min, or enlarge the root if the geometry \
-             extends beyond it"
-        }
-    };
-    warning.to_owned()
-}
-
-fn flow_without_far_field() -> String {
-    "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
-     to the far field, or set keep = inside if the flow is internal"
-        .to_owned()
-}
-
-fn boxes_without_effect(count: usize) -> String {
-    let boxes =
-        if count == 1 { "an extent box".to_owned() } else { format!("{count} extent boxes") };
-    format!(
-        "{boxes} ([[box]]) without volume within the root: nothing is refined there; correct the corners or their unit"
-    )
-}
-
-fn body_cut(facets: u64, total: u64) -> String {
-    let verb = if facets == 1 { "lies" } else { "lie" };
-    format!(
-        "{facets} of {total} facets {verb} wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the \
-         root unless the body is meant to extend beyond it"
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,7 +127,5 @@ mod tests {
         says(Keep::Outside, "enlarge the root");
         says(Keep::Inside, "set keep = outside");
         says(Keep::All, "crosses all leaves");
-        assert!(flow_at_boundary(true).starts_with("the flow reaches"));
-        assert!(flow_at_boundary(false).starts_with("a component that is inside"));
     }
 }
