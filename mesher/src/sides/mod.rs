@@ -18,7 +18,6 @@ pub mod flow;
 pub mod global;
 pub mod leaks;
 pub mod nodes;
-pub mod openness;
 pub mod rays;
 pub mod vote;
 
