@@ -8,13 +8,17 @@
 //! simulated ranks. `tests/library/walkthrough.rs` fails when a committed drawing differs from what this program draws.
 
 use bricks::octant::{LEVEL_MAX, Side};
+use mesher::Options;
 use mesher::input::case::Case;
 use mesher::input::ingest;
 use mesher::partition::{Division, Partitioner, Weights};
-use mesher::{Options, words};
 use ranks::sim;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use words::words;
+
+#[path = "../tests/support/words.rs"]
+mod words;
 
 /// Ranks that share the mesh.
 const RANKS: usize = 4;

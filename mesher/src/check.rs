@@ -10,14 +10,13 @@ pub mod base;
 pub mod graded;
 pub mod sides;
 
+use crate::grow::Mesh;
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
 use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
-use crate::mesh::Mesh;
-use crate::options::Options;
-use crate::output::manifest::PartWords;
-use crate::output::report::Report;
+use crate::job::Options;
+use crate::output::manifest::{MeshEntry, PartWords};
 use crate::output::stream::Counts;
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::sides::Sides;
@@ -159,14 +158,23 @@ pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
 pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     let mut sum = 0u64;
-    for (number, set) in [split, crossing, &sides.stored].into_iter().enumerate() {
-        for (l, b) in (0..).zip(set).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
-            if ownership.owns(l, b.key) {
-                sum = sum.wrapping_add(hash(&(number, l, b.key, b.bits)));
-            }
+    for (number, sets) in [split, crossing, &sides.stored].into_iter().enumerate() {
+        for (l, b) in bricks_of(sets).filter(|(l, b)| ownership.owns(*l, b.key)) {
+            sum = sum.wrapping_add(hash(&(number, l, b.key, b.bits)));
         }
     }
     comm.sum(sum)
+}
+
+/// The bricks of all levels, each with its level.
+fn bricks_of(sets: &PerLevel) -> impl Iterator<Item = (Level, Brick)> {
+    (0..).zip(sets).flat_map(|(l, set)| set.bricks().map(move |b| (l, b)))
+}
+
+/// The volume, in octants of level 19, of some octants in bricks that this rank owns.
+fn volume_owned(octants: impl Iterator<Item = (Level, Brick)>, ownership: &Ownership) -> u64 {
+    let owned = octants.filter(|(l, b)| ownership.owns(*l, b.key));
+    owned.map(|(l, b)| volume_of(l, b.bits)).sum()
 }
 
 fn hash(value: &impl Hash) -> u64 {
@@ -188,7 +196,7 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     };
     let mut out = Vec::new();
     for (number, set) in sets.iter().enumerate() {
-        for (l, b) in (0..).zip(*set).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
+        for (l, b) in bricks_of(set) {
             let owners = owners_of(l, b.key);
             let is_full = l < 2 || owners.len() >= OWNERS_MANY;
             let is_held = is_full || owners.contains(&comm.rank());
@@ -249,15 +257,13 @@ fn is_in_leaf(leaves: &PerLevel, l: Level, code: u64) -> bool {
 
 /// The leaves of all ranks tile the root: as no octant is split without its parent, their volumes must add up.
 fn is_complete(split: &PerLevel, ownership: &Ownership, comm: &dyn Comm) {
-    let mut volume = 0;
-    for l in 0..=LEVEL_MAX {
+    let leaves = (0..=LEVEL_MAX).flat_map(|l| {
         let mut cursor = split[l as usize].cursor();
-        for b in Tree::exists(split, l) {
-            let leaves = b.bits & !cursor.get(b.key);
-            volume += if ownership.owns(l, b.key) { volume_of(l, leaves) } else { 0 };
-        }
-    }
-    assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves must tile the root");
+        let leaves = move |b: Brick| Brick { bits: b.bits & !cursor.get(b.key), ..b };
+        Tree::exists(split, l).map(leaves).map(move |b| (l, b))
+    });
+    let volume = comm.sum(volume_owned(leaves, ownership));
+    assert_eq!(volume, volume_of(0, 1), "leaves must tile the root");
 }
 
 /// The volume of some octants of a level, in octants of level 19.
@@ -275,11 +281,7 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!(counts.total(), number, "counts must add up");
-    let mut add = |sets: &PerLevel| {
-        for (l, b) in (0..).zip(sets).flat_map(|(l, set)| set.bricks().map(move |b| (l, b))) {
-            volume += if mesh.ownership.owns(l, b.key) { volume_of(l, b.bits) } else { 0 };
-        }
-    };
+    let mut add = |sets| volume += volume_owned(bricks_of(sets), &mesh.ownership);
     if !mesh.is_base {
         add(mesh.sides.deleted());
         if !mesh.rules.keep_crossing {
@@ -303,9 +305,9 @@ fn level_of(word: u64) -> Level {
 }
 
 /// The numbers of leaves by level, by rank and of this rank add up.
-pub fn totals(report: &Report, parts: &[PartWords], leaves: u64, comm: &dyn Comm) {
+pub fn totals(entry: &MeshEntry, parts: &[PartWords], leaves: u64, comm: &dyn Comm) {
     let by_rank: u64 = parts.iter().map(|p| p[0]).sum();
-    assert_eq!(report.cells, by_rank, "leaves by level and by rank must add up");
+    assert_eq!(entry.leaves, by_rank, "leaves by level and by rank must add up");
     assert_eq!(parts[comm.rank()][0], leaves, "parts must be in the order of ranks");
 }
 

@@ -46,28 +46,18 @@
 
 use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
+use crate::record::Counters;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::dilate::{Reach, Tile, Words};
+use bricks::dilate::{Reach, Tile};
 use bricks::kept::Kept;
 use bricks::octant::Level;
 use bricks::tree::{PerLevel, Tree};
 use ranks::Comm;
 
-/// The work done on this rank; repeats exactly.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Work {
-    /// Words of the dilated tiles.
-    pub words_dilated: Words,
-    /// Octants split by gradation, in bricks that this rank owns.
-    pub octants_split: u64,
-    /// Bricks sent to other ranks.
-    pub bricks_sent: u64,
-}
-
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
 /// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
-/// `crossing` are the base tree's crossing leaves. Collective.
+/// `crossing` are the base tree's crossing leaves. Counts the work. Collective.
 pub fn grade(
     split: PerLevel,
     crossing: &PerLevel,
@@ -75,11 +65,11 @@ pub fn grade(
     rules: &Rules,
     ownership: &Ownership,
     comm: &dyn Comm,
-) -> (PerLevel, Work) {
+) -> (PerLevel, Counters) {
     let surface = rules.level_surface;
     let tile = Tile::default();
-    let work = Work::default();
-    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, tile, work };
+    let counters = Counters::default();
+    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, tile, counters };
     if !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
@@ -93,7 +83,7 @@ pub fn grade(
         }
         touched = if l > 1 { g.reach(l, 1).coarsen() } else { BrickSet::default() };
     }
-    (g.split, g.work)
+    (g.split, g.counters)
 }
 
 /// The kept leaves of level `l` in bricks that this rank owns.
@@ -119,7 +109,7 @@ struct Gradation<'a> {
     comm: &'a dyn Comm,
     /// Scratch; empty between dilations.
     tile: Tile,
-    work: Work,
+    counters: Counters,
 }
 
 impl Gradation<'_> {
@@ -129,7 +119,7 @@ impl Gradation<'_> {
         let fresh = self.parents_of_split(l).without(&self.split[l as usize - 1]);
         let ([fresh, touched], sent) =
             self.ownership.redistribute(l - 1, [fresh, touched], self.comm);
-        self.work.bricks_sent += sent;
+        self.counters.halo_bricks += sent;
         self.split_more(l - 1, fresh);
         self.split_kept(l - 1, touched);
     }
@@ -182,7 +172,7 @@ impl Gradation<'_> {
         let mut reach = Reach::new(l, &mut tile);
         dilate(self, &mut reach);
         let (reached, words) = reach.finish();
-        self.work.words_dilated += words;
+        self.counters.words_dilated += words;
         self.tile = tile;
         reached
     }
@@ -191,7 +181,7 @@ impl Gradation<'_> {
     /// them, which split those that are kept. Collective.
     fn split_where_kept(&mut self, l: Level, reached: BrickSet) {
         let ([reached], sent) = self.ownership.redistribute(l, [reached], self.comm);
-        self.work.bricks_sent += sent;
+        self.counters.halo_bricks += sent;
         self.split_kept(l, reached);
     }
 
@@ -203,7 +193,7 @@ impl Gradation<'_> {
 
     /// Splits octants that are not split yet, in bricks that this rank holds.
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
-        self.work.octants_split += (fresh.bricks())
+        self.counters.octants_split_graded += (fresh.bricks())
             .filter(|b| self.ownership.owns(l, b.key))
             .map(|b| u64::from(b.bits.count_ones()))
             .sum::<u64>();

@@ -5,25 +5,66 @@ use crate::error::Error;
 use crate::grade;
 use crate::input::lattice::{Bounds, Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
-use crate::job::Job;
-use crate::mesh::Mesh;
-use crate::options::Options;
-use crate::output::report::warnings;
+use crate::job::{Job, Options};
+use crate::output::stream::Leaves;
+use crate::output::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner};
 use crate::record::Recorder;
 use crate::refine;
-use crate::refine::voxelise::BinnedFacets;
-use crate::sides::{self, Decided, leaks, openness};
+use crate::refine::voxelise::{self, BinnedFacets};
+use crate::sides::leaks::{self, Leaks};
+use crate::sides::{self, Decided, Sides};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
-use bricks::tree::Tree;
+use bricks::tree::{PerLevel, Tree};
 use ranks::{Comm, Solo, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
+
+/// A mesh as one rank holds it.
+pub struct Mesh {
+    /// The facets of all ranks, in numbers.
+    pub facets: FacetCounts,
+    /// The rules on the lattice.
+    pub rules: Rules,
+    /// The ranks that own and hold bricks.
+    pub ownership: Ownership,
+    /// Level of the base leaves, or of the octants between which partition boundaries lie.
+    pub level_base: Level,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
+    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
+    pub split: PerLevel,
+    /// Crossing leaves of T0.
+    pub crossing: PerLevel,
+    /// Sides of the leaves of T0.
+    pub sides: Sides,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Leaks,
+    /// Whether the facets bound nothing and are either open or doubled.
+    pub bounds_nothing: bool,
+    /// Name of the case in advice to the user.
+    pub case_name: String,
+    /// Whether the tree is T0, of which all leaves are in the mesh.
+    pub is_base: bool,
+}
+
+impl Mesh {
+    /// The leaves that this rank owns.
+    pub fn leaves(&self) -> Leaves<'_> {
+        Leaves {
+            split: &self.split,
+            crossing: &self.crossing,
+            sides: &self.sides,
+            ownership: &self.ownership,
+            drops_crossing: !self.is_base && !self.rules.keep_crossing,
+        }
+    }
+}
 
 /// Phases 3 to 8: from the facets and the rules on the lattice to the tree. `count` sees the base tree. Collective.
 ///
@@ -62,9 +103,9 @@ pub fn grow<F: Borrow<[Facet]>>(
         if options.checks() {
             binned.check_invariants();
         }
-        refine::refine(&binned, &rules, &ownership)
+        voxelise::refine(&binned, &rules, &ownership.octants())
     });
-    job.counters.add_voxelised(&work);
+    job.counters = work;
 
     // 5. Repartition after refinement: by the predicted work on T0. Replicas of bricks become equal.
     if is_parallel {
@@ -86,7 +127,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let is_closed = job.phase("leaks", |comm| openness::is_closed(facets.borrow(), comm));
+    let is_closed = job.phase("leaks", |comm| leaks::is_closed(facets.borrow(), comm));
     let decided = job.phase("sides", |comm| {
         sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
@@ -103,10 +144,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         let leaks =
             leaks::find(regions, sides.summary.inside > 0, &tree, &ownership, facets, &rules, comm);
         let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
-            && match is_closed {
-                true => openness::is_doubled(facets, comm),
-                false => !openness::is_sheet(facets, comm),
-            };
+            && (!is_closed || leaks::is_doubled(facets, comm));
         (leaks, bounds_nothing)
     });
     drop(facets);
@@ -142,7 +180,9 @@ pub fn grow<F: Borrow<[Facet]>>(
         grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
     });
     mesh.split = split;
-    job.counters.add_graded(&work);
+    job.counters.octants_split_graded = work.octants_split_graded;
+    job.counters.words_dilated = work.words_dilated;
+    job.counters.halo_bricks = work.halo_bricks;
     let mut fingerprint = 0;
     job.check(|comm| {
         check::graded(&mesh, comm);

@@ -1,9 +1,33 @@
-//! A run on one rank: what its phases share.
+//! A run on one rank: its options, and what its phases share.
 
-use crate::counters::Counters;
-use crate::options::Options;
-use crate::record::Recorder;
+use crate::output::write::Output;
+use crate::partition::Division;
+use crate::record::{Counters, Recorder};
 use ranks::{Comm, uncounted};
+
+/// Options that have no effect on the mesh, but for `ungraded`.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How to divide the work among ranks.
+    pub division: Division,
+    /// Stop after sides: the mesh is the base tree T0, with all its leaves.
+    pub ungraded: bool,
+    /// What to write, and where.
+    pub out: Option<Output>,
+    /// Check invariants after each phase, which debug builds do in any case.
+    pub check: bool,
+    /// Fail if the geometry leaks.
+    pub strict: bool,
+    /// What to call the case in advice to the user.
+    pub case_name: String,
+}
+
+impl Options {
+    /// Whether checks run: in debug builds, and in release builds on request.
+    pub fn checks(&self) -> bool {
+        cfg!(debug_assertions) || self.check
+    }
+}
 
 /// A run on one rank.
 pub struct Job<'a> {
@@ -28,14 +52,9 @@ impl<'a> Job<'a> {
         self.record.phase(name, self.comm, || work(self.comm))
     }
 
-    /// Whether checks run: in debug builds, and in release builds if the options ask for them.
-    pub fn checks(&self) -> bool {
-        self.options.checks()
-    }
-
     /// Checks what a phase has made if checks are on. Messages are not counted. Collective if `check` is.
     pub fn check(&self, check: impl FnOnce(&dyn Comm)) {
-        if self.checks() {
+        if self.options.checks() {
             uncounted(self.comm, || check(self.comm));
         }
     }

@@ -9,14 +9,11 @@
 #![deny(missing_docs)]
 
 pub mod check;
-mod counters;
 pub mod error;
 pub mod grade;
 mod grow;
 pub mod input;
 mod job;
-mod mesh;
-mod options;
 pub mod output;
 pub mod partition;
 pub mod record;
@@ -26,11 +23,8 @@ pub mod sides;
 #[path = "../bricks/src/values.rs"]
 mod values;
 
-pub use counters::Counters;
-pub use grow::grow;
-pub use job::Job;
-pub use mesh::Mesh;
-pub use options::Options;
+pub use grow::{Mesh, grow};
+pub use job::{Job, Options};
 
 use error::Error;
 use files::interrupt::stop_at;
@@ -38,7 +32,6 @@ use input::case::Case;
 use input::quantise::Quantised;
 use input::{ingest, quantise};
 use output::report::Report;
-use output::report::leaks::LeakEntry;
 use output::write::OutDir;
 use output::{htg, leaves};
 use ranks::Comm;
@@ -79,25 +72,6 @@ pub fn mesh_if(
     Ok(report)
 }
 
-/// The leaf words that this rank owns, in order, a summary of the components and the leaks: phases 1 to 8, and no report.
-/// Collective.
-pub fn words(
-    case: &Case,
-    options: &Options,
-    comm: &dyn Comm,
-) -> Result<(Vec<u64>, sides::Summary, Vec<LeakEntry>), Error> {
-    let mut record = Recorder::default();
-    let job = &mut Job::new(options, comm, &mut record);
-    let quantised = quantised(case, job)?;
-    let mesh = grow(quantised, job, |_, _| {})?;
-    let mut words = Vec::new();
-    mesh.leaves().emit(|w| {
-        words.extend_from_slice(w);
-        Ok::<(), Error>(())
-    })?;
-    Ok((words, mesh.sides.summary, LeakEntry::of(&mesh)))
-}
-
 /// Phases 1 and 2. Collective.
 ///
 /// # Errors
@@ -108,7 +82,7 @@ pub fn quantised(case: &Case, job: &mut Job) -> Result<Quantised, Error> {
     job.check(|comm| check::slices(&slice, comm));
 
     // 2. Quantise: the facets and the rules on the lattice.
-    let given = if job.checks() { slice.facets.clone() } else { Vec::new() };
+    let given = if job.options.checks() { slice.facets.clone() } else { Vec::new() };
     let quantised = job.phase("quantise", |comm| quantise::quantise(case, slice, comm))?;
     job.check(|comm| {
         check::rules(&quantised.rules, comm);
@@ -127,15 +101,16 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
     }
 
     // 10. Finish: sums over the ranks, and the manifest.
-    let (report, parts) =
+    let (entry, parts) =
         job.phase("finish", |comm| leaves::finish(mesh, &counts, &digests, out, comm))?;
     job.counters.leaves = counts.total();
     job.counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };
-    job.counters.add_traffic(job.comm.traffic());
-    job.check(|comm| check::totals(&report, &parts, counts.total(), comm));
-    Ok(report.with_ranks(job))
+    let traffic = job.comm.traffic();
+    (job.counters.messages, job.counters.message_bytes) = (traffic.messages, traffic.bytes);
+    job.check(|comm| check::totals(&entry, &parts, counts.total(), comm));
+    Ok(Report::new(mesh, entry, job))
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
-//! Times and messages of each phase on one rank, and the phase that it is in.
+//! Times and messages of each phase on one rank, the phase that it is in, and the work that it has done.
 
 use cpu_time::ThreadTime;
 use files::interrupt::stop_at;
 use ranks::{Comm, Traffic};
+use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -84,6 +85,31 @@ impl Recorder {
     pub fn phases(&self) -> &[Phase] {
         &self.phases
     }
+}
+
+/// Work done by one rank, in numbers that repeat exactly.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Counters {
+    /// Tests of a facet against the 64 octants of a brick.
+    pub facet_brick_tests: u64,
+    /// Bricks visited by voxelisation.
+    pub bricks_voxelised: u64,
+    /// Rays cast by all ranks; counted on rank 0.
+    pub rays: u64,
+    /// Octants split by gradation, in bricks that the rank owns.
+    pub octants_split_graded: u64,
+    /// Words of dilated tiles.
+    pub words_dilated: u64,
+    /// Bricks sent to other ranks by gradation.
+    pub halo_bricks: u64,
+    /// Messages sent.
+    pub messages: u64,
+    /// Payload sent, in bytes.
+    pub message_bytes: u64,
+    /// Leaves of the mesh.
+    pub leaves: u64,
+    /// Leaves in the rank's heaviest base leaf.
+    pub base_leaf_cells_max: u64,
 }
 
 /// Peak resident memory of this process, in bytes; 0 on systems that do not provide it.

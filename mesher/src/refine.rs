@@ -7,18 +7,11 @@
 
 pub mod voxelise;
 
-use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
-use crate::refine::voxelise::{BinnedFacets, ContainingOctant, Work};
+use crate::refine::voxelise::ContainingOctant;
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, corner, edge};
-use bricks::tree::Tree;
 use ranks::{Comm, MessageBuffer};
-
-/// Refines the octants that this rank owns around its facets, which must be all that [reach](route) them.
-pub fn refine(facets: &BinnedFacets, rules: &Rules, ownership: &Ownership) -> (Tree, Work) {
-    voxelise::refine(facets, rules, &ownership.octants())
-}
 
 /// Sends every facet to the owners of the octants that its extent reaches. Returns the facets for this rank. Collective.
 pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Facet> {

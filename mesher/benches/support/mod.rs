@@ -153,7 +153,7 @@ pub fn kernels() -> Vec<Kernel> {
                     &Solo,
                 )
                 .1
-                .octants_split
+                .octants_split_graded
             }),
         ),
         kernel(

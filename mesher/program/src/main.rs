@@ -10,8 +10,7 @@ use cli::{Args, Asked, CommChoice, UNPRINTED, case, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
 use mesher::Options;
 use mesher::error::Error;
-use mesher::input::agreement;
-use mesher::input::ingest::Source;
+use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
@@ -319,7 +318,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     agree(comm, apart.and_then(|()| on_json("choose another --json", &check_writable)))?;
     let case = case(args, comm)?;
     agree(comm, registered(&case.source))?;
-    agreement::on_geometry(&case.source, comm)?;
+    ingest::agree_on(&case.source, comm)?;
     if let Some(dir) = &args.status {
         // Not before the inputs are known, which these files must not replace.
         let path = dir.join(format!("rank-{:05}.txt", comm.rank()));

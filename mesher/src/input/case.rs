@@ -56,13 +56,6 @@ impl Case {
     /// # Errors
     /// If a parameter is out of range.
     pub fn rules(&self, bounds: &Bounds) -> Result<Rules, Error> {
-        let positive = |what: &str, v: f64| {
-            if v.is_finite() && v > 0.0 {
-                Ok(())
-            } else {
-                Err(Error::input(format!("{what} is {v}: give a positive number")))
-            }
-        };
         positive("spacing_min", self.spacing_min)?;
         if self.layer_cells_min == 0 {
             return Err(Error::input("layer_cells_min is 0: a layer has at least 1 cell"));
@@ -75,16 +68,19 @@ impl Case {
             }
         };
         positive("the root's edge", root.edge)?;
-        if !root.origin.iter().all(|c| c.is_finite()) {
-            return Err(Error::input("the root's origin is not finite: give three numbers"));
-        }
+        let finite = |what: &str, point: [f64; 3]| match point.iter().all(|c| c.is_finite()) {
+            true => Ok(()),
+            false => Err(Error::input(format!("{what} is not finite: give three numbers"))),
+        };
+        finite("the root's origin", root.origin)?;
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
-        let boxes =
-            self.boxes.iter().enumerate().map(|(i, b)| b.on(&root, i)).collect::<Result<_, _>>()?;
-        let seeds = (0..)
-            .zip(&self.seeds)
-            .map(|(number, &given)| on_lattice(given, &root, number))
-            .collect::<Result<_, _>>()?;
+        let boxes = self.boxes.iter().enumerate().map(|(i, b)| b.on(&root, i));
+        let boxes = boxes.collect::<Result<_, _>>()?;
+        let seed = |(number, &given): (usize, &[f64; 3])| {
+            finite(&format!("seed {number}"), given)?;
+            Ok(Seed { given, lattice: root.nearest(given) })
+        };
+        let seeds = self.seeds.iter().enumerate().map(seed).collect::<Result<_, Error>>()?;
         Ok(Rules {
             root,
             level_surface,
@@ -98,35 +94,27 @@ impl Case {
     }
 }
 
-/// A seed on the lattice; `number`, from 0, identifies it in errors.
-fn on_lattice(given: [f64; 3], root: &Root, number: usize) -> Result<Seed, Error> {
-    if !given.iter().all(|c| c.is_finite()) {
-        return Err(Error::input(format!("seed {number} is not finite: give three numbers")));
+fn positive(what: &str, v: f64) -> Result<(), Error> {
+    match v.is_finite() && v > 0.0 {
+        true => Ok(()),
+        false => Err(Error::input(format!("{what} is {v}: give a positive number"))),
     }
-    Ok(Seed { given, lattice: std::array::from_fn(|a| root.quantise(a, given[a])) })
 }
 
 impl BoxSpec {
     /// The box on the lattice; `number`, from 0, identifies it in errors.
     fn on(&self, root: &Root, number: usize) -> Result<ExtentBox, Error> {
-        let ordered = (0..3).all(|a| {
-            self.min[a] < self.max[a] && self.min[a].is_finite() && self.max[a].is_finite()
-        });
-        if !ordered {
+        let [min, max] = [self.min, self.max];
+        if !(0..3).all(|a| min[a] < max[a] && min[a].is_finite() && max[a].is_finite()) {
             return Err(Error::input(format!(
                 "box {number}: min must be below max on every axis, and both finite"
             )));
         }
-        if !(self.spacing.is_finite() && self.spacing > 0.0) {
-            return Err(Error::input(format!(
-                "box {number}: spacing is {}: give a positive number",
-                self.spacing
-            )));
-        }
-        let on_lattice =
-            |p: [f64; 3]| std::array::from_fn(|a| root.quantise(a, p[a]).clamp(0, ROOT_EDGE));
-        let level = root.level_of(self.spacing, &format!("box {number}: spacing"))?;
-        Ok(ExtentBox { min: on_lattice(self.min), max: on_lattice(self.max), level })
+        let spacing = format!("box {number}: spacing");
+        positive(&spacing, self.spacing)?;
+        let level = root.level_of(self.spacing, &spacing)?;
+        let on_lattice = |p| root.nearest(p).map(|c| c.clamp(0, ROOT_EDGE));
+        Ok(ExtentBox { min: on_lattice(min), max: on_lattice(max), level })
     }
 }
 

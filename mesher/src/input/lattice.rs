@@ -35,17 +35,19 @@ impl Bounds {
 
     /// Bounds of facets. Their coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
-        let (mut lo, mut hi) = ([f32::INFINITY; 9], [f32::NEG_INFINITY; 9]);
-        widen(facets, &mut lo, &mut hi);
-        let of = |all: [f32; 9], pick: fn(f32, f32) -> f32| {
-            [0, 1, 2].map(|a| f64::from(pick(pick(all[a], all[a + 3]), all[a + 6])))
-        };
-        Self { lo: of(lo, f32::min), hi: of(hi, f32::max) }
+        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for v in facets.as_flattened() {
+            // One instruction each, unlike `min` and `max`, which consider what is not a number.
+            lo = [0, 1, 2].map(|a| if v[a] < lo[a] { v[a] } else { lo[a] });
+            hi = [0, 1, 2].map(|a| if v[a] > hi[a] { v[a] } else { hi[a] });
+        }
+        Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
     }
 
     /// Whether these bounds extend beyond the root, after rounding to its lattice.
     pub fn exceed(&self, root: &Root) -> bool {
-        (0..3).any(|a| root.quantise(a, self.lo[a]) < 0 || root.quantise(a, self.hi[a]) > ROOT_EDGE)
+        root.nearest(self.lo).iter().any(|&c| c < 0)
+            || root.nearest(self.hi).iter().any(|&c| c > ROOT_EDGE)
     }
 
     /// Bounds of the union of both sets.
@@ -79,6 +81,11 @@ impl Root {
     #[inline]
     pub fn quantise(&self, axis: usize, x: f64) -> i64 {
         ((x - self.origin[axis]) * (ROOT_EDGE as f64 / self.edge)).round_ties_even() as i64
+    }
+
+    /// The nearest lattice point.
+    pub fn nearest(&self, p: [f64; 3]) -> [i64; 3] {
+        std::array::from_fn(|a| self.quantise(a, p[a]))
     }
 
     /// Coordinates of a lattice point in the unit of the geometry.
@@ -143,21 +150,6 @@ fn nearest(c: f64, origin: f64, scale: f64) -> f64 {
 /// Distance from the root's centre: the allowed range is symmetric about it.
 fn off_centre(c: f64) -> f64 {
     (c - ROOT_EDGE as f64 * 0.5).abs()
-}
-
-widest! {
-    fn widen(facets: &[geometries::Facet], lo: &mut [f32; 9], hi: &mut [f32; 9]) = widen_lanes;
-}
-
-#[inline(always)]
-fn widen_lanes(facets: &[geometries::Facet], lo: &mut [f32; 9], hi: &mut [f32; 9]) {
-    let (mut least, mut most) = (*lo, *hi);
-    for f in facets {
-        let c: [f32; 9] = bytemuck::cast(*f);
-        least = std::array::from_fn(|i| if c[i] < least[i] { c[i] } else { least[i] });
-        most = std::array::from_fn(|i| if c[i] > most[i] { c[i] } else { most[i] });
-    }
-    (*lo, *hi) = (least, most);
 }
 
 widest! {
@@ -242,11 +234,6 @@ pub struct Seed {
 }
 
 impl Seed {
-    /// A lattice point.
-    pub fn at(lattice: [i64; 3], root: &Root) -> Self {
-        Self { given: root.locate(lattice), lattice }
-    }
-
     /// Whether the point lies in the root, whose upper faces do not belong to it.
     pub fn is_in_root(&self) -> bool {
         self.lattice.iter().all(|c| (0..ROOT_EDGE).contains(c))

@@ -1,6 +1,5 @@
 //! Phases 1 and 2: the case, its geometry, and both on the lattice.
 
-pub mod agreement;
 pub mod case;
 pub mod ingest;
 pub mod lattice;

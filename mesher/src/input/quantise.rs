@@ -6,7 +6,6 @@ use crate::input::ingest::Slice;
 use crate::input::lattice::{Bounds, Rules};
 use bricks::digest;
 use bricks::facet::Facet;
-use bricks::octant::ROOT_EDGE;
 use ranks::{Comm, agree, gather, uncounted};
 
 /// The facets of all ranks, in numbers.
@@ -14,8 +13,8 @@ use ranks::{Comm, agree, gather, uncounted};
 pub struct FacetCounts {
     /// All facets.
     pub total: u64,
-    /// Those with a point beyond the root.
-    pub beyond_root: u64,
+    /// Whether some lie beyond the root, wholly or partly.
+    pub beyond_root: bool,
     /// The digest of the geometry.
     pub digest: u128,
 }
@@ -41,15 +40,10 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     let bounds = gather(comm, &[local]).into_iter().fold(Bounds::EMPTY, Bounds::union);
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
-    let beyond_root = if bounds.exceed(&rules.root) { comm.sum(beyond_root(&facets)) } else { 0 };
+    let beyond_root = bounds.exceed(&rules.root);
     // Each facet is in one slice.
     let digests = uncounted(comm, || gather(comm, &[digest::of_facets(&facets)]));
     let digest = digests.into_iter().fold(0, u128::wrapping_add);
     let counts = FacetCounts { total: slice.total, beyond_root, digest };
     Ok(Quantised { rules, bounds, facets, counts })
-}
-
-fn beyond_root(facets: &[Facet]) -> u64 {
-    let is_in_root = |c: &i32| (0..=ROOT_EDGE).contains(&i64::from(*c));
-    facets.iter().filter(|f| !f.v.as_flattened().iter().all(is_in_root)).count() as u64
 }

@@ -8,8 +8,8 @@
 mod numbering;
 mod siblings;
 
+use crate::Mesh;
 use crate::error::Error;
-use crate::mesh::Mesh;
 use crate::output::write::{OutDir, TREE};
 use files::Draft;
 use numbering::Numbering;

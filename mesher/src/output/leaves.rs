@@ -1,9 +1,8 @@
 //! The leaves of the finished mesh: digests, files and the manifest.
 
+use crate::Mesh;
 use crate::error::Error;
-use crate::mesh::Mesh;
-use crate::output::manifest::{self, Manifest, PartWords};
-use crate::output::report::Report;
+use crate::output::manifest::{self, Manifest, MeshEntry, PartWords};
 use crate::output::stream::Counts;
 use crate::output::write::{OutDir, Part, part_name};
 use bricks::digest::Digests;
@@ -40,27 +39,27 @@ pub fn emit(
     Ok((counts, digests, heaviest.max))
 }
 
-/// Sums over the ranks, and writes the manifest if a directory is given. Returns the report without times and counters, and the parts
-/// of all ranks. Collective.
+/// Sums over the ranks, and writes the manifest if a directory is given. Returns the mesh in numbers, and the parts of all ranks.
+/// Collective.
 pub fn finish(
     mesh: &Mesh,
     counts: &Counts,
     digests: &Digests,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<(Report, Vec<PartWords>), Error> {
+) -> Result<(MeshEntry, Vec<PartWords>), Error> {
     let (digests, parts) = manifest::gather(counts.total(), digests, comm);
     let counts = counts.gather(comm);
-    let report = Report::new(mesh, &counts, &digests, comm.size());
+    let entry = MeshEntry::new(mesh, &counts, &digests);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
             stop_at(format_args!("manifest:0"));
-            out.manifest(&Manifest::new(&out.output, mesh, &report, &digests, &parts))
+            out.manifest(&Manifest::new(&out.output, &entry, &digests, &parts))
         }
         _ => Ok(()),
     };
     agree(comm, publish())?;
-    Ok((report, parts))
+    Ok((entry, parts))
 }
 
 /// The number of leaves in this rank's heaviest octant of a level, as they are streamed in Morton order. It bounds the load balance of

@@ -1,37 +1,135 @@
-//! The manifest of a mesh, `mesh.json`: its inputs, counts, digests and files.
+//! The manifest of a mesh, `mesh.json`, and what it has in common with the report of the run: the mesh in numbers.
 
+use crate::Mesh;
 use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
-use crate::mesh::Mesh;
-use crate::output::report::leaks::LeakEntry;
-use crate::output::report::{Geometry, Report};
+use crate::output::stream::Counts;
 use crate::output::write::{Output, TREE, part_name};
+use crate::sides::Summary;
+use crate::sides::leaks::Leak;
 use bricks::digest::{Digests, hex};
+use bricks::octant::{LEVEL_MAX, Level};
 use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Contents of `mesh.json`. Boxes are in lattice units, the root is in the geometry's unit.
+/// A mesh in numbers: its rules, its leaves and its components. Boxes and seeds are in lattice units, everything else is in the
+/// geometry's unit.
 #[derive(Clone, Debug, Serialize)]
-pub struct Manifest<'a> {
-    schema: &'static str,
+pub struct MeshEntry {
     program: &'static str,
     tree: &'static str,
-    root: Root,
-    level_surface: u32,
+    /// The root cube.
+    pub root: Root,
+    /// Surface level.
+    pub level_surface: Level,
     layer_cells_min: u32,
     keep: Keep,
     keep_crossing: bool,
-    boxes: &'a [ExtentBox],
-    geometry: &'a Geometry,
-    leaks: &'a [LeakEntry],
-    leaves: u64,
-    leaves_by_level: &'a [u64],
+    boxes: Vec<ExtentBox>,
+    geometry: Value,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Vec<LeakEntry>,
+    /// Leaves of the mesh.
+    pub leaves: u64,
+    /// Leaves by level, 0 to 19.
+    pub leaves_by_level: Vec<u64>,
     leaves_by_side: Value,
     seeds: Vec<[i64; 3]>,
     enclosed: Enclosed,
     components: Value,
     components_ambiguous: Value,
-    digest: &'a str,
+    /// The mesh's digest.
+    pub digest: String,
+    /// Leaves by side: outside, inside, crossing.
+    #[serde(skip)]
+    pub by_side: [u64; 3],
+    /// The components of the base tree.
+    #[serde(skip)]
+    pub summary: Summary,
+}
+
+/// A leak.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LeakEntry {
+    /// The spacing at which the region is closed.
+    pub spacing_coarse: f64,
+    /// The spacing of the mesh.
+    pub spacing_fine: f64,
+    /// The region's volume at the coarser spacing.
+    pub volume: f64,
+    /// A point in it.
+    pub point: [f64; 3],
+}
+
+impl LeakEntry {
+    /// The leaks of a mesh.
+    pub fn of(mesh: &Mesh) -> Vec<Self> {
+        let root = mesh.rules.root;
+        let edge_of = |l: Level| root.edge / f64::from(1u32 << l);
+        let entry = |leak: &Leak| Self {
+            spacing_coarse: edge_of(leak.level),
+            spacing_fine: edge_of(mesh.rules.level_surface),
+            volume: leak.volume as f64 * edge_of(LEVEL_MAX).powi(3),
+            point: root.locate(leak.first.centroid()),
+        };
+        mesh.leaks.0.iter().map(entry).collect()
+    }
+}
+
+impl MeshEntry {
+    /// The mesh with these leaves on all ranks.
+    pub fn new(mesh: &Mesh, counts: &Counts, digests: &Digests) -> Self {
+        let Mesh { rules, sides, .. } = mesh;
+        let by_level = &counts.by_level[..=LEVEL_MAX as usize];
+        let by_side: [u64; 3] = [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum());
+        let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
+        let place = |q| rules.root.locate(q);
+        Self {
+            program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
+            tree: if mesh.is_base { "base" } else { "final" },
+            root: rules.root,
+            level_surface: rules.level_surface,
+            layer_cells_min: rules.layer_cells_min,
+            keep: rules.keep,
+            keep_crossing: rules.keep_crossing,
+            boxes: rules.boxes.clone(),
+            geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
+            leaks: LeakEntry::of(mesh),
+            leaves: counts.total(),
+            leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
+            leaves_by_side: json!({
+                "outside": by_side[0],
+                "inside": by_side[1],
+                "crossing": by_side[2],
+            }),
+            seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
+            enclosed: rules.enclosed,
+            components: json!({
+                "outside": outside,
+                "inside": inside,
+                "enclosed": {
+                    "count": enclosed.map_or(0, |e| e.count),
+                    "leaves": enclosed.map_or(0, |e| e.leaves),
+                    "example": enclosed.map(|e| place(e.example)),
+                },
+            }),
+            components_ambiguous: json!({
+                "count": ambiguous.map_or(0, |a| a.count),
+                "example": ambiguous.map(|a| place(a.example)),
+            }),
+            digest: hex(digests.whole()),
+            by_side,
+            summary: sides.summary,
+        }
+    }
+}
+
+/// Contents of `mesh.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Manifest<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    mesh: &'a MeshEntry,
     octant_digests: Vec<String>,
     parts: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,51 +159,20 @@ pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<Par
 }
 
 impl<'a> Manifest<'a> {
-    /// The manifest of a mesh with these numbers, digests and parts; parts and tree are named as far as `output` has them.
+    /// The manifest of a mesh with these digests and parts; parts and tree are named as far as `output` has them.
     pub fn new(
         output: &Output,
-        mesh: &'a Mesh,
-        report: &'a Report,
+        mesh: &'a MeshEntry,
         digests: &Digests,
         parts: &[PartWords],
     ) -> Self {
-        let rules = &mesh.rules;
-        let [outside, inside, crossing] = report.cells_by_side;
         let part = |(rank, &[leaves, high, low]): (usize, &PartWords)| {
             let digest = hex(u128::from(high) << 64 | u128::from(low));
             json!({ "file": part_name(rank), "leaves": leaves, "digest": digest })
         };
         Self {
             schema: "octree-leaf-set/1",
-            program: report.program,
-            tree: if mesh.is_base { "base" } else { "final" },
-            root: rules.root,
-            level_surface: rules.level_surface,
-            layer_cells_min: rules.layer_cells_min,
-            keep: rules.keep,
-            keep_crossing: rules.keep_crossing,
-            boxes: &rules.boxes,
-            geometry: &report.geometry,
-            leaks: &report.leaks,
-            leaves: report.cells,
-            leaves_by_level: &report.cells_by_level,
-            leaves_by_side: json!({ "outside": outside, "inside": inside, "crossing": crossing }),
-            seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
-            enclosed: rules.enclosed,
-            components: json!({
-                "outside": report.components_outside,
-                "inside": report.components_inside,
-                "enclosed": {
-                    "count": report.components_enclosed,
-                    "leaves": report.enclosed_leaves,
-                    "example": report.enclosed_example,
-                },
-            }),
-            components_ambiguous: json!({
-                "count": report.components_ambiguous,
-                "example": report.ambiguous_example,
-            }),
-            digest: &report.digest,
+            mesh,
             octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
             parts: parts.iter().enumerate().filter(|_| output.words).map(part).collect(),
             hyper_tree_grid: output.tree.then_some(TREE),

@@ -5,4 +5,5 @@ pub mod leaves;
 pub mod manifest;
 pub mod report;
 pub mod stream;
+pub(crate) mod warnings;
 pub mod write;

@@ -1,45 +1,21 @@
-//! The report of a run: a table for people, JSON for programs, and warnings.
+//! The report of a run: a table for people, JSON for programs.
 //!
 //! Invariants of a report, which [`Report::check_invariants`] executes before it is returned:
 //! - leaves by level, by side and by rank add up to all leaves, and a rank's heaviest base leaf has no more than the rank;
-//! - components by side add up to all; there are no more enclosed ones than outside, and an example where there is one to show;
+//! - no more components are enclosed than outside, each with a leaf, and no more decided by majority than there are;
 //! - every quantity by rank has an entry for each rank; times are finite and not negative;
 //! - the wall time is that of the slowest rank.
 
-pub mod leaks;
-mod text;
-pub(crate) mod warnings;
-
-pub use text::grouped;
-
-use crate::input::quantise::FacetCounts;
-use crate::job::Job;
-use crate::mesh::Mesh;
-use crate::output::stream::Counts;
+use crate::output::manifest::MeshEntry;
+use crate::output::warnings;
 use crate::partition::Partitioner;
-use crate::record::peak_rss_bytes;
+use crate::record::{Phase, peak_rss_bytes};
 use crate::sides::Summary;
-use bricks::digest::{Digests, hex};
-use bricks::octant::{LEVEL_MAX, Level};
-use leaks::LeakEntry;
+use crate::{Job, Mesh};
+use bricks::octant::Level;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// The facets as read, in manifest and report.
-#[derive(Clone, Debug, Serialize)]
-pub struct Geometry {
-    /// Their number.
-    pub facets: u64,
-    /// Their digest on the lattice.
-    pub digest: String,
-}
-
-impl Geometry {
-    /// The facets of all ranks.
-    pub fn of(facets: &FacetCounts) -> Self {
-        Self { facets: facets.total, digest: hex(facets.digest) }
-    }
-}
+use std::fmt;
 
 /// One phase over all ranks.
 #[derive(Clone, Debug, Serialize)]
@@ -60,49 +36,21 @@ pub struct PhaseEntry {
     pub message_bytes: Vec<u64>,
 }
 
-/// A run's results. In JSON, under `schema`, `octree-mesher-run/1`.
+/// A run's results: those of its mesh, which the manifest has as well, and those of its ranks. In JSON, under `schema`, `octree-mesher-run/2`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     schema: &'static str,
-    pub(crate) program: &'static str,
+    /// The mesh in numbers.
+    #[serde(flatten)]
+    pub mesh: MeshEntry,
     /// Facets in the geometry.
     pub facets: u64,
-    /// The same, with their digest.
-    pub geometry: Geometry,
     /// Leaves of the mesh.
     pub cells: u64,
-    /// Leaves by level, 0 to 19.
-    pub cells_by_level: Vec<u64>,
-    /// Leaves by side: outside, inside, crossing.
-    pub cells_by_side: [u64; 3],
-    /// The mesh's digest.
-    pub digest: String,
-    /// Edge of the root in the geometry's unit.
-    pub root_edge: f64,
-    /// Surface level.
-    pub level_surface: Level,
     /// Level of the base leaves, or of the octants between which partition boundaries lie.
     pub level_base: Level,
     /// The partitioner that was used: METIS leaves few base leaves to the curve. None for a single rank.
     pub partitioner: Option<Partitioner>,
-    /// Components of non-crossing leaves of the base tree.
-    pub components: u64,
-    /// Those that are outside, enclosed ones included.
-    pub components_outside: u64,
-    /// Those that are inside.
-    pub components_inside: u64,
-    /// Outside components that are deleted because the far field does not reach them.
-    pub components_enclosed: u64,
-    /// Their leaves in the base tree.
-    pub enclosed_leaves: u64,
-    /// A point in one of them.
-    pub enclosed_example: Option<[f64; 3]>,
-    /// Components decided by majority.
-    pub components_ambiguous: u64,
-    /// A point in one of them.
-    pub ambiguous_example: Option<[f64; 3]>,
-    /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Vec<LeakEntry>,
     /// What is probably not as the user intended, and what to try: a sentence each.
     pub warnings: Vec<String>,
     /// Number of ranks.
@@ -118,47 +66,13 @@ pub struct Report {
 }
 
 impl Report {
-    /// The report of a mesh with these leaves on `ranks` ranks, without times and counters.
-    pub(crate) fn new(mesh: &Mesh, counts: &Counts, digests: &Digests, ranks: usize) -> Self {
-        let Mesh { rules, sides, .. } = mesh;
-        let by_level = &counts.by_level[..=LEVEL_MAX as usize];
-        let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
-        Self {
-            schema: "octree-mesher-run/1",
-            program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
-            facets: mesh.facets.total,
-            geometry: Geometry::of(&mesh.facets),
-            cells: counts.total(),
-            cells_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
-            cells_by_side: [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum()),
-            digest: hex(digests.whole()),
-            root_edge: rules.root.edge,
-            level_surface: rules.level_surface,
-            level_base: mesh.level_base,
-            partitioner: mesh.partitioner,
-            components: outside + inside,
-            components_outside: outside,
-            components_inside: inside,
-            components_enclosed: enclosed.map_or(0, |e| e.count),
-            enclosed_leaves: enclosed.map_or(0, |e| e.leaves),
-            enclosed_example: enclosed.map(|e| rules.root.locate(e.example)),
-            components_ambiguous: ambiguous.map_or(0, |a| a.count),
-            ambiguous_example: ambiguous.map(|a| rules.root.locate(a.example)),
-            leaks: LeakEntry::of(mesh),
-            warnings: warnings::of(mesh),
-            ranks,
-            time_wall_s: 0.0,
-            peak_rss_bytes: Vec::new(),
-            phases: Vec::new(),
-            counters: BTreeMap::new(),
-        }
-    }
-
-    /// Adds the counters and times of all ranks. Collective.
-    pub(crate) fn with_ranks(mut self, job: &Job) -> Self {
+    /// The report of a run that has made `mesh`, with the counters and times of all ranks. Collective.
+    pub(crate) fn new(mesh: &Mesh, entry: MeshEntry, job: &Job) -> Self {
         let Job { comm, record, counters, .. } = job;
+        let counters: BTreeMap<String, u64> = serde_json::to_value(counters)
+            .and_then(serde_json::from_value)
+            .expect("counters are numbers with names");
         let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
-        let counters = counters.by_name();
         words.extend(counters.values());
         words.extend(record.phases().iter().flat_map(|p| {
             let t = p.traffic;
@@ -170,11 +84,11 @@ impl Report {
         // The columns of the table that has a row for each rank.
         let mut columns = (0..).map(|i| all.messages().map(|(_, w)| w[i]).collect::<Vec<u64>>());
         let mut column = || columns.next().expect("columns have no end");
-        self.peak_rss_bytes = column();
-        self.counters = counters.into_keys().map(|name| (name, column())).collect();
-        for phase in record.phases() {
+        let peak_rss_bytes = column();
+        let counters = counters.into_keys().map(|name| (name, column())).collect();
+        let phase = |phase: &Phase| {
             let mut seconds = || column().into_iter().map(f64::from_bits).collect::<Vec<f64>>();
-            self.phases.push(PhaseEntry {
+            PhaseEntry {
                 name: phase.name.into(),
                 time_wall_s: seconds(),
                 time_cpu_s: seconds(),
@@ -182,21 +96,35 @@ impl Report {
                 time_comm_cpu_s: seconds(),
                 messages: column(),
                 message_bytes: column(),
-            });
-        }
-        let total = |r: usize| self.phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
-        self.time_wall_s = (0..self.ranks).map(total).fold(0.0, f64::max);
-        self.check_invariants();
-        self
+            }
+        };
+        let phases: Vec<PhaseEntry> = record.phases().iter().map(phase).collect();
+        let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
+        let report = Self {
+            schema: "octree-mesher-run/2",
+            facets: mesh.facets.total,
+            cells: entry.leaves,
+            mesh: entry,
+            level_base: mesh.level_base,
+            partitioner: mesh.partitioner,
+            warnings: warnings::of(mesh),
+            ranks: comm.size(),
+            time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
+            peak_rss_bytes,
+            phases,
+            counters,
+        };
+        report.check_invariants();
+        report
     }
 
     /// # Panics
     /// If an invariant at the head of this file is violated.
     pub fn check_invariants(&self) {
-        let all = self.cells;
+        let (all, mesh) = (self.cells, &self.mesh);
         let sums = [
-            ("level", self.cells_by_level.iter().sum::<u64>()),
-            ("side", self.cells_by_side.iter().sum()),
+            ("level", mesh.leaves_by_level.iter().sum::<u64>()),
+            ("side", mesh.by_side.iter().sum()),
             ("rank", self.counters["leaves"].iter().sum()),
         ];
         for (by, sum) in sums {
@@ -209,15 +137,13 @@ impl Report {
                 "rank {rank}: a base leaf of {heaviest} of {leaves} leaves"
             );
         }
-        let [outside, inside] = [self.components_outside, self.components_inside];
-        assert_eq!(self.components, outside + inside, "components must be outside or inside");
-        let [enclosed, ambiguous] = [self.components_enclosed, self.components_ambiguous];
-        assert!(enclosed <= outside, "{enclosed} of {outside} outside components are enclosed");
-        assert!(ambiguous <= self.components, "{ambiguous} of {} are ambiguous", self.components);
-        assert!(self.enclosed_leaves >= enclosed, "each of {enclosed} components must have a leaf");
-        let examples = [(enclosed, self.enclosed_example), (ambiguous, self.ambiguous_example)];
-        for (count, example) in examples {
-            assert_eq!(count > 0, example.is_some(), "an example of {count} components");
+        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.summary;
+        if let Some(e) = enclosed {
+            let is_right = (1..=outside.min(e.leaves)).contains(&e.count);
+            assert!(is_right, "{e:?} of {outside} outside components");
+        }
+        if let Some(a) = ambiguous {
+            assert!((1..=outside + inside).contains(&a.count), "{a:?} of all components");
         }
         assert!(self.counters.values().all(|c| c.len() == self.ranks), "a counter for each rank");
         assert_eq!(self.peak_rss_bytes.len(), self.ranks, "a peak for each rank");
@@ -239,9 +165,74 @@ impl Report {
     }
 }
 
+/// The greatest value divided by the mean: 1 is perfect balance.
+fn imbalance(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    if mean > 0.0 { values.iter().fold(0.0, |m: f64, v| m.max(*v)) / mean } else { 1.0 }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { mesh, level_base, ranks, .. } = self;
+        let (edge, level_surface) = (mesh.root.edge, mesh.level_surface);
+        let [outside, inside, crossing] = mesh.by_side.map(grouped);
+        writeln!(f, "facets         {}", grouped(self.facets))?;
+        writeln!(f, "root edge      {edge} (level 0), surface level {level_surface}")?;
+        writeln!(f, "cells          {}", grouped(self.cells))?;
+        writeln!(f, "  by side      outside {outside}, inside {inside}, crossing {crossing}")?;
+        for (l, &n) in mesh.leaves_by_level.iter().enumerate().filter(|(_, n)| **n > 0) {
+            let (cells, edge) = (grouped(n), edge / f64::from(1u32 << l));
+            writeln!(f, "  level {l:>2}     {cells:>16}   edge {edge:e}")?;
+        }
+        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.summary;
+        let (enclosed, ambiguous) =
+            (enclosed.map_or(0, |e| e.count), ambiguous.map_or(0, |a| a.count));
+        let [outside, inside, enclosed, ambiguous] =
+            [outside, inside, enclosed, ambiguous].map(grouped);
+        writeln!(
+            f,
+            "components     outside {outside}, inside {inside}; deleted as enclosed {enclosed}, decided by majority {ambiguous}"
+        )?;
+        writeln!(f, "digest         {}", mesh.digest)?;
+        let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
+        let (lambda, partitioner) = (imbalance(&leaves), self.partitioner);
+        let partitioner = partitioner.map_or(String::new(), |p| format!(", partitioner {p:?}"));
+        writeln!(
+            f,
+            "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}{partitioner}"
+        )?;
+        writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
+        for PhaseEntry { name, time_wall_s, time_cpu_s, .. } in &self.phases {
+            let wall = time_wall_s.iter().copied().fold(0.0, f64::max);
+            let (cpu, lambda) = (time_cpu_s.iter().sum::<f64>(), imbalance(time_cpu_s));
+            writeln!(f, "  {name:<12} {wall:>10.3} {cpu:>9.3}   {lambda:>8.3}")?;
+        }
+        let (cells, wall) = (self.cells.max(1) as f64, self.time_wall_s);
+        let rate = cells / wall.max(1e-9) / 1e6;
+        writeln!(f, "time           {wall:.3} s wall, {rate:.2} M cells/s")?;
+        let peak = self.peak_rss_bytes.iter().sum::<u64>() as f64;
+        let (peak_mb, per_cell) = (peak / 1e6, peak / cells);
+        write!(f, "peak memory    {peak_mb:.1} MB over all ranks, {per_cell:.2} bytes per cell")
+    }
+}
+
+/// A number with a comma before each group of three digits.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, d) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(d);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sides::{Ambiguous, EnclosedComponents};
     use ranks::{Comm, sim};
 
     fn report() -> Report {
@@ -256,15 +247,16 @@ mod tests {
     fn a_wrong_report_is_not_returned() {
         let sound = report();
         sound.check_invariants();
+        let enclosed = |count, leaves| Some(EnclosedComponents { count, leaves, example: [0; 3] });
         let corruptions: [&dyn Fn(&mut Report); 12] = [
             &|r| r.cells += 1,
-            &|r| r.cells_by_level[3] += 1,
-            &|r| r.cells_by_side[1] += 1,
+            &|r| r.mesh.leaves_by_level[3] += 1,
+            &|r| r.mesh.by_side[1] += 1,
             &|r| r.counters.get_mut("leaves").expect("a counter")[1] += 1,
             &|r| r.counters.get_mut("base_leaf_cells_max").expect("a counter")[0] = r.cells,
-            &|r| r.components_inside += 1,
-            &|r| r.components_enclosed = r.components_outside + 1,
-            &|r| r.components_ambiguous += 1,
+            &|r| r.mesh.summary.enclosed = enclosed(2, 9),
+            &|r| r.mesh.summary.enclosed = enclosed(1, 0),
+            &|r| r.mesh.summary.ambiguous = Some(Ambiguous { count: 3, example: [0; 3] }),
             &|r| _ = r.peak_rss_bytes.pop(),
             &|r| r.phases[2].time_cpu_s[1] = f64::NAN,
             &|r| _ = r.phases[1].messages.pop(),
@@ -276,5 +268,60 @@ mod tests {
             let check = std::panic::AssertUnwindSafe(|| report.check_invariants());
             assert!(std::panic::catch_unwind(check).is_err(), "corruption {number}");
         }
+    }
+
+    #[test]
+    fn digits_are_grouped_in_threes() {
+        assert_eq!(
+            [0, 12, 123, 1234, 1_234_567].map(grouped),
+            ["0", "12", "123", "1,234", "1,234,567"]
+        );
+    }
+
+    #[test]
+    fn imbalance_is_greatest_over_mean() {
+        assert_eq!(imbalance(&[1.0, 3.0]), 1.5);
+        assert_eq!(imbalance(&[0.0]), 1.0);
+    }
+
+    #[test]
+    fn a_report_shows_its_numbers() {
+        let phase = PhaseEntry {
+            name: "sides".into(),
+            time_wall_s: vec![0.25, 0.5],
+            time_cpu_s: vec![1.0, 3.0],
+            time_comm_wall_s: vec![],
+            time_comm_cpu_s: vec![],
+            messages: vec![],
+            message_bytes: vec![],
+        };
+        let mut report = report();
+        (report.facets, report.cells, report.phases) = (1280, 3_000_000, vec![phase]);
+        (report.mesh.leaves_by_level, report.mesh.by_side) = (vec![0, 0, 1234], [1000, 2000, 3]);
+        (report.mesh.root.edge, report.mesh.level_surface) = (8.0, 2);
+        report.mesh.digest = "abc".into();
+        let example = [0; 3];
+        report.mesh.summary = Summary {
+            outside: 1500,
+            inside: 1,
+            enclosed: Some(EnclosedComponents { count: 1000, leaves: 2000, example }),
+            ambiguous: Some(Ambiguous { count: 7, example }),
+            ..Summary::default()
+        };
+        (report.level_base, report.time_wall_s) = (1, 0.5);
+        report.peak_rss_bytes = vec![2_000_000, 4_000_000];
+        report.counters.insert("leaves".into(), vec![1, 3]);
+        let text = "facets         1,280\n\
+                    root edge      8 (level 0), surface level 2\n\
+                    cells          3,000,000\n  by side      outside 1,000, inside 2,000, crossing 3\n  \
+                    level  2                1,234   edge 2e0\n\
+                    components     outside 1,500, inside 1; deleted as enclosed 1,000, decided by majority 7\n\
+                    digest         abc\n\
+                    ranks          2, cells max/mean 1.500, base level 1, partitioner Morton\n\
+                    phase              wall s     cpu s   cpu max/mean\n  \
+                    sides             0.500     4.000      1.500\n\
+                    time           0.500 s wall, 6.00 M cells/s\n\
+                    peak memory    6.0 MB over all ranks, 2.00 bytes per cell";
+        assert_eq!(report.to_string(), text);
     }
 }

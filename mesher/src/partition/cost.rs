@@ -1,8 +1,8 @@
 //! The cost model: CPU time that sides and gradation take on a rank, predicted from T0.
 //!
 //! The predicted time is a sum of counts times the times of [`FITTED`]. Surfaces oblique to the axes leave more components in a
-//! brick; rough ones leave components of a single octant, which branch predictors handle badly. `mesher/cost-model/README.md` has
-//! the program that fits the times, the data, and the prediction errors.
+//! brick; rough ones leave components of a single octant, which branch predictors handle badly. The times were
+//! fitted in November 2026 by non-negative least squares on the relative errors of 64 simulated ranks on each of four meshes.
 
 use crate::partition::ownership::Ownership;
 use bricks::brick;

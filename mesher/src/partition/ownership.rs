@@ -10,11 +10,10 @@
 //!
 //! Invariants: intervals are in order from the start of the curve, and adjacent intervals have different owners.
 
-mod neighbours;
 mod redistribute;
 
 use crate::partition::curve::Boundary;
-use bricks::octant::{LEVEL_MAX, Level, start57};
+use bricks::octant::{LEVEL_MAX, Level, morton, position, start57};
 use bricks::tree::Tree;
 use std::ops::Range;
 use std::sync::Arc;
@@ -137,17 +136,6 @@ impl Ownership {
         self.intervals.starts.iter().copied().zip(self.intervals.owners.iter().copied())
     }
 
-    /// The number of ranks that hold brick `key` of level `l`.
-    pub fn holders(&self, l: Level, key: u64) -> usize {
-        if self.is_fully_replicated(l, key) {
-            return self.ranks;
-        }
-        let mut owners = self.owners_of(l, key).to_vec();
-        owners.sort_unstable();
-        owners.dedup();
-        owners.len()
-    }
-
     /// The owner at a level-19 code.
     #[inline]
     pub fn owner_at(&self, start: u64) -> usize {
@@ -160,6 +148,48 @@ impl Ownership {
         let interval = self.intervals.at(start57(l, code));
         (self.intervals.end(interval) >= start57(l, code + 1))
             .then(|| self.intervals.owners[interval])
+    }
+
+    /// The ranks whose octants touch this rank's over a face, an edge or a corner; each with the level-19 code of one of this
+    /// rank's octants that it touches.
+    pub fn neighbours(&self) -> Vec<(usize, u64)> {
+        let mut found = vec![false; self.ranks];
+        if let Some(rank) = self.rank {
+            found[rank] = true;
+        }
+        let mut neighbours = Vec::new();
+        for (l, code) in self.octants() {
+            let p = position(code).map(i64::from);
+            let mut add = |owner: usize| {
+                if !std::mem::replace(&mut found[owner], true) {
+                    neighbours.push((owner, start57(l, code)));
+                }
+            };
+            for step in (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]) {
+                let touching: [i64; 3] = std::array::from_fn(|a| p[a] + i64::from(step[a]));
+                if touching.iter().all(|c| (0..1 << l).contains(c)) {
+                    self.owners_touching(l, morton(touching.map(|c| c as u32)), step, &mut add);
+                }
+            }
+        }
+        neighbours
+    }
+
+    /// Calls `add` with the owners, other than this rank, of the parts of an octant that touch the octant from which `step` leads to
+    /// it.
+    fn owners_touching(&self, l: Level, code: u64, step: [i8; 3], add: &mut impl FnMut(usize)) {
+        if self.own.start <= start57(l, code) && start57(l, code + 1) <= self.own.end {
+            return;
+        }
+        if let Some(owner) = self.sole_owner(l, code) {
+            return add(owner);
+        }
+        // After a step up only the lower children touch, after a step down only the upper ones.
+        let touches =
+            |child: u64| (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 });
+        for child in (0..8).filter(|&child| touches(child)) {
+            self.owners_touching(l + 1, code << 3 | child, step, add);
+        }
     }
 
     /// The fully replicated bricks of a tree: the same on all ranks.

@@ -13,10 +13,8 @@
 //!
 //! Invariant of [`BinnedFacets`]: facets are sorted by containing octant, and each one meets the root.
 
-#[cfg(test)]
-mod tests;
-
 use crate::input::lattice::{ExtentBox, Rules, box_mask};
+use crate::record::Counters;
 use bricks::brick;
 use bricks::brickset::ones;
 use bricks::facet::{Facet, crossed};
@@ -125,19 +123,10 @@ impl BinnedFacets {
 /// An octant below which a rank refines: its level and Morton code.
 type Root = (Level, u64);
 
-/// The work done on this rank; repeats exactly.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Work {
-    /// Facet-brick tests.
-    pub facet_brick_tests: u64,
-    /// Bricks visited.
-    pub bricks_voxelised: u64,
-}
-
 /// Refines the subtrees below `roots`, which are ascending and disjoint octants. Returns the splits and the
 /// crossing leaves of T0 in these subtrees, and those splits of their ancestors that the subtrees alone
 /// ask for. The union over roots that tile the root cube, and over all facets, is T0.
-pub fn refine(binned: &BinnedFacets, rules: &Rules, roots: &[Root]) -> (Tree, Work) {
+pub fn refine(binned: &BinnedFacets, rules: &Rules, roots: &[Root]) -> (Tree, Counters) {
     let mut v = Voxeliser {
         binned,
         surface: rules.level_surface,
@@ -145,13 +134,13 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, roots: &[Root]) -> (Tree, Wo
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
-        work: Work::default(),
+        counters: Counters::default(),
     };
     let straddling = v.straddling(roots);
     for (&root, list) in roots.iter().zip(straddling) {
         v.subtree(root, list);
     }
-    (v.tree, v.work)
+    (v.tree, v.counters)
 }
 
 struct Voxeliser<'a> {
@@ -163,7 +152,7 @@ struct Voxeliser<'a> {
     lists: Vec<u32>,
     /// Tested facets of the bricks on the path from the root, with the octants that they cross.
     pairs: Vec<(u32, u64)>,
-    work: Work,
+    counters: Counters,
 }
 
 /// The facets of a brick: those contained in the octant that it fills, and those that straddle its boundary.
@@ -245,7 +234,7 @@ impl Voxeliser<'_> {
         boxes: &[ExtentBox],
         allowed: u64,
     ) {
-        self.work.bricks_voxelised += 1;
+        self.counters.bricks_voxelised += 1;
         let min_corner = brick::min_corner(l, key);
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
@@ -310,7 +299,7 @@ impl Voxeliser<'_> {
                 crossing |= mask;
             }
         }
-        self.work.facet_brick_tests += facets.straddling.len() as u64;
+        self.counters.facet_brick_tests += facets.straddling.len() as u64;
         crossing
     }
 
@@ -330,7 +319,7 @@ impl Voxeliser<'_> {
             if octant.level() < l {
                 let mask = crossed(&self.binned.facets[i], min_corner, l);
                 self.pairs.push((i as u32, mask));
-                self.work.facet_brick_tests += 1;
+                self.counters.facet_brick_tests += 1;
                 crossing |= mask;
                 i += 1;
                 continue;
@@ -363,4 +352,49 @@ fn reaches(f: &Facet, (level, code): Root) -> bool {
         let (lo, hi) = f.range(a);
         lo <= min_corner[a] + h && hi >= min_corner[a]
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "facets must be sorted by containing octant")]
+    fn facets_out_of_order_are_found() {
+        let facet = |c: i32| Facet { v: [[c; 3]; 3] };
+        let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
+        binned.check_invariants();
+        binned.containing.swap(0, 1);
+        binned.check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "facet 1, binned at")]
+    fn a_facet_in_the_wrong_bin_is_found() {
+        let facet = |c: i32| Facet { v: [[c; 3]; 3] };
+        let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
+        binned.facets[1] = facet(20_000);
+        binned.check_invariants();
+    }
+
+    #[test]
+    fn runs_of_every_length_end_before_their_end() {
+        let all: Vec<ContainingOctant> = (0..40).map(|i| ContainingOctant(i / 2)).collect();
+        for length in 0..all.len() {
+            for end in 0..22 {
+                let containing = &all[..length];
+                let want = containing.iter().take_while(|h| h.0 < end).count();
+                assert_eq!(run_length(containing, ContainingOctant(end)), want, "{length}, {end}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_are_those_of_the_proofs() {
+        let of = |a: &[i128]| {
+            let v = [0, 3, 6].map(|i| [0, 1, 2].map(|axis| a[i + axis] as i32));
+            ContainingOctant::of(&Facet { v }).map(|octant| octant.0.into()).into_iter().collect()
+        };
+        crate::values::compare("src/refine/voxelise.rs", &[("of", &of)]);
+    }
 }

@@ -5,13 +5,12 @@
 //! with the components' labels. Where labels differ across a face, the pair is an edge of a graph; only
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
-use super::components::{self, FacedOctants, MergedComponents};
+use super::components::{self, FacedOctants, MergedComponents, UnionFind};
 use super::nodes::{Component, Nodes};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use ranks::{Comm, MessageBuffer, gather};
-use std::collections::BTreeMap;
 
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
@@ -126,37 +125,36 @@ fn replicated_components(nodes: &Nodes) -> Vec<Component> {
     out
 }
 
-/// The sets into which pairs unite labels, as a forest: labels with others of their sets, which are less. The least label, which has
-/// none, represents a set.
-#[derive(Default)]
-struct Unions(BTreeMap<Label, Label>);
+/// The sets into which pairs unite labels. The least label represents a set.
+struct Unions {
+    /// All labels of the pairs, ascending.
+    labels: Vec<Label>,
+    /// The sets of their numbers.
+    sets: UnionFind,
+}
 
 impl Unions {
     fn of(pairs: &[[Label; 2]]) -> Self {
-        let mut unions = Self::default();
-        for &[a, b] in pairs {
-            let (a, b) = (unions.find(a), unions.find(b));
-            if a != b {
-                unions.0.insert(a.max(b), a.min(b));
-            }
+        let mut labels = pairs.as_flattened().to_vec();
+        labels.sort_unstable();
+        labels.dedup();
+        let mut sets = UnionFind::new(labels.len() as u32);
+        for pair in pairs {
+            let [a, b] = pair.map(|label| labels.partition_point(|&l| l < label) as u32);
+            sets.unite(a, b);
         }
-        unions
+        Self { labels, sets }
     }
 
-    fn find(&mut self, mut label: Label) -> Label {
-        while let Some(&up) = self.0.get(&label) {
-            // Shortens the path for later searches.
-            if let Some(&further) = self.0.get(&up) {
-                self.0.insert(label, further);
-            }
-            label = up;
-        }
-        label
+    fn find(&mut self, label: Label) -> Label {
+        let number = self.labels.binary_search(&label);
+        number.map_or(label, |n| self.labels[self.sets.find(n as u32) as usize])
     }
 
-    /// The forest: pairs that unite the same labels.
-    fn pairs(self) -> Vec<[Label; 2]> {
-        self.0.into_iter().map(|(label, up)| [label, up]).collect()
+    /// Pairs that unite the same labels: one for each but the least of its set.
+    fn pairs(mut self) -> Vec<[Label; 2]> {
+        let all = self.labels.clone().into_iter().map(|label| [label, self.find(label)]);
+        all.filter(|[label, least]| label != least).collect()
     }
 }
 

@@ -5,8 +5,8 @@
 //! Within a brick, local components are flood fills by shifts. Across bricks a union-find merges them
 //! in a walk of the tree ([`components`]). Across ranks they receive common labels, by messages about
 //! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`],
-//! [`vote`]) or, if the case has seeds, decided by them ([`seeds`]). Outside components that the far field
-//! does not reach are found last ([`enclosed`]), and what is closed at a coarser spacing only ([`leaks`]).
+//! [`vote`]) or, if the case has seeds, decided by them ([`flow`], which also finds the outside components that the far field
+//! does not reach). What is closed at a coarser spacing only is found last ([`leaks`]).
 //!
 //! Invariants of [`Sides`]:
 //! - `stored` holds non-crossing leaves of the base tree: the inside ones if everything is kept, and otherwise
@@ -14,18 +14,16 @@
 //! - leaves that share part of a face are on the same side, and all kept or all deleted.
 
 pub mod components;
-pub mod enclosed;
+pub mod flow;
 pub mod global;
 pub mod leaks;
 pub mod nodes;
-pub mod openness;
 pub mod rays;
-pub mod seeds;
 pub mod vote;
 
+use crate::Options;
 use crate::error::Error;
 use crate::input::lattice::{Keep, Rules};
-use crate::options::Options;
 use crate::partition::ownership::Ownership;
 use bricks::brick::Brick;
 use bricks::facet::Facet;
@@ -179,9 +177,8 @@ pub fn decide(
         vote::decide(&components.all, &components.candidates, facets, comm)
     } else {
         let label = |c| components.label(c);
-        let found = seeds::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
-        let flow = seeds::flow(&found, rules, tree, ownership, comm)?;
-        seeds::decide(&components.all, flow, rules.keep)
+        let found = flow::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
+        flow::decide(&components.all, flow::of_seeds(&found, &rules.seeds)?, rules.keep)
     };
     components.nodes.drop_links();
 

@@ -151,11 +151,6 @@ impl Nodes {
         self.masks.len() as Component
     }
 
-    /// Number of nodes of a level.
-    pub fn len(&self, l: Level) -> Node {
-        (self.levels[l as usize].components.len() - 1) as Node
-    }
-
     /// Split octants of a node.
     #[inline]
     pub fn split(&self, l: Level, n: Node) -> u64 {

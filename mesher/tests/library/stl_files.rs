@@ -195,14 +195,14 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
         enclosed: mesher::input::lattice::Enclosed::Delete,
     };
     let options = crate::support::options(crate::support::Run::SOLO.division, false);
-    match mesher::words(&case, &options, &Solo) {
+    match crate::support::words(&case, &options, &Solo) {
         Ok((words, ..)) => prop_assert!(words.is_sorted() && !words.is_empty()),
         Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
     }
     // A root that most facets are outside.
     let root = mesher::input::lattice::Root { origin: [0.0; 3], edge: 1.0 };
     (case.root, case.spacing_min) = (mesher::input::case::RootSpec::Exact(root), 0.25);
-    if let Err(e) = mesher::words(&case, &options, &Solo) {
+    if let Err(e) = crate::support::words(&case, &options, &Solo) {
         prop_assert!(matches!(e, Error::Input(_)), "{}", e);
     }
     Ok(())

@@ -2,14 +2,14 @@
 #![allow(dead_code, missing_docs)]
 
 use bricks::octant::position;
+use mesher::Options;
 use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
-use mesher::output::report::leaks::LeakEntry;
+use mesher::output::manifest::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
-use mesher::{Options, words};
 use ranks::Solo;
 use ranks::sim::Adversary;
 use std::rc::Rc;
@@ -19,11 +19,13 @@ pub mod fibres;
 pub mod orders;
 pub mod schedules;
 pub mod symmetry;
+pub mod words;
 
 // Each test uses some of these.
 #[allow(unused_imports)]
 pub use draw::{closed, config, cuboid, leaky_on_rays, rooms, run, slit, small, soup, thin};
 use schedules::{on_ranks, plain};
+pub use words::words;
 
 pub type Facet = [[f32; 3]; 3];
 

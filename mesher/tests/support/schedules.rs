@@ -3,13 +3,13 @@
 
 use super::draw::{leaky_on_rays, soup, thin};
 use super::fibres;
-use super::{Outcome, Run, Small, options, small};
+use super::{Outcome, Run, Small, options, small, words};
 use mesher::error::Error;
 use mesher::input::case::Case;
-use mesher::output::report::leaks::LeakEntry;
+use mesher::output::manifest::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
-use mesher::{Options, mesh, words};
+use mesher::{Options, mesh};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -106,7 +106,7 @@ pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Par
         false => None,
         true => {
             let report = mesh(case, options, comm, &mut Recorder::default())?;
-            Some((report.digest, report.cells))
+            Some((report.mesh.digest, report.cells))
         }
     };
     let (words, summary, leaks) = words(case, options, comm)?;

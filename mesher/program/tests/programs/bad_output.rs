@@ -190,7 +190,7 @@ fn a_report_is_written_through_whatever_is_no_regular_file() {
     let writer = start(workspace.mesher(&args("fifo")));
     let read = std::fs::read_to_string(&fifo).expect("a FIFO can be read");
     writer.finish().succeeds();
-    assert!(read.contains("octree-mesher-run/1") && read.ends_with("}\n"), "{read}");
+    assert!(read.contains("octree-mesher-run/2") && read.ends_with("}\n"), "{read}");
     assert!(!fifo.is_file());
 
     // A pipe, and a regular file that has been written to before.
@@ -200,7 +200,7 @@ fn a_report_is_written_through_whatever_is_no_regular_file() {
     let args = "body.stl --spacing-min 0.5 --json /dev/stdout";
     in_shell(&workspace, &shell, "exec > log; echo first", args, ".").succeeds();
     let log = std::fs::read_to_string(workspace.path().join("log")).expect("the log");
-    assert!(log.starts_with("first\n{") && log.contains("octree-mesher-run/1"), "{log}");
+    assert!(log.starts_with("first\n{") && log.contains("octree-mesher-run/2"), "{log}");
 }
 
 /// Devices are those of this test: it needs the right to make them.

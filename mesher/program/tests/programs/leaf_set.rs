@@ -30,7 +30,7 @@ fn read_part(path: &Path) -> Vec<u64> {
 fn meshed(workspace: &Workspace, ungraded: bool) -> Vec<u64> {
     let case = program::case_file::read(&workspace.path().join("case.toml")).expect("a good case");
     let options = crate::support::options(crate::support::Run::SOLO.division, ungraded);
-    mesher::words(&case, &options, &Solo).expect("a good case").0
+    crate::support::words(&case, &options, &Solo).expect("a good case").0
 }
 
 fn level_of(w: u64) -> usize {
@@ -140,8 +140,8 @@ fn written_meshes_are_read_back() {
 
 /// Asserts the fields of the report.
 fn assert_report(report: &Value, words: &[u64], ranks: usize) {
-    assert_eq!(report["schema"], "octree-mesher-run/1");
-    assert_counts(report, words, ["cells", "cells_by_level"]);
+    assert_eq!(report["schema"], "octree-mesher-run/2");
+    assert_counts(report, words, ["cells", "leaves_by_level"]);
     assert_eq!(report["ranks"], ranks);
     assert_eq!(report["facets"].as_u64(), Some(320));
     assert_eq!(report["level_surface"], 6);

@@ -114,7 +114,7 @@ proptest! {
         }
     }
 
-    /// Which seed is refused, and the point that is offered instead.
+    /// Which seed is refused.
     #[test]
     fn unusable_seeds_are_refused_as_by_the_reference(
         case in small(soup()),
@@ -131,7 +131,8 @@ proptest! {
         match (got, reference::mesh(&case.reference_case())) {
             (Ok(got), Ok(want)) => prop_assert_eq!(got.words, want.words),
             (Err(got), Err(want)) => {
-                let want = numbers(want.to_string());
+                // The reference offers another point after that of the seed.
+                let want = numbers(want.to_string())[..4].to_vec();
                 let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
                 let agree = got.len() == want.len() && got.iter().zip(&want).all(near);
                 prop_assert!(agree, "{got:?} instead of {want:?}");
@@ -164,36 +165,28 @@ fn meshed(facets: &[Facet], options: &[&str]) -> (Value, String) {
 #[test]
 fn the_report_counts_components_by_side_and_those_that_are_enclosed() {
     let (report, stderr) = meshed(&box_in_box(), &[]);
-    for (key, value) in [
-        ("components", json!(3)),
-        ("components_outside", json!(2)),
-        ("components_inside", json!(1)),
-        ("components_enclosed", json!(1)),
-        ("warnings", json!([])),
-    ] {
-        assert_eq!(report[key], value, "{key}");
+    for (key, value) in [("outside", json!(2)), ("inside", json!(1))] {
+        assert_eq!(report["components"][key], value, "{key}");
     }
-    assert!(report["enclosed_leaves"].as_u64().is_some_and(|n| n > 0));
-    assert_eq!(report["enclosed_example"].as_array().map(Vec::len), Some(3));
+    let enclosed = &report["components"]["enclosed"];
+    assert_eq!((&enclosed["count"], &report["warnings"]), (&json!(1), &json!([])));
+    assert!(enclosed["leaves"].as_u64().is_some_and(|n| n > 0));
+    assert_eq!(enclosed["example"].as_array().map(Vec::len), Some(3));
     assert_eq!(stderr, "");
     let (kept, _) = meshed(&box_in_box(), &["--enclosed", "keep"]);
-    assert_eq!(
-        (&kept["components_enclosed"], &kept["enclosed_example"]),
-        (&json!(0), &json!(null))
-    );
+    let enclosed = &kept["components"]["enclosed"];
+    assert_eq!((&enclosed["count"], &enclosed["example"]), (&json!(0), &json!(null)));
     assert!(kept["cells"].as_u64() > report["cells"].as_u64());
 }
 
 #[test]
 fn a_seed_in_the_solid_makes_it_the_flow() {
     let (report, _) = meshed(&box_in_box(), &["--keep", "inside", "--seed", "16,32,32"]);
-    assert_eq!(
-        (&report["components_inside"], &report["components_outside"]),
-        (&json!(1), &json!(2))
-    );
+    let components = &report["components"];
+    assert_eq!((&components["inside"], &components["outside"]), (&json!(1), &json!(2)));
     let seeds = ["--keep", "inside", "--seed", "32,32,32", "--seed", "16,32,32"];
     let (report, _) = meshed(&box_in_box(), &seeds);
-    assert_eq!(report["components_inside"], 2);
+    assert_eq!(report["components"]["inside"], 2);
 }
 
 #[test]
@@ -203,16 +196,16 @@ fn a_flow_that_leaks_and_a_region_without_cells_produce_warnings() {
         (
             open_box(),
             &["--keep", "inside", "--seed", "32,32,32"],
-            "reaches the root's boundary from its seeds: right if the root cuts an open end",
+            "the flow reaches the root's boundary: right if the root cuts the geometry",
         ),
         (cuboid([-1.0; 3], [65.0; 3]), &["--keep", "outside"], "nothing is outside the geometry"),
         (
             cuboid([-1.0; 3], [65.0; 3]),
             &["--keep", "inside"],
-            "inside by its rays reaches the root's boundary: right if the root cuts the geometry",
+            "the flow reaches the root's boundary: right if the root cuts the geometry",
         ),
         (box_in_box(), &["--seed", "16,32,32"], "the flow of no seed reaches the root's boundary"),
-        (cuboid([-8.0, 8.0, 8.0], [56.0; 3]), &[], "10 of 12 facets lie wholly or partly beyond"),
+        (cuboid([-8.0, 8.0, 8.0], [56.0; 3]), &[], "facets lie wholly or partly beyond the root"),
     ] {
         let (report, stderr) = meshed(&facets, options);
         let warnings = report["warnings"].as_array().expect("a list");
@@ -234,7 +227,7 @@ fn a_box_that_refines_nothing_produces_a_warning() {
         );
         workspace.write("case.toml", text);
         let finished = run(workspace.mesher(&["case.toml"]));
-        let found = finished.stderr.matches("without volume within the root").count();
+        let found = finished.stderr.matches("has no volume within the root").count();
         assert_eq!((finished.code, found), (Some(0), count), "{corner}: {finished:?}");
     }
 }
@@ -250,14 +243,14 @@ fn a_seed_in_the_far_field_and_a_body_that_ends_at_the_root_produce_no_warnings(
 }
 
 #[test]
-fn an_unusable_seed_is_refused_with_a_point_that_can_be_used() {
+fn an_unusable_seed_is_refused_with_its_place() {
     let workspace = Workspace::new();
     workspace.write("body.stl", stl(&box_in_box()));
     let args = ["body.stl", "--spacing-min", "2", "--root", "0,0,0,64", "--seed"];
     for (seed, expected) in [
-        ("9,32,32", ["seed 0 at (9, 32, 32)", "crosses", "(11, 31, 31)"]),
-        ("64,32,32", ["seed 0 at (64, 32, 32)", "outside the root", "(60, 28, 28)"]),
-        ("1e300,0,0", ["seed 0", "outside the root", "nearest"]),
+        ("9,32,32", ["seed 0 at (9, 32, 32)", "crosses", "move it"]),
+        ("64,32,32", ["seed 0 at (64, 32, 32)", "outside the root", "move it"]),
+        ("1e300,0,0", ["seed 0", "outside the root", "move it"]),
         ("nan,0,0", ["seed 0", "not finite", "three numbers"]),
     ] {
         run(workspace.mesher(&[&args[..], &[seed]].concat())).refuses(2, &expected);

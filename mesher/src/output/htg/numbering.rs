@@ -1,6 +1,6 @@
 //! Numbers of siblings in the order of the file: level by level, and in Morton order within a level.
 
-use crate::mesh::Mesh;
+use crate::Mesh;
 use crate::partition::ownership::{Ownership, brick_start};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};

@@ -1,7 +1,7 @@
 //! The nodes that a rank owns, eight siblings at a time, in the order of the file.
 
 use super::numbering::Numbering;
-use crate::mesh::Mesh;
+use crate::Mesh;
 use crate::output::stream::{LevelCursors, Octants};
 use bricks::brick::{byte, children, parents};
 use bricks::brickset::ones;

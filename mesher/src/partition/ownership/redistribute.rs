@@ -7,6 +7,7 @@ use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::PerLevel;
 use ranks::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
+use std::mem::take;
 use std::ops::Range;
 
 impl Ownership {
@@ -53,14 +54,12 @@ impl Ownership {
             self.select(index, *l, set, &mut out)
         };
         let retained: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
-        let mut full = std::mem::take(&mut out.full);
+        let mut full = take(&mut out.full);
         if any_full && let Some(to_reducers) = split_by_reducer(&mut full, |a, b| a | b, comm) {
             full.clear();
-            out.push_by_receiver(ENTRIES_TO_REDUCE, to_reducers);
+            out.to_reducers = to_reducers;
         }
-        let single = std::mem::take(&mut out.single);
-        let sent = out.bricks_packed + out.push_by_receiver(ENTRIES, single);
-        let messages = out.into_messages(&sets);
+        let (messages, sent) = out.into_messages(&sets);
         let retained_part = |((_, mut set), range): ((Level, BrickSet), Range<usize>)| {
             set.keep(range);
             vec![set]
@@ -146,24 +145,14 @@ const ENTRIES_TO_REDUCE: u64 = ENTRIES + 1;
 /// The queue of bricks to send. Entries store their set index in the bits above the key.
 #[derive(Default)]
 struct Outgoing {
-    /// Receiver and block.
-    blocks: Vec<(usize, Block)>,
-    /// The entries of the blocks.
-    entries: Vec<Entry>,
+    /// Receiver, set index, and range of the set's bricks.
+    packed: Vec<(usize, usize, Range<usize>)>,
     /// Receiver and brick, for bricks sent as entries.
     single: Vec<(usize, Entry)>,
     /// Fully replicated bricks.
     full: Vec<Entry>,
-    /// Number of bricks in [`Block::Bricks`].
-    bricks_packed: u64,
-}
-
-/// A part of a message.
-enum Block {
-    /// A set index, and a range of the set's bricks.
-    Bricks(usize, Range<usize>),
-    /// The header, and a range of [`Outgoing::entries`].
-    Entries(u64, Range<usize>),
+    /// Those that other ranks reduce, with their receivers.
+    to_reducers: Vec<(usize, Entry)>,
 }
 
 impl Outgoing {
@@ -173,43 +162,42 @@ impl Outgoing {
             let entry = |b: Brick| (to, [(set_index as u64) << KEY_BITS | b.key, b.bits]);
             return self.single.extend(bricks.map(|position| entry(set.brick(position))));
         }
-        self.bricks_packed += bricks.len() as u64;
-        self.blocks.push((to, Block::Bricks(set_index, bricks)));
+        self.packed.push((to, set_index, bricks));
     }
 
-    /// Adds one block of entries per receiver. Returns the number of entries.
-    fn push_by_receiver(&mut self, header: u64, mut entries: Vec<(usize, Entry)>) -> u64 {
-        entries.sort_by_key(|e| e.0);
+    /// Serialises the queue, of bricks of `sets`. Also returns the number of bricks, without those to be reduced.
+    fn into_messages(mut self, sets: &[(Level, BrickSet)]) -> (MessageBuffer, u64) {
+        self.packed.sort_by_key(|block| block.0);
+        self.to_reducers.sort_by_key(|e| e.0);
+        self.single.sort_by_key(|e| e.0);
         // With METIS a rank may own several intervals in a brick, which gives duplicates.
-        entries.dedup();
-        for group in entries.chunk_by(|a, b| a.0 == b.0) {
-            let start = self.entries.len();
-            self.entries.extend(group.iter().map(|e| e.1));
-            self.blocks.push((group[0].0, Block::Entries(header, start..self.entries.len())));
-        }
-        entries.len() as u64
-    }
-
-    /// Serialises the queue; [`Block::Bricks`] refer to `sets`.
-    fn into_messages(mut self, sets: &[(Level, BrickSet)]) -> MessageBuffer {
-        self.blocks.sort_by_key(|block| block.0);
+        self.single.dedup();
+        let bricks_packed: usize = self.packed.iter().map(|block| block.2.len()).sum();
+        let entries = self.to_reducers.len() + self.single.len();
         // A packed brick takes 1.5 words, an entry 2, the headers of a block about 8.
-        let words =
-            2 * (self.entries.len() + 4 * self.blocks.len()) as u64 + self.bricks_packed * 3 / 2;
-        let mut messages = MessageBuffer::with_capacity(words as usize);
-        for (to, block) in self.blocks {
-            messages.append(to, |words| match block {
-                Block::Bricks(set_index, bricks) => {
+        let words = 2 * entries + 8 * self.packed.len() + bricks_packed * 3 / 2;
+        let mut messages = MessageBuffer::with_capacity(words);
+        let mut packed = self.packed.into_iter().peekable();
+        let mut queues = [(ENTRIES_TO_REDUCE, &self.to_reducers[..]), (ENTRIES, &self.single[..])];
+        loop {
+            let first = queues.iter().filter_map(|queue| Some(queue.1.first()?.0));
+            let Some(to) = first.chain(packed.peek().map(|block| block.0)).min() else { break };
+            messages.append(to, |words| {
+                while let Some((_, set_index, bricks)) = packed.next_if(|block| block.0 == to) {
                     words.push(set_index as u64);
                     sets[set_index].1.pack(bricks, words);
                 }
-                Block::Entries(header, entries) => {
-                    words.extend([header, entries.len() as u64]);
-                    words.extend(self.entries[entries].as_flattened());
+                for (header, rest) in &mut queues {
+                    let (entries, others) = rest.split_at(rest.partition_point(|e| e.0 == to));
+                    if !entries.is_empty() {
+                        words.extend([*header, entries.len() as u64]);
+                        entries.iter().for_each(|e| words.extend(e.1));
+                    }
+                    *rest = others;
                 }
             });
         }
-        messages
+        (messages, (bricks_packed + self.single.len()) as u64)
     }
 }
 

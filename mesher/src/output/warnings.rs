@@ -1,0 +1,132 @@
+//! Warnings: meshes that follow the rules and are probably not what the user wants.
+
+use crate::Mesh;
+use crate::input::lattice::{ExtentBox, Keep};
+use crate::output::manifest::LeakEntry;
+use crate::sides::Summary;
+use bricks::octant::ROOT_EDGE;
+
+const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
+    leaks through an opening that is wider than a cell: close the openings that `harness leak` finds, increase spacing_min, or enlarge the root";
+const FLOW_WITHOUT_FAR_FIELD: &str = "keep = outside, and the flow of no seed reaches the root's boundary: the seeds may lie in the solid or in a cavity; move a seed \
+    to the far field, or set keep = inside if the flow is internal";
+const BOXES_WITHOUT_EFFECT: &str = "an extent box ([[box]]) has no volume within the root: nothing is refined there; correct its corners or their unit";
+const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the root unless the body is meant to \
+    extend beyond it";
+
+/// A sentence for each warning: what was found, and what to try.
+pub fn of(mesh: &Mesh) -> Vec<String> {
+    if mesh.is_base {
+        return Vec::new();
+    }
+    let summary = &mesh.sides.summary;
+    let empty = empty_region(mesh.rules.keep, summary);
+    // These two already advise to enlarge the root.
+    let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
+    let has_effect = |b: &ExtentBox| b.meets([0; 3], ROOT_EDGE);
+    let leaks = of_leaks(mesh);
+    let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
+    let others = [
+        (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),
+        (summary.flow_misses_boundary, FLOW_WITHOUT_FAR_FIELD),
+        (!mesh.rules.boxes.iter().all(has_effect), BOXES_WITHOUT_EFFECT),
+        (mesh.facets.beyond_root && !explains_cut, BODY_CUT),
+    ];
+    let others = others.into_iter().filter(|other| other.0).map(|other| other.1.to_owned());
+    leaks.into_iter().chain(empty).chain(others).collect()
+}
+
+/// The warning of a geometry that leaks, or that is open and bounds nothing.
+pub fn of_leaks(mesh: &Mesh) -> Option<String> {
+    // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
+    let leaks = LeakEntry::of(mesh);
+    let largest = (0..leaks.len()).rev().max_by_key(|&i| mesh.leaks.0[i].volume);
+    let Some(largest) = largest else {
+        let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
+        let is_inner = mesh.rules.keep == Keep::Inside;
+        return match mesh.bounds_nothing {
+            true => empty.or_else(|| Some(bounds_nothing(mesh))),
+            false => empty.filter(|_| is_inner),
+        };
+    };
+    let LeakEntry { spacing_coarse, spacing_fine, volume, point: [x, y, z] } = leaks[largest];
+    let (case, has_seeds) = (&mesh.case_name, !mesh.rules.seeds.is_empty());
+    let (before, after) = match mesh.leaks.0[largest].is_inside {
+        _ if has_seeds && mesh.rules.keep != Keep::All => ("deleted", "kept"),
+        true => ("outside", "inside"),
+        false => ("inside", "outside"),
+    };
+    // A search starts in the flow if that is known.
+    let end = if has_seeds { "to" } else { "from" };
+    Some(format!(
+        "the geometry leaks: a region with a volume of {volume:.4e} at ({x}, {y}, {z}), {before} at a spacing of {spacing_coarse}, became \
+         {after} at {spacing_fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
+    ))
+}
+
+fn bounds_nothing(mesh: &Mesh) -> String {
+    let (case, rules) = (&mesh.case_name, &mesh.rules);
+    let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
+    format!(
+        "the facets bound no inside at spacings of {spacing}, {} and {}: either the flow fills the body through openings, which \
+         `harness leak {case} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as `harness geometry` states, or \
+         the body is thinner than its cells; close the openings, remove the copies, or change spacing_min, unless the facets are a sheet, \
+         such as a terrain",
+        2.0 * spacing,
+        4.0 * spacing
+    )
+}
+
+fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
+    let &Summary { outside, inside, enclosed, .. } = summary;
+    let kept = match keep {
+        Keep::Outside => outside - enclosed.map_or(0, |e| e.count),
+        Keep::Inside => inside,
+        Keep::All => outside + inside,
+    };
+    let warning = match keep {
+        _ if kept > 0 => return None,
+        Keep::Inside => {
+            "nothing is inside the geometry, so the mesh has at most crossing leaves: close inlets, outlets and holes that are \
+             wider than a cell (`harness leak` finds them), remove facets that appear twice (`harness geometry`), change spacing_min, or \
+             set keep = outside"
+        }
+        Keep::Outside => {
+            "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
+             or set keep = inside"
+        }
+        Keep::All => "the geometry crosses all leaves: decrease spacing_min",
+    };
+    Some(warning.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sides::EnclosedComponents;
+
+    #[test]
+    fn a_region_without_components_is_empty() {
+        let summary = |outside, inside, count| Summary {
+            outside,
+            inside,
+            enclosed: Some(EnclosedComponents { count, leaves: 9, example: [0; 3] }),
+            ..Summary::default()
+        };
+        for (keep, empty, not_empty) in [
+            (Keep::Outside, summary(2, 1, 2), summary(2, 0, 1)),
+            (Keep::Inside, summary(2, 0, 0), summary(0, 1, 0)),
+            (Keep::All, summary(0, 0, 0), summary(0, 1, 0)),
+        ] {
+            assert!(empty_region(keep, &empty).is_some(), "{keep:?}");
+            assert_eq!(empty_region(keep, &not_empty), None, "{keep:?}");
+        }
+        assert_eq!(empty_region(Keep::All, &summary(1, 0, 0)), None);
+        let says = |keep, word: &str| {
+            assert!(empty_region(keep, &Summary::default()).is_some_and(|w| w.contains(word)));
+        };
+        says(Keep::Outside, "enlarge the root");
+        says(Keep::Inside, "set keep = outside");
+        says(Keep::All, "crosses all leaves");
+    }
+}

@@ -1,0 +1,145 @@
+//! The flow: components with a seed, whatever rays would say, so that a hole in the geometry joins to the flow what lies beyond it;
+//! and the far field, every outside component with a face on the root's boundary.
+//!
+//! The paper floods from one cell that rays find outside, and deletes what the flood does not reach. Here outside components that the
+//! far field does not reach are *enclosed*, such as sealed cavities and the overlap of two solids, which is outside by the parity of
+//! rays.
+
+use super::global::Label;
+use super::nodes::{Component, Nodes};
+use super::vote::FirstLeaf;
+use super::{EnclosedComponents, Verdict};
+use crate::error::Error;
+use crate::input::lattice::{Enclosed, Keep, Rules, Seed};
+use crate::partition::ownership::Ownership;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, morton};
+use bricks::tree::Tree;
+use ranks::{Comm, all_gather_reduced, gather};
+use std::collections::{HashMap, HashSet};
+
+/// Stands for the label of a component where a seed's leaf crosses. No component has it.
+const CROSSING: Label = Label::MAX;
+
+/// Those of some seeds that lie in the root, by number, each with the component that it lies in; none in a crossing leaf. `label`
+/// returns the label of a local component. Collective; the same on all ranks.
+pub fn find(
+    seeds: &[Seed],
+    tree: &Tree,
+    nodes: &Nodes,
+    ownership: &Ownership,
+    label: impl Fn(Component) -> Label,
+    comm: &dyn Comm,
+) -> HashMap<u64, Option<Label>> {
+    let mut mine = Vec::new();
+    for (number, seed) in (0..).zip(seeds).filter(|(_, seed)| seed.is_in_root()) {
+        let (l, code) = leaf_at(tree, seed);
+        let (key, bit) = (code >> 6, code & 63);
+        if !ownership.owns(l, key) {
+            continue;
+        }
+        let mut found = CROSSING;
+        nodes.finder().find(l, key, 1 << bit, |c| found = label(c));
+        mine.push([number, found]);
+    }
+    let found = gather(comm, &mine).into_iter();
+    found.map(|[number, label]| (number, (label != CROSSING).then_some(label))).collect()
+}
+
+/// Level and code of the leaf that contains a seed, or of an octant above it in a brick that this rank does not
+/// own.
+fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
+    let position = seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32);
+    let code = |l: Level| morton(position) >> (3 * (LEVEL_MAX - l));
+    let is_split = |l: &Level| tree.split[*l as usize].contains(code(*l));
+    let l = (0..LEVEL_MAX).take_while(is_split).count() as Level;
+    (l, code(l))
+}
+
+/// The components that have a seed, of seeds that were [found](find).
+///
+/// # Errors
+/// If a seed is outside the root or in a crossing leaf.
+pub fn of_seeds(
+    found: &HashMap<u64, Option<Label>>,
+    seeds: &[Seed],
+) -> Result<HashSet<Label>, Error> {
+    for (number, seed) in (0..).zip(seeds) {
+        let problem = match found.get(&number) {
+            None => "outside the root",
+            Some(None) => "in a leaf that the geometry crosses",
+            Some(Some(_)) => continue,
+        };
+        let [x, y, z] = seed.given;
+        return Err(Error::input(format!(
+            "seed {number} at ({x}, {y}, {z}) lies {problem}: move it into the flow, farther than a cell from the geometry, or decrease \
+             spacing_min"
+        )));
+    }
+    Ok(found.values().copied().flatten().collect())
+}
+
+/// The sides of all components: the flow is on the side that is kept, outside if everything is.
+pub fn decide(components: &[FirstLeaf], flow: HashSet<Label>, keep: Keep) -> Verdict {
+    let inside = match keep {
+        Keep::Inside => flow,
+        Keep::Outside | Keep::All => {
+            components.iter().map(|c| c.0).filter(|label| !flow.contains(label)).collect()
+        }
+    };
+    Verdict { inside, ..Verdict::default() }
+}
+
+impl Verdict {
+    /// Compares the components with those at the root's boundary, of which `at_boundary` are this rank's, some more
+    /// than once. Collective.
+    pub fn compare_with_boundary(
+        &mut self,
+        rules: &Rules,
+        components: &[FirstLeaf],
+        at_boundary: impl Iterator<Item = Label>,
+        comm: &dyn Comm,
+    ) {
+        let outside = components.iter().map(|c| c.0).filter(|label| !self.inside.contains(label));
+        let outside: HashSet<Label> = outside.collect();
+        let by_rays = rules.seeds.is_empty();
+        let matters = match rules.keep {
+            // A single outside component either reaches the boundary or is the only one and kept.
+            Keep::Outside if by_rays => rules.enclosed == Enclosed::Delete && outside.len() > 1,
+            Keep::Outside => true,
+            Keep::Inside => !self.inside.is_empty(),
+            Keep::All => false,
+        };
+        if !matters {
+            return;
+        }
+        let mine = at_boundary.map(|label| [label, 0]).collect();
+        let far_field =
+            all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label);
+        let far_field: HashSet<Label> = far_field.collect();
+        match rules.keep {
+            Keep::Inside => {
+                self.summary.inside_reaches_boundary = !self.inside.is_disjoint(&far_field);
+            }
+            _ if !by_rays => self.summary.flow_misses_boundary = outside.is_disjoint(&far_field),
+            _ if outside.is_disjoint(&far_field) => {}
+            _ => self.enclosed = outside.difference(&far_field).copied().collect(),
+        }
+    }
+
+    /// The enclosed components in numbers, of whose leaves this rank owns `leaves`; none if there are none.
+    /// Collective.
+    pub fn enclosed_components(
+        &self,
+        components: &[FirstLeaf],
+        leaves: u64,
+        comm: &dyn Comm,
+    ) -> Option<EnclosedComponents> {
+        let enclosed = components.iter().filter(|(label, _)| self.enclosed.contains(label));
+        let first = enclosed.map(|&(_, first)| first).min()?;
+        Some(EnclosedComponents {
+            count: self.enclosed.len() as u64,
+            leaves: comm.sum(leaves),
+            example: first.centroid(),
+        })
+    }
+}

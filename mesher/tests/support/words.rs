@@ -1,0 +1,28 @@
+//! The leaf words of a mesh, without files.
+#![allow(dead_code, missing_docs)]
+
+use mesher::error::Error;
+use mesher::input::case::Case;
+use mesher::output::manifest::LeakEntry;
+use mesher::record::Recorder;
+use mesher::sides::Summary;
+use mesher::{Job, Options, grow, quantised};
+use ranks::Comm;
+
+/// The leaf words that this rank owns, in order, a summary of the components and the leaks: phases 1 to 8, and no report.
+/// Collective.
+pub fn words(
+    case: &Case,
+    options: &Options,
+    comm: &dyn Comm,
+) -> Result<(Vec<u64>, Summary, Vec<LeakEntry>), Error> {
+    let mut record = Recorder::default();
+    let job = &mut Job::new(options, comm, &mut record);
+    let mesh = grow(quantised(case, job)?, job, |_, _| {})?;
+    let mut words = Vec::new();
+    mesh.leaves().emit(|w| {
+        words.extend_from_slice(w);
+        Ok::<(), Error>(())
+    })?;
+    Ok((words, mesh.sides.summary, LeakEntry::of(&mesh)))
+}
