@@ -20,7 +20,6 @@ use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
-use std::thread::sleep;
 use std::time::Duration;
 
 #[global_allocator]
@@ -83,26 +82,7 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
-/// Time for rank 0 to end the job.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
-const ADDRESS_SPACE_MPI: f64 = 384e6;
-
 fn run_mpi(asked: &Result<Asked, Error>) {
-    let left = planner::address_space_left();
-    if left < ADDRESS_SPACE_MPI {
-        let e = Error::memory(format!(
-            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
-            left / 1e6,
-            (ADDRESS_SPACE_MPI - left) / 1e6
-        ));
-        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
-        if !launch::is_first() {
-            sleep(PATIENCE);
-        }
-        exit(fail(&e, true));
-    }
     // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
     let comm = interrupt::uninterrupted(launch::join);
     // A panic that unwinds would leave the other ranks waiting forever.
