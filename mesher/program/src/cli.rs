@@ -1,7 +1,6 @@
 //! The command line, and the case that it describes.
 
 use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
-use clap_complete::Shell;
 use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
@@ -191,30 +190,14 @@ fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The definition of the command line, with the options that print something and exit.
+/// The definition of the command line.
 fn command() -> Command {
-    let prints = |name| {
-        Arg::new(name).long(name).exclusive(true).help_heading("Options that print and exit")
-    };
-    Args::command()
-        .arg(
-            prints("completions")
-                .value_name("SHELL")
-                .value_parser(value_parser!(Shell))
-                .help("Print the completion script for a shell"),
-        )
-        .arg(prints("man").action(ArgAction::SetTrue).help("Print the man page, in roff"))
-        .arg(
-            Arg::new("serve")
-                .long("serve")
-                .exclusive(true)
-                .action(ArgAction::SetTrue)
-                .help("Run the command lines on standard input: spares the start of MPI")
-                .long_help(
-                    "Run one command line after another: each is a line of standard input, a JSON array of the words after the program's \
-                     name, and answered by its exit code on a line of standard output",
-                ),
-        )
+    Args::command().arg(
+        Arg::new("serve").long("serve").exclusive(true).action(ArgAction::SetTrue).help(
+            "Run one command line after another, which spares the start of MPI: each is a line of standard input, a JSON array of the \
+             words after the program's name, and answered by its exit code on a line of standard output",
+        ),
+    )
 }
 
 /// What the command line asks for.
@@ -225,8 +208,7 @@ pub enum Asked {
     Serve,
 }
 
-/// The command line. Help, version, completions and the man page are printed here, on the first rank of a job, and end the
-/// process.
+/// The command line. Help and version are printed here, on the first rank of a job, and end the process.
 ///
 /// # Errors
 /// In one sentence, as all other errors.
@@ -234,17 +216,6 @@ pub fn parse<W: Into<OsString> + Clone>(
     words: impl IntoIterator<Item = W>,
 ) -> Result<Asked, Error> {
     let parsed = command().try_get_matches_from(words).and_then(|mut m| {
-        if let Some(&shell) = m.get_one::<Shell>("completions") {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut command(), "mesher", &mut script);
-            print_and_exit(|| io::stdout().write_all(&script));
-        }
-        if m.get_flag("man") {
-            let mut page = Vec::new();
-            let rendered = clap_mangen::Man::new(command()).render(&mut page);
-            rendered.expect("memory can be written to");
-            print_and_exit(|| io::stdout().write_all(&page));
-        }
         if m.get_flag("serve") {
             return Ok(Asked::Serve);
         }
@@ -252,7 +223,12 @@ pub fn parse<W: Into<OsString> + Clone>(
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {
-            print_and_exit(|| e.print());
+            let print = || e.print().and_then(|()| io::stdout().flush());
+            match launch::is_first().then(print).transpose() {
+                // A closed pipe is no reason to fail.
+                Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
+                _ => exit(0),
+            }
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
@@ -263,15 +239,6 @@ pub fn parse<W: Into<OsString> + Clone>(
         let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
         Error::input(format!("{sentence}; see --help"))
     })
-}
-
-fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
-    let print = || print().and_then(|()| io::stdout().flush());
-    match launch::is_first().then(print).transpose() {
-        // A closed pipe is no reason to fail.
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
-        _ => exit(0),
-    }
 }
 
 /// How to divide the work among ranks.

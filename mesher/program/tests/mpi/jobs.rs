@@ -54,7 +54,7 @@ fn an_error_on_one_rank_ends_all_ranks() {
         (&["nan.stl", spacing][..], 2, &["facet 39", "not finite"][..]),
         (&["cut.stl", spacing], 2, &["cut.stl", "promises 40 facets"]),
         (&["absent.stl", spacing], 2, &["absent.stl"]),
-        (&["typo.toml"], 2, &["\"spacing_min\"?"]),
+        (&["typo.toml"], 2, &["`spacing_min`"]),
         (&["case.toml", "--keep", "everything"], 2, &["--keep"]),
         (&["case.toml", "--out", "file/mesh"], 4, &["file/mesh"]),
         (&["case.toml", "--out", "mesh", "--json", "file/run.json"], 4, &["file/run.json"]),
