@@ -1,7 +1,6 @@
 //! Errors of the user's input and output. Each message is one sentence: the problem, its location
 //! and a remedy.
 use crate::case::Root;
-use files::ClaimError;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -137,12 +136,12 @@ pub enum Error {
         nearest: Option<[f64; 3]>,
     },
     /// The output directory is not empty, or another run writes to it.
-    #[error("output directory {}: {taken}; choose another", path.display())]
+    #[error("output directory {}: {source}; choose another", path.display())]
     OutputTaken {
         /// The directory.
         path: PathBuf,
         /// The cause.
-        taken: ClaimError,
+        source: io::Error,
     },
     /// A file cannot be written.
     #[error("cannot write {}: {source}; check the path, its permissions and the free space", path.display())]

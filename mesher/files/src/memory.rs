@@ -6,7 +6,6 @@ use crate::interrupt;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{Cursor, Write, stderr};
 use std::process::exit;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
@@ -20,20 +19,12 @@ pub struct Heap {
     pub program: &'static str,
     /// What the user can do.
     pub advice: &'static str,
+    /// Ends the program with an exit code.
+    pub end: fn(i32) -> !,
 }
 
 /// Time for the first thread that gets no memory to end the program.
 const PATIENCE: Duration = Duration::from_secs(3);
-
-/// Ends the program with an exit code.
-type End = fn(i32) -> !;
-
-static END: OnceLock<End> = OnceLock::new();
-
-/// Sets how the program ends; without it, the process exits.
-pub fn ends_with(end: End) {
-    END.get_or_init(|| end);
-}
 
 // SAFETY: all calls go to the system's allocator with the caller's arguments, and so do its results, except that null ends the process.
 unsafe impl GlobalAlloc for Heap {
@@ -85,10 +76,7 @@ impl Heap {
                 self.program, self.advice
             );
             let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
-            if let Some(end) = END.get() {
-                end(OUT_OF_MEMORY);
-            }
-            exit(OUT_OF_MEMORY);
+            (self.end)(OUT_OF_MEMORY);
         }
         // The thread that came first ends the process.
         sleep(PATIENCE);

@@ -24,6 +24,7 @@ use std::time::Duration;
 static HEAP: Heap = Heap {
     program: "mesher",
     advice: "choose a larger spacing (--plan estimates what fits) or use more machines",
+    end: launch::abort,
 };
 
 /// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
@@ -65,11 +66,14 @@ fn main() {
 /// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
 /// their own, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
 /// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
-/// needs as much again in every phase (a page fault takes 2 us on a virtual machine).
+/// needs as much again in every phase (a page fault takes 2 us on a virtual machine). The thread that handles signals needs no heap of its
+/// own, which would take 64 MiB of address space.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn fix_heap() {
-    use libc::{M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
-    for (parameter, value) in [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20)] {
+    use libc::{M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
+    for (parameter, value) in
+        [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, 1)]
+    {
         // SAFETY: `mallopt` only sets a number, under the lock of the heap; any size is valid.
         unsafe { libc::mallopt(parameter, value) };
     }
@@ -94,11 +98,9 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
 }
 
 fn run_mpi(asked: &Result<Asked, Error>) {
-    // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
-    let comm = interrupt::uninterrupted(launch::join);
+    let comm = launch::join();
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| launch::abort(BUG));
-    files::ends_with(launch::abort);
     let code = match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
         Err(e) => fail(&Error::Input(e), launch::is_first()),
