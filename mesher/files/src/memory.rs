@@ -5,7 +5,6 @@
 use crate::interrupt;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{Cursor, Write, stderr};
-use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
@@ -22,9 +21,6 @@ pub struct Heap {
     /// Ends the program with an exit code.
     pub end: fn(i32) -> !,
 }
-
-/// Time for the first thread that gets no memory to end the program.
-const PATIENCE: Duration = Duration::from_secs(3);
 
 // SAFETY: all calls go to the system's allocator with the caller's arguments, and so do its results, except that null ends the process.
 unsafe impl GlobalAlloc for Heap {
@@ -66,20 +62,19 @@ impl Heap {
     #[cold]
     fn end(&self, bytes: usize) -> ! {
         static IS_ENDING: AtomicBool = AtomicBool::new(false);
-        if !IS_ENDING.swap(true, Ordering::AcqRel) {
-            interrupt::abandon();
-            // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
-            let mut line = Cursor::new([0; 256]);
-            let _ = writeln!(
-                line,
-                "{}: memory ran out at a request for {bytes} bytes: {}",
-                self.program, self.advice
-            );
-            let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
-            (self.end)(OUT_OF_MEMORY);
+        while IS_ENDING.swap(true, Ordering::AcqRel) {
+            // The thread that came first ends the process.
+            sleep(Duration::from_secs(1));
         }
-        // The thread that came first ends the process.
-        sleep(PATIENCE);
-        exit(OUT_OF_MEMORY)
+        interrupt::abandon();
+        // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
+        let mut line = Cursor::new([0; 256]);
+        let _ = writeln!(
+            line,
+            "{}: memory ran out at a request for {bytes} bytes: {}",
+            self.program, self.advice
+        );
+        let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
+        (self.end)(OUT_OF_MEMORY)
     }
 }

@@ -1,8 +1,8 @@
 //! The output that this process has begun, and its removal when the process ends before it is complete.
 //!
 //! Invariants:
-//! - output is begun, completed and removed under one lock. A thread that ends the process keeps the lock, so that nothing is begun or
-//!   completed after that;
+//! - output is begun, completed and removed under one lock. Once a thread ends the process, others wait for the end instead of beginning or
+//!   completing any;
 //! - nothing is allocated under the lock: the process may end because memory ran out;
 //! - output is complete once its final name belongs to the file that was begun. Of several processes of a run, the file system decides
 //!   between a rename to the final name and a removal, of which one succeeds.
@@ -14,17 +14,20 @@ use std::ffi::{CStr, CString};
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::park;
 
 /// Greatest number of unfinished outputs of a process.
 const OUTPUTS: usize = 256;
 
 static STATE: Mutex<State> =
-    Mutex::new(State { outputs: [const { None }; OUTPUTS], is_complete: false });
+    Mutex::new(State { outputs: [const { None }; OUTPUTS], is_complete: false, is_ending: false });
 
 struct State {
     outputs: [Option<Output>; OUTPUTS],
     /// Whether output has been completed: then the run ends with success.
     is_complete: bool,
+    /// Whether a thread ends the process and has removed what was unfinished.
+    is_ending: bool,
 }
 
 /// Unfinished output: a file, perhaps with others that are finished before it.
@@ -49,9 +52,21 @@ fn lock() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The lock of a thread that does not end the process; waits if another one does.
+fn lock_to_work() -> MutexGuard<'static, State> {
+    let state = lock();
+    if state.is_ending {
+        drop(state);
+        loop {
+            park();
+        }
+    }
+    state
+}
+
 /// Runs `body`, which begins or completes a part of some output, unless the process is about to end.
 pub fn locked<T>(body: impl FnOnce() -> T) -> T {
-    let _state = lock();
+    let _state = lock_to_work();
     body()
 }
 
@@ -61,7 +76,7 @@ impl Unfinished {
     /// # Errors
     /// With whatever `begin` returns; then it leaves nothing.
     pub fn begin(begin: impl FnOnce() -> Result<Output, Errno>) -> Result<Self, Errno> {
-        let outputs = &mut lock().outputs;
+        let outputs = &mut lock_to_work().outputs;
         let free = outputs.iter().position(Option::is_none).ok_or(Errno::MFILE)?;
         outputs[free] = Some(begin()?);
         Ok(Self(free))
@@ -69,7 +84,7 @@ impl Unfinished {
 
     /// Gives the output its final name with `publish`.
     pub fn publish(&self, publish: impl FnOnce(&Output) -> Result<(), Errno>) -> io::Result<()> {
-        let state = &mut *lock();
+        let state = &mut *lock_to_work();
         state.outputs[self.0].as_ref().map_or(Ok(()), publish)?;
         state.is_complete = true;
         Ok(())
@@ -82,7 +97,7 @@ impl Unfinished {
 
     /// Keeps the output, which is complete.
     pub fn keep(self) {
-        let state = &mut *lock();
+        let state = &mut *lock_to_work();
         state.outputs[self.0] = None;
         state.is_complete = true;
         std::mem::forget(self);
@@ -97,20 +112,19 @@ impl Drop for Unfinished {
 
 /// Notes that the outcome of the run is decided, or that another run begins.
 pub fn complete(is_complete: bool) {
-    lock().is_complete = is_complete;
+    lock_to_work().is_complete = is_complete;
 }
 
 /// Removes all unfinished output before the process ends. Removes none if some is complete and the process therefore `ends_well`; returns
 /// whether that is so.
 pub fn abandon_all(ends_well: bool) -> bool {
-    let state = lock();
+    let mut state = lock();
     let outputs = || state.outputs.iter().flatten();
     if ends_well && (state.is_complete || outputs().any(|output| output.is_at(1))) {
         return true;
     }
     outputs().for_each(Output::abandon);
-    // Nothing is begun from now on.
-    std::mem::forget(state);
+    state.is_ending = true;
     false
 }
 

@@ -166,20 +166,19 @@ fn level_base(s: &str) -> Result<LevelBase, String> {
 }
 
 fn comm_choice(s: &str) -> Result<CommChoice, String> {
-    let mut words = s.split(':');
-    let choice = match (words.next(), words.next(), words.next()) {
-        (Some("auto"), None, None) => Some(CommChoice::Auto),
-        (Some("solo"), None, None) => Some(CommChoice::Solo),
-        (Some("mpi"), None, None) => Some(CommChoice::Mpi),
-        (Some("sim"), Some(ranks), seed) => (|| {
-            let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
-            Some(CommChoice::Sim { ranks, seed: seed.unwrap_or("1").parse().ok()? })
-        })(),
+    let sim = |ranks: &str, seed: &str| {
+        let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
+        Some(CommChoice::Sim { ranks, seed: seed.parse().ok()? })
+    };
+    let choice = match s.split(':').collect::<Vec<_>>()[..] {
+        ["auto"] => Some(CommChoice::Auto),
+        ["solo"] => Some(CommChoice::Solo),
+        ["mpi"] => Some(CommChoice::Mpi),
+        ["sim", ranks] => sim(ranks, "1"),
+        ["sim", ranks, seed] => sim(ranks, seed),
         _ => None,
     };
-    choice
-        .filter(|_| words.next().is_none())
-        .ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
+    choice.ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
 }
 
 fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
