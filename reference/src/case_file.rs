@@ -44,7 +44,8 @@ const ROOT_SCALE: f64 = 10.0;
 /// The case file or the geometry cannot be read or is invalid. Lengths are checked later, by
 /// [`Input::new`](crate::lattice::Input::new).
 pub fn read(path: &Path) -> Result<Case, Error> {
-    let invalid = |problem: String| Error::CaseFile { path: path.to_owned(), problem };
+    let invalid =
+        |problem: String| Error::Invalid(format!("case file {}: {problem}", path.display()));
     let text = String::from_utf8(input_file::read(path)?)
         .map_err(|error| invalid(format!("{error}; save it as UTF-8")))?;
     let file: CaseFile = toml::from_str(&text).map_err(|error| invalid(explain(&error, &text)))?;
