@@ -44,7 +44,8 @@ const ROOT_SCALE: f64 = 10.0;
 /// The case file or the geometry cannot be read or is invalid. Lengths are checked later, by
 /// [`Input::new`](crate::lattice::Input::new).
 pub fn read(path: &Path) -> Result<Case, Error> {
-    let invalid = |problem: String| Error::CaseFile { path: path.to_owned(), problem };
+    let invalid =
+        |problem: String| Error::Invalid(format!("case file {}: {problem}", path.display()));
     let text = String::from_utf8(input_file::read(path)?)
         .map_err(|error| invalid(format!("{error}; save it as UTF-8")))?;
     let file: CaseFile = toml::from_str(&text).map_err(|error| invalid(explain(&error, &text)))?;
@@ -93,20 +94,9 @@ fn root(file: &CaseFile, facets: &[[[f64; 3]; 3]]) -> Result<Root, String> {
     }
 }
 
-/// One sentence with the line of the error and, for an unknown key, the most similar known key.
+/// One sentence with the line of the error; for an unknown key, with all known ones.
 fn explain(error: &toml::de::Error, text: &str) -> String {
-    let before = error.span().and_then(|span| text.get(..span.start));
-    let line = before
-        .map_or(String::new(), |before| format!("line {}: ", before.matches('\n').count() + 1));
-    // The message of serde has the form: unknown field `a`, expected one of `b`, `c`.
-    let message = error.message();
-    let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    match names.split_first() {
-        Some((unknown, known)) if message.starts_with("unknown ") => {
-            let nearest = known.iter().min_by_key(|name| strsim::osa_distance(unknown, name));
-            let advice = nearest.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-            format!("{line}{message}{advice}")
-        }
-        _ => format!("{line}{message}; correct the case file"),
-    }
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    format!("line {line}: {}; correct the case file", error.message())
 }

@@ -58,20 +58,32 @@ impl Input {
     pub fn new(case: &Case) -> Result<Self, Error> {
         let root = case.root;
         if !root.origin.iter().all(|x| x.is_finite()) {
-            return Err(Error::RootOrigin(root.origin));
+            let origin = root.origin;
+            return invalid(format!(
+                "the root's origin {origin:?} is not finite: give three finite numbers"
+            ));
         }
         if !is_length(root.edge) {
-            return Err(Error::RootEdge(root.edge));
+            let edge = root.edge;
+            return invalid(format!(
+                "the root's edge is {edge}: it must be finite and greater than 0"
+            ));
         }
         if case.layer_cells_min == 0 {
-            return Err(Error::LayerCells);
+            return invalid(
+                "layer_cells_min is 0: it must be at least 1, which is plain 2:1 balance"
+                    .to_owned(),
+            );
         }
         let level_surface = level(&root, "spacing_min", case.spacing_min)?;
         let mut boxes = Vec::new();
         for (index, spec) in case.boxes.iter().enumerate() {
             let finite = spec.min.iter().chain(&spec.max).all(|x| x.is_finite());
             if !finite || (0..3).any(|a| spec.min[a] >= spec.max[a]) {
-                return Err(Error::BoxCorners { index, min: spec.min, max: spec.max });
+                return invalid(format!(
+                    "box {index} extends from {:?} to {:?}: its corners must be finite and min less than max along every axis",
+                    spec.min, spec.max
+                ));
             }
             let level = level(&root, &format!("the spacing of box {index}"), spec.spacing)?;
             let corner = |x| quantised(&root, x).map(|q| q.clamp(0.0, ROOT_EDGE as f64) as i64);
@@ -109,6 +121,10 @@ pub fn location(root: &Root, point: [i64; 3]) -> [f64; 3] {
     std::array::from_fn(|a| root.origin[a] + point[a] as f64 * unit)
 }
 
+fn invalid<T>(problem: String) -> Result<T, Error> {
+    Err(Error::Invalid(problem))
+}
+
 fn is_length(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
@@ -125,12 +141,18 @@ fn cells_in(extent: &Extent, level: u32) -> f64 {
 /// The coarsest level whose cells have an edge of at most `spacing`.
 fn level(root: &Root, name: &str, spacing: f64) -> Result<u32, Error> {
     if !is_length(spacing) {
-        return Err(Error::Spacing { name: name.to_owned(), spacing });
+        return invalid(format!("{name} is {spacing}: it must be finite and greater than 0"));
     }
-    (0..=LEVEL_MAX).find(|&d| root.edge / f64::from(1_u32 << d) <= spacing).ok_or_else(|| {
-        let least = root.edge / f64::from(1_u32 << LEVEL_MAX);
-        Error::SpacingTooFine { name: name.to_owned(), spacing, least }
-    })
+    let level = (0..=LEVEL_MAX).find(|&d| root.edge / f64::from(1_u32 << d) <= spacing);
+    level.map_or_else(
+        || {
+            let least = root.edge / f64::from(1_u32 << LEVEL_MAX);
+            invalid(format!(
+                "{name} is {spacing}, less than {least}, the cell edge at the deepest level, 19: choose a larger spacing or a smaller root"
+            ))
+        },
+        Ok,
+    )
 }
 
 /// The nearest lattice point. The coordinates remain floating-point numbers because they may be too
@@ -142,7 +164,7 @@ fn quantised(root: &Root, x: [f64; 3]) -> [f64; 3] {
 
 fn quantised_seed(root: &Root, index: usize, seed: [f64; 3]) -> Result<Seed, Error> {
     if !seed.iter().all(|x| x.is_finite()) {
-        return Err(Error::SeedNotFinite { index, seed });
+        return invalid(format!("seed {index} is {seed:?}: give three finite numbers"));
     }
     let point = quantised(root, seed).map(|q| q.clamp(-1.0, ROOT_EDGE as f64) as i64);
     Ok(Seed { given: seed, point })
@@ -153,11 +175,17 @@ fn quantised_facet(root: &Root, index: usize, facet: &[[f64; 3]; 3]) -> Result<F
     for (point, &vertex) in points.iter_mut().zip(facet) {
         let q = quantised(root, vertex);
         if !vertex.iter().chain(&q).all(|x| x.is_finite()) {
-            return Err(Error::VertexNotFinite { facet: index, vertex });
+            return invalid(format!(
+                "facet {index} has a vertex {vertex:?} that is not finite: repair the geometry"
+            ));
         }
         let allowed = -(ROOT_EDGE as f64)..=2.0 * ROOT_EDGE as f64;
         if !q.iter().all(|x| allowed.contains(x)) {
-            return Err(Error::VertexOutside { facet: index, vertex, root: *root });
+            return invalid(format!(
+                "facet {index} has a vertex {vertex:?} more than one root edge outside the root (origin {:?}, edge {}): enlarge or move the \
+                 root, or correct the vertex",
+                root.origin, root.edge
+            ));
         }
         // The conversion is exact: q are integers of at most 2^28 in absolute value.
         *point = q.map(|x| x as i64);

@@ -11,8 +11,11 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 #[global_allocator]
-static HEAP: Heap =
-    Heap { program: "error", advice: "choose a larger spacing, or use a machine with more memory" };
+static HEAP: Heap = Heap {
+    program: "error",
+    advice: "choose a larger spacing, or use a machine with more memory",
+    end: std::process::exit,
+};
 
 /// The exit code of output that cannot be written.
 const EXIT_OUTPUT: u8 = 4;

@@ -21,7 +21,7 @@ const FACET_BYTES: usize = 50;
 /// The file cannot be read, is damaged or is not STL, or a vertex is not finite.
 pub fn read(path: &Path) -> Result<Vec<Facet>, Error> {
     let bytes = input_file::read(path)?;
-    parse(&bytes).map_err(|problem| Error::Stl { path: path.to_owned(), problem })
+    parse(&bytes).map_err(|why| Error::Invalid(format!("geometry {}: {why}", path.display())))
 }
 
 /// Parses the bytes of an STL file.

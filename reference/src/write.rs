@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::kept::Components;
 use crate::leaks::Leak;
 use crate::leaves::{Geometry, Tally, hex};
-use files::{Claim, ClaimError, write_atomically};
+use files::{Claim, write_atomically};
 use serde::Serialize;
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -132,9 +132,11 @@ impl Manifest {
 pub fn claim(directory: &Path) -> Result<Claim, Error> {
     let write = |source| Error::Write { path: directory.to_owned(), source };
     directory.parent().map_or(Ok(()), fs::create_dir_all).map_err(write)?;
-    Claim::create(directory, MANIFEST_FILE, [LEAF_FILE.to_owned()]).map_err(|error| match error {
-        ClaimError::Io(source) => write(source),
-        taken => Error::OutputTaken { path: directory.to_owned(), taken },
+    Claim::create(directory, MANIFEST_FILE, [LEAF_FILE.to_owned()]).map_err(|e| match e.kind() {
+        io::ErrorKind::DirectoryNotEmpty => {
+            Error::OutputTaken { path: directory.to_owned(), source: e }
+        }
+        _ => write(e),
     })
 }
 

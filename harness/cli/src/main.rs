@@ -22,6 +22,7 @@ use std::sync::Once;
 static HEAP: Heap = Heap {
     program: "harness",
     advice: "use a smaller mesh, fewer --jobs or a machine with more memory",
+    end: interrupt::out_of_memory,
 };
 
 fn main() -> ExitCode {
@@ -31,7 +32,6 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return refuse(&error),
     };
-    files::ends_with(interrupt::out_of_memory);
     report_a_panic_once();
     let Ok(ended) = catch_unwind(|| dispatch(arguments)) else {
         interrupt::clean();

@@ -2,9 +2,9 @@
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
 use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT};
-use files::{Plain, message};
+use files::{message, plain};
 use run::engine::interrupt;
-use std::fmt::{self, Arguments};
+use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write, stderr, stdout};
 use std::sync::OnceLock;
 
@@ -28,10 +28,7 @@ pub fn write(text: Arguments) {
     if files::clash().is_some() {
         return;
     }
-    let mut plain = Plain(String::new());
-    // Only the text itself can fail.
-    let _ = fmt::Write::write_fmt(&mut plain, text);
-    note(stdout().lock().write_all(plain.0.as_bytes()));
+    note(stdout().lock().write_all(plain(&text).as_bytes()));
 }
 
 /// Writes a message to standard error, at most a screen. If that fails, there is no place left to report it.

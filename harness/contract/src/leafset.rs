@@ -78,7 +78,7 @@ pub(crate) fn create(
     let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
     let write = || {
         let names = manifest.parts.iter().map(|part| part.file.clone());
-        let claim = Claim::create(dir, manifest::FILE, names).map_err(io::Error::from)?;
+        let claim = Claim::create(dir, manifest::FILE, names)?;
         for (i, part) in manifest.parts.iter().enumerate() {
             let mut out = BufWriter::new(claim.draft(&part.file)?);
             fill(i, &mut out)?;

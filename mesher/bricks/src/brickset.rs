@@ -8,17 +8,14 @@
 //! - the first run starts at the first brick, and each run has at least one brick;
 //! - runs have strictly ascending upper halves of keys.
 
-mod ranges;
+mod parts;
 mod read;
 #[cfg(test)]
 pub(crate) mod tests;
-mod union;
 
-pub use read::{Bricks, ChildBricks, Cursor, Groups};
+pub use read::{Bricks, Cursor};
 
 use crate::brick::{self, Brick};
-use crate::widest;
-use std::ops::Range;
 
 /// Bits of a key that are stored per brick.
 const LOW_BITS: u32 = 32;
@@ -107,13 +104,6 @@ impl BrickSet {
         Bricks::new(self)
     }
 
-    /// The groups of bricks whose keys agree in all but their lowest `low_bits` bits, at most the lower half, in
-    /// order: the key of the first brick and the positions of all.
-    #[inline]
-    pub fn groups(&self, low_bits: u32) -> Groups<'_> {
-        Groups::new(self, low_bits)
-    }
-
     /// Number of bricks.
     pub fn len(&self) -> usize {
         self.low.len()
@@ -126,12 +116,7 @@ impl BrickSet {
 
     /// Number of octants.
     pub fn count(&self) -> u64 {
-        count_ones(&self.bits)
-    }
-
-    /// Number of octants in the bricks at a range of positions.
-    pub fn count_in(&self, range: Range<usize>) -> u64 {
-        count_ones(&self.bits[range])
+        self.bits.iter().map(|w| u64::from(w.count_ones())).sum()
     }
 
     /// The bits of brick `key`; 0 if the set has no octant in it.
@@ -194,8 +179,14 @@ impl BrickSet {
 
     /// The children of the set's octants, brick by brick in Morton order.
     #[inline]
-    pub fn child_bricks(&self) -> ChildBricks<'_> {
-        ChildBricks::new(self)
+    pub fn child_bricks(&self) -> impl Iterator<Item = Brick> + '_ {
+        self.bricks().flat_map(|b| {
+            let child = move |j: u32| {
+                let j = u64::from(j);
+                Brick { key: b.key << 3 | j, bits: brick::children(brick::byte(b.bits, j)) }
+            };
+            ones(u64::from(brick::parents(b.bits))).map(child)
+        })
     }
 
     /// The codes of the set's octants in Morton order.
@@ -230,16 +221,6 @@ impl BrickSet {
             assert!(a.key < b.key, "brick {:#x} must precede brick {:#x}", b.key, a.key);
         }
     }
-}
-
-widest! {
-    /// Number of bits that are set.
-    fn count_ones(words: &[u64]) -> u64 = count_ones_lanes;
-}
-
-#[inline(always)]
-fn count_ones_lanes(words: &[u64]) -> u64 {
-    words.iter().map(|w| u64::from(w.count_ones())).sum()
 }
 
 /// Positions of the set bits of `bits`, ascending.

@@ -6,77 +6,32 @@
 //!   up removes the claim, so that the rename fails;
 //! - a run removes files only in the directory that it opened, and only under the names that it gave when it claimed.
 
-use crate::draft::{Draft, c_string, rename_to_new};
-use crate::interrupt::uninterrupted;
-use crate::unfinished::{self, Output, Unfinished};
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, openat, unlinkat};
+use crate::draft::Draft;
+use crate::unfinished::{Output, Unfinished, open_file, rename_to_new};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, unlinkat};
 use rustix::io::Errno;
-use std::ffi::CString;
-use std::fs::{self, File};
+use std::ffi::{CStr, CString};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::mem::MaybeUninit;
+use std::os::fd::OwnedFd;
+use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
-use thiserror::Error;
 
 /// A directory that this run alone writes to. All its files are removed if this is dropped before [`keep`](Self::keep), and the
 /// directory as well if it is new.
 #[derive(Debug)]
 pub struct Claim {
-    entry: Unfinished,
-    dir: OwnedFd,
-    /// The file that becomes the last one, and its temporary and its final name.
-    last: (File, [CString; 2]),
+    unfinished: Unfinished,
+    /// The file that becomes the last one.
+    last: File,
     is_new: bool,
-    is_kept: bool,
 }
-
-/// The reason why a directory cannot be claimed.
-#[derive(Debug, Error)]
-pub enum ClaimError {
-    /// Another run has claimed it.
-    #[error("another run is writing to this directory, or was killed while it did")]
-    Claimed,
-    /// It contains files.
-    #[error("the directory is not empty")]
-    NotEmpty,
-    /// It cannot be created or written to.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-}
-
-impl From<Errno> for ClaimError {
-    fn from(e: Errno) -> Self {
-        Self::Io(e.into())
-    }
-}
-
-impl From<ClaimError> for io::Error {
-    fn from(e: ClaimError) -> Self {
-        match e {
-            ClaimError::Io(e) => e,
-            taken => {
-                Self::new(io::ErrorKind::DirectoryNotEmpty, format!("{taken}: choose another"))
-            }
-        }
-    }
-}
-
-/// Suffix of temporary names.
-const DRAFT: &str = ".draft";
-/// How often a directory is created that another run removes at the same time.
-const ATTEMPTS: usize = 100;
 
 /// The temporary and the final name of a file.
 fn names_of(name: &str) -> [CString; 2] {
-    [format!("{name}{DRAFT}"), name.to_owned()]
+    [format!("{name}.draft"), name.to_owned()]
         .map(|name| CString::new(name).expect("output files have names without NUL"))
-}
-
-/// Whether a directory has a single entry.
-fn is_alone(path: &Path) -> io::Result<bool> {
-    let mut entries = fs::read_dir(path)?;
-    entries.next().transpose()?;
-    Ok(entries.next().transpose()?.is_none())
 }
 
 impl Claim {
@@ -84,43 +39,20 @@ impl Claim {
     /// the file that is written last, `others` are the names of all others that this and other processes will write.
     ///
     /// # Errors
-    /// If another run has claimed it, or it is not empty, or cannot be created or written to.
+    /// If another run has claimed it or it is not empty, of the kind `DirectoryNotEmpty`; or if it cannot be created or written to.
     pub fn create(
         path: &Path,
         last: &str,
         others: impl IntoIterator<Item = String>,
-    ) -> Result<Self, ClaimError> {
-        uninterrupted(|| {
-            for _ in 0..ATTEMPTS {
-                let is_new = match fs::create_dir(path) {
-                    Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(e.into()),
-                    created => created.is_ok(),
-                };
-                // A directory that another run has claimed since then is not empty, and stays.
-                let give_up = |error| {
-                    if is_new {
-                        let _ = fs::remove_dir(path);
-                    }
-                    Err(error)
-                };
-                match Self::open(path, last, OFlags::CREATE | OFlags::EXCL) {
-                    // Another run has removed the directory since then.
-                    Err(Errno::NOENT) => {}
-                    Err(Errno::EXIST) => return Err(ClaimError::Claimed),
-                    Err(e) => return give_up(e.into()),
-                    Ok((dir, file)) => {
-                        let names = names_of(last);
-                        let is_alone = is_alone(path);
-                        if let Ok(true) = is_alone {
-                            return Ok(Self::new(path, dir, (file, names), others, is_new)?);
-                        }
-                        let _ = unlinkat(&dir, &names[0], AtFlags::empty());
-                        return give_up(is_alone.map_or_else(Into::into, |_| ClaimError::NotEmpty));
-                    }
-                }
+    ) -> io::Result<Self> {
+        let taken = |why: &str| Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, why));
+        match Self::begin(path, last, others, Self::make) {
+            Err(Errno::EXIST) => {
+                taken("another run is writing to this directory, or was killed while it did")
             }
-            Err(Errno::NOENT.into())
-        })
+            Err(Errno::NOTEMPTY) => taken("the directory is not empty"),
+            claim => Ok(claim?),
+        }
     }
 
     /// The claim that another process of this run has created. `others` are names of files that this process removes if it gives up.
@@ -133,35 +65,45 @@ impl Claim {
         others: impl IntoIterator<Item = String>,
         is_new: bool,
     ) -> io::Result<Self> {
-        uninterrupted(|| {
-            let (dir, file) = Self::open(path, last, OFlags::empty())?;
-            Self::new(path, dir, (file, names_of(last)), others, is_new)
-        })
+        let open = |path: &CStr, claim: &CStr| Ok((open(path, claim, OFlags::empty())?, is_new));
+        Ok(Self::begin(path, last, others, open)?)
     }
 
-    fn open(path: &Path, last: &str, flags: OFlags) -> Result<(OwnedFd, File), Errno> {
-        let always = OFlags::CLOEXEC;
-        let dir = openat(CWD, path, OFlags::DIRECTORY | always, Mode::empty())?;
-        let claim = &names_of(last)[0];
-        let file = openat(&dir, claim, OFlags::WRONLY | always | flags, Mode::from(0o666))?;
-        Ok((dir, file.into()))
-    }
-
-    fn new(
+    fn begin(
         path: &Path,
-        dir: OwnedFd,
-        last: (File, [CString; 2]),
+        last: &str,
         others: impl IntoIterator<Item = String>,
-        is_new: bool,
-    ) -> io::Result<Self> {
-        let entry = Unfinished::new(Output {
-            dir: dir.as_raw_fd(),
-            created: is_new.then(|| c_string(path)).transpose()?,
-            names: last.1.clone(),
-            file: last.0.as_raw_fd(),
-            others: others.into_iter().flat_map(|name| names_of(&name)).collect(),
+        open: impl FnOnce(&CStr, &CStr) -> Result<(Opened, bool), Errno>,
+    ) -> Result<Self, Errno> {
+        let path = CString::new(path.as_os_str().as_bytes()).map_err(|_| Errno::INVAL)?;
+        let names = names_of(last);
+        let others: Vec<CString> = others.into_iter().flat_map(|name| names_of(&name)).collect();
+        let mut opened = None;
+        let unfinished = Unfinished::begin(|| {
+            let ((dir, last, id), is_new) = open(&path, &names[0])?;
+            opened = Some((last, is_new));
+            Ok(Output { dir, names, id, others, created: is_new.then_some(path) })
+        })?;
+        let (last, is_new) = opened.expect("the claim was opened");
+        Ok(Self { unfinished, last: last.into(), is_new })
+    }
+
+    /// Creates a claim, and its directory if it does not exist. Returns whether it did not.
+    fn make(path: &CStr, claim: &CStr) -> Result<(Opened, bool), Errno> {
+        let is_new = match mkdirat(CWD, path, Mode::from(0o777)) {
+            Err(Errno::EXIST) => false,
+            made => made.map(|()| true)?,
+        };
+        let opened = open(path, claim, OFlags::CREATE | OFlags::EXCL).and_then(|opened| {
+            let dir = &opened.0;
+            is_alone(dir).inspect_err(|_| _ = unlinkat(dir, claim, AtFlags::empty()))?;
+            Ok(opened)
         });
-        Ok(Self { entry, dir, last, is_new, is_kept: false })
+        if opened.is_err() && is_new {
+            // One that another run has claimed since then is not empty, and stays.
+            let _ = unlinkat(CWD, path, AtFlags::REMOVEDIR);
+        }
+        opened.map(|opened| (opened, is_new))
     }
 
     /// Whether the directory was created for this run.
@@ -174,10 +116,7 @@ impl Claim {
     /// # Errors
     /// If it exists or cannot be created.
     pub fn draft(&self, name: &str) -> io::Result<Draft> {
-        let [draft, name] = names_of(name);
-        let flags = OFlags::WRONLY | OFlags::CREATE | OFlags::EXCL | OFlags::CLOEXEC;
-        let file = openat(&self.dir, &draft, flags, Mode::from(0o666))?;
-        Ok(Draft::claimed(file.into(), self.dir.try_clone()?, draft, name))
+        Draft::claimed(self.unfinished.dir()?, names_of(name))
     }
 
     /// Writes the last file. In one process of the run, after all others have published their files.
@@ -185,34 +124,44 @@ impl Claim {
     /// # Errors
     /// If the file cannot be written, or another process of the run has given up.
     pub fn commit(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-        let (file, [draft, name]) = &self.last;
-        let mut out = BufWriter::new(file);
+        let mut out = BufWriter::new(&self.last);
         fill(&mut out)?;
         out.into_inner()?.sync_all()?;
-        rename_to_new(self.dir.as_fd(), draft, name)?;
-        match rustix::fs::fsync(&self.dir) {
-            // Some network file systems cannot.
-            Ok(()) | Err(Errno::INVAL) => unfinished::complete(true),
-            Err(e) => {
+        self.unfinished.publish(|Output { dir, names, .. }| {
+            rename_to_new(dir, names)?;
+            match fsync(dir) {
+                // Some network file systems cannot.
+                Err(Errno::INVAL) => Ok(()),
                 // Without its last file the directory is unfinished, and will be removed.
-                let _ = unlinkat(&self.dir, name, AtFlags::empty());
-                return Err(e.into());
+                synchronised => {
+                    synchronised.inspect_err(|_| _ = unlinkat(dir, &names[1], AtFlags::empty()))
+                }
             }
-        }
-        Ok(())
+        })
     }
 
     /// Keeps the files. In every process of the run, after [`commit`](Self::commit).
-    pub fn keep(mut self) {
-        unfinished::complete(true);
-        self.is_kept = true;
+    pub fn keep(self) {
+        self.unfinished.keep();
     }
 }
 
-impl Drop for Claim {
-    fn drop(&mut self) {
-        if !self.is_kept {
-            self.entry.abandon();
-        }
+/// A directory, the file of a claim, and its device and inode.
+type Opened = (OwnedFd, OwnedFd, (u64, u64));
+
+fn open(path: &CStr, claim: &CStr, flags: OFlags) -> Result<Opened, Errno> {
+    let dir = openat(CWD, path, OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty())?;
+    let (file, id) = open_file(&dir, claim, flags)?;
+    Ok((dir, file, id))
+}
+
+/// Finds out that a directory has an entry besides the claim.
+fn is_alone(dir: &OwnedFd) -> Result<(), Errno> {
+    let mut buffer = [MaybeUninit::uninit(); 2048];
+    let mut entries = RawDir::new(dir, &mut buffer);
+    let mut others = 0;
+    while let Some(entry) = entries.next() {
+        others += usize::from(![c".", c".."].contains(&entry?.file_name()));
     }
+    if others > 1 { Err(Errno::NOTEMPTY) } else { Ok(()) }
 }

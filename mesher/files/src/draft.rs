@@ -1,86 +1,71 @@
 //! Single files.
 
-use crate::interrupt::uninterrupted;
-use crate::unfinished::{self, Output, Unfinished};
+use crate::unfinished::{Output, Unfinished, locked, open_file, rename_to_new};
 use crate::uses::register_output;
-use rustix::fs::{CWD, RenameFlags, renameat, renameat_with};
-use rustix::io::Errno;
-use std::ffi::{CStr, CString};
+use rustix::fs::{CWD, Mode, OFlags, openat, renameat};
+use std::ffi::CString;
 use std::fs::{self, File, Metadata, OpenOptions};
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
-use std::os::unix::net::UnixStream;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use tempfile::{Builder, TempPath};
 
 /// A file that is being written, removed if it is dropped before [`publish`](Self::publish).
 #[derive(Debug)]
 pub struct Draft {
-    place: Place,
     file: File,
+    place: Place,
 }
 
 #[derive(Debug)]
 enum Place {
     /// Written under a temporary name in the same directory.
-    Beside { draft: TempPath, entry: Unfinished, path: PathBuf },
+    Beside(Unfinished),
     /// A file of a claimed directory, under a temporary name; the claim removes it.
-    Claimed { dir: OwnedFd, draft: CString, name: CString },
+    Claimed { dir: OwnedFd, names: [CString; 2] },
     /// Not a regular file: written directly.
     Through,
 }
 
-/// The kind of file that a path leads to.
-enum Destination {
-    /// A regular file, or none yet, at this path without symbolic links.
-    Regular(PathBuf),
-    /// Any other.
-    Special(OwnedFd),
-}
-
 impl Draft {
     /// Begins the file `path`. A regular file is replaced when it is published. A symbolic link stays: the file that it leads to is
-    /// replaced. Whatever else the path leads to is written through: devices, FIFOs, sockets, and the standard output and error, even
+    /// replaced. Whatever else the path leads to is written through: devices, FIFOs, and the standard output and error, even
     /// if they are regular files.
     ///
     /// # Errors
     /// If the file is a directory or an input of this run, or cannot be created or opened.
     pub fn create(path: &Path) -> io::Result<Self> {
         register_output(path)?;
-        match destination(path)? {
-            Destination::Special(file) => Ok(Self { place: Place::Through, file: file.into() }),
-            Destination::Regular(path) => uninterrupted(|| Self::beside(path)),
+        if let Some(file) = special(path)? {
+            return Ok(Self { file, place: Place::Through });
         }
-    }
-
-    fn beside(path: PathBuf) -> io::Result<Self> {
-        // As for any other file, the user's umask decides who may read it.
-        let mut options = OpenOptions::new();
-        options.write(true).create_new(true).mode(0o666);
-        // An error from here names no temporary file, unlike those of `tempfile_in`.
+        let path = target(path);
         let folder = folder_of(&path);
         if !folder.is_dir() {
             let why = format!("{} is not a directory: create it", folder.display());
             return Err(io::Error::new(io::ErrorKind::NotFound, why));
         }
-        let file = Builder::new().make_in(folder, |draft| options.open(draft))?;
-        let (file, draft) = file.into_parts();
-        let (from, to) = (c_string(&draft)?, c_string(&path)?);
-        let output = Output {
-            dir: CWD.as_raw_fd(),
-            names: [from, to],
-            file: file.as_raw_fd(),
-            others: Vec::new(),
-            created: None,
-        };
-        Ok(Self { place: Place::Beside { entry: Unfinished::new(output), draft, path }, file })
+        let dir =
+            openat(CWD, folder, OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty())?;
+        let random = RandomState::new().hash_one(0);
+        let name = path.file_name().unwrap_or_default().as_bytes();
+        let names = [CString::new(format!(".{random:016x}.draft"))?, CString::new(name)?];
+        let mut created = None;
+        let unfinished = Unfinished::begin(|| {
+            let (file, id) = open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL)?;
+            created = Some(file);
+            Ok(Output { dir, names, id, others: Vec::new(), created: None })
+        })?;
+        let file = created.expect("the file was created").into();
+        Ok(Self { file, place: Place::Beside(unfinished) })
     }
 
-    /// A file in a claimed directory.
-    pub(crate) fn claimed(file: File, dir: OwnedFd, draft: CString, name: CString) -> Self {
-        Self { place: Place::Claimed { dir, draft, name }, file }
+    /// A file of a claimed directory with a temporary and a final name.
+    pub(crate) fn claimed(dir: OwnedFd, names: [CString; 2]) -> io::Result<Self> {
+        let file = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?.0.into();
+        Ok(Self { file, place: Place::Claimed { dir, names } })
     }
 
     /// The file, to write or to seek in; what is not a regular file may not allow the latter.
@@ -104,19 +89,15 @@ impl Draft {
     /// # Errors
     /// If that fails; the file is removed.
     pub fn publish(self) -> io::Result<()> {
-        let Self { place, file } = self;
-        match place {
+        self.synchronise()?;
+        match self.place {
             Place::Through => {}
-            Place::Claimed { dir, draft, name } => {
-                file.sync_all()?;
-                rename_to_new(dir.as_fd(), &draft, &name)?;
-            }
-            Place::Beside { entry, draft, path } => {
-                file.sync_all()?;
-                draft.persist(&path).map_err(|e| e.error)?;
-                unfinished::complete(true);
-                // The handler compares the final name with the open file until here.
-                drop(entry);
+            Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
+            Place::Beside(unfinished) => {
+                unfinished.publish(|Output { dir, names: [from, to], .. }| {
+                    renameat(dir, from, dir, to)
+                })?;
+                unfinished.keep();
             }
         }
         Ok(())
@@ -165,42 +146,30 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Renames a file in a directory, without replacing another.
-pub(crate) fn rename_to_new(dir: BorrowedFd, from: &CStr, to: &CStr) -> io::Result<()> {
-    match renameat_with(dir, from, dir, to, RenameFlags::NOREPLACE) {
-        // Some network file systems cannot. The claim excludes other runs.
-        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => Ok(renameat(dir, from, dir, to)?),
-        result => Ok(result?),
+/// The file that is written through at this path; none if it is a regular file, or does not exist.
+fn special(path: &Path) -> io::Result<Option<File>> {
+    let found = match fs::metadata(path) {
+        Ok(found) => found,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(e),
+    };
+    let stream = standard_stream(&found);
+    if found.is_dir() {
+        Err(io::ErrorKind::IsADirectory.into())
+    } else if stream.is_some() || found.is_file() {
+        Ok(stream.map(File::from))
+    } else {
+        OpenOptions::new().write(true).open(path).map(Some)
     }
 }
 
-fn destination(path: &Path) -> io::Result<Destination> {
-    let found = match fs::metadata(path) {
-        Ok(found) => found,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            // A symbolic link may lead to a file that does not exist yet.
-            let mut path = path.to_owned();
-            while let Ok(next) = fs::read_link(&path) {
-                path = folder_of(&path).join(next);
-            }
-            return Ok(Destination::Regular(path));
-        }
-        Err(e) => return Err(e),
-    };
-    let kind = found.file_type();
-    if kind.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
+/// The file that symbolic links lead to, which may not exist yet.
+fn target(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    while let Ok(next) = fs::read_link(&path) {
+        path = folder_of(&path).join(next);
     }
-    if let Some(stream) = standard_stream(&found) {
-        return Ok(Destination::Special(stream));
-    }
-    if kind.is_file() {
-        return Ok(Destination::Regular(fs::canonicalize(path)?));
-    }
-    Ok(Destination::Special(match kind.is_socket() {
-        true => UnixStream::connect(path)?.into(),
-        false => OpenOptions::new().write(true).open(path)?.into(),
-    }))
+    path
 }
 
 /// The standard output or error, if that is the file: opening `/dev/stdout` again would overwrite what has been printed.
@@ -215,8 +184,4 @@ fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-pub(crate) fn c_string(path: &Path) -> io::Result<CString> {
-    Ok(CString::new(path.as_os_str().as_bytes())?)
 }

@@ -2,7 +2,7 @@
 //! that this process has begun remains; a file that another run has made is never removed.
 //!
 //! - [`open`] and [`read`] open inputs; no output may be one of them, also under another name.
-//! - [`Draft`] is a file, [`write_atomically`] writes one in one call. Devices, FIFOs and sockets are written through.
+//! - [`Draft`] is a file, [`write_atomically`] writes one in one call. Devices and FIFOs are written through.
 //! - [`Claim`] is a directory of files that become visible together, with the last of them.
 //! - [`Heap`] is the allocator of a program that ends when it gets no more memory.
 //! - [`interrupt::install`] makes signals remove whatever is unfinished and end the process.
@@ -13,18 +13,57 @@ mod claim;
 mod draft;
 pub mod interrupt;
 mod memory;
-mod text;
 mod unfinished;
 mod uses;
 
-pub use claim::{Claim, ClaimError};
+pub use claim::Claim;
 pub use draft::{Draft, check_writable, write_atomically};
-pub use memory::{Heap, OUT_OF_MEMORY, ends_with};
-pub use text::{Plain, message};
+pub use memory::{Heap, OUT_OF_MEMORY};
 pub use uses::{
     append_log, clash, name_output, open, read, read_log, read_text, register_input,
     register_output,
 };
 
+use std::fmt::{Display, Write};
+
 /// Exit code of a program with a bug: it panicked.
 pub const BUG: i32 = 70;
+
+/// Greatest length of a message in characters: about a screen.
+const SCREEN: usize = 1600;
+
+/// Text that others have written, without the control characters that move the cursor or worse: all but ends of lines and tabs.
+pub fn plain(text: &dyn Display) -> String {
+    let is_shown = |c: &char| !c.is_control() || *c == '\n' || *c == '\t';
+    text.to_string().chars().map(|c| if is_shown(&c) { c } else { '\u{fffd}' }).collect()
+}
+
+/// A message without control characters, of at most a screen.
+pub fn message(text: &dyn Display) -> String {
+    let mut text = plain(text);
+    if let Some((end, _)) = text.char_indices().nth(SCREEN) {
+        let rest = text[end..].chars().count();
+        text.truncate(end);
+        let _ = write!(text, " ... ({rest} characters more)");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_replaced() {
+        let (escape, next_line) = ("\x1b[2J\r\x07", "\u{9b}");
+        let text = message(&format_args!("a{escape}b\tc\n{next_line}ä"));
+        assert_eq!(text, "a\u{fffd}[2J\u{fffd}\u{fffd}b\tc\n\u{fffd}ä");
+    }
+
+    #[test]
+    fn a_message_is_at_most_a_screen() {
+        assert_eq!(message(&"ä".repeat(SCREEN)), "ä".repeat(SCREEN));
+        let long = message(&"ä".repeat(SCREEN + 3));
+        assert!(long.ends_with("ä ... (3 characters more)") && long.chars().count() < SCREEN + 40);
+    }
+}

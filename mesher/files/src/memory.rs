@@ -5,8 +5,6 @@
 use crate::interrupt;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{Cursor, Write, stderr};
-use std::process::exit;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
@@ -20,19 +18,8 @@ pub struct Heap {
     pub program: &'static str,
     /// What the user can do.
     pub advice: &'static str,
-}
-
-/// Time for the first thread that gets no memory to end the program.
-const PATIENCE: Duration = Duration::from_secs(3);
-
-/// Ends the program with an exit code.
-type End = fn(i32) -> !;
-
-static END: OnceLock<End> = OnceLock::new();
-
-/// Sets how the program ends; without it, the process exits.
-pub fn ends_with(end: End) {
-    END.get_or_init(|| end);
+    /// Ends the program with an exit code.
+    pub end: fn(i32) -> !,
 }
 
 // SAFETY: all calls go to the system's allocator with the caller's arguments, and so do its results, except that null ends the process.
@@ -75,23 +62,19 @@ impl Heap {
     #[cold]
     fn end(&self, bytes: usize) -> ! {
         static IS_ENDING: AtomicBool = AtomicBool::new(false);
-        if !IS_ENDING.swap(true, Ordering::AcqRel) {
-            interrupt::abandon();
-            // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
-            let mut line = Cursor::new([0; 256]);
-            let _ = writeln!(
-                line,
-                "{}: memory ran out at a request for {bytes} bytes: {}",
-                self.program, self.advice
-            );
-            let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
-            if let Some(end) = END.get() {
-                end(OUT_OF_MEMORY);
-            }
-            exit(OUT_OF_MEMORY);
+        while IS_ENDING.swap(true, Ordering::AcqRel) {
+            // The thread that came first ends the process.
+            sleep(Duration::from_secs(1));
         }
-        // The thread that came first ends the process.
-        sleep(PATIENCE);
-        exit(OUT_OF_MEMORY)
+        interrupt::abandon();
+        // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
+        let mut line = Cursor::new([0; 256]);
+        let _ = writeln!(
+            line,
+            "{}: memory ran out at a request for {bytes} bytes: {}",
+            self.program, self.advice
+        );
+        let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
+        (self.end)(OUT_OF_MEMORY)
     }
 }

@@ -1,128 +1,174 @@
-//! The output that this process has begun, and its removal in a signal handler.
+//! The output that this process has begun, and its removal when the process ends before it is complete.
 //!
 //! Invariants:
-//! - whatever the handler calls is async-signal-safe: system calls, atomics, and no allocation;
-//! - entries are never freed, so the handler may walk the list at any time; an entry of finished or removed output is dead;
-//! - output is complete once its final name belongs to the file that was begun. The file system decides between a rename to the final
-//!   name and a removal, of which one succeeds.
+//! - output is begun, completed and removed under one lock. Once a thread ends the process, others wait for the end instead of beginning or
+//!   completing any;
+//! - nothing is allocated under the lock: the process may end because memory ran out;
+//! - output is complete once its final name belongs to the file that was begun. Of several processes of a run, the file system decides
+//!   between a rename to the final name and a removal, of which one succeeds.
 
-use rustix::fs::{AtFlags, CWD, fstat, statat, unlinkat};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, RenameFlags, fstat, openat, statat, unlinkat};
+use rustix::fs::{renameat, renameat_with};
+use rustix::io::Errno;
 use std::ffi::{CStr, CString};
-use std::os::fd::{BorrowedFd, RawFd};
-use std::ptr::null_mut;
-use std::sync::atomic::{AtomicBool, AtomicPtr, Ordering};
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::park;
 
-/// The latest entry.
-static LATEST: AtomicPtr<Entry> = AtomicPtr::new(null_mut());
-/// Whether output has been completed: then the run ends with success.
-static IS_COMPLETE: AtomicBool = AtomicBool::new(false);
+/// Greatest number of unfinished outputs of a process.
+const OUTPUTS: usize = 256;
 
-struct Entry {
-    output: Output,
-    is_live: AtomicBool,
-    before: *const Entry,
+static STATE: Mutex<State> =
+    Mutex::new(State { outputs: [const { None }; OUTPUTS], is_complete: false, is_ending: false });
+
+struct State {
+    outputs: [Option<Output>; OUTPUTS],
+    /// Whether output has been completed: then the run ends with success.
+    is_complete: bool,
+    /// Whether a thread ends the process and has removed what was unfinished.
+    is_ending: bool,
 }
 
-/// Unfinished output: a file, perhaps with others that are finished before it. Descriptors belong to the caller, who keeps them open as
-/// long as the entry lives.
+/// Unfinished output: a file, perhaps with others that are finished before it.
 pub struct Output {
     /// The directory of the names.
-    pub dir: RawFd,
+    pub dir: OwnedFd,
     /// The file's temporary and final name.
     pub names: [CString; 2],
-    /// The file.
-    pub file: RawFd,
-    /// Names of other files to remove, temporary and final.
+    /// Device and inode of the file.
+    pub id: (u64, u64),
+    /// Names of other files to remove.
     pub others: Vec<CString>,
     /// The directory's path if it was created for this output.
     pub created: Option<CString>,
 }
 
-/// Keeps an entry alive.
+/// Output that is removed if this is dropped: its place among all outputs.
 #[derive(Debug)]
-pub struct Unfinished(&'static Entry);
+pub struct Unfinished(usize);
 
-// SAFETY: an entry is immutable but for an atomic, and so are those before it.
-unsafe impl Sync for Entry {}
+fn lock() -> MutexGuard<'static, State> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
-impl std::fmt::Debug for Entry {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Entry").field("is_live", &self.is_live).finish_non_exhaustive()
+/// The lock of a thread that does not end the process; waits if another one does.
+fn lock_to_work() -> MutexGuard<'static, State> {
+    let state = lock();
+    if state.is_ending {
+        drop(state);
+        loop {
+            park();
+        }
     }
+    state
+}
+
+/// Runs `body`, which begins or completes a part of some output, unless the process is about to end.
+pub fn locked<T>(body: impl FnOnce() -> T) -> T {
+    let _state = lock_to_work();
+    body()
 }
 
 impl Unfinished {
-    /// Enters output into the list.
-    pub fn new(output: Output) -> Self {
-        let entry = Entry { output, is_live: AtomicBool::new(true), before: null_mut() };
-        let entry = Box::into_raw(Box::new(entry));
-        let link = |before: *mut Entry| {
-            // SAFETY: no one else has a pointer to the entry before it is in the list.
-            unsafe { (*entry).before = before };
-            Some(entry)
-        };
-        let _ = LATEST.fetch_update(Ordering::AcqRel, Ordering::Acquire, link);
-        // SAFETY: the entry is never freed, and never changed from here on.
-        Self(unsafe { &*entry })
+    /// Begins output.
+    ///
+    /// # Errors
+    /// With whatever `begin` returns; then it leaves nothing.
+    pub fn begin(begin: impl FnOnce() -> Result<Output, Errno>) -> Result<Self, Errno> {
+        let outputs = &mut lock_to_work().outputs;
+        let free = outputs.iter().position(Option::is_none).ok_or(Errno::MFILE)?;
+        outputs[free] = Some(begin()?);
+        Ok(Self(free))
     }
 
-    /// Removes the output, unless it is complete. Returns whether it is.
-    pub fn abandon(&self) -> bool {
-        self.0.output.abandon()
+    /// Gives the output its final name with `publish`.
+    pub fn publish(&self, publish: impl FnOnce(&Output) -> Result<(), Errno>) -> io::Result<()> {
+        let state = &mut *lock_to_work();
+        state.outputs[self.0].as_ref().map_or(Ok(()), publish)?;
+        state.is_complete = true;
+        Ok(())
+    }
+
+    /// The directory of the output.
+    pub fn dir(&self) -> io::Result<OwnedFd> {
+        lock().outputs[self.0].as_ref().ok_or(Errno::NOENT)?.dir.try_clone()
+    }
+
+    /// Keeps the output, which is complete.
+    pub fn keep(self) {
+        let state = &mut *lock_to_work();
+        state.outputs[self.0] = None;
+        state.is_complete = true;
+        std::mem::forget(self);
     }
 }
 
 impl Drop for Unfinished {
     fn drop(&mut self) {
-        self.0.is_live.store(false, Ordering::Release);
+        lock().outputs[self.0].take().iter().for_each(Output::abandon);
     }
 }
 
-/// Notes that output has its final name, from when on [`abandon_all`] removes nothing; or that another run begins.
+/// Notes that the outcome of the run is decided, or that another run begins.
 pub fn complete(is_complete: bool) {
-    IS_COMPLETE.store(is_complete, Ordering::Release);
+    lock_to_work().is_complete = is_complete;
 }
 
-/// Removes all unfinished output, the latest first. If the process `ends`, only unless some output is complete: it would end with success
-/// anyway. Returns whether some is. Async-signal-safe.
-pub fn abandon_all(ends: bool) -> bool {
-    let mut next = LATEST.load(Ordering::Acquire).cast_const();
-    let mut is_complete = ends && IS_COMPLETE.load(Ordering::Acquire);
-    // SAFETY: entries are never freed.
-    while let Some(entry) = unsafe { next.as_ref() }.filter(|_| !is_complete) {
-        is_complete = entry.is_live.load(Ordering::Acquire) && entry.output.abandon() && ends;
-        next = entry.before;
+/// Removes all unfinished output before the process ends. Removes none if some is complete and the process therefore `ends_well`; returns
+/// whether that is so.
+pub fn abandon_all(ends_well: bool) -> bool {
+    let mut state = lock();
+    let outputs = || state.outputs.iter().flatten();
+    if ends_well && (state.is_complete || outputs().any(|output| output.is_at(1))) {
+        return true;
     }
-    is_complete
+    outputs().for_each(Output::abandon);
+    state.is_ending = true;
+    false
 }
 
 impl Output {
-    /// Removes the output, unless it is complete. Returns whether it is.
-    fn abandon(&self) -> bool {
-        // SAFETY: the caller keeps the descriptor open.
-        let dir = unsafe { BorrowedFd::borrow_raw(self.dir) };
-        let [draft, name] = &self.names;
-        let remove = |name: &CStr| unlinkat(dir, name, AtFlags::empty()).is_ok();
+    /// Removes the output, unless it is complete.
+    fn abandon(&self) {
+        let remove = |name: &CStr| unlinkat(&self.dir, name, AtFlags::empty()).is_ok();
         // One process of the run succeeds: the others find the file gone.
-        let is_first = is_name_of(dir, draft, self.file) && remove(draft);
-        if !is_first && is_name_of(dir, name, self.file) {
-            return true;
+        let is_first = self.is_at(0) && remove(&self.names[0]);
+        if !is_first && self.is_at(1) {
+            return;
         }
         self.others.iter().for_each(|name| _ = remove(name));
         if let Some(path) = &self.created {
             // The last process of the run succeeds; a directory that is not empty stays.
             let _ = unlinkat(CWD, path, AtFlags::REMOVEDIR);
         }
-        false
+    }
+
+    /// Whether the file has its temporary or its final name.
+    fn is_at(&self, name: usize) -> bool {
+        let found = statat(&self.dir, &self.names[name], AtFlags::SYMLINK_NOFOLLOW);
+        found.is_ok_and(|found| (found.st_dev, found.st_ino) == self.id)
     }
 }
 
-/// Whether a name in a directory is that of an open file.
-fn is_name_of(dir: BorrowedFd, name: &CStr, file: RawFd) -> bool {
-    // SAFETY: the caller keeps the descriptor open.
-    let file = unsafe { BorrowedFd::borrow_raw(file) };
-    let found = statat(dir, name, AtFlags::SYMLINK_NOFOLLOW);
-    fstat(file).is_ok_and(|mine| {
-        found.is_ok_and(|found| (found.st_dev, found.st_ino) == (mine.st_dev, mine.st_ino))
-    })
+/// Creates a file, or opens it without `OFlags::CREATE`. Returns its device and inode as well.
+pub fn open_file(
+    dir: impl AsFd,
+    name: &CStr,
+    flags: OFlags,
+) -> Result<(OwnedFd, (u64, u64)), Errno> {
+    let always = OFlags::WRONLY | OFlags::CLOEXEC;
+    // As for any other file, the user's umask decides who may read it.
+    let file = openat(dir, name, always | flags, Mode::from(0o666))?;
+    let found = fstat(&file)?;
+    Ok((file, (found.st_dev, found.st_ino)))
+}
+
+/// Gives a file its final name, which no other file has.
+pub fn rename_to_new(dir: &OwnedFd, [from, to]: &[CString; 2]) -> Result<(), Errno> {
+    match renameat_with(dir, from, dir, to, RenameFlags::NOREPLACE) {
+        // Some network file systems cannot. The claim excludes other runs.
+        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => renameat(dir, from, dir, to),
+        result => result,
+    }
 }

@@ -1,15 +1,15 @@
 //! The plan of a run: its cells, time, memory and files, estimated before it is made; and the refusal of a run that would not fit.
 //!
-//! First the cells are estimated roughly, from the extents and areas of facets and from the volumes of boxes. A run whose memory
-//! is far from every [limit](Limit) is made without a plan. Otherwise pilot runs (`pilot`) of the same case at coarser spacings are
-//! extrapolated: two of them, of which the finer has at most a 64th of the cells. A case with few cells is its own pilot.
+//! First the cells are estimated roughly, from the areas of facets and the volumes of boxes. A run whose memory is far from every
+//! [limit](Tightest) is made without a plan. Otherwise pilot runs (`pilot`) of the same case at ever finer spacings are made, at least
+//! two, as long as they have at most a 64th of the cells, and the last two are extrapolated. A case with few cells is its own pilot.
 //!
-//! The memory of a rank is what it has resident after the pilots, with its facets, plus the growth of its sets. Nothing here is
+//! The memory of a rank is what it has resident after the pilots plus the growth of its sets. Nothing here is
 //! counted as communication of the mesher. The mesher knows nothing of its planner: [`mesh`] asks before it lets it run.
 //!
 //! Invariants of a plan, which [`Plan::check_invariants`] executes before it is returned:
-//! - it fits if and only if the tightest limit leaves what is needed; only otherwise does it name a factor, above 1, and its spacing;
-//! - pilots become finer; the last one is the run itself, with its cells, if the source is the mesh, and coarser otherwise;
+//! - it fits if and only if the tightest limit leaves what is needed; only otherwise does it name a factor, above 1;
+//! - pilots become finer; if the last one is the run itself, the cells are its cells;
 //! - each rank has an entry; times are finite; the leaf words take about 8 bytes for each cell.
 
 #![deny(missing_docs)]
@@ -17,70 +17,31 @@
 #[cfg(test)]
 #[path = "../../tests/support/cases.rs"]
 mod cases;
+mod memory;
 mod pilot;
-mod room;
-mod shared;
 #[cfg(test)]
 mod tests;
-mod text;
-mod volumes;
 
-pub use room::Limit;
-pub use shared::Tightest;
+pub use memory::Tightest;
 
-use bricks::facet::Facet;
-use bricks::octant::{Level, ROOT_EDGE, edge};
+use bricks::octant::{Level, edge};
 use bricks::tree::Tree;
+use memory::Ranks;
 use mesher::error::Error;
 use mesher::input::case::Case;
-use mesher::input::lattice::{Bounds, Rules};
+use mesher::input::lattice::Rules;
 use mesher::input::quantise::Quantised;
 use mesher::output::leaves;
-use mesher::output::report::Report;
-use mesher::output::write::Output;
+use mesher::output::report::{Report, grouped};
 use mesher::partition::area;
 use mesher::partition::cost::Counts;
 use mesher::partition::ownership::Ownership;
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
-use pilot::{Amounts, Pilots};
+use pilot::{Amounts, Boxes, Pilot};
 use ranks::{Comm, gather, uncounted};
 use serde::Serialize;
-use shared::Ranks;
-use volumes::Volumes;
-
-/// What a plan is made for.
-struct Problem<'a> {
-    /// The rules on the lattice.
-    rules: &'a Rules,
-    /// The bounds of all facets.
-    bounds: &'a Bounds,
-    /// This rank's slice of the facets.
-    facets: &'a [Facet],
-    /// The spacing at the surface that the case gives.
-    spacing_min: f64,
-    /// The parts of the boxes.
-    volumes: &'a Volumes,
-    /// CPU time of this rank so far, in seconds.
-    time_cpu_s: f64,
-    /// What is written.
-    output: Option<&'a Output>,
-    /// All ranks.
-    comm: &'a dyn Comm,
-}
-
-/// A pilot run, coarser by some levels: the amounts of this rank. Collective.
-type Pilot<'a> = &'a mut dyn FnMut(Level) -> Result<Amounts, Error>;
-
-/// The source of an estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Source {
-    /// The case was meshed.
-    Mesh,
-    /// Two pilot runs were extrapolated.
-    Pilots,
-}
+use std::fmt;
 
 /// One pilot run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -93,15 +54,12 @@ pub struct PilotEntry {
     pub time_cpu_s: f64,
 }
 
-/// An estimate of what a run takes. In JSON, under `schema`, `octree-mesher-plan/1`. The same on all ranks.
+/// An estimate of what a run takes. In JSON, under `schema`, `octree-mesher-plan/2`. The same on all ranks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     schema: &'static str,
-    program: &'static str,
     /// Number of ranks.
     pub ranks: usize,
-    /// The source of the estimate.
-    pub source: Source,
     /// The pilot runs, coarsest first.
     pub pilots: Vec<PilotEntry>,
     /// Leaves of the mesh.
@@ -110,8 +68,8 @@ pub struct Plan {
     pub time_cpu_s: f64,
     /// Peak resident memory by rank, in bytes.
     pub memory_peak_bytes: Vec<u64>,
-    /// Size of the leaf words (`--write words`) by rank, in bytes.
-    pub words_bytes: Vec<u64>,
+    /// Size of the leaf words (`--write words`) of a rank, in bytes.
+    pub words_bytes: u64,
     /// Size of the tree (`--write htg`), in bytes.
     pub tree_bytes: u64,
     /// The limit that the run comes closest to; none if nothing limits memory.
@@ -120,20 +78,18 @@ pub struct Plan {
     pub fits: bool,
     /// If it does not: the least factor, a power of two, by which all spacings must be multiplied.
     pub spacing_factor_fits: Option<f64>,
-    /// `spacing_min` times that factor.
-    pub spacing_min_fits: Option<f64>,
 }
 
 /// Cells below which a run is too small to be planned, at a byte for each: it fits wherever the program does.
 const CELLS_SMALL: f64 = 64e6;
 /// Bytes per cell of a rough estimate; a quarter of it is usual.
 const BYTES_ROUGH: f64 = 2.0;
-/// A pilot run has at most this fraction of the cells, so that two take about 2 % of the time.
+/// Part of the memory that a rough estimate of a run takes which does certainly not fit.
+const USED_UNDOUBTED: f64 = 8.0;
+/// A pilot run has at most this fraction of the cells, so that all of them take about 2 % of the time.
 const PART_OF_CELLS: f64 = 64.0;
 /// Cells of a pilot run that takes a moment, a fraction of a second.
 const CELLS_MOMENT: f64 = 8.4e6;
-/// Greatest number of cells of a pilot run: layers of many cells fill the far field, and only a large pilot shows how that grows.
-const CELLS_PILOT: f64 = 1e9;
 /// Bytes per cell of the tree's file with layers of at least four cells: the surface takes most of them, and thinner layers have fewer cells
 /// for it.
 const TREE_BYTES_PER_CELL: f64 = 0.055;
@@ -142,53 +98,18 @@ const TIMES_WRITTEN_S: [f64; 2] = [4e-9, 2.5e-9];
 /// Bytes of the header of a file of leaf words.
 const WORDS_HEADER: u64 = 128;
 
-/// Bytes that the limit on the address space leaves this process; infinite without one.
-pub fn address_space_left() -> f64 {
-    room::Room::read().address_space
+/// What a plan is made for. The functions of this type are collective.
+struct Problem<'a> {
+    rules: &'a Rules,
+    /// A rough estimate of the cells: around facets, and in boxes.
+    rough: [f64; 2],
+    /// CPU time of all ranks before the mesh, and to write a cell, in seconds.
+    times_s: [f64; 2],
+    comm: &'a dyn Comm,
 }
 
-impl<'a> Problem<'a> {
-    fn new(quantised: &'a Quantised, case: &Case, volumes: &'a Volumes, job: &Job<'a>) -> Self {
-        Self {
-            rules: &quantised.rules,
-            bounds: &quantised.bounds,
-            facets: &quantised.facets,
-            spacing_min: case.spacing_min,
-            volumes,
-            output: job.options.out.as_ref(),
-            time_cpu_s: job.record.phases().iter().map(|p| p.time_cpu_s).sum(),
-            comm: job.comm,
-        }
-    }
-
-    /// Whether the run is small for certain, from the extent of the facets alone.
-    fn is_small(&self) -> bool {
-        let h = edge(self.rules.level_surface);
-        let layers = 2.0 * (f64::from(self.rules.layer_cells_min) + 2.0);
-        let cells: f64 = (0..3)
-            .map(|a| {
-                let ends = [self.bounds.lo[a], self.bounds.hi[a]];
-                let ends = ends.map(|x| self.rules.root.quantise(a, x).clamp(0, ROOT_EDGE));
-                (ends[1] - ends[0]) as f64 / h as f64 + layers
-            })
-            .product();
-        2.0 * (cells + self.volumes.cells()) < CELLS_SMALL
-    }
-
-    /// A rough estimate of the cells, and the part of the tightest limit that their mesh takes at most. Collective.
-    fn rough(&self) -> ([f64; 2], f64) {
-        let cells = self.cells_rough();
-        let ranks = Ranks::gather(self.comm, Amounts::default(), 0);
-        (cells, used(&ranks, cells.iter().sum()))
-    }
-
-    /// A rough estimate of the cells: around facets, and in boxes. Collective.
-    fn cells_rough(&self) -> [f64; 2] {
-        let face = (edge(self.rules.level_surface) as f64).powi(2);
-        let faces = self.comm.sum((area::total(self.facets) / face) as u64) as f64;
-        [faces * area::leaves_per_surface_cell(self.rules) as f64, self.volumes.cells()]
-    }
-}
+/// Makes a pilot run that is coarser by some levels, and returns the amounts of this rank.
+type Run<'a> = &'a mut dyn FnMut(Level) -> Result<Amounts, Error>;
 
 /// Meshes a case, if it fits into memory or the user insists. Collective.
 ///
@@ -202,10 +123,12 @@ pub fn mesh(
     record: &mut Recorder,
 ) -> Result<Report, Error> {
     mesher::mesh_if(case, &mut Job::new(options, comm, record), |quantised, job| {
-        let volumes = Volumes::new(&quantised.rules.boxes);
-        let problem = Problem::new(quantised, case, &volumes, job);
-        let pilot = &mut |shift| pilot(quantised, &volumes, shift, options, comm);
-        if is_forced { Ok(()) } else { before_run(&problem, pilot) }
+        if is_forced {
+            return Ok(());
+        }
+        let boxes = Boxes::new(&quantised.rules.boxes);
+        let run = &mut |shift| pilot(quantised, &boxes, shift, options, comm);
+        uncounted(comm, || Problem::new(quantised, &boxes, job).check(run))
     })
 }
 
@@ -221,16 +144,16 @@ pub fn plan(
 ) -> Result<Plan, Error> {
     let mut job = Job::new(options, comm, record);
     let quantised = mesher::quantised(case, &mut job)?;
-    let volumes = Volumes::new(&quantised.rules.boxes);
     job.record.report_status("plan");
-    let problem = Problem::new(&quantised, case, &volumes, &job);
-    of_case(&problem, &mut |shift| pilot(&quantised, &volumes, shift, options, comm))
+    let boxes = Boxes::new(&quantised.rules.boxes);
+    let run = &mut |shift| pilot(&quantised, &boxes, shift, options, comm);
+    uncounted(comm, || Problem::new(&quantised, &boxes, &job).plan(run))
 }
 
 /// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
 fn pilot(
     quantised: &Quantised,
-    volumes: &Volumes,
+    boxes: &Boxes,
     shift: Level,
     options: &Options,
     comm: &dyn Comm,
@@ -239,15 +162,15 @@ fn pilot(
     let run = |rules: Rules| {
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, comm, &mut record);
-        let mut base = Amounts::default();
+        let mut bytes_sides = 0.0;
         let count = |tree: &Tree, ownership: &Ownership| {
-            base = pilot::of_base_tree(tree, &Counts::of_rank(tree, ownership));
+            bytes_sides = pilot::bytes_sides(tree, &Counts::of_rank(tree, ownership));
         };
         let facets = &quantised.facets[..];
         let &Quantised { bounds, counts, .. } = quantised;
         let mesh = grow(Quantised { rules, bounds, facets, counts }, job, count)?;
         let (counts, ..) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
-        Ok(pilot::of_mesh(base, &mesh, counts.total(), job, volumes))
+        Ok(pilot::amounts(bytes_sides, &mesh, counts.total(), job, boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     match run(rules.clone()) {
@@ -257,102 +180,94 @@ fn pilot(
     }
 }
 
-/// Refuses a run that would not fit. Collective.
-///
-/// # Errors
-/// If it would not; the same on all ranks.
-fn before_run(problem: &Problem, pilot: Pilot) -> Result<(), Error> {
-    if problem.is_small() {
-        return Ok(());
+impl<'a> Problem<'a> {
+    fn new(quantised: &'a Quantised, boxes: &Boxes, job: &Job<'a>) -> Self {
+        let rules = &quantised.rules;
+        let face = (edge(rules.level_surface) as f64).powi(2);
+        let faces = job.comm.sum((area::total(&quantised.facets) / face) as u64) as f64;
+        let before: f64 = job.record.phases().iter().map(|p| p.time_cpu_s).sum();
+        let written = job.options.out.as_ref().map_or([false; 2], |o| [o.words, o.tree]);
+        let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);
+        Self {
+            rules,
+            rough: [faces * area::leaves_per_surface_cell(rules) as f64, boxes.cells()],
+            times_s: [gather(job.comm, &[before]).iter().sum(), times.map(|(_, time)| time).sum()],
+            comm: job.comm,
+        }
     }
-    uncounted(problem.comm, || {
-        let (rough, used) = problem.rough();
-        if used <= 0.5 {
+
+    /// The part of the tightest limit that the run takes at most, by the rough estimate.
+    fn used_rough(&self) -> f64 {
+        let ranks = Ranks::gather(self.comm, Amounts::default());
+        let more = self.rough.iter().sum::<f64>() * BYTES_ROUGH / ranks.count() as f64;
+        let part = |t: Tightest| t.needed_bytes as f64 / (t.left_bytes as f64).max(1.0);
+        ranks.tightest(&vec![more; ranks.count()]).map_or(0.0, part)
+    }
+
+    /// Refuses a run that would not fit.
+    fn check(&self, run: Run) -> Result<(), Error> {
+        if self.rough.iter().sum::<f64>() < CELLS_SMALL || self.used_rough() <= 0.5 {
             return Ok(());
         }
-        let plan = from_pilots(problem, rough, cells_max(rough, used, 0.0), pilot)?;
+        let plan = self.plan(run)?;
         if plan.fits { Ok(()) } else { Err(plan.refusal()) }
-    })
-}
-
-/// The plan of a case, whatever it takes. Collective.
-///
-/// # Errors
-/// If a pilot run fails.
-fn of_case(problem: &Problem, pilot: Pilot) -> Result<Plan, Error> {
-    uncounted(problem.comm, || {
-        let (rough, used) = problem.rough();
-        from_pilots(problem, rough, cells_max(rough, used, CELLS_MOMENT), pilot)
-    })
-}
-
-/// The part of the tightest limit that a mesh of some cells takes at most.
-fn used(ranks: &Ranks, cells: f64) -> f64 {
-    let more = vec![cells * BYTES_ROUGH / ranks.count() as f64; ranks.count()];
-    let part = |t: Tightest| t.needed_bytes as f64 / (t.left_bytes as f64).max(1.0);
-    ranks.tightest(&more).map_or(0.0, part)
-}
-
-/// Greatest number of cells of a pilot run; `least` of them in any case. Where there is no doubt that the run does not fit, few.
-fn cells_max(rough: [f64; 2], used: f64, least: f64) -> f64 {
-    let cells: f64 = rough.iter().sum();
-    if used > 100.0 {
-        CELLS_MOMENT / 4.0
-    } else {
-        (cells / PART_OF_CELLS).max(least).min(CELLS_PILOT)
     }
-}
 
-/// Makes the pilot runs and extrapolates them. Collective.
-fn from_pilots(
-    problem: &Problem,
-    rough: [f64; 2],
-    cells_max: f64,
-    pilot: Pilot,
-) -> Result<Plan, Error> {
-    let comm = problem.comm;
-    let coarsest = problem.rules.level_deepest();
-    let rough_at =
-        |shift: Level| rough[0] / 4f64.powi(shift as i32) + rough[1] / 8f64.powi(shift as i32);
-    let mut runs: Vec<(Level, Ranks)> = Vec::new();
-    let mut run = |shift: Level| {
-        runs.push((shift, Ranks::gather(comm, pilot(shift)?, problem.facets.len())));
-        Ok::<_, Error>(extrapolation(&runs, rough[1]))
-    };
-    let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
-    let mut pilots = run(first)?;
-    if first > 0 {
-        let last = (0..first).find(|&s| pilots.at(s).cells <= cells_max).unwrap_or(first - 1);
-        if 0 < last && last + 1 < first {
-            run(last + 1)?;
+    /// Makes the pilot runs and extrapolates them.
+    fn plan(&self, run: Run) -> Result<Plan, Error> {
+        let coarsest = self.rules.level_deepest();
+        let [rough, rough_boxed] = self.rough;
+        let rough_at =
+            |shift: Level| rough / 4f64.powi(shift as i32) + rough_boxed / 8f64.powi(shift as i32);
+        // Without doubt that the run does not fit, its pilots are short.
+        let doubted = if self.used_rough() > USED_UNDOUBTED { 0.0 } else { rough_at(0) };
+        let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT);
+        let first = (0..coarsest).find(|&s| rough_at(s) <= cells_max / 4.0).unwrap_or(coarsest);
+        let mut pilots = Vec::new();
+        let mut coarser = None;
+        for shift in (0..=first).rev() {
+            let ranks = Ranks::gather(self.comm, run(shift)?);
+            let amounts = ranks.total();
+            pilots.push(PilotEntry {
+                spacing_factor: factor(shift),
+                cells: amounts.cells as u64,
+                time_cpu_s: amounts.time_cpu_s(),
+            });
+            let pilot = Pilot { shift, amounts, coarser, cells_boxed: rough_boxed };
+            let is_last = coarser.is_some() && pilot.at(shift - shift.min(1)).cells > cells_max;
+            if shift == 0 || is_last {
+                return Ok(self.plan_of(pilots, &pilot, &ranks));
+            }
+            coarser = Some(amounts);
         }
-        pilots = run(last)?;
+        unreachable!("the last pilot is the run itself")
     }
-    let entry = |(shift, ranks): &(Level, Ranks)| {
-        let total = ranks.total();
-        let (cells, time_cpu_s) = (total.cells as u64, total.time_cpu_s());
-        PilotEntry { spacing_factor: factor(*shift), cells, time_cpu_s }
-    };
-    let entries = runs.iter().map(entry).collect();
-    let (finest, ranks) = runs.pop().expect("a pilot was run");
-    let source = if finest == 0 { Source::Mesh } else { Source::Pilots };
-    let at = |shift| Plan::new(source, &ranks, pilots.at(shift), ranks.growth(&pilots.at(shift)));
-    let before: f64 = gather(comm, &[problem.time_cpu_s]).into_iter().sum();
-    let mut plan = at(0);
-    plan.pilots = entries;
-    let thin = f64::max(4.0 / f64::from(problem.rules.layer_cells_min), 1.0);
-    plan.tree_bytes = (plan.tree_bytes as f64 * thin) as u64;
-    let written = |o: &Output| [o.words, o.tree].map(|is| f64::from(u8::from(is)));
-    let written = problem.output.map_or([0.0; 2], written);
-    let per_cell: f64 = written.iter().zip(TIMES_WRITTEN_S).map(|(is, time)| is * time).sum();
-    plan.time_cpu_s = before + pilots.at(0).time_cpu_s() + per_cell * pilots.at(0).cells;
-    plan.check_invariants();
-    if !plan.fits {
-        let fitting = (1..=coarsest).find(|&shift| at(shift).fits).map(factor);
-        plan.spacing_factor_fits = fitting;
-        plan.spacing_min_fits = fitting.map(|factor| factor * problem.spacing_min);
+
+    /// The plan that the last pilot run results in.
+    fn plan_of(&self, pilots: Vec<PilotEntry>, pilot: &Pilot, ranks: &Ranks) -> Plan {
+        let tightest_at = |shift| ranks.tightest(&ranks.growth(&pilot.at(shift)));
+        let fits = |tightest: Option<Tightest>| tightest.is_none_or(|t| t.fits());
+        let Amounts { cells, .. } = pilot.at(0);
+        let tightest = tightest_at(0);
+        let fitting = || (1..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
+        let thin = f64::max(4.0 / f64::from(self.rules.layer_cells_min), 1.0);
+        let [before, written] = self.times_s;
+        let plan = Plan {
+            schema: "octree-mesher-plan/2",
+            ranks: ranks.count(),
+            pilots,
+            cells: cells as u64,
+            time_cpu_s: before + pilot.at(0).time_cpu_s() + written * cells,
+            memory_peak_bytes: ranks.peaks(&ranks.growth(&pilot.at(0))),
+            words_bytes: (cells / ranks.count() as f64 * 8.0) as u64 + WORDS_HEADER,
+            tree_bytes: (cells * TREE_BYTES_PER_CELL * thin) as u64,
+            tightest,
+            fits: fits(tightest),
+            spacing_factor_fits: if fits(tightest) { None } else { fitting().map(factor) },
+        };
+        plan.check_invariants();
+        plan
     }
-    Ok(plan)
 }
 
 /// The factor between spacings that are some levels apart.
@@ -360,57 +275,85 @@ fn factor(shift: Level) -> f64 {
     2f64.powi(shift as i32)
 }
 
-/// The last two of some pilot runs.
-fn extrapolation(runs: &[(Level, Ranks)], cells_boxed: f64) -> Pilots {
-    let mut latest = runs.iter().rev().map(|(shift, ranks)| (*shift, ranks.total()));
-    let fine = latest.next().expect("a pilot was run");
-    Pilots { fine, coarse: latest.next(), cells_boxed }
-}
-
 impl Plan {
     /// # Panics
     /// If an invariant at the head of this file is violated.
     pub fn check_invariants(&self) {
-        let lists = [&self.memory_peak_bytes, &self.words_bytes];
-        assert!(lists.iter().all(|l| l.len() == self.ranks), "an entry for each rank");
-        let words: u64 = self.words_bytes.iter().sum();
+        assert_eq!(self.memory_peak_bytes.len(), self.ranks, "an entry for each rank");
+        let words = self.words_bytes * self.ranks as u64;
         assert!(words / 8 >= self.cells / 2, "{words} bytes of words for {} cells", self.cells);
-        let fits = self.tightest.is_none_or(|t| t.needed_bytes <= t.left_bytes);
+        let fits = self.tightest.is_none_or(|t| t.fits());
         assert_eq!(self.fits, fits, "the tightest limit must decide: {:?}", self.tightest);
         let factor = self.spacing_factor_fits;
-        assert_eq!(factor.is_some(), self.spacing_min_fits.is_some(), "a factor and its spacing");
         assert!(factor.is_none_or(|f| !fits && f > 1.0), "{factor:?} for a plan that fits");
         let time = self.time_cpu_s;
         assert!(time.is_finite() && time >= 0.0, "{time} s of CPU time");
         let factors = |p: &[PilotEntry]| p[0].spacing_factor > p[1].spacing_factor;
         assert!(self.pilots.windows(2).all(factors), "pilots must become finer");
-        let last = self.pilots.last().map(|p| (p.spacing_factor == 1.0, p.cells));
-        match self.source {
-            Source::Pilots => assert!(last.is_some_and(|l| !l.0), "a pilot must be coarser"),
-            Source::Mesh => assert_eq!(last, Some((true, self.cells)), "the run is its own plan"),
-        }
+        let last = self.pilots.last().expect("a pilot");
+        let is_own = last.spacing_factor > 1.0 || last.cells == self.cells;
+        assert!(is_own, "the run is its own plan: {last:?}");
     }
 
-    /// The plan of a mesh with these amounts, for which each rank takes as many bytes as given beyond what it has.
-    fn new(source: Source, ranks: &Ranks, amounts: Amounts, more: Vec<f64>) -> Self {
-        let count = ranks.count();
-        let tightest = ranks.tightest(&more);
-        let words = (amounts.cells / count as f64 * 8.0) as u64 + WORDS_HEADER;
-        Self {
-            schema: "octree-mesher-plan/1",
-            program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
-            ranks: count,
-            source,
-            pilots: Vec::new(),
-            cells: amounts.cells as u64,
-            time_cpu_s: 0.0,
-            memory_peak_bytes: ranks.peaks(&more),
-            words_bytes: vec![words; count],
-            tree_bytes: (amounts.cells * TREE_BYTES_PER_CELL) as u64,
-            tightest,
-            fits: tightest.is_none_or(|t| t.needed_bytes <= t.left_bytes),
-            spacing_factor_fits: None,
-            spacing_min_fits: None,
+    /// The error that refuses a run that does not fit.
+    pub fn refusal(&self) -> Error {
+        let Tightest { limit, left_bytes, needed_bytes } =
+            self.tightest.expect("a limit that does not suffice");
+        let fitting = match self.spacing_factor_fits {
+            Some(factor) => format!("multiply all spacings by {factor}, which fits"),
+            None => "no spacing of this case fits".into(),
+        };
+        Error::memory(format!(
+            "the mesh would have {} cells and need {} of memory, but the {limit} has {} left: {fitting}, use more machines, or try with \
+             --force",
+            self.about(),
+            bytes(needed_bytes),
+            bytes(left_bytes),
+        ))
+    }
+
+    /// The number of cells, to the precision of its source.
+    fn about(&self) -> String {
+        match self.pilots.last() {
+            Some(last) if last.spacing_factor > 1.0 => format!("about {:.1e}", self.cells as f64),
+            _ => grouped(self.cells),
         }
     }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for p in &self.pilots {
+            let (factor, cells) = (p.spacing_factor, grouped(p.cells));
+            writeln!(
+                f,
+                "pilot          {factor} times the spacings: {cells} cells, {:.2} s of CPU time",
+                p.time_cpu_s
+            )?;
+        }
+        writeln!(f, "cells          {}", self.about())?;
+        writeln!(f, "time           {:.2} s of CPU time over all ranks", self.time_cpu_s)?;
+        let peaks = &self.memory_peak_bytes;
+        let [all, most] = [peaks.iter().sum(), peaks.iter().copied().max().unwrap_or(0)].map(bytes);
+        writeln!(f, "peak memory    {all} over all ranks, {most} on a rank at most")?;
+        let [words, tree] = [self.words_bytes, self.tree_bytes].map(bytes);
+        writeln!(f, "files          leaf words of {words} per rank; or a tree of {tree}")?;
+        match self.tightest {
+            None => write!(f, "fits           no limit is known"),
+            Some(Tightest { limit, left_bytes, needed_bytes }) => {
+                let fits = if self.fits { "yes" } else { "no" };
+                let [needed, left] = [needed_bytes, left_bytes].map(bytes);
+                write!(f, "fits           {fits}: needs {needed} more, the {limit} has {left} left")
+            }
+        }
+    }
+}
+
+/// A number of bytes with three digits.
+fn bytes(n: u64) -> String {
+    let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
+    let power = n.max(1).ilog10() / 3;
+    let value = n as f64 / 1000f64.powi(power as i32);
+    let digits = usize::from(power > 0 && value < 100.0);
+    format!("{value:.digits$} {}", units[power as usize])
 }

@@ -107,47 +107,15 @@ impl File {
     }
 }
 
-/// One sentence about a malformed case file. Suggests the nearest known key for an unknown one.
+/// One sentence about a malformed case file, with the line.
 fn explain(text: &str, e: &toml::de::Error) -> String {
-    let begin = e.span().map_or(0, |s| text[..s.start].rfind('\n').map_or(0, |at| at + 1));
-    let line = format!("line {}", text[..begin].matches('\n').count() + 1);
+    let before = e.span().map_or("", |s| &text[..s.start]);
     let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let nearest = message.starts_with("unknown field").then(|| {
-        let wrong = quoted.next().unwrap_or_default();
-        quoted
-            .max_by(|a, b| {
-                strsim::jaro_winkler(a, wrong).total_cmp(&strsim::jaro_winkler(b, wrong))
-            })
-            .map(|known| (wrong, known))
-    });
-    match nearest.flatten() {
-        Some((wrong, known)) => {
-            format!("{line}: unknown key \"{wrong}\": did you mean \"{known}\"?")
-        }
+    match before.matches('\n').count() {
         // Of the file as a whole.
-        None if begin == 0 && message.starts_with("missing") => message,
-        None => format!("{line}{}: {message}{}", key(&text[begin..]), advice(&text[begin..])),
+        0 if message.starts_with("missing") => message,
+        lines => format!("line {}: {message}", lines + 1),
     }
-}
-
-/// The way to write the path if a text begins with the key of one, as part of a message: double quotes make a backslash special.
-fn advice(text: &str) -> &'static str {
-    match text.lines().next().and_then(|line| line.split_once('=')) {
-        Some((key, value)) if key.trim() == "geometry" && !value.trim().starts_with('\'') => {
-            ": put the path in single quotes, geometry = 'DIRECTORY/FILE.stl'"
-        }
-        _ => "",
-    }
-}
-
-/// The key or table at the beginning of a text, as part of a message; nothing if there is none.
-fn key(text: &str) -> String {
-    let line = text.lines().next().unwrap_or_default();
-    let key = line.split('=').next().unwrap_or_default().trim();
-    let is_part = |c: char| c.is_alphanumeric() || "_-.[]\"".contains(c);
-    let is_key = !key.is_empty() && key.chars().all(is_part);
-    if is_key { format!(", {key}") } else { String::new() }
 }
 
 #[cfg(test)]
@@ -172,11 +140,11 @@ mod tests {
         for (text, expected) in [
             (
                 "geometry = \"a.stl\"\nspacing_mim = 0.5\n",
-                "line 2: unknown key \"spacing_mim\": did you mean \"spacing_min\"?",
+                "line 2: unknown field `spacing_mim`, expected one of `geometry`, `generator`, `spacing_min`",
             ),
             (
                 "geometry = \"a.stl\"\nspacing_min = 1\n[[box]]\nmin = [0,0,0]\nmax = [1,1,1]\nspacing = 1\nlevel = 3\n",
-                "unknown key \"level\"",
+                "line 7: unknown field `level`",
             ),
             ("spacing_min = 0.5\n", "no geometry"),
             ("geometry = \"a.stl\"\n", "spacing_min"),
@@ -191,13 +159,13 @@ mod tests {
             ),
             (
                 "geometry = \"a.stl\"\nspacing_min = 0.5\n[root]\norigin = [0,0,0]\n",
-                "line 3, [root]: missing field `edge`",
+                "line 3: missing field `edge`",
             ),
             ("geometry = ", "line 1"),
-            ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1, geometry: invalid type: map"),
-            (r#"geometry = "C:\Users\me\a.stl""#, "put the path in single quotes"),
-            ("geometry = a/b.stl", "put the path in single quotes"),
-            ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2, [spacing_min]: "),
+            ("geometry = { a = 1 }\nspacing_min = 1\n", "line 1: invalid type: map"),
+            (r#"geometry = "C:\Users\me\a.stl""#, "line 1: "),
+            ("geometry = a/b.stl", "line 1: "),
+            ("geometry = \"a.stl\"\n[spacing_min]\na = 1\n", "line 2: "),
         ] {
             let e = parsed(text).unwrap_err();
             assert!(e.contains(expected), "{e}");

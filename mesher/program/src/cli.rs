@@ -1,7 +1,6 @@
 //! The command line, and the case that it describes.
 
 use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
-use clap_complete::Shell;
 use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
@@ -14,7 +13,6 @@ use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
-use std::time::Duration;
 
 /// Exit code of a run whose text could not be printed.
 pub const UNPRINTED: i32 = 4;
@@ -23,7 +21,7 @@ pub const UNPRINTED: i32 = 4;
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
-/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
+/// mesh would not fit into memory or memory ran out, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
@@ -68,9 +66,6 @@ pub struct Args {
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
-    /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub stall_limit: Option<Duration>,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -164,26 +159,20 @@ fn level_base(s: &str) -> Result<LevelBase, String> {
     }
 }
 
-fn seconds(s: &str) -> Result<Duration, String> {
-    let limit = s.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
-    limit.filter(|l| !l.is_zero()).ok_or_else(|| "give a positive number of seconds".into())
-}
-
 fn comm_choice(s: &str) -> Result<CommChoice, String> {
-    let mut words = s.split(':');
-    let choice = match (words.next(), words.next(), words.next()) {
-        (Some("auto"), None, None) => Some(CommChoice::Auto),
-        (Some("solo"), None, None) => Some(CommChoice::Solo),
-        (Some("mpi"), None, None) => Some(CommChoice::Mpi),
-        (Some("sim"), Some(ranks), seed) => (|| {
-            let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
-            Some(CommChoice::Sim { ranks, seed: seed.unwrap_or("1").parse().ok()? })
-        })(),
+    let sim = |ranks: &str, seed: &str| {
+        let ranks = ranks.parse().ok().filter(|r| (1..=4096).contains(r))?;
+        Some(CommChoice::Sim { ranks, seed: seed.parse().ok()? })
+    };
+    let choice = match s.split(':').collect::<Vec<_>>()[..] {
+        ["auto"] => Some(CommChoice::Auto),
+        ["solo"] => Some(CommChoice::Solo),
+        ["mpi"] => Some(CommChoice::Mpi),
+        ["sim", ranks] => sim(ranks, "1"),
+        ["sim", ranks, seed] => sim(ranks, seed),
         _ => None,
     };
-    choice
-        .filter(|_| words.next().is_none())
-        .ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
+    choice.ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
 }
 
 fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
@@ -194,30 +183,14 @@ fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The definition of the command line, with the options that print something and exit.
+/// The definition of the command line.
 fn command() -> Command {
-    let prints = |name| {
-        Arg::new(name).long(name).exclusive(true).help_heading("Options that print and exit")
-    };
-    Args::command()
-        .arg(
-            prints("completions")
-                .value_name("SHELL")
-                .value_parser(value_parser!(Shell))
-                .help("Print the completion script for a shell"),
-        )
-        .arg(prints("man").action(ArgAction::SetTrue).help("Print the man page, in roff"))
-        .arg(
-            Arg::new("serve")
-                .long("serve")
-                .exclusive(true)
-                .action(ArgAction::SetTrue)
-                .help("Run the command lines on standard input: spares the start of MPI")
-                .long_help(
-                    "Run one command line after another: each is a line of standard input, a JSON array of the words after the program's \
-                     name, and answered by its exit code on a line of standard output",
-                ),
-        )
+    Args::command().arg(
+        Arg::new("serve").long("serve").exclusive(true).action(ArgAction::SetTrue).help(
+            "Run one command line after another, which spares the start of MPI: each is a line of standard input, a JSON array of the \
+             words after the program's name, and answered by its exit code on a line of standard output",
+        ),
+    )
 }
 
 /// What the command line asks for.
@@ -228,8 +201,7 @@ pub enum Asked {
     Serve,
 }
 
-/// The command line. Help, version, completions and the man page are printed here, on the first rank of a job, and end the
-/// process.
+/// The command line. Help and version are printed here, on the first rank of a job, and end the process.
 ///
 /// # Errors
 /// In one sentence, as all other errors.
@@ -237,17 +209,6 @@ pub fn parse<W: Into<OsString> + Clone>(
     words: impl IntoIterator<Item = W>,
 ) -> Result<Asked, Error> {
     let parsed = command().try_get_matches_from(words).and_then(|mut m| {
-        if let Some(&shell) = m.get_one::<Shell>("completions") {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut command(), "mesher", &mut script);
-            print_and_exit(|| io::stdout().write_all(&script));
-        }
-        if m.get_flag("man") {
-            let mut page = Vec::new();
-            let rendered = clap_mangen::Man::new(command()).render(&mut page);
-            rendered.expect("memory can be written to");
-            print_and_exit(|| io::stdout().write_all(&page));
-        }
         if m.get_flag("serve") {
             return Ok(Asked::Serve);
         }
@@ -255,7 +216,12 @@ pub fn parse<W: Into<OsString> + Clone>(
     });
     parsed.map_err(|e| {
         if !e.use_stderr() {
-            print_and_exit(|| e.print());
+            let print = || e.print().and_then(|()| io::stdout().flush());
+            match launch::is_first().then(print).transpose() {
+                // A closed pipe is no reason to fail.
+                Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
+                _ => exit(0),
+            }
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
@@ -266,15 +232,6 @@ pub fn parse<W: Into<OsString> + Clone>(
         let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
         Error::input(format!("{sentence}; see --help"))
     })
-}
-
-fn print_and_exit(print: impl FnOnce() -> io::Result<()>) -> ! {
-    let print = || print().and_then(|()| io::stdout().flush());
-    match launch::is_first().then(print).transpose() {
-        // A closed pipe is no reason to fail.
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => exit(UNPRINTED),
-        _ => exit(0),
-    }
 }
 
 /// How to divide the work among ranks.

@@ -3,8 +3,6 @@
 #![deny(missing_docs)]
 
 mod cli;
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
-mod heap;
 
 use cli::{Args, Asked, CommChoice, UNPRINTED, case, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
@@ -13,19 +11,19 @@ use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
-use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
+use ranks::{Comm, Solo, agree, launch, sim, text_of_first, uncounted};
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
-use std::thread::sleep;
 use std::time::Duration;
 
 #[global_allocator]
 static HEAP: Heap = Heap {
     program: "mesher",
     advice: "choose a larger spacing (--plan estimates what fits) or use more machines",
+    end: launch::abort,
 };
 
 /// Time that an interrupted rank of a job lives on. When one rank has ended, launchers kill the others at once, which must have removed
@@ -34,7 +32,7 @@ const LINGER: Duration = Duration::from_millis(300);
 
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    heap::fix_thresholds();
+    fix_heap();
     let asked = parse(std::env::args_os());
     let message = match (launch::is_first(), stderr().is_terminal()) {
         (false, _) => "",
@@ -64,6 +62,22 @@ fn main() {
     }
 }
 
+/// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
+/// their own, which are returned to the system when freed: on a rank of a large mesh, all large sets; with 940 M cells on one rank glibc
+/// would keep a tenth of the memory unused. The second is what the heap keeps at its end: with many ranks the sets are in the heap, which
+/// needs as much again in every phase (a page fault takes 2 us on a virtual machine). The thread that handles signals needs no heap of its
+/// own, which would take 64 MiB of address space.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn fix_heap() {
+    use libc::{M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
+    for (parameter, value) in
+        [(M_MMAP_THRESHOLD, 4 << 20), (M_TRIM_THRESHOLD, 64 << 20), (M_ARENA_MAX, 1)]
+    {
+        // SAFETY: `mallopt` only sets a number, under the lock of the heap; any size is valid.
+        unsafe { libc::mallopt(parameter, value) };
+    }
+}
+
 /// Resolves `auto` by the launcher's environment.
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     match asked {
@@ -82,31 +96,10 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
-/// Time for rank 0 to end the job.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
-const ADDRESS_SPACE_MPI: f64 = 384e6;
-
 fn run_mpi(asked: &Result<Asked, Error>) {
-    let left = planner::address_space_left();
-    if left < ADDRESS_SPACE_MPI {
-        let e = Error::memory(format!(
-            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
-            left / 1e6,
-            (ADDRESS_SPACE_MPI - left) / 1e6
-        ));
-        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
-        if !launch::is_first() {
-            sleep(PATIENCE);
-        }
-        exit(fail(&e, true));
-    }
-    // The threads that MPI starts block signals for ever: this thread creates files, so its handler alone knows all of them.
-    let comm = interrupt::uninterrupted(launch::join);
+    let comm = launch::join();
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| launch::abort(BUG));
-    files::ends_with(launch::abort);
     let code = match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
         Err(e) => fail(&Error::Input(e), launch::is_first()),
@@ -233,38 +226,33 @@ fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
     let words: Vec<String> = serde_json::from_str(line)
         .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
     // These would end the service.
-    let prints = |w: &String| ["-h", "--help", "-V", "--version", "--man"].contains(&w.as_str());
-    let of_job = "a run of a service has no --help, --version, --man, --completions, --serve, --stall-limit, and no --comm but that of the job";
-    if words.iter().any(|w| prints(w) || w.starts_with("--completions")) {
-        return Err(Error::input(of_job));
+    let prints = |w: &String| ["-h", "--help", "-V", "--version"].contains(&w.as_str());
+    let of_job = || {
+        Error::input(
+            "a run of a service has no --help, --version or --serve, and no --comm but that of the job",
+        )
+    };
+    if words.iter().any(prints) {
+        return Err(of_job());
     }
     match parse(std::iter::once("mesher".to_owned()).chain(words))? {
-        Asked::Run(mut args) if args.stall_limit.is_none() && args.comm.is_of(comm.size()) => {
+        Asked::Run(mut args) if args.comm.is_of(comm.size()) => {
             args.quiet = true;
             Ok(*args)
         }
-        _ => Err(Error::input(of_job)),
+        _ => Err(of_job()),
     }
 }
 
 /// One rank's run; returns the exit code, the same on all ranks. Collective.
 fn run(args: &Args, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
-    if let Some(limit) = args.stall_limit {
-        comm.limit_calls(limit);
-    }
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(progress);
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
-    if let Some(limit) = args.stall_limit {
-        comm.enter("done");
-        interrupt::stop_at(format_args!("done:{}", comm.rank()));
-        comm.barrier();
-        end_within(limit);
-    }
     interrupt::stop_at(format_args!("end:{}", comm.rank()));
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
@@ -277,20 +265,6 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
         (0, Some(refusal)) => fail(&refusal, first),
         (code, _) => code,
     }
-}
-
-/// Ends the process if it has not ended within the limit: MPI's own end waits for all ranks, without limit.
-fn end_within(limit: Duration) {
-    let end = move || {
-        sleep(limit);
-        complain(&format_args!(
-            "mesher: the run is complete, but another rank has not ended for {} s: look at it with a debugger",
-            limit.as_secs_f64()
-        ));
-        // What the process runs at its exit may wait for that rank as well.
-        interrupt::exit_at_once(STALLED);
-    };
-    let _ = std::thread::Builder::new().spawn(end);
 }
 
 /// Makes the geometry known as an input: no output of the run may be that file.

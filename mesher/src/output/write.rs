@@ -7,7 +7,7 @@
 //! - after an error or an interrupt, none of the mesh's files remains.
 
 use crate::error::Error;
-use files::{Claim, ClaimError, Draft};
+use files::{Claim, Draft};
 use ranks::{Comm, agree};
 use serde::Serialize;
 use std::fmt::Display;
@@ -77,9 +77,11 @@ impl OutDir {
         let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
         let created = agree(
             comm,
-            created.map_err(|e| match e {
-                ClaimError::Io(e) => output(path, e),
-                taken => Error::input(format!("{}: {taken}: choose another --out", path.display())),
+            created.map_err(|e| match e.kind() {
+                ErrorKind::DirectoryNotEmpty => {
+                    Error::input(format!("{}: {e}: choose another --out", path.display()))
+                }
+                _ => output(path, e),
             }),
         )?;
         let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));

@@ -8,7 +8,7 @@
 use crate::partition::cost::{WEIGHT_OF_NEIGHBOUR, weight_of_brick};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, brick_start};
-use bricks::brick;
+use bricks::brick::{self, Brick};
 use bricks::brickset::{BrickSet, ones};
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree};
@@ -110,9 +110,17 @@ impl<'a> Loads<'a> {
     fn add_octants(&mut self, l: Level, set: &BrickSet, each: i64) {
         let owns = |key| self.ownership.owns(l, key);
         if let Some(up) = l.checked_sub(self.level + 2) {
-            // The bricks of one bin have one owner.
-            for (key, bricks) in set.groups(3 * up).filter(|(key, _)| owns(*key)) {
-                self.add(brick_start(l, key), each * set.count_in(bricks) as i64);
+            let mut bricks = set.bricks().peekable();
+            while let Some(first) = bricks.next() {
+                let bin = |b: &Brick| b.key >> (3 * up);
+                let mut octants = i64::from(first.bits.count_ones());
+                while let Some(b) = bricks.next_if(|b| bin(b) == bin(&first)) {
+                    octants += i64::from(b.bits.count_ones());
+                }
+                // The bricks of one bin have one owner.
+                if owns(first.key) {
+                    self.add(brick_start(l, first.key), each * octants);
+                }
             }
             return;
         }

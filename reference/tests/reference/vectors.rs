@@ -3,7 +3,7 @@ use crate::support;
 use reference::lattice::{Facet, Input};
 use reference::leaves::{Tally, digest_of_facets, hex};
 use reference::octant::Octant;
-use reference::{BoxSpec, Case, Error, Root, Side, digest, mix};
+use reference::{BoxSpec, Case, Root, Side, digest, mix};
 use serde_json::Value;
 
 fn cases(name: &str) -> Vec<Value> {
@@ -91,7 +91,9 @@ fn levels_of_spacings_agree_with_the_vectors() {
         let found = Input::new(&Case { spacing_min, ..empty([0.0; 3], edge) });
         match case["level"].as_u64() {
             Some(level) => assert_eq!(u64::from(found.unwrap().level_surface), level),
-            None => assert!(matches!(found, Err(Error::SpacingTooFine { .. }))),
+            None => {
+                assert!(found.unwrap_err().to_string().contains("the cell edge at the deepest"))
+            }
         }
     }
 }
@@ -115,7 +117,8 @@ fn quantised_vertices_agree_with_the_vectors() {
         let found =
             Input::new(&Case { facets, ..empty(point(&case["origin"]), number(&case["edge"])) });
         if case["lattice"].is_null() {
-            assert!(matches!(found, Err(Error::VertexOutside { facet: 0, .. })));
+            let why = found.unwrap_err().to_string();
+            assert!(why.starts_with("facet 0 ") && why.contains("outside the root"), "{why}");
         } else {
             assert_eq!(found.unwrap().facets[0][0], lattice_point(&case["lattice"]));
         }

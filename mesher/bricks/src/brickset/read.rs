@@ -1,8 +1,7 @@
-//! Readers of a set: bricks, groups of bricks, bricks of the children, and lookups by ascending keys.
+//! Readers of a set: bricks, and lookups by ascending keys.
 
 use super::{BrickSet, Run, high_of};
-use crate::brick::{self, Brick};
-use std::ops::Range;
+use crate::brick::Brick;
 
 /// The bricks of a set in order.
 #[derive(Clone)]
@@ -40,33 +39,6 @@ impl Iterator for Bricks<'_> {
     }
 }
 
-/// See [`BrickSet::groups`].
-pub struct Groups<'a> {
-    bricks: Bricks<'a>,
-    shift: u32,
-}
-
-impl<'a> Groups<'a> {
-    pub(super) fn new(set: &'a BrickSet, shift: u32) -> Self {
-        Self { bricks: set.bricks(), shift }
-    }
-}
-
-impl Iterator for Groups<'_> {
-    /// The first brick's key, and the positions of all bricks.
-    type Item = (u64, Range<usize>);
-
-    #[inline]
-    fn next(&mut self) -> Option<Self::Item> {
-        let first = self.bricks.next()?;
-        let Bricks { set, at, run_end, .. } = self.bricks;
-        let group = |low: u32| low.checked_shr(self.shift).unwrap_or(0);
-        let more = leading(&set.low[at..run_end], |low| group(low) == group(first.key as u32));
-        self.bricks.at += more;
-        Some((first.key, at - 1..at + more))
-    }
-}
-
 /// Number of elements before the first one for which `leads` is false. Galloping search: fast if that one is
 /// near.
 #[inline]
@@ -77,38 +49,6 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
     }
     let near = &low[step / 2..low.len().min(step)];
     step / 2 + near.partition_point(|&low| leads(low))
-}
-
-/// See [`BrickSet::child_bricks`].
-#[derive(Clone)]
-pub struct ChildBricks<'a> {
-    bricks: Bricks<'a>,
-    now: Brick,
-    /// Sibling groups of the brick that remain.
-    left: u8,
-}
-
-impl<'a> ChildBricks<'a> {
-    #[inline]
-    pub(super) fn new(set: &'a BrickSet) -> Self {
-        Self { bricks: set.bricks(), now: Brick { key: 0, bits: 0 }, left: 0 }
-    }
-}
-
-impl Iterator for ChildBricks<'_> {
-    type Item = Brick;
-
-    #[inline]
-    fn next(&mut self) -> Option<Brick> {
-        if self.left == 0 {
-            self.now = self.bricks.next()?;
-            self.left = brick::parents(self.now.bits);
-        }
-        let j = u64::from(self.left.trailing_zeros());
-        self.left &= self.left - 1;
-        let bits = brick::children(brick::byte(self.now.bits, j));
-        Some(Brick { key: self.now.key << 3 | j, bits })
-    }
 }
 
 /// Reads a set in ascending order of keys; see [`BrickSet::cursor`].

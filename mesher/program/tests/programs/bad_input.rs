@@ -188,17 +188,20 @@ fn case_files_with_mistakes_are_refused() {
     for (text, words) in [
         (
             "geometry = \"body.stl\"\nspacing_mim = 0.5\n",
-            &["line 2", "spacing_mim", "\"spacing_min\"?"][..],
+            &["line 2", "spacing_mim", "`spacing_min`"][..],
         ),
-        (&format!("{GOOD}layers_min = 3\n"), &["line 3", "layers_min", "\"layer_cells_min\"?"]),
-        (&format!("{GOOD}keep_crosing = true\n"), &["\"keep_crossing\"?"]),
-        (&format!("{GOOD}[[boxes]]\nmin = [0,0,0]\n"), &["line 3", "boxes", "\"box\"?"]),
-        (&format!("{GOOD}[root]\norigin = [0.0, 0.0, 0.0]\nedges = 1.0\n"), &["\"edge\"?"]),
+        (&format!("{GOOD}layers_min = 3\n"), &["line 3", "layers_min", "`layer_cells_min`"]),
+        (&format!("{GOOD}keep_crosing = true\n"), &["keep_crosing", "`keep_crossing`"]),
+        (&format!("{GOOD}[[boxes]]\nmin = [0,0,0]\n"), &["line 3", "boxes", "`box`"]),
+        (&format!("{GOOD}[root]\norigin = [0.0, 0.0, 0.0]\nedges = 1.0\n"), &["edges", "`edge`"]),
         (
             &format!("{GOOD}[[box]]\nmin = [0.0,0.0,0.0]\nmax = [1.0,1.0,1.0]\nspacings = 1.0\n"),
-            &["line 6", "\"spacing\"?"],
+            &["line 6", "spacings", "`spacing`"],
         ),
-        ("spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacet = 80\n", &["\"facets\"?"]),
+        (
+            "spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacet = 80\n",
+            &["facet", "`facets`"],
+        ),
         ("spacing_min = 0.5\n[generator]\nshape = \"spere\"\nfacets = 80\n", &["spere"]),
         ("spacing_min = 0.5\n[generator]\nshape = \"sphere\"\nfacets = 0\n", &["generator"]),
         ("spacing_min = 0.5\n", &["no geometry"]),

@@ -226,7 +226,7 @@ fn a_full_device_is_an_error_of_output() {
         (format!("{body} --json full > null"), OUTPUT),
         (format!("{body} --json null > null"), 0),
         ("--help > full".to_owned(), OUTPUT),
-        ("--man > full".to_owned(), OUTPUT),
+        ("--help > full".to_owned(), OUTPUT),
         (format!("{warned} > null 2> full"), OUTPUT),
         ("absent.stl --spacing-min 0.5 2> full".to_owned(), INPUT),
         (format!("{body} | true"), 0),

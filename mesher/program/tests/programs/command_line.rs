@@ -17,7 +17,7 @@ fn help_is_printed_once_per_job() {
     let workspace = Workspace::new();
     for launcher in ["OMPI_COMM_WORLD", "PMI", "PMIX"] {
         for (rank, is_printed) in [(0, true), (1, false), (2, false)] {
-            for option in ["--help", "--version", "--man", "--completions=bash"] {
+            for option in ["--help", "--version"] {
                 let finished = run_as_rank(&workspace, &[option], launcher, rank);
                 finished.succeeds();
                 assert_eq!(!finished.stdout.is_empty(), is_printed, "{launcher} {rank} {option}");
@@ -105,25 +105,6 @@ fn the_version_has_the_commit_of_the_work_tree() {
     let is_tag_or_hash = |c: &str| is_hash(c.trim_end_matches("-dirty")) || c.contains("-g");
     // Sources without git have no commit.
     assert!(rest.is_empty() || commit.is_some_and(is_tag_or_hash), "{finished:?}");
-}
-
-#[test]
-fn completions_and_man_page_have_all_options() {
-    let workspace = Workspace::new();
-    let shown = run(workspace.mesher(&["--help"])).stdout;
-    let words = shown.split_whitespace().map(|w| w.trim_end_matches(','));
-    let options: Vec<&str> = words.filter(|w| w.starts_with("--") && w.len() > 3).collect();
-    assert!(options.len() > 15, "{options:?}");
-    for args in [&["--completions", "bash"][..], &["--completions=zsh"], &["--man"]] {
-        let finished = run(workspace.mesher(args));
-        finished.succeeds();
-        let text = finished.stdout.replace('\\', "");
-        for option in options.iter().filter(|o| o.chars().all(|c| c == '-' || c.is_alphabetic())) {
-            assert!(text.contains(option), "{option} is missing from {args:?}");
-        }
-    }
-    run(workspace.mesher(&["--completions", "no-such-shell"])).refuses(2, &["no-such-shell"]);
-    run(workspace.mesher(&["case.toml", "--man"])).refuses(2, &["--man"]);
 }
 
 /// Standard error is not a terminal here, so clap writes no colours and the mesher no progress.

@@ -1,4 +1,4 @@
-//! Ranges of a set's bricks: finding, removing, appending and packing them.
+//! Parts of sets: finding, removing, sending and uniting them.
 
 use super::{BrickSet, LOW_BITS, Run, high_of};
 use crate::brick::Brick;
@@ -29,11 +29,6 @@ impl BrickSet {
         Brick { key: self.key_at(position), bits: self.bits[position] }
     }
 
-    /// The keys of the first brick and the last; none if the set is empty.
-    pub fn ends(&self) -> Option<(u64, u64)> {
-        (!self.is_empty()).then(|| (self.key_at(0), self.key_at(self.len() - 1)))
-    }
-
     /// Removes all bricks except those at a range of positions.
     pub fn keep(&mut self, range: Range<usize>) {
         if range == (0..self.len()) {
@@ -54,69 +49,6 @@ impl BrickSet {
         let first = self.runs.partition_point(|r| r.start <= range.start) - 1;
         let runs = self.runs[first..].iter().take_while(|r| r.start < range.end);
         runs.map(|r| Run { start: r.start.max(range.start) - range.start, ..*r }).collect()
-    }
-
-    /// Adds a set whose bricks all follow those of this set.
-    ///
-    /// # Panics
-    /// If they do not.
-    pub fn append(&mut self, after: Self) {
-        let Some(runs) = self.runs_with(&after) else {
-            return if self.is_empty() {
-                *self = after
-            };
-        };
-        self.runs = runs;
-        self.low.extend_from_slice(&after.low);
-        self.bits.extend_from_slice(&after.bits);
-    }
-
-    /// Adds a set whose bricks all precede those of this set.
-    ///
-    /// # Panics
-    /// If they do not.
-    pub fn prepend(&mut self, before: Self) {
-        let Some(runs) = before.runs_with(self) else {
-            return if self.is_empty() {
-                *self = before
-            };
-        };
-        self.runs = runs;
-        self.low.splice(..0, before.low);
-        self.bits.splice(..0, before.bits);
-    }
-
-    /// The runs of this set and of one that follows it; none if one of them is empty.
-    fn runs_with(&self, after: &Self) -> Option<Vec<Run>> {
-        let ((_, last), (first, _)) = (self.ends()?, after.ends()?);
-        assert!(last < first, "bricks must be added in Morton order");
-        let same = usize::from(high_of(last) == high_of(first));
-        let theirs = after.runs[same..].iter();
-        let theirs = theirs.map(|r| Run { start: r.start + self.len(), ..*r });
-        Some(self.runs.iter().copied().chain(theirs).collect())
-    }
-
-    /// The union of sets. Fast if the sets do not overlap, or if one is much larger than the others.
-    pub fn union_of(mut sets: Vec<Self>) -> Self {
-        sets.retain(|s| !s.is_empty());
-        sets.sort_by_key(Self::ends);
-        let follows = |w: &[Self]| w[0].ends().map(|e| e.1) < w[1].ends().map(|e| e.0);
-        if !sets.windows(2).all(follows) {
-            sets.sort_by_key(Self::len);
-            return sets.into_iter().reduce(Self::union).unwrap_or_default();
-        }
-        let Some(largest) = (0..sets.len()).max_by_key(|&i| sets[i].len()) else {
-            return Self::default();
-        };
-        let (more, after) =
-            (sets.iter().map(Self::len).sum::<usize>(), sets.split_off(largest + 1));
-        let mut all = sets.pop().unwrap_or_default();
-        all.reserve_exact(more - all.len());
-        let mut before = Self::default();
-        sets.into_iter().for_each(|set| before.append(set));
-        all.prepend(before);
-        after.into_iter().for_each(|set| all.append(set));
-        all
     }
 
     /// Appends the bricks at a range of positions to a message: the numbers of runs and bricks, the runs, the lower
@@ -152,5 +84,81 @@ impl BrickSet {
         low.iter().for_each(|w| set.low.extend([*w as u32, (w >> LOW_BITS) as u32]));
         set.low.truncate(bits.len());
         (set, words)
+    }
+
+    /// The union of sets. The larger of two sets is changed in place.
+    pub fn union_of(mut sets: Vec<Self>) -> Self {
+        sets.sort_by_key(Self::len);
+        sets.into_iter().reduce(Self::union).unwrap_or_default()
+    }
+
+    /// The union of two sets. Merges in place, from the back, because sets take much of the memory.
+    pub fn union(self, other: Self) -> Self {
+        let (mut set, rest) = if self.len() < other.len() { (other, self) } else { (self, other) };
+        if rest.is_empty() {
+            return set;
+        }
+        let mut cursor = set.cursor();
+        let common = rest.bricks().filter(|b| cursor.get(b.key) != 0).count();
+        let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
+        let mut k = set.len() + rest.len() - common;
+        set.reserve_exact(k - set.len());
+        set.low.resize(k, 0);
+        set.bits.resize(k, 0);
+        // New runs, in descending order; the runs before them do not change.
+        let mut runs: Vec<Run> = Vec::new();
+        while let Some(r) = theirs.last(&rest) {
+            k -= 1;
+            let b = mine.last(&set);
+            let (from_mine, from_theirs) =
+                (b.is_some_and(|b| b.key >= r.key), b.is_none_or(|b| b.key <= r.key));
+            let key = if from_theirs { r.key } else { b.map_or(r.key, |b| b.key) };
+            let part = |from: bool, bits: u64| if from { bits } else { 0 };
+            set.low[k] = key as u32;
+            set.bits[k] = part(from_theirs, r.bits) | part(from_mine, b.map_or(0, |b| b.bits));
+            match runs.last_mut() {
+                Some(run) if run.high == high_of(key) => run.start = k,
+                _ => runs.push(Run { high: high_of(key), start: k }),
+            }
+            if from_mine {
+                mine.step(&set);
+            }
+            if from_theirs {
+                theirs.step(&rest);
+            }
+        }
+        set.runs.truncate(mine.runs);
+        if set.runs.last().is_some_and(|r| runs.last().is_some_and(|n| n.high == r.high)) {
+            runs.pop();
+        }
+        set.runs.extend(runs.into_iter().rev());
+        set
+    }
+}
+
+/// Reads a set from the back; bricks that have been read may be overwritten.
+struct Back {
+    /// Number of bricks that remain.
+    left: usize,
+    /// Number of runs that they belong to.
+    runs: usize,
+}
+
+impl Back {
+    fn new(set: &BrickSet) -> Self {
+        Self { left: set.len(), runs: set.runs.len() }
+    }
+
+    #[inline]
+    fn last(&self, set: &BrickSet) -> Option<Brick> {
+        let at = self.left.checked_sub(1)?;
+        let key = set.runs[self.runs - 1].high | u64::from(set.low[at]);
+        Some(Brick { key, bits: set.bits[at] })
+    }
+
+    #[inline]
+    fn step(&mut self, set: &BrickSet) {
+        self.left -= 1;
+        self.runs -= usize::from(set.runs[self.runs - 1].start == self.left);
     }
 }

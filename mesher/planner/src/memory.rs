@@ -1,0 +1,302 @@
+//! The memory of all ranks and the limits that they share: a process has an address space, and the ranks of one machine divide its
+//! memory and that of their control group (a container, a job of a batch system).
+
+use crate::pilot::Amounts;
+use bytemuck::{Pod, Zeroable};
+use mesher::record::peak_rss_bytes;
+use ranks::{Comm, gather};
+use serde::Serialize;
+use std::fs::read_to_string;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+
+/// Bytes of the holes that sets leave which grow in the heap: this part of the sets, as long as they are smaller than the blocks that get
+/// mappings of their own; and bytes at most.
+const HOLES: [f64; 2] = [0.3, 5e6];
+
+/// All ranks after a pilot run.
+pub struct Ranks {
+    all: Vec<Rank>,
+    /// Number of ranks in each process.
+    in_process: f64,
+}
+
+/// A rank's amounts, and the memory of its process in bytes. What cannot be read is no limit: infinite.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct Rank {
+    amounts: Amounts,
+    /// Resident memory now, and at most so far.
+    resident: f64,
+    peak: f64,
+    /// What the limit on the address space of the process leaves.
+    address_space: f64,
+    /// What the control groups leave to all their processes.
+    control_group: f64,
+    /// What the machine has available for all processes.
+    machine: f64,
+    /// A digest that machines differ in.
+    node: u64,
+}
+
+/// The limit that a run comes closest to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tightest {
+    /// Its name.
+    pub limit: &'static str,
+    /// Bytes that it leaves: to a process if it limits the address space, otherwise to the ranks of one machine.
+    pub left_bytes: u64,
+    /// Bytes that these would take beyond what they have.
+    pub needed_bytes: u64,
+}
+
+impl Tightest {
+    /// Whether the limit leaves what is needed.
+    pub fn fits(&self) -> bool {
+        self.needed_bytes <= self.left_bytes
+    }
+}
+
+impl Rank {
+    /// The memory and the limits of this process.
+    fn read(amounts: Amounts) -> Self {
+        let text = |path: &str| read_to_string(path).unwrap_or_default();
+        let mut node = DefaultHasher::new();
+        text("/proc/sys/kernel/random/boot_id").hash(&mut node);
+        let [size, resident] = pages(&text("/proc/self/statm"));
+        Self {
+            amounts,
+            resident,
+            peak: peak_rss_bytes() as f64,
+            address_space: (address_space_max() - size).max(0.0),
+            control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
+            machine: available(&text("/proc/meminfo")),
+            node: node.finish(),
+        }
+    }
+}
+
+/// The size of this process's address space and its resident memory, in bytes; zeros where the system does not report them.
+fn pages(statm: &str) -> [f64; 2] {
+    let mut pages = statm.split_whitespace().map_while(|n| n.parse::<f64>().ok());
+    // SAFETY: the call reads a constant of the system.
+    let bytes = unsafe { libc::sysconf(libc::_SC_PAGESIZE) } as f64;
+    [(); 2].map(|()| pages.next().unwrap_or(0.0) * bytes)
+}
+
+fn address_space_max() -> f64 {
+    let mut limit = libc::rlimit { rlim_cur: libc::RLIM_INFINITY, rlim_max: libc::RLIM_INFINITY };
+    // SAFETY: the call only writes `limit`.
+    unsafe { libc::getrlimit(libc::RLIMIT_AS, &mut limit) };
+    match limit.rlim_cur {
+        libc::RLIM_INFINITY => f64::INFINITY,
+        bytes => bytes as f64,
+    }
+}
+
+fn available(meminfo: &str) -> f64 {
+    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemAvailable:"));
+    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
+    kib.map_or(f64::INFINITY, |kib| kib * 1024.0)
+}
+
+/// The least that the groups of this process leave, from its own group to the root of the hierarchy below `mount`. Inside a container
+/// a group's path may be that outside: then only the mount's own files exist.
+fn control_group(groups: &str, mount: &Path) -> f64 {
+    let of_line = |line: &str| {
+        let mut fields = line.splitn(3, ':').skip(1);
+        let (controllers, path) = (fields.next()?, fields.next()?);
+        let mount = match controllers {
+            "" => mount.to_owned(),
+            c if c.split(',').any(|c| c == "memory") => mount.join("memory"),
+            _ => return None,
+        };
+        let own = mount.join(path.trim_start_matches('/'));
+        let folders = own.ancestors().take_while(|folder| folder.starts_with(&mount));
+        Some(folders.map(left).fold(f64::INFINITY, f64::min))
+    };
+    groups.lines().filter_map(of_line).fold(f64::INFINITY, f64::min)
+}
+
+/// What one group leaves: version 2 or 1. The cache of files gives way to other memory.
+fn left(folder: &Path) -> f64 {
+    let text = |name: &str| read_to_string(folder.join(name)).unwrap_or_default();
+    let number =
+        |names: [&str; 2]| names.iter().find_map(|name| text(name).trim().parse::<f64>().ok());
+    let stat = text("memory.stat");
+    let cache = |name: &str| stat.lines().find_map(|l| l.strip_prefix(name)?.parse::<f64>().ok());
+    let used = number(["memory.current", "memory.usage_in_bytes"]).unwrap_or(0.0);
+    let cached = cache("file ").or_else(|| cache("total_cache ")).unwrap_or(0.0);
+    // "max" in version 2 and almost 2^63 in version 1 mean no limit.
+    let max = number(["memory.max", "memory.limit_in_bytes"]).filter(|max| *max < 2f64.powi(60));
+    max.map_or(f64::INFINITY, |max| (max - (used - cached).max(0.0)).max(0.0))
+}
+
+impl Ranks {
+    /// Gathers the amounts and limits of all ranks. Collective.
+    pub fn gather(comm: &dyn Comm, amounts: Amounts) -> Self {
+        let all = gather(comm, &[Rank::read(amounts)]);
+        Self { all, in_process: comm.ranks_in_process() as f64 }
+    }
+
+    /// Number of ranks.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    /// The amounts of all ranks together.
+    pub fn total(&self) -> Amounts {
+        Amounts::sum(self.all.iter().map(|rank| rank.amounts))
+    }
+
+    /// Bytes that each rank takes beyond what it has, for a mesh that takes `amounts` on all ranks.
+    pub fn growth(&self, amounts: &Amounts) -> Vec<f64> {
+        let factor = amounts.bytes() / self.total().bytes().max(1.0) - 1.0;
+        let of_rank = |rank: &Rank| {
+            let sets = (rank.amounts.bytes() * factor).max(0.0);
+            sets + (HOLES[0] * sets).min(HOLES[1])
+        };
+        self.all.iter().map(of_rank).collect()
+    }
+
+    /// Peak resident memory of each rank, if each takes as many bytes as given beyond what it has. Ranks of one process have equal
+    /// parts of it.
+    pub fn peaks(&self, more: &[f64]) -> Vec<u64> {
+        let peak = |(rank, more): (&Rank, &f64)| {
+            rank.peak.max(rank.resident + more * self.in_process) / self.in_process
+        };
+        self.all.iter().zip(more).map(|pair| peak(pair) as u64).collect()
+    }
+
+    /// The limit that the ranks come closest to, if each takes as many bytes as given beyond what it has.
+    pub fn tightest(&self, more: &[f64]) -> Option<Tightest> {
+        let mut all = Vec::new();
+        for (rank, own) in self.all.iter().zip(more) {
+            let on_node = self.all.iter().zip(more).filter(|(other, _)| other.node == rank.node);
+            let node: f64 = on_node.map(|(_, more)| more).sum();
+            all.push(("address space", rank.address_space, own * self.in_process));
+            all.push(("control group", rank.control_group, node));
+            all.push(("machine", rank.machine, node));
+        }
+        let part = |(_, left, needed): &(&str, f64, f64)| needed / left.max(1.0);
+        let limited = all.into_iter().filter(|(_, left, _)| left.is_finite());
+        limited.max_by(|a, b| part(a).total_cmp(&part(b))).map(|(limit, left, needed)| Tightest {
+            limit,
+            left_bytes: left as u64,
+            needed_bytes: needed as u64,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::array;
+
+    fn rank(node: u64, address_space: f64, machine: f64) -> Rank {
+        let amounts = Amounts { bytes_sides: 10.0, ..Amounts::default() };
+        let control_group = f64::INFINITY;
+        Rank { amounts, resident: 50.0, peak: 70.0, address_space, control_group, machine, node }
+    }
+
+    #[test]
+    fn ranks_of_one_machine_divide_its_memory() {
+        let all = vec![rank(1, 900.0, 100.0), rank(2, 900.0, 1000.0), rank(1, 900.0, 100.0)];
+        let ranks = Ranks { all, in_process: 1.0 };
+        let tightest = ranks.tightest(&[40.0, 500.0, 50.0]).unwrap();
+        assert_eq!((tightest.limit, tightest.needed_bytes), ("machine", 90));
+        let tightest = ranks.tightest(&[0.0, 850.0, 0.0]).unwrap();
+        assert_eq!((tightest.limit, tightest.left_bytes), ("address space", 900));
+        assert_eq!(ranks.peaks(&[5.0, 50.0, 500.0]), [70, 100, 550]);
+        let three_times = Amounts { bytes_sides: 90.0, ..Amounts::default() };
+        assert_eq!(ranks.growth(&three_times), [26.0; 3]);
+    }
+
+    #[test]
+    fn ranks_of_one_process_have_one_address_space() {
+        let all = vec![rank(1, 100.0, f64::INFINITY), rank(1, 100.0, f64::INFINITY)];
+        let ranks = Ranks { all, in_process: 2.0 };
+        assert_eq!(ranks.tightest(&[60.0, 60.0]).unwrap().needed_bytes, 120);
+        assert_eq!(ranks.peaks(&[60.0, 60.0]), [85, 85]);
+    }
+
+    #[test]
+    fn sets_grow_with_holes() {
+        let growth = |has: f64, needs: f64| {
+            let amounts = Amounts { bytes_graded: has, ..Amounts::default() };
+            let ranks = Ranks { all: vec![Rank { amounts, ..rank(1, 0.0, 0.0) }], in_process: 1.0 };
+            ranks.growth(&Amounts { bytes_sides: needs, ..Amounts::default() })
+        };
+        assert_eq!(growth(1e6, 2e6), [1.3e6]);
+        assert_eq!(growth(1e6, 101e6), [1e8 + 5e6]);
+        assert_eq!(growth(1e6, 0.5e6), [0.0]);
+        assert_eq!(growth(0.5, 3.0), [1.3], "less than a byte counts as one");
+    }
+
+    #[test]
+    fn ranks_gather_what_each_one_has() {
+        ranks::sim::run(3, 1, |comm| {
+            let amounts = |rank: usize| {
+                let part = |i: usize| (100 * rank + i) as f64;
+                bytemuck::cast(array::from_fn::<f64, { crate::pilot::AMOUNTS }, _>(part))
+            };
+            let ranks = Ranks::gather(comm, amounts(comm.rank()));
+            assert_eq!((ranks.count(), ranks.in_process), (3, 3.0));
+            let found: Vec<Amounts> = ranks.all.iter().map(|rank| rank.amounts).collect();
+            assert_eq!(found, [0, 1, 2].map(amounts));
+            assert_eq!(ranks.total().cells_boxed_deleted, 303.0);
+            for rank in &ranks.all {
+                assert_eq!(rank.node, ranks.all[0].node);
+                assert!([rank.resident, rank.peak].iter().all(|b| (1e5..1e11).contains(b)));
+            }
+        });
+    }
+
+    #[test]
+    fn a_limit_that_leaves_nothing_is_the_tightest() {
+        let mut one = rank(1, 900.0, 1000.0);
+        one.control_group = 0.0;
+        let tightest = Ranks { all: vec![one], in_process: 1.0 }.tightest(&[2.0]).unwrap();
+        let expected = Tightest { limit: "control group", left_bytes: 0, needed_bytes: 2 };
+        assert_eq!(tightest, expected);
+    }
+
+    #[test]
+    fn both_versions_of_control_groups_are_read_and_the_tightest_group_counts() {
+        let left = |line: &str, files: &[(&str, &str)]| {
+            let folder = tempfile::tempdir().unwrap();
+            for (name, text) in files {
+                let path = folder.path().join(name);
+                std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+                std::fs::write(path, text).unwrap();
+            }
+            control_group(line, folder.path())
+        };
+        let two = [
+            ("memory.max", "max\n"),
+            ("a/memory.max", "1000\n"),
+            ("a/memory.current", "700\n"),
+            ("a/memory.stat", "anon 100\nfile 600\n"),
+            ("a/b/memory.max", "5000\n"),
+        ];
+        assert_eq!(left("0::/a/b\n", &two), 900.0);
+        assert_eq!(left("0::/of/the/host\n", &two), f64::INFINITY);
+        let one = [
+            ("memory/memory.limit_in_bytes", "9223372036854771712\n"),
+            ("memory/a/memory.limit_in_bytes", "1000\n"),
+            ("memory/a/memory.usage_in_bytes", "700\n"),
+            ("memory/a/memory.stat", "cache 1\ntotal_cache 100\n"),
+        ];
+        assert_eq!(left("5:cpu,memory:/\n3:cpuset:/a\n", &one), f64::INFINITY);
+        assert_eq!(left("5:cpu,memory:/a\n", &one), 400.0);
+    }
+
+    #[test]
+    fn memory_that_is_available_is_read() {
+        assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   7 kB\n"), 7168.0);
+        assert_eq!(available(""), f64::INFINITY);
+        if cfg!(target_os = "linux") {
+            assert!(Rank::read(Amounts::default()).machine.is_finite());
+        }
+    }
+}
