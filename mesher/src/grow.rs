@@ -16,7 +16,7 @@ use crate::record::Recorder;
 use crate::refine;
 use crate::refine::voxelise::{self, BinnedFacets};
 use crate::sides::leaks::{self, Leaks};
-use crate::sides::{self, Decided, Sides};
+use crate::sides::{self, Decided, Sides, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
@@ -45,7 +45,7 @@ pub struct Mesh {
     pub sides: Sides,
     /// What is closed at a coarser spacing, and open at that of the mesh.
     pub leaks: Leaks,
-    /// Whether the facets bound nothing and are either open or doubled.
+    /// Whether the facets are an open body, and bound nothing although the outside is kept.
     pub bounds_nothing: bool,
     /// Name of the case in advice to the user.
     pub case_name: String,
@@ -127,7 +127,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let is_closed = job.phase("leaks", |comm| leaks::is_closed(facets.borrow(), comm));
+    let is_closed = job.phase("leaks", |comm| openness::is_closed(facets.borrow(), comm));
     let decided = job.phase("sides", |comm| {
         sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
     })?;
@@ -144,7 +144,10 @@ pub fn grow<F: Borrow<[Facet]>>(
         let leaks =
             leaks::find(regions, sides.summary.inside > 0, &tree, &ownership, facets, &rules, comm);
         let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
-            && (!is_closed || leaks::is_doubled(facets, comm));
+            && match is_closed {
+                true => openness::is_doubled(facets, comm),
+                false => !openness::is_sheet(facets, comm),
+            };
         (leaks, bounds_nothing)
     });
     drop(facets);

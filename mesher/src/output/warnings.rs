@@ -68,10 +68,9 @@ fn bounds_nothing(mesh: &Mesh) -> String {
     let (case, rules) = (&mesh.case_name, &mesh.rules);
     let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
     format!(
-        "the facets bound no inside at spacings of {spacing}, {} and {}: either the flow fills the body through openings, which \
-         `harness leak {case} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as `harness geometry` states, or \
-         the body is thinner than its cells; close the openings, remove the copies, or change spacing_min, unless the facets are a sheet, \
-         such as a terrain",
+        "the facets bound no inside at spacings of {spacing}, {} and {}, and are no sheet: either the flow fills the body through \
+         openings, which `harness leak {case} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as \
+         `harness geometry` states, or the body is thinner than its cells; close the openings, remove the copies, or change spacing_min",
         2.0 * spacing,
         4.0 * spacing
     )

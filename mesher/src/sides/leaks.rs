@@ -19,7 +19,6 @@ use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
@@ -243,47 +242,10 @@ impl Leaks {
     }
 }
 
-/// Exclusive or of the hashes of all edges.
-fn boundary(facets: &[Facet]) -> u128 {
-    let mut all = 0;
-    for f in facets {
-        let [a, b, c] = f.v.map(|v| v.iter().fold(0, |sum, &c| chained(sum, c)));
-        // An edge without length is none.
-        let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to);
-        all = edges.fold(all, |all, (from, to)| all ^ mix(from.wrapping_add(to)));
-    }
-    all
-}
-
-/// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface: one with an even number of facets at every
-/// edge, up to a chance of 2^-64. All rays from a point off it have the same parity, and all points of a component have that parity: so
-/// it does not leak. Collective.
-pub fn is_closed(mine: &[Facet], comm: &dyn Comm) -> bool {
-    let mine = boundary(mine);
-    let all = uncounted(comm, || comm.all_gather(&[(mine >> 64) as u64, mine as u64]));
-    all.words().as_chunks().0.iter().fold([0; 2], |[a, b], [c, d]| [a ^ c, b ^ d]) == [0; 2]
-}
-
-/// Whether every facet of all ranks, of which `mine` are this rank's, appears an even number of times, so that no ray finds an inside.
-/// Collective.
-pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
-    let hash = |f: &Facet| {
-        let mut v = f.v;
-        v.sort_unstable();
-        v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
-    };
-    let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
-    let all = uncounted(comm, || comm.all_gather(&words));
-    let add = |[count, xor]: [u64; 2], [n, of]: &[u64; 2]| [count + n, xor ^ of];
-    let [count, xor] = all.words().as_chunks().0.iter().fold([0; 2], add);
-    count > 0 && xor == 0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tests::rules;
-    use ranks::{Solo, sim};
 
     /// A leak between level 2 and the surface level, 3: two octants of level 2.
     fn leak() -> Leak {
@@ -342,36 +304,5 @@ mod tests {
     #[should_panic(expected = "must fit into the root")]
     fn leaks_larger_than_the_root_are_found() {
         check(&[Leak { volume: 65 << (3 * (LEVEL_MAX - 2)), ..leak() }]);
-    }
-
-    /// Whether some facets are closed, and whether all appear twice; the same on any number of ranks.
-    fn kind(facets: &[Facet]) -> (bool, bool) {
-        let of = |mine: &[Facet], comm: &dyn Comm| (is_closed(mine, comm), is_doubled(mine, comm));
-        let alone = of(facets, &Solo);
-        let slice = |rank: usize| &facets[facets.len() * rank / 3..facets.len() * (rank + 1) / 3];
-        let among = sim::run(3, 1, |comm| of(slice(comm.rank()), comm));
-        assert_eq!(among, [alone; 3]);
-        alone
-    }
-
-    #[test]
-    fn closed_surfaces_and_those_that_appear_twice_are_recognised() {
-        let e = 1 << 20;
-        let corners = [[0; 3], [e, 0, 0], [0, e, 0], [0, 0, e]];
-        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 3, 2]];
-        let body = faces.map(|face| Facet { v: face.map(|i| corners[i]) });
-        assert_eq!(kind(&body), (true, false));
-        assert_eq!(kind(&body.repeat(31)), (true, false));
-        assert_eq!(kind(&body.repeat(31)[1..]), (false, false));
-        for missing in 0..4 {
-            let mut open = body.to_vec();
-            open.remove(missing);
-            assert_eq!(kind(&open), (false, false));
-            open.push(Facet { v: [corners[missing]; 3] });
-            assert_eq!(kind(&open), (false, false), "one facet is a point");
-        }
-        let turned = body.map(|f| Facet { v: [f.v[1], f.v[0], f.v[2]] });
-        assert_eq!(kind(&[turned[0], body[1], body[2], body[3]]), (true, false));
-        assert_eq!(kind(&[body, turned].concat()), (true, true));
     }
 }

@@ -18,6 +18,7 @@ pub mod flow;
 pub mod global;
 pub mod leaks;
 pub mod nodes;
+pub mod openness;
 pub mod rays;
 pub mod vote;
 

@@ -1,0 +1,212 @@
+//! Whether the facets form a closed surface, a sheet, or a body with openings.
+//!
+//! An edge that belongs to an odd number of facets is on the boundary of the surface. The exclusive or of a hash of every edge of every facet
+//! is 0 if there is none, and otherwise only by a chance of 2^-64. All rays from a point off a closed surface have the same parity, and all points of
+//! a component have that parity: so a closed surface does not leak.
+//!
+//! A surface that closes the openings of consistently oriented facets has at least the area of the sum of their normals. If that is a
+//! large part of their own area, an opening is no tear: the facets are a sheet. Facets that are turned may have such a sum without any
+//! large opening. So the loops of the boundary must enclose as much, too, which they do if the facets are oriented consistently.
+//!
+//! Both are sums over the facets, to which each rank contributes those of its slice.
+
+use bricks::digest::{chained, mix};
+use bricks::facet::Facet;
+use ranks::{Comm, MessageBuffer, uncounted};
+use std::collections::{BTreeMap, BTreeSet};
+
+type Vertex = [i32; 3];
+
+/// A boundary of more words than this is not searched for loops: a soup of facets without common edges.
+const WORDS_MAX: u64 = 1 << 23;
+/// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
+const SHEET: f64 = 0.25;
+
+/// Exclusive or of the hashes of all edges.
+fn boundary(facets: &[Facet]) -> u128 {
+    let mut all = 0;
+    for f in facets {
+        let [a, b, c] = f.v.map(|v| v.iter().fold(0, |sum, &c| chained(sum, c)));
+        // An edge without length is none.
+        let edges = [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to);
+        all = edges.fold(all, |all, (from, to)| all ^ mix(from.wrapping_add(to)));
+    }
+    all
+}
+
+/// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface. Collective.
+pub fn is_closed(mine: &[Facet], comm: &dyn Comm) -> bool {
+    let mine = boundary(mine);
+    let all = uncounted(comm, || comm.all_gather(&[(mine >> 64) as u64, mine as u64]));
+    all.words().as_chunks().0.iter().fold([0; 2], |[a, b], [c, d]| [a ^ c, b ^ d]) == [0; 2]
+}
+
+/// Whether the facets of all ranks, of which `mine` are this rank's, form a sheet. Collective.
+pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
+    // The sum of the normals, and that of their lengths, each rounded down.
+    let mut sums = [0i128; 4];
+    for f in mine {
+        let normal = f.normal();
+        let length = normal.iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
+        (0..3).for_each(|a| sums[a] += i128::from(normal[a]));
+        sums[3] += length as i128;
+    }
+    let words: [u64; 8] = bytemuck::cast(sums);
+    let all = uncounted(comm, || comm.all_gather(&words));
+    let [x, y, z, area] = all.words().as_chunks::<8>().0.iter().fold([0; 4], |sum, words| {
+        let of_rank: [i128; 4] = bytemuck::cast(*words);
+        std::array::from_fn(|i| sum[i] + of_rank[i])
+    });
+    let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
+    closing.min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
+}
+
+/// Twice the area that the boundary of the facets of all ranks encloses: of each of its loops, the vector area. Collective.
+fn enclosed_by_boundary(mine: &[Facet], comm: &dyn Comm) -> f64 {
+    let edges = mine.iter().flat_map(|f| [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|i| f.v[i])));
+    let entry = |mut ends: [Vertex; 2]| {
+        ends.sort_unstable();
+        let words: [u64; 3] = bytemuck::cast(ends);
+        // All ranks send an edge to the same rank.
+        let hash = words.iter().fold(0, |sum, &word| mix(sum ^ word) as u64);
+        ((hash % comm.size() as u64) as usize, words)
+    };
+    let out = edges.filter(|[from, to]| from != to).map(entry).collect();
+    let received = uncounted(comm, || comm.sparse_all_to_all(MessageBuffer::of_entries(out)));
+    let mut edges: Vec<[u64; 3]> = received.values().collect();
+    edges.sort_unstable();
+    let odd = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
+    let odd: Vec<u64> = odd.flat_map(|same| same[0]).collect();
+    if uncounted(comm, || comm.sum(odd.len() as u64)) > WORDS_MAX {
+        return f64::INFINITY;
+    }
+    let all = uncounted(comm, || comm.all_gather(&odd));
+    let edges = all.words().as_chunks::<3>().0.iter().map(|words| bytemuck::cast(*words));
+    loops(edges).iter().map(|of| vector_area(of)).sum()
+}
+
+/// The closed loops of some edges, an even number of which meet in every vertex.
+fn loops(edges: impl Iterator<Item = [Vertex; 2]>) -> Vec<Vec<Vertex>> {
+    let mut ends: BTreeMap<Vertex, BTreeSet<Vertex>> = BTreeMap::new();
+    for [from, to] in edges {
+        ends.entry(from).or_default().insert(to);
+        ends.entry(to).or_default().insert(from);
+    }
+    let mut found = Vec::new();
+    let vertices: Vec<Vertex> = ends.keys().copied().collect();
+    for start in vertices {
+        while let Some(mut to) = ends.get_mut(&start).and_then(BTreeSet::pop_first) {
+            let mut path = vec![start];
+            while to != start {
+                let from = *path.last().expect("it has the start");
+                path.push(to);
+                let of = ends.get_mut(&to).expect("every end is a vertex");
+                of.remove(&from);
+                to = of.pop_first().expect("an even number of edges meets in a vertex");
+            }
+            let last = path.last().expect("it has the start");
+            ends.get_mut(&start).expect("it is a vertex").remove(last);
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Length of the sum of the cross products of a loop: twice the area, if it is plane.
+fn vector_area(of: &[Vertex]) -> f64 {
+    let from_start = |v: Vertex| [0, 1, 2].map(|a| f64::from(v[a]) - f64::from(of[0][a]));
+    let mut sum = [0.0; 3];
+    for pair in of.windows(2) {
+        let [p, q] = [from_start(pair[0]), from_start(pair[1])];
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            sum[a] += p[b] * q[c] - p[c] * q[b];
+        }
+    }
+    sum.iter().map(|n| n * n).sum::<f64>().sqrt()
+}
+
+/// Whether every facet of all ranks, of which `mine` are this rank's, appears an even number of times, so that no ray finds an inside.
+/// Collective.
+pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
+    let hash = |f: &Facet| {
+        let mut v = f.v;
+        v.sort_unstable();
+        v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
+    };
+    let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
+    let all = uncounted(comm, || comm.all_gather(&words));
+    let add = |[count, xor]: [u64; 2], [n, of]: &[u64; 2]| [count + n, xor ^ of];
+    let [count, xor] = all.words().as_chunks().0.iter().fold([0; 2], add);
+    count > 0 && xor == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ranks::{Solo, sim};
+
+    /// Two facets of a parallelogram, whose normal is the cross product of `a` and `b`.
+    fn pair(at: [i32; 3], a: [i32; 3], b: [i32; 3]) -> [Facet; 2] {
+        let sum = |p: [i32; 3], q: [i32; 3]| std::array::from_fn(|i| p[i] + q[i]);
+        let (pa, pb) = (sum(at, a), sum(at, b));
+        let far = sum(pa, b);
+        [Facet { v: [at, pa, far] }, Facet { v: [at, far, pb] }]
+    }
+
+    /// The six faces of a cube, outwards.
+    fn cube() -> Vec<[Facet; 2]> {
+        let e = 1 << 20;
+        let axes = [[e, 0, 0], [0, e, 0], [0, 0, e]];
+        let face = |a: usize| {
+            let (u, w) = (axes[(a + 1) % 3], axes[(a + 2) % 3]);
+            [pair(axes[a], u, w), pair([0; 3], w, u)]
+        };
+        [0, 1, 2].into_iter().flat_map(face).collect()
+    }
+
+    /// Whether some faces are closed, and whether they are a sheet; the same on any number of ranks.
+    fn kind(faces: &[[Facet; 2]]) -> (bool, bool) {
+        let facets = faces.as_flattened();
+        let of = |mine: &[Facet], comm: &dyn Comm| (is_closed(mine, comm), is_sheet(mine, comm));
+        let alone = of(facets, &Solo);
+        let slice = |rank: usize| &facets[facets.len() * rank / 3..facets.len() * (rank + 1) / 3];
+        let among = sim::run(3, 1, |comm| of(slice(comm.rank()), comm));
+        assert_eq!(among, [alone; 3]);
+        alone
+    }
+
+    #[test]
+    fn closed_surfaces_sheets_and_open_bodies_are_distinguished() {
+        const CLOSED: (bool, bool) = (true, false);
+        const SHEET: (bool, bool) = (false, true);
+        const OPEN: (bool, bool) = (false, false);
+        let cube = cube();
+        assert_eq!(kind(&cube), CLOSED);
+        let mut many = cube.repeat(31);
+        assert_eq!(kind(&many), CLOSED, "31 copies");
+        many.pop();
+        assert_eq!(kind(&many), OPEN);
+        for missing in 0..6 {
+            let mut faces = cube.clone();
+            faces.remove(missing);
+            assert_eq!(kind(&faces), OPEN, "a box without a lid");
+            assert_eq!(kind(&cube[missing..=missing]), SHEET);
+            let lid = cube[missing][0];
+            faces.push([lid, Facet { v: [lid.v[0]; 3] }]);
+            assert_eq!(kind(&faces), OPEN, "one facet is missing, and one is a point");
+        }
+        assert_eq!(kind(&cube[..4]), OPEN, "the normals of a tube's ends cancel");
+        let mut turned = cube.clone();
+        turned[2][0].v.swap(0, 1);
+        assert_eq!(kind(&turned), CLOSED, "whatever the orientation");
+        let mut torn = cube.clone();
+        torn[0][1] = Facet { v: [[0; 3]; 3] };
+        torn[2].iter_mut().for_each(|f| f.v.swap(0, 1));
+        assert_eq!(kind(&torn), OPEN, "a side is turned, and the tear is small");
+        let twice = [&cube[..], &turned].concat();
+        let facets: Vec<Facet> = twice.concat();
+        assert!(is_doubled(&facets, &Solo) && !is_doubled(&facets[1..], &Solo));
+        assert!(!is_doubled(&cube.concat(), &Solo));
+    }
+}
