@@ -49,6 +49,7 @@ impl Recorder {
     /// Runs and times a phase. The times of phases with the same name add up.
     pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
         self.report_status(name);
+        comm.enter(name);
         stop_at(format_args!("{name}:{}", comm.rank()));
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
@@ -136,7 +137,7 @@ mod tests {
             let work = |calls: usize| {
                 let since = ThreadTime::now();
                 while since.elapsed().as_millis() < 4 {}
-                (0..calls).for_each(|_| _ = comm.sum(0));
+                (0..calls).for_each(|_| comm.barrier());
                 since.elapsed().as_secs_f64()
             };
             let worked_s = [("a", 1), ("b", 0), ("a", 2)]

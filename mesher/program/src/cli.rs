@@ -13,6 +13,7 @@ use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::exit;
+use std::time::Duration;
 
 /// Exit code of a run whose text could not be printed.
 pub const UNPRINTED: i32 = 4;
@@ -21,7 +22,7 @@ pub const UNPRINTED: i32 = 4;
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
-/// mesh would not fit into memory or memory ran out, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
 #[derive(Parser)]
 #[command(version = env!("MESHER_VERSION"))]
 pub struct Args {
@@ -66,6 +67,9 @@ pub struct Args {
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
+    /// End the job if ranks of MPI wait for another one for longer than this, and name it; greater than the time of the longest phase
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub stall_limit: Option<Duration>,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -157,6 +161,11 @@ fn level_base(s: &str) -> Result<LevelBase, String> {
         Ok(l) if l <= bricks::octant::LEVEL_MAX => Ok(LevelBase(Some(l))),
         _ => Err("give auto or a level from 0 to 19".into()),
     }
+}
+
+fn seconds(s: &str) -> Result<Duration, String> {
+    let limit = s.parse().ok().and_then(|s| Duration::try_from_secs_f64(s).ok());
+    limit.filter(|l| !l.is_zero()).ok_or_else(|| "give a positive number of seconds".into())
 }
 
 fn comm_choice(s: &str) -> Result<CommChoice, String> {

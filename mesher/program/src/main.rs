@@ -11,7 +11,7 @@ use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
-use ranks::{Comm, Solo, agree, launch, sim, text_of_first, uncounted};
+use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
@@ -229,14 +229,14 @@ fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
     let prints = |w: &String| ["-h", "--help", "-V", "--version"].contains(&w.as_str());
     let of_job = || {
         Error::input(
-            "a run of a service has no --help, --version or --serve, and no --comm but that of the job",
+            "a run of a service has no --help, --version, --serve or --stall-limit, and no --comm but that of the job",
         )
     };
     if words.iter().any(prints) {
         return Err(of_job());
     }
     match parse(std::iter::once("mesher".to_owned()).chain(words))? {
-        Asked::Run(mut args) if args.comm.is_of(comm.size()) => {
+        Asked::Run(mut args) if args.stall_limit.is_none() && args.comm.is_of(comm.size()) => {
             args.quiet = true;
             Ok(*args)
         }
@@ -247,12 +247,21 @@ fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
 /// One rank's run; returns the exit code, the same on all ranks. Collective.
 fn run(args: &Args, comm: &dyn Comm) -> i32 {
     let first = comm.rank() == 0;
+    if let Some(limit) = args.stall_limit {
+        comm.limit_calls(limit);
+    }
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
     let mut record = Recorder::new(progress);
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();
     record.report_status("done");
+    if let Some(limit) = args.stall_limit {
+        comm.enter("done");
+        interrupt::stop_at(format_args!("done:{}", comm.rank()));
+        comm.barrier();
+        end_within(limit);
+    }
     interrupt::stop_at(format_args!("end:{}", comm.rank()));
     if progress {
         let _ = write!(stderr(), "\r\x1b[K");
@@ -265,6 +274,20 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
         (0, Some(refusal)) => fail(&refusal, first),
         (code, _) => code,
     }
+}
+
+/// Ends the process if it has not ended within the limit: MPI's own end waits for all ranks, without limit.
+fn end_within(limit: Duration) {
+    let end = move || {
+        sleep(limit);
+        complain(&format_args!(
+            "mesher: the run is complete, but another rank has not ended for {} s: look at it with a debugger",
+            limit.as_secs_f64()
+        ));
+        // What the process runs at its exit may wait for that rank as well.
+        interrupt::exit_at_once(STALLED);
+    };
+    let _ = std::thread::Builder::new().spawn(end);
 }
 
 /// Makes the geometry known as an input: no output of the run may be that file.

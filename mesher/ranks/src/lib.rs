@@ -14,17 +14,20 @@ mod message_buffer;
 mod metered;
 #[cfg(feature = "mpi")]
 mod mpi;
+mod reduced;
 pub mod sim;
 
-pub use agree::{
-    Entry, agree, all_gather_from_reducers, all_gather_reduced, pack_bytes, split_by_reducer,
-    text_of_first, unpack_bytes,
-};
+pub use agree::{agree, pack_bytes, text_of_first, unpack_bytes};
 pub use message_buffer::MessageBuffer;
 pub use metered::{Metered, Traffic};
+pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, split_by_reducer};
 
 use bytemuck::Pod;
 use std::sync::Arc;
+use std::time::Duration;
+
+/// Exit code of a job with a rank that keeps the others waiting.
+pub const STALLED: i32 = 75;
 
 /// The messages of all ranks, in the order of the ranks. Ranks in one process use the same buffer: copies would take memory and time
 /// that ranks of an MPI job do not take.
@@ -66,6 +69,17 @@ pub trait Comm {
     /// Begins another run in the same job: returns after rank 0 has called it as well, and counts messages from zero from then on.
     /// The other ranks sleep meanwhile: rank 0 may wait for its next run for hours. Collective.
     fn next_run(&self) {}
+
+    /// Ends the job if a rank keeps the others waiting in a call for longer than `limit`; ranks of one process never do. Collective.
+    fn limit_calls(&self, _limit: Duration) {}
+
+    /// Notes the phase that the rank is in.
+    fn enter(&self, _phase: &'static str) {}
+
+    /// Returns after all ranks have called it. Collective.
+    fn barrier(&self) {
+        self.sums(&[0]);
+    }
 
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {

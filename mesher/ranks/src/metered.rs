@@ -3,7 +3,7 @@
 use crate::{Comm, Gathered, MessageBuffer};
 use cpu_time::ThreadTime;
 use std::cell::Cell;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The messages that a rank has sent to other ranks so far, and the time in its calls.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -110,6 +110,14 @@ impl<C: Comm> Comm for Metered<C> {
     fn next_run(&self) {
         self.comm.next_run();
         self.total.take();
+    }
+
+    fn limit_calls(&self, limit: Duration) {
+        self.comm.limit_calls(limit);
+    }
+
+    fn enter(&self, phase: &'static str) {
+        self.comm.enter(phase);
     }
 }
 

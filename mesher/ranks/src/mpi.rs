@@ -1,17 +1,28 @@
 //! Ranks of a real MPI job, through `rsmpi`.
 //!
 //! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
-//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core.
+//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
+//! are sent in chunks, as MPI counts in i32.
+//!
+//! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others (`stall`).
+
+mod stall;
 
 use crate::{Comm, Gathered, MessageBuffer};
 use mpi::collective::SystemOperation;
-use mpi::datatype::PartitionMut;
 use mpi::environment::Universe;
+use mpi::point_to_point::{Message, Status};
+use mpi::request::{Request, Scope};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
-use std::cell::Cell;
+use stall::Watch;
+use std::cell::{Cell, OnceCell};
 use std::thread::sleep;
 use std::time::Duration;
 
+/// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
+const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
+/// Greatest number of words in one allgather, summed over the ranks.
+const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
 /// Tag of the message that begins another run. Sparse all-to-alls have 0 and 1.
 const NEXT_RUN: i32 = 2;
 /// Longest sleep of a rank between two runs.
@@ -19,6 +30,8 @@ const PAUSE_MAX: Duration = Duration::from_millis(50);
 
 /// One rank of an MPI job.
 pub struct Mpi {
+    /// Present if calls have a limit.
+    watch: OnceCell<Watch>,
     world: mpi::topology::SimpleCommunicator,
     /// Whether the number of sparse all-to-alls so far is odd.
     odd: Cell<bool>,
@@ -33,7 +46,12 @@ impl Mpi {
     /// If MPI was initialised before.
     pub fn start() -> Self {
         let universe = mpi::initialize().expect("MPI is initialised once");
-        Self { world: universe.world(), odd: Cell::new(false), _universe: universe }
+        Self {
+            watch: OnceCell::new(),
+            world: universe.world(),
+            odd: Cell::new(false),
+            _universe: universe,
+        }
     }
 }
 
@@ -67,20 +85,18 @@ impl Comm for Mpi {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {
-        let mut lengths = vec![0; self.size()];
-        self.world.all_gather_into(&count(mine.len()), &mut lengths[..]);
-        let mut all = MessageBuffer::with_lengths(lengths.iter().map(|&n| n as usize));
-        count(all.words().len());
-        let starts: Vec<i32> =
-            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
-        let mut target = PartitionMut::new(all.words_mut(), &lengths[..], &starts[..]);
-        self.world.all_gather_varcount_into(mine, &mut target);
-        all.into()
+        self.gather(mine).into()
     }
 
     fn sums(&self, mine: &[u64]) -> Vec<u64> {
         let mut sums = vec![0; mine.len()];
-        self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum());
+        match self.watch.get() {
+            None => self.world.all_reduce_into(mine, &mut sums[..], SystemOperation::sum()),
+            Some(watch) => mpi::request::scope(|scope| {
+                let (to, sum) = (&mut sums[..], SystemOperation::sum());
+                complete(watch, self.world.immediate_all_reduce_into(scope, mine, to, sum));
+            }),
+        }
         sums
     }
 
@@ -100,18 +116,21 @@ impl Comm for Mpi {
                     received.write(me, words.iter().copied());
                     continue;
                 }
-                count(words.len());
                 let process = self.world.process_at_rank(to as i32);
-                sends.push(process.immediate_synchronous_send_with_tag(scope, words, tag));
+                sends.extend(
+                    chunks(words).map(|chunk| {
+                        process.immediate_synchronous_send_with_tag(scope, chunk, tag)
+                    }),
+                );
             }
             let mut barrier = None;
+            self.watch.get().into_iter().for_each(Watch::start);
             loop {
-                while let Some((message, status)) =
+                self.watch.get().into_iter().for_each(Watch::poll);
+                while let Some(first) =
                     self.world.any_process().immediate_matched_probe_with_tag(tag)
                 {
-                    let words = status.count(u64::equivalent_datatype()) as usize;
-                    let from = status.source_rank() as usize;
-                    message.matched_receive_into(received.room(from, words));
+                    self.receive(first, tag, &mut received);
                 }
                 sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
                 barrier = match barrier {
@@ -143,12 +162,92 @@ impl Comm for Mpi {
         }
         first.receive_with_tag::<u64>(NEXT_RUN);
     }
+
+    fn limit_calls(&self, limit: Duration) {
+        self.watch.get_or_init(|| Watch::new(&self.world, limit));
+    }
+
+    fn enter(&self, phase: &'static str) {
+        if let Some(watch) = self.watch.get() {
+            watch.enter(phase);
+        }
+    }
 }
 
-/// A number of words as MPI counts them.
-///
-/// # Panics
-/// If there are 2^31 or more: 16 GiB in one message, or in what all ranks gather.
-fn count(words: usize) -> i32 {
-    words.try_into().expect("MPI takes fewer than 2^31 words in a call")
+/// Waits for a collective call under a limit.
+fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, S>) {
+    let mut pending = Some(request);
+    watch.wait(|| {
+        pending = pending.take().and_then(|request| request.test().err());
+        pending.is_none()
+    });
+}
+
+impl Mpi {
+    fn gather(&self, mine: &[u64]) -> MessageBuffer {
+        let mut counts = vec![0u64; self.size()];
+        let length = mine.len() as u64;
+        match self.watch.get() {
+            None => self.world.all_gather_into(&length, &mut counts[..]),
+            Some(watch) => mpi::request::scope(|scope| {
+                let all = &mut counts[..];
+                complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
+            }),
+        }
+        let longest = counts.iter().copied().max().unwrap_or(0) as usize;
+        // MPI counts the sum over the ranks in i32.
+        let step = (GATHERED / self.size()).max(1);
+        let parts: Vec<MessageBuffer> = (0..longest)
+            .step_by(step)
+            .map(|at| {
+                let part = |len: usize| len.saturating_sub(at).min(step);
+                let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
+                self.all_gather_part(&mine[at.min(mine.len())..][..part(mine.len())], &lengths)
+            })
+            .collect();
+        match <[MessageBuffer; 1]>::try_from(parts) {
+            Ok([all]) => all,
+            Err(parts) => {
+                let words = |rank: usize| parts.iter().flat_map(move |p| p.of(rank));
+                (0..self.size()).map(|rank| (rank, words(rank).copied())).collect()
+            }
+        }
+    }
+
+    /// Gathers the given numbers of words from the ranks.
+    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> MessageBuffer {
+        let starts: Vec<i32> =
+            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
+        let lengths_all = lengths.iter().map(|&n| n as usize);
+        let mut all = MessageBuffer::with_lengths(lengths_all);
+        let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
+        match self.watch.get() {
+            None => self.world.all_gather_varcount_into(mine, &mut target),
+            Some(watch) => mpi::request::scope(|scope| {
+                let to = &mut target;
+                complete(watch, self.world.immediate_all_gather_varcount_into(scope, mine, to));
+            }),
+        }
+        all
+    }
+
+    /// Receives the message whose first chunk has been matched.
+    fn receive(&self, first: (Message, Status), tag: i32, received: &mut MessageBuffer) {
+        let from = first.1.source_rank();
+        let mut chunk = first;
+        loop {
+            let words = chunk.1.count(u64::equivalent_datatype()) as usize;
+            chunk.0.matched_receive_into(received.room(from as usize, words));
+            if words < CHUNK {
+                return;
+            }
+            chunk = self.world.process_at_rank(from).matched_probe_with_tag(tag);
+        }
+    }
+}
+
+/// A message in full chunks, and a last one that is shorter and may be empty: it marks the end of the message.
+fn chunks(words: &[u64]) -> impl Iterator<Item = &[u64]> {
+    let (full, last) = words.as_chunks::<CHUNK>();
+    full.iter().map(|chunk| &chunk[..]).chain([last])
 }

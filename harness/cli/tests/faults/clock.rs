@@ -72,8 +72,8 @@ pub fn family() {
         Ok(_) => {
             let mut job = mpirun(3);
             job.arg("-x").arg(format!("LD_PRELOAD={}", library.display()));
-            job.arg(mesher).args("case.toml --quiet --json p.json".split(' '));
-            check("mesher on 3 ranks", job, 0, Some("p.json"));
+            job.arg(mesher).args("case.toml --quiet --stall-limit 600 --json p.json".split(' '));
+            check("mesher on 3 ranks, --stall-limit 600", job, 0, Some("p.json"));
         }
         Err(why) => skip("a clock that jumps on MPI ranks", &why),
     }

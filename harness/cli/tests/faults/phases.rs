@@ -1,4 +1,4 @@
-//! Ranks that are killed or crash at the beginning of each phase. A rank names its phase in its status file: that write is the
+//! Ranks that are killed, crash or stop at the beginning of each phase. A rank names its phase in its status file: that write is the
 //! call that the fault is injected into.
 
 use crate::place::{Ended, Files, HANGS, Place};
@@ -10,16 +10,23 @@ use std::time::Duration;
 
 const CASE: &str = "spacing_min = 0.02\nroot_scale = 2.0\nkeep = \"all\"\n[generator]\nshape = \"sphere\"\nfacets = 1280\n";
 const RANKS: usize = 3;
-/// Time for a job: that of the launcher and of the clean-up.
+/// Time for a job: that of the launcher, of the limit for calls, and of the clean-up.
 const LIMIT: Duration = HANGS;
 const OPTIONS: &str =
     "case.toml --out out --json run.json --write words,htg --status status --quiet";
+/// Only where a rank stops: a busy machine may stop any rank for seconds.
+const STALL_LIMIT: [&str; 2] = ["--stall-limit", "2"];
 /// Phases in which the faults of a sample occur.
 const SAMPLE: [&str; 2] = ["sides", "leaves"];
 
+/// The action that stops a rank.
+const STOP: &str = "SIG19";
 /// Signals, and exit codes that jobs may have after them.
-const SIGNALS: [(&str, &str, &[i32]); 2] =
-    [("killed", "SIG9", &[137]), ("crashes", "SIG6", &[134])];
+const SIGNALS: [(&str, &str, &[i32]); 3] = [
+    ("killed", "SIG9", &[137]),
+    ("crashes", "SIG6", &[134]),
+    ("stopped, --stall-limit 2", STOP, &[75]),
+];
 
 /// Every fault in every phase, on the first rank and on another.
 pub fn family() {
@@ -50,7 +57,7 @@ pub fn family() {
                 let left = left(&place.files(), &complete);
                 let mut row =
                     Row::new(format!("phase {phase}"), format!("rank {rank} of {RANKS} {what}"));
-                let wrong = judge(&ended, codes, left, phase);
+                let wrong = judge(&ended, codes, left, phase, rank);
                 row.add(
                     ended.code,
                     ended.seconds,
@@ -79,6 +86,7 @@ impl Job<'_> {
         command.env("INJECT_RANK", self.rank.to_string()).arg(self.injector);
         command.args(["write", action, &n.to_string()]).args([&dir, &log, &self.mesher.to_owned()]);
         command.args(OPTIONS.split(' '));
+        command.args(STALL_LIMIT.iter().filter(|_| action == STOP));
         let ended = self.place.run(command, LIMIT);
         let log = fs::read_to_string(log).unwrap_or_default();
         let phase = |line: &str| line.split(' ').nth(2).map(str::to_owned);
@@ -86,12 +94,25 @@ impl Job<'_> {
     }
 }
 
-fn judge(ended: &Ended, codes: &[i32], left: &str, phase: &str) -> Option<String> {
+fn judge(ended: &Ended, codes: &[i32], left: &str, phase: &str, rank: usize) -> Option<String> {
     if ended.wrong.is_some() {
         return ended.wrong.clone();
     }
     if !ended.code.is_some_and(|code| codes.contains(&code)) {
         return Some(format!("the exit code is not one of {codes:?}"));
+    }
+    // A rank that the machine does not run for seconds is named as well.
+    let is_named = |line: &str| {
+        let (before, _) = line.split_once(" does not answer")?;
+        let (_, ranks) = before.rsplit_once("rank ")?;
+        Some(ranks.split(", ").any(|named| *named == rank.to_string()))
+    };
+    // A rank that was stopped goes on when the launcher ends it, and reports the interrupt.
+    let is_reason = |line: &&str| line.starts_with("mesher: ") && !line.ends_with(": interrupted");
+    let ours = ended.err.lines().filter(is_reason).count();
+    let is_named = ended.err.lines().any(|line| is_named(line) == Some(true));
+    if codes == [75] && !(is_named && ours == 1) {
+        return Some("the rank is not named in one sentence".to_owned());
     }
     match left {
         "nothing" => None,

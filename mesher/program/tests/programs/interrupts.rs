@@ -183,3 +183,42 @@ fn a_job_that_is_interrupted_or_killed_leaves_no_files_and_no_ranks() {
         }
     }
 }
+
+/// A rank that stops keeps the others waiting, in calls of MPI, up to its end.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_rank_that_keeps_the_others_waiting_is_named() {
+    for (i, name) in
+        ["grade", "leaves", "finish", "manifest", "complete", "report", "end"].iter().enumerate()
+    {
+        let rank = if *name == "manifest" { 0 } else { i % 3 };
+        let point = format!("{name}:{rank}");
+        let (workspace, finished) = job(3, &point, &["--stall-limit", "3"], None, &[]);
+        assert_eq!(finished.code, Some(75), "{point}: {finished:?}");
+        match *name {
+            "end" => assert!(finished.stderr.contains("has not ended"), "{finished:?}"),
+            _ => {
+                // A rank that the machine does not run for seconds is named as well.
+                let (_, named) = finished.stderr.split_once(", and rank ").expect("a name");
+                let (named, _) = named.split_once(" does not answer").expect("a name");
+                let is_named = named.split(", ").any(|other| other == rank.to_string());
+                assert!(is_named && finished.stderr.contains("in phase "), "{point}: {finished:?}");
+            }
+        }
+        assert_all_or_nothing(&workspace, &["case.toml"], &finished);
+    }
+}
+
+/// The limit changes neither the mesh nor the counters.
+#[test]
+#[cfg_attr(not(feature = "mpi"), ignore = "needs MPI: build with --features mpi")]
+fn a_job_within_its_limit_is_as_without_one() {
+    let workspace = workspace();
+    let report = |options: &[&str]| {
+        let args = ["case.toml", "--quiet", "--json", "run.json"];
+        run(workspace.mpirun(3, &[&args[..], options].concat())).succeeds();
+        let report = workspace.json("run.json");
+        (report["digest"].clone(), report["counters"].clone())
+    };
+    assert_eq!(report(&["--stall-limit", "600"]), report(&[]));
+}
