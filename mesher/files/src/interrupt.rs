@@ -48,7 +48,7 @@ pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
             if !(abandon_all(true) && is_first) {
                 print(message);
                 sleep(linger);
-                low_level::exit(INTERRUPTED);
+                exit_at_once(INTERRUPTED);
             }
             is_first = false;
         }
@@ -93,6 +93,11 @@ pub fn abandon() {
 /// outputs, whose process then ends.
 pub fn abandon_unfinished() {
     abandon_all(false);
+}
+
+/// Ends the process without what it would run at its exit.
+pub fn exit_at_once(code: i32) -> ! {
+    low_level::exit(code)
 }
 
 /// Stops the process, as SIGSTOP does, if the environment variable `STOP_AT` is this point. Tests then send signals, and let it

@@ -1,6 +1,6 @@
 //! The command line, and the case that it describes.
 
-use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, value_parser};
+use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser};
 use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;

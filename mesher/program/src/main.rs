@@ -17,6 +17,7 @@ use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
+use std::thread::sleep;
 use std::time::Duration;
 
 #[global_allocator]
