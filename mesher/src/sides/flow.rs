@@ -6,14 +6,15 @@
 //! rays.
 
 use super::global::Label;
-use super::nodes::{Component, Nodes};
-use super::vote::FirstLeaf;
+use super::nodes::{Component, Nodes, open_bricks};
+use super::vote::{Candidate, FirstLeaf};
 use super::{EnclosedComponents, Verdict};
 use crate::error::Error;
 use crate::input::lattice::{Enclosed, Keep, Rules, Seed};
 use crate::partition::ownership::Ownership;
-use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, morton};
-use bricks::tree::Tree;
+use bricks::brickset::ones;
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
+use bricks::tree::{LEVELS, Tree};
 use ranks::{Comm, all_gather_reduced, gather};
 use std::collections::{HashMap, HashSet};
 
@@ -55,27 +56,67 @@ fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
     (l, code(l))
 }
 
-/// The components that have a seed, of seeds that were [found](find).
+/// The components that have a seed, of seeds that were [found](find). Collective; the same on all ranks.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
 pub fn of_seeds(
     found: &HashMap<u64, Option<Label>>,
-    seeds: &[Seed],
+    rules: &Rules,
+    tree: &Tree,
+    ownership: &Ownership,
+    comm: &dyn Comm,
 ) -> Result<HashSet<Label>, Error> {
-    for (number, seed) in (0..).zip(seeds) {
+    for (number, seed) in (0..).zip(&rules.seeds) {
         let problem = match found.get(&number) {
-            None => "outside the root",
-            Some(None) => "in a leaf that the geometry crosses",
+            None => "lies outside the root",
+            Some(None) => "lies in a leaf that the geometry crosses",
             Some(Some(_)) => continue,
         };
-        let [x, y, z] = seed.given;
-        return Err(Error::input(format!(
-            "seed {number} at ({x}, {y}, {z}) lies {problem}: move it into the flow, farther than a cell from the geometry, or decrease \
-             spacing_min"
-        )));
+        return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
     }
     Ok(found.values().copied().flatten().collect())
+}
+
+/// The error of a seed, with the nearest point that could replace it. Collective.
+fn unusable(
+    number: u64,
+    seed: &Seed,
+    problem: &str,
+    rules: &Rules,
+    tree: &Tree,
+    ownership: &Ownership,
+    comm: &dyn Comm,
+) -> Error {
+    let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
+    let all = gather(comm, nearest(tree, ownership, near).as_slice());
+    let [x, y, z] = seed.given;
+    let advice = match all.into_iter().min() {
+        Some([_, first]) => {
+            let [x, y, z] = rules.root.locate(Candidate(first).centroid());
+            format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
+        }
+        None => "the geometry crosses all leaves: decrease spacing_min".to_owned(),
+    };
+    Error::input(format!("seed {number} at ({x}, {y}, {z}) {problem}; {advice}"))
+}
+
+/// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance
+/// and its [`Candidate`]. Of leaves at the same distance the first, by level and Morton code.
+fn nearest(tree: &Tree, ownership: &Ownership, point: [i64; 3]) -> Option<[u64; 2]> {
+    let mut best = None;
+    for l in 0..LEVELS as Level {
+        for b in open_bricks(tree, ownership, l) {
+            for bit in ones(b.open) {
+                let leaf = Candidate::new(l, b.key << 6 | u64::from(bit));
+                let centroid = leaf.centroid();
+                let squared = |a: usize| (centroid[a] - point[a]).pow(2) as u64;
+                let found = [(0..3).map(squared).sum(), leaf.0];
+                best = Some(best.map_or(found, |best: [u64; 2]| best.min(found)));
+            }
+        }
+    }
+    best
 }
 
 /// The sides of all components: the flow is on the side that is kept, outside if everything is.

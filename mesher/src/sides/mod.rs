@@ -179,7 +179,8 @@ pub fn decide(
     } else {
         let label = |c| components.label(c);
         let found = flow::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
-        flow::decide(&components.all, flow::of_seeds(&found, &rules.seeds)?, rules.keep)
+        let flow = flow::of_seeds(&found, rules, tree, ownership, comm)?;
+        flow::decide(&components.all, flow, rules.keep)
     };
     components.nodes.drop_links();
 
