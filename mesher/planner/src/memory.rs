@@ -63,12 +63,12 @@ impl Rank {
         let text = |path: &str| read_to_string(path).unwrap_or_default();
         let mut node = DefaultHasher::new();
         text("/proc/sys/kernel/random/boot_id").hash(&mut node);
-        let [size, resident] = pages(&text("/proc/self/statm"));
+        let [_, resident] = pages();
         Self {
             amounts,
             resident,
             peak: peak_rss_bytes() as f64,
-            address_space: (address_space_max() - size).max(0.0),
+            address_space: address_space_left(),
             control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
             machine: available(&text("/proc/meminfo")),
             node: node.finish(),
@@ -77,20 +77,22 @@ impl Rank {
 }
 
 /// The size of this process's address space and its resident memory, in bytes; zeros where the system does not report them.
-fn pages(statm: &str) -> [f64; 2] {
+fn pages() -> [f64; 2] {
+    let statm = read_to_string("/proc/self/statm").unwrap_or_default();
     let mut pages = statm.split_whitespace().map_while(|n| n.parse::<f64>().ok());
     // SAFETY: the call reads a constant of the system.
     let bytes = unsafe { libc::sysconf(libc::_SC_PAGESIZE) } as f64;
     [(); 2].map(|()| pages.next().unwrap_or(0.0) * bytes)
 }
 
-fn address_space_max() -> f64 {
+/// What the limit on its address space leaves this process, in bytes; infinity without a limit.
+pub fn address_space_left() -> f64 {
     let mut limit = libc::rlimit { rlim_cur: libc::RLIM_INFINITY, rlim_max: libc::RLIM_INFINITY };
     // SAFETY: the call only writes `limit`.
     unsafe { libc::getrlimit(libc::RLIMIT_AS, &mut limit) };
     match limit.rlim_cur {
         libc::RLIM_INFINITY => f64::INFINITY,
-        bytes => bytes as f64,
+        bytes => (bytes as f64 - pages()[0]).max(0.0),
     }
 }
 

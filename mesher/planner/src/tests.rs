@@ -72,7 +72,7 @@ fn the_finer_pilot_takes_a_moment_or_has_a_64th_of_the_cells() {
 fn what_is_written_takes_time() {
     let time = |words, tree| {
         let directory = "m".into();
-        let out = Some(Output { directory, words, tree, cell_ranks: false });
+        let out = Some(Output { directory, words, tree });
         let options = Options { out, ..options() };
         let mut record = Recorder::default();
         let mut job = Job::new(&options, &Solo, &mut record);

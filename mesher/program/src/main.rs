@@ -97,7 +97,26 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
+/// Time for rank 0 to end the job.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+const ADDRESS_SPACE_MPI: f64 = 384e6;
+
 fn run_mpi(asked: &Result<Asked, Error>) {
+    let left = planner::address_space_left();
+    if left < ADDRESS_SPACE_MPI {
+        let e = Error::memory(format!(
+            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            left / 1e6,
+            (ADDRESS_SPACE_MPI - left) / 1e6
+        ));
+        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
+        if !launch::is_first() {
+            sleep(PATIENCE);
+        }
+        exit(fail(&e, true));
+    }
     let comm = launch::join();
     // A panic that unwinds would leave the other ranks waiting forever.
     abort_on_panic(|| launch::abort(BUG));
