@@ -60,7 +60,7 @@ impl Default for Limits {
 impl Limits {
     /// What of a case is beyond the limits, as the rest of a sentence about the engine; `None` if nothing is.
     pub fn exceeded_by(&self, case: &Case) -> Option<String> {
-        let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
+        let (level, facets) = (case.inputs().level_deepest(), case.facets.len() as u64);
         if level > self.level_max {
             return Some(format!(
                 "supports levels up to {} (level_max in [limits]), and the case needs {level}",

@@ -5,9 +5,8 @@ use super::report::{Check, Outcome};
 use super::serial::Base;
 use crate::engine::failure::{End, Failure};
 use crate::oracle::Question;
-use check::oracle::sample::{self, Sample};
 use check::oracle::vote::{self, Answer, Ballot};
-use check::oracle::watertight::{is_doubled, is_watertight};
+use check::oracle::{self, Sample, is_doubled, is_watertight};
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::parity::Parity;
@@ -36,7 +35,7 @@ impl CaseRun<'_> {
             Some(Size::Small) => POINTS_OF_SMALL,
             _ => self.options.oracle_points,
         };
-        let sample = sample::choose(case, &base.tree.words, most, self.options.seed);
+        let sample = oracle::choose(case, &base.tree.words, most, self.options.seed);
         let (answers, failures) = match self.ask(case, &sample, &oracles.found) {
             Ok(answered) => answered,
             Err(failure) if failure.is_interrupt() => return,
