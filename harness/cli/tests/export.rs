@@ -225,7 +225,7 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     assert_eq!(differences(&of_tree.1), differences(&of_words.1));
     manifest.leaves += 1;
     write(&manifest);
-    assert!(harness(&["diff", "mesh", "tree"]).1.contains("manifest of B contradicts"));
+    assert_eq!(harness(&["audit", "tree"]).0, 1);
 
     let (code, output, error) = harness(&["audit", "mesh.vtkhdf", "--sides", "side"]);
     assert_eq!(error, "");

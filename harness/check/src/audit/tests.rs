@@ -205,7 +205,7 @@ fn a_tree_beside_parts_must_have_their_leaves() {
         let checks = audit(dir.path()).checks;
         assert_eq!((checks[0].name, checks[0].examined), (checks::FILES, 2));
         let result = checks.into_iter().find(|check| check.name == TREE).expect("its check");
-        let details = result.findings.iter().map(|finding| finding.clone());
+        let details = result.findings.iter().cloned();
         (result.examined, details.collect::<Vec<_>>().join("\n"))
     };
     let bytes = std::fs::read(sample).unwrap();

@@ -112,7 +112,7 @@ mod tests {
             let mesh = leaf_set(vec![words]);
             let result = check(Subject::new(&case, &mesh));
             assert_eq!(result.examined, 64);
-            result.findings.into_iter().map(|finding| finding).collect::<Vec<_>>()
+            result.findings
         };
         assert_eq!(findings(|path| path.starts_with('0')), Vec::<String>::new());
         let [missing] = &findings(|path| path != "0.0" && path.starts_with('0'))[..] else {

@@ -18,7 +18,7 @@ fn findings(change: impl Fn(&mut Manifest)) -> Vec<String> {
     change(&mut manifest);
     let mut result = CheckResult::new("kept");
     check(&cavity(), &manifest.clone(), &manifest, &mut result);
-    result.findings.into_iter().map(|finding| finding).collect()
+    result.findings
 }
 
 /// Asserts that there is one finding, with this text.
