@@ -45,11 +45,24 @@ impl Clearance<'_> {
         if let Some(required) = required.filter(|&of| trail.has_coarser(self.tree, &octant, of)) {
             self.report(trail, required, result);
         }
-        for digit in (0..8).filter(|_| handle.is_node()) {
-            let child = octant.child(digit);
+        if !handle.is_node() {
+            return;
+        }
+        let within = |digit: u8| {
             let content = self.tree.child(handle, digit, octant.level);
-            let most = (self.within)(content, child.level);
-            if most.is_some_and(|most| trail.has_coarser(self.tree, &child, most)) {
+            (self.within)(content, octant.level + 1)
+        };
+        // One search around all children comes first; it usually finds nothing.
+        let most = (0..8).filter_map(within).reduce(|a, b| Required {
+            margin: a.margin.max(b.margin),
+            bound: a.bound.max(b.bound),
+        });
+        if !most.is_some_and(|most| trail.has_coarser(self.tree, &octant, most)) {
+            return;
+        }
+        for digit in 0..8 {
+            let child = octant.child(digit);
+            if within(digit).is_some_and(|most| trail.has_coarser(self.tree, &child, most)) {
                 trail.descend(self.tree, digit);
                 self.below(trail, result);
                 trail.ascend();
