@@ -50,14 +50,17 @@ pub struct Sides {
 }
 
 /// How leaves touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Touching {
-    /// In part of a face.
+    /// In part of a face
+    #[value(name = "faces")]
     Face,
-    /// In part of a face or an edge.
+    /// In part of a face or an edge
+    #[value(name = "edges")]
     Edge,
-    /// In a face, an edge or a corner.
+    /// In a face, an edge or a corner
+    #[value(name = "corners")]
     Corner,
 }
 

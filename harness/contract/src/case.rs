@@ -11,7 +11,6 @@ use serde::Deserialize;
 
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
-use crate::seed::BaseTree;
 use crate::stl;
 
 pub use geometries::Facet;
@@ -157,13 +156,9 @@ impl Case {
 
     /// Refuses a seed in a crossing leaf of T0.
     fn refuse_crossing_seeds(&self) -> Result<(), String> {
-        let base = BaseTree {
-            facets: &self.facets_lattice,
-            level: self.level_surface,
-            boxes: &self.boxes,
-        };
+        let inputs = self.inputs();
         for (i, (&seed, at)) in self.seeds_lattice.iter().zip(&self.seeds).enumerate() {
-            if let (leaf, Some(facet)) = base.leaf_at(seed) {
+            if let (leaf, Some(facet)) = inputs.base_leaf_at(seed, &self.facets_lattice) {
                 let leaf = self.root.describe(&leaf);
                 return Err(format!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
@@ -173,6 +168,11 @@ impl Case {
             }
         }
         Ok(())
+    }
+
+    /// The inputs, as the manifest of a final mesh has them.
+    pub fn inputs(&self) -> Manifest {
+        self.manifest(Tree::Final, String::new())
     }
 
     /// The manifest of a mesh of this case, without leaves.
@@ -187,11 +187,6 @@ impl Case {
             enclosed: self.enclosed,
             ..Manifest::without_leaves(tree, self.root, program)
         }
-    }
-
-    /// Deepest level that the surface or a box requires.
-    pub fn level_deepest(&self) -> u8 {
-        self.boxes.iter().map(|b| b.level).fold(self.level_surface, u8::max)
     }
 }
 

@@ -62,22 +62,15 @@ impl Root {
     /// A point of the user with as few decimals as its lattice point needs, and without the rounding errors beyond them: what
     /// is printed. A lattice point next to 24900 is printed as 24900.
     pub fn rounded(&self, at: [f64; 3]) -> [f64; 3] {
-        let unit = self.edge / UNITS_PER_EDGE as f64;
-        let decimals_max = (-unit.log10().floor()).clamp(0.0, 300.0) as usize;
-        let with_decimals = |at: [f64; 3], decimals: usize| {
-            // Adding 0 makes -0 positive.
-            at.map(|x| format!("{x:.decimals$}").parse().map_or(x, |rounded: f64| rounded + 0.0))
-        };
+        let decimals_max = (-(self.edge / UNITS_PER_EDGE as f64).log10().floor()).clamp(0.0, 300.0);
         let exact = self.units(at);
-        let mut rounded = with_decimals(at, decimals_max);
-        for decimals in (0..decimals_max).rev() {
-            let shorter = with_decimals(at, decimals);
-            let units = self.units(shorter);
-            for a in (0..3).filter(|&a| units[a] == exact[a]) {
-                rounded[a] = shorter[a];
-            }
-        }
-        rounded
+        // Adding 0 makes -0 positive.
+        let with_decimals =
+            |x: f64, n: usize| format!("{x:.n$}").parse().map_or(x, |rounded: f64| rounded + 0.0);
+        std::array::from_fn(|a| {
+            let mut shorter = (0..=decimals_max as usize).map(|n| with_decimals(at[a], n));
+            shorter.find(|&x| self.units([x; 3])[a] == exact[a]).unwrap_or(at[a])
+        })
     }
 
     /// The coarsest level whose cells are at most `spacing` wide; `None` if it is deeper than 19.

@@ -11,7 +11,6 @@
 pub mod case;
 pub mod catalogue;
 pub mod digest;
-mod directory;
 pub mod failure;
 pub mod files;
 pub mod htg;
@@ -26,7 +25,7 @@ pub mod octant;
 pub mod paper;
 pub mod parity;
 pub mod plain;
-mod seed;
+mod rules;
 pub mod sets;
 pub mod stl;
 #[cfg(any(test, feature = "testing"))]

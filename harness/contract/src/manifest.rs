@@ -351,20 +351,20 @@ impl Tally {
 
     /// Adds one word. Call [`Tally::finish`] after the last.
     pub fn add(&mut self, word: u64) {
-        self.count(word, 1);
+        self.count(word);
         self.octants[octant_index(word)].add(word);
     }
 
-    /// Counts `leaves` words with the level and side of `word`, and leaves the digests unchanged.
-    pub fn count(&mut self, word: u64, leaves: u64) {
-        self.leaves += leaves;
+    /// Counts a word by level and side, and leaves the digests unchanged.
+    pub fn count(&mut self, word: u64) {
+        self.leaves += 1;
         if let Some(count) = self.by_level.get_mut(usize::from(crate::word::level(word))) {
-            *count += leaves;
+            *count += 1;
         }
         match word & 3 {
-            0 => self.by_side.outside += leaves,
-            1 => self.by_side.inside += leaves,
-            2 => self.by_side.crossing += leaves,
+            0 => self.by_side.outside += 1,
+            1 => self.by_side.inside += 1,
+            2 => self.by_side.crossing += 1,
             _ => {}
         }
     }

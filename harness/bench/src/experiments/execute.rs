@@ -3,8 +3,8 @@
 use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use super::variant::Base;
+use check::audit::audit_against;
 use check::audit::record::AuditRecord;
-use check::audit::{AuditOptions, audit_against};
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::description::is_own;
@@ -178,12 +178,9 @@ impl Runner<'_> {
 fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), String> {
     let case = Case::read(case).map_err(|error| error.to_string())?;
     let promises = &engine.description().promises;
-    let report = audit_against(mesh, &AuditOptions::default(), Some(&case), promises);
-    let broken = report.checks.iter().find_map(|check| check.findings.first());
-    match broken {
-        Some(finding) => {
-            Err(format!("the mesh breaks the promise {}: {}", finding.check, finding.detail))
-        }
+    let report = audit_against(mesh, Some(&case), promises);
+    match report.checks.iter().find(|check| !check.holds()) {
+        Some(check) => Err(format!("the mesh breaks the promise {check}")),
         None => Ok(()),
     }
 }

@@ -211,7 +211,7 @@ fn place_in_source(error: &str) -> String {
 }
 
 fn failed_check(result: &CheckResult, ranks: Ranks) -> Fault {
-    let first = result.findings.first().map_or("", |finding| finding.detail.as_str());
+    let first = result.findings.first().map_or("", |finding| finding.as_str());
     let sentence = match result.findings_total {
         1 => format!("{ranks}: {first}"),
         count => format!("{ranks}: {count} findings, the first: {first}"),

@@ -28,19 +28,6 @@ use contract::tree::Tree;
 
 pub mod record;
 
-/// Options of an audit.
-#[derive(Clone, Debug)]
-pub struct AuditOptions {
-    /// Maximum number of distinct nodes in memory. A node needs up to 120 bytes while the tables grow.
-    pub nodes_max: usize,
-}
-
-impl Default for AuditOptions {
-    fn default() -> Self {
-        Self { nodes_max: NODES_MAX }
-    }
-}
-
 /// The result of an audit.
 #[derive(Clone, Debug)]
 pub struct AuditReport {
@@ -124,22 +111,26 @@ impl fmt::Display for AuditReport {
 pub const TREE: &str = "tree file";
 
 /// Audits a mesh by itself.
-pub fn audit(dir: &Path, options: &AuditOptions) -> AuditReport {
-    audit_against(dir, options, None, &Promises::of_definition())
+pub fn audit(dir: &Path) -> AuditReport {
+    audit_against(dir, None, &Promises::of_definition())
 }
 
 /// Audits a mesh of which these promises are made, against its case if it is known. A mesh that cannot be read is a finding.
-pub fn audit_against(
+pub fn audit_against(dir: &Path, case: Option<&Case>, promises: &Promises) -> AuditReport {
+    audit_within(NODES_MAX, dir, case, promises)
+}
+
+fn audit_within(
+    nodes_max: usize,
     dir: &Path,
-    options: &AuditOptions,
     case: Option<&Case>,
     promises: &Promises,
 ) -> AuditReport {
     let start = Instant::now();
     let mut report =
         AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
-    let read = Mesh::open(dir)
-        .and_then(|mesh| Pass::over(&mesh, options.nodes_max).map(|pass| (mesh, pass)));
+    let read =
+        Mesh::open(dir).and_then(|mesh| Pass::over(&mesh, nodes_max).map(|pass| (mesh, pass)));
     report.time_read_s = start.elapsed().as_secs_f64();
     match read {
         Ok((mesh, pass)) => {

@@ -107,7 +107,7 @@ fn peak_rss_bytes(status: &str) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::audit::{AuditOptions, audit};
+    use crate::audit::audit;
     use contract::testing::{leaf_set, words_of};
 
     #[test]
@@ -126,7 +126,7 @@ mod tests {
         {
             set.manifest.leaves += extra_leaves;
             set.write(place.path()).unwrap();
-            let record = AuditRecord::of(&audit(place.path(), &AuditOptions::default()));
+            let record = AuditRecord::of(&audit(place.path()));
             let path = place.path().join(name);
             record.write(&path).unwrap();
             assert_eq!(AuditRecord::read(&path).unwrap(), record);

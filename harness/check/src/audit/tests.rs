@@ -7,10 +7,10 @@ use contract::manifest::{Keep, Sides};
 use contract::testing::{leaf_set, random_words, words_of};
 use proptest::prelude::*;
 
-fn audited(set: &LeafSet, options: &AuditOptions) -> AuditReport {
+fn audited(set: &LeafSet) -> AuditReport {
     let dir = tempfile::tempdir().unwrap();
     set.write(dir.path()).unwrap();
-    audit(dir.path(), options)
+    audit(dir.path())
 }
 
 fn found(report: &AuditReport) -> Vec<&'static str> {
@@ -28,9 +28,9 @@ proptest! {
         let mut parts = vec![Vec::new(); 5];
         words.iter().zip(&part_of).for_each(|(&w, &part)| parts[part].push(w));
         let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
-        let (leaves, options) = (words.len() as u64, AuditOptions::default());
-        let one = audited(&leaf_set(vec![words]), &options);
-        let several = audited(&leaf_set(parts), &options);
+        let leaves = words.len() as u64;
+        let one = audited(&leaf_set(vec![words]));
+        let several = audited(&leaf_set(parts));
         prop_assert_eq!(found(&one), found(&several));
         prop_assert!(!found(&several).contains(&"manifest") && !found(&several).contains(&"linear"));
         prop_assert_eq!(several.leaves, leaves);
@@ -40,10 +40,10 @@ proptest! {
 #[test]
 fn a_correct_mesh_passes_and_an_unsorted_part_fails() {
     let words = correct();
-    assert!(audited(&leaf_set(vec![words.clone(), vec![]]), &AuditOptions::default()).holds());
+    assert!(audited(&leaf_set(vec![words.clone(), vec![]])).holds());
     let mut unsorted = words;
     unsorted.swap(3, 4);
-    let report = audited(&leaf_set(vec![unsorted]), &AuditOptions::default());
+    let report = audited(&leaf_set(vec![unsorted]));
     assert!(found(&report).contains(&"linear"));
 }
 
@@ -54,7 +54,7 @@ fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
     let dir = tempfile::tempdir().unwrap();
     leaf_set(vec![words]).write(dir.path()).unwrap();
     let names = |promises: &Promises| {
-        let report = audit_against(dir.path(), &AuditOptions::default(), None, promises);
+        let report = audit_against(dir.path(), None, promises);
         let names: Vec<_> = report.checks.iter().map(|check| check.name).collect();
         (names, found(&report))
     };
@@ -67,7 +67,7 @@ fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
     let (names_of_balance, findings) = names(&balance(Touching::Corner, 4));
     assert_eq!((&names_of_balance[..], &findings[..]), (&checked[..], &["balance"][..]));
     assert_eq!(names(&balance(Touching::Corner, 8)), (names_of_balance, vec![]));
-    let of_definition = audit(dir.path(), &AuditOptions::default());
+    let of_definition = audit(dir.path());
     let expected: Vec<_> = of_definition.checks.iter().map(|check| check.name).collect();
     let by_promise = names(&Promises::of_definition());
     assert_eq!(by_promise, (expected, found(&of_definition)));
@@ -76,7 +76,7 @@ fn promises_replace_the_checks_of_the_definition_unless_they_include_it() {
 
 #[test]
 fn a_check_that_had_nothing_to_check_examined_nothing_and_the_others_every_leaf() {
-    let report = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+    let report = audited(&leaf_set(vec![correct()]));
     assert!(report.not_run().count() > 0 && report.checked_anything());
     assert_eq!(report.nodes, Tree::of_words(&correct()).nodes() as u64);
     for check in &report.checks {
@@ -96,7 +96,7 @@ fn what_needs_unknown_sides_is_not_checked() {
     words.pop();
     let mut set = leaf_set(vec![words]);
     let found = |set: &LeafSet, name: &str| {
-        let checks = audited(set, &AuditOptions::default()).checks;
+        let checks = audited(set).checks;
         checks.into_iter().find(|c| c.name == name).expect("a check of the audit")
     };
     let is_withdrawn = |set: &LeafSet, name: &str| {
@@ -123,11 +123,11 @@ fn a_promise_of_sides_is_broken_by_a_mesh_without() {
         set.manifest.sides = if known { Sides::Known } else { Sides::Unknown };
         let dir = tempfile::tempdir().unwrap();
         set.write(dir.path()).unwrap();
-        let report = audit_against(dir.path(), &AuditOptions::default(), Some(&case), &promises);
+        let report = audit_against(dir.path(), Some(&case), &promises);
         let check = report.checks.iter().find(|check| check.name == "sides").unwrap();
         assert_eq!((check.was_run(), check.holds()), (true, known), "{report}");
         let claims = report.checks.iter().find(|check| check.name == "manifest").unwrap();
-        let claims: Vec<&str> = claims.findings.iter().map(|f| f.detail.as_str()).collect();
+        let claims: Vec<&str> = claims.findings.iter().map(|f| f.as_str()).collect();
         let level = "level_surface: 0 in the manifest, but 2 in fact";
         assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
         // Leaves near the facet are not judged, and are not counted.
@@ -161,7 +161,7 @@ fn the_report_states_each_check_and_whether_leaves_were_checked() {
 
 #[test]
 fn a_report_that_contradicts_itself_is_a_bug() {
-    let correct = audited(&leaf_set(vec![correct()]), &AuditOptions::default());
+    let correct = audited(&leaf_set(vec![correct()]));
     let faults: [fn(&mut AuditReport); 5] = [
         |r| r.checks.clear(),
         |r| r.checks.push(r.checks[0].clone()),
@@ -181,7 +181,9 @@ fn a_report_that_contradicts_itself_is_a_bug() {
 fn an_exceeded_memory_limit_is_a_finding() {
     let mut set = leaf_set(vec![words_of(|o| o.level < 5 && o.corner[0] < 1 << 18)]);
     set.manifest.leaves += 1;
-    let report = audited(&set, &AuditOptions { nodes_max: 1 });
+    let dir = tempfile::tempdir().unwrap();
+    set.write(dir.path()).unwrap();
+    let report = audit_within(1, dir.path(), None, &Promises::of_definition());
     assert_eq!(found(&report), ["manifest", CAPACITY]);
 }
 
@@ -200,10 +202,10 @@ fn a_tree_beside_parts_must_have_their_leaves() {
         let dir = tempfile::tempdir().unwrap();
         set.write(dir.path()).unwrap();
         std::fs::write(dir.path().join(TREE_FILE), tree).unwrap();
-        let checks = audit(dir.path(), &AuditOptions::default()).checks;
+        let checks = audit(dir.path()).checks;
         assert_eq!((checks[0].name, checks[0].examined), (checks::FILES, 2));
         let result = checks.into_iter().find(|check| check.name == TREE).expect("its check");
-        let details = result.findings.iter().map(|finding| finding.detail.clone());
+        let details = result.findings.iter().cloned();
         (result.examined, details.collect::<Vec<_>>().join("\n"))
     };
     let bytes = std::fs::read(sample).unwrap();

@@ -4,7 +4,7 @@
 //! Section 7 of reference/DEFINITION.md; the paper's 4:1 rule, at most one hanging node per edge, follows. The check cannot detect needless refinement. If crossing leaves are deleted and T0 is
 //! unknown, it cannot detect imbalance between a deleted leaf and its neighbours.
 
-use super::gap::{ALL_AXES, Gap};
+use super::clearance::{ALL_AXES, check_gap};
 use super::{Check, CheckResult, Subject, several_levels};
 use crate::promises::Touching;
 use contract::lattice::Root;
@@ -48,7 +48,7 @@ fn touching_leaves(
     };
     let what = &format!("leaves that {how} differ by {} levels or more", levels + 1);
     // Distances are integers: octants less than one cell apart touch.
-    Gap { tree, root, margin: &|_| Some(1), directions, levels, what }.check(result);
+    check_gap(tree, (root, what), &|_| Some(1), directions, levels, result);
 }
 
 #[cfg(test)]

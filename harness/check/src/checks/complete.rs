@@ -9,11 +9,11 @@
 
 use std::fmt::Write;
 
-use super::contact::{self, Contacts};
+use super::contact;
 use super::region::Survey;
 use super::truth::{Found, Truth};
-use super::{Check, CheckResult, Subject, Terms, some_leaves};
-use contract::manifest::{Keep, Sides};
+use super::{Check, CheckResult, Subject, some_leaves};
+use contract::manifest::{Keep, Manifest, Sides};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
@@ -58,7 +58,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let _ = write!(result.note, "the mesh fills {:.6} % of the root", 100.0 * fraction);
 }
 
-fn compare(found: &Found, terms: &Terms, result: &mut CheckResult) {
+fn compare(found: &Found, terms: &Manifest, result: &mut CheckResult) {
     let what = match found.base {
         None => "a leaf is coarser than T0:",
         Some(kind) => match (Truth::keeps(kind, terms), found.is_hole()) {
@@ -73,25 +73,23 @@ fn compare(found: &Found, terms: &Terms, result: &mut CheckResult) {
     report(result, what, &found.octant, terms);
 }
 
-fn report(result: &mut CheckResult, what: &str, octant: &Octant, terms: &Terms) {
+fn report(result: &mut CheckResult, what: &str, octant: &Octant, terms: &Manifest) {
     result.report_with(|| format!("{what} {}", terms.root.describe(octant)));
 }
 
-impl Terms {
-    /// Whether a leaf may have a deleted neighbour across a face.
-    fn may_face_hole(&self, kind: Kind, level: u8) -> bool {
-        match (self.keep_crossing, self.keep) {
-            (true, Keep::All) => false,
-            // Crossing leaves separate the sides, so only they can have deleted neighbours.
-            (true, _) => kind == Side::Crossing as Kind,
-            // Crossing leaves are deleted, and every leaf that touched one is at least as fine as the surface.
-            (false, _) => level >= self.level_surface,
-        }
+/// Whether a leaf may have a deleted neighbour across a face.
+fn may_face_hole(terms: &Manifest, kind: Kind, level: u8) -> bool {
+    match (terms.keep_crossing, terms.keep) {
+        (true, Keep::All) => false,
+        // Crossing leaves separate the sides, so only they can have deleted neighbours.
+        (true, _) => kind == Side::Crossing as Kind,
+        // Crossing leaves are deleted, and every leaf that touched one is at least as fine as the surface.
+        (false, _) => level >= terms.level_surface,
     }
 }
 
 /// Checks the boundaries of holes, from the leaves only.
-fn check_holes(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
+fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     if tree.root() == Handle::HOLE {
         // A body that fills the root leaves an empty mesh, unless nothing is ever deleted.
         if terms.keep == Keep::All && terms.keep_crossing {
@@ -99,9 +97,8 @@ fn check_holes(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
         }
         return;
     }
-    let matters = |kind: Kind, level: u8| !terms.may_face_hole(kind, level);
-    Contacts { tree, sought: HOLES, matters: &matters }.visit(&mut |octant, kind, across| {
-        if across & HOLES != 0 {
+    contact::visit(tree, HOLES, &mut |octant, kind, across| {
+        if across & HOLES != 0 && !may_face_hole(terms, kind, octant.level) {
             result.report_with(|| {
                 let leaf = terms.root.describe(&octant);
                 let side = match terms.sides {
@@ -144,7 +141,7 @@ mod tests {
         for (keep, keep_crossing, findings) in
             [(Keep::All, true, 1), (Keep::All, false, 0), (Keep::Outside, true, 0)]
         {
-            let terms = Terms { keep, keep_crossing, ..Terms::of_manifest(&manifest) };
+            let terms = Manifest { keep, keep_crossing, ..manifest.clone() };
             let mut result = CheckResult::new("complete");
             check_holes(&Tree::default(), &terms, &mut result);
             assert_eq!(result.findings_total, findings);

@@ -1,8 +1,8 @@
 //! The components of T0's leaves, their sides, and which of them are enclosed (reference/DEFINITION.md,
 //! sections 4 and 5).
 
-use super::terms::Terms;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::manifest::Manifest;
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::parity::Parity;
 use contract::sets::Sets;
@@ -29,12 +29,14 @@ pub struct Component {
 /// What decides the side of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
+    /// The words of its leaves state it.
+    Stated,
     /// The seed with this index lies in it.
     Seed(usize),
     /// No seed lies in it.
     NoSeed,
-    /// The six rays of this candidate agree, and those of the given number of candidates before it do not.
-    Rays(Octant, usize),
+    /// The six rays of this candidate agree, and those of no candidate before it.
+    Rays(Octant),
     /// The rays of no candidate agree. The majority of the rays of this many candidates, and how many of them are odd.
     Majority(usize, usize),
 }
@@ -47,25 +49,38 @@ impl Component {
 }
 
 /// The components of sorted leaves that tile the root.
-pub fn find(words: &[u64], terms: &Terms, facets: &[FacetLattice]) -> Vec<Component> {
-    let groups = groups(words);
-    let at_boundary: Vec<bool> =
-        groups.iter().map(|group| touches_boundary(words, group)).collect();
-    let mut components: Vec<Component> = match terms.seeds.is_empty() {
-        true => {
-            let parity = Parity::new(facets);
-            groups.into_iter().map(|group| by_rays(group, words, &parity)).collect()
-        }
-        false => {
-            let seeded = seeded_leaves(words, terms);
-            groups.into_iter().map(|group| by_seeds(group, words, &seeded, terms)).collect()
-        }
+pub fn find(words: &[u64], inputs: &Manifest, facets: &[FacetLattice]) -> Vec<Component> {
+    if inputs.seeds.is_empty() {
+        let parity = Parity::new(facets);
+        return decided(words, inputs, |leaves| by_rays(leaves, words, &parity));
+    }
+    let seeded = seeded_leaves(words, inputs);
+    decided(words, inputs, |leaves| by_seeds(leaves, &seeded, inputs))
+}
+
+/// The components of sorted leaves that do not overlap, with the sides that their words state.
+pub fn stated(words: &[u64], inputs: &Manifest) -> Vec<Component> {
+    let side = |leaves: &[u32]| word::side(words[leaves[0] as usize]);
+    decided(words, inputs, |leaves| (side(leaves), Decision::Stated))
+}
+
+fn decided(
+    words: &[u64],
+    inputs: &Manifest,
+    decide: impl Fn(&[u32]) -> (Side, Decision),
+) -> Vec<Component> {
+    let component = |leaves: Vec<u32>| {
+        let (side, decision) = decide(&leaves);
+        let first = word::octant(words[leaves[0] as usize]);
+        Component { leaves, side, decision, first, enclosed: false }
     };
-    let outside = |component: &Component| component.side == Side::Outside;
-    let far_field = components.iter().zip(&at_boundary).any(|(c, at)| *at && outside(c));
-    if terms.deletes_enclosed() && far_field {
-        for (component, at) in components.iter_mut().zip(&at_boundary) {
-            component.enclosed = !at && outside(component);
+    let mut components: Vec<Component> = groups(words).into_iter().map(component).collect();
+    let is_outside = |component: &Component| component.side == Side::Outside;
+    let is_far_field = |c: &Component| is_outside(c) && touches_boundary(words, &c.leaves);
+    let far_field: Vec<bool> = components.iter().map(is_far_field).collect();
+    if inputs.deletes_enclosed() && far_field.contains(&true) {
+        for (component, is_far_field) in components.iter_mut().zip(far_field) {
+            component.enclosed = is_outside(component) && !is_far_field;
         }
     }
     components
@@ -113,7 +128,7 @@ pub fn in_root(point: [i64; 3]) -> bool {
 }
 
 /// The indices of the leaves that contain seeds, ascending, with the index of the first seed in each.
-pub fn seeded_leaves(words: &[u64], terms: &Terms) -> Vec<(u32, usize)> {
+pub fn seeded_leaves(words: &[u64], terms: &Manifest) -> Vec<(u32, usize)> {
     let seeds = terms.seeds.iter().enumerate();
     let leaves = seeds.filter_map(|(seed, &at)| Some((leaf_at(words, at)? as u32, seed)));
     let mut seeded: Vec<(u32, usize)> = leaves.collect();
@@ -145,23 +160,18 @@ fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usi
     })
 }
 
-fn component(leaves: Vec<u32>, words: &[u64], side: Side, decision: Decision) -> Component {
-    let first = word::octant(words[leaves[0] as usize]);
-    Component { leaves, side, decision, first, enclosed: false }
-}
-
 /// A component with a seed is flow; any other has the other side.
-fn by_seeds(leaves: Vec<u32>, words: &[u64], seeded: &[(u32, usize)], terms: &Terms) -> Component {
-    let flow = terms.side_of_flow();
+fn by_seeds(leaves: &[u32], seeded: &[(u32, usize)], inputs: &Manifest) -> (Side, Decision) {
+    let flow = inputs.side_of_flow();
     let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
-    match seed_in(&leaves, seeded) {
-        Some(seed) => component(leaves, words, flow, Decision::Seed(seed)),
-        None => component(leaves, words, other, Decision::NoSeed),
+    match seed_in(leaves, seeded) {
+        Some(seed) => (flow, Decision::Seed(seed)),
+        None => (other, Decision::NoSeed),
     }
 }
 
 /// The first candidate whose rays agree decides. Without one, the majority of all rays decides.
-fn by_rays(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
+fn by_rays(leaves: &[u32], words: &[u64], parity: &Parity) -> (Side, Decision) {
     let (mut candidates, mut inside) = (0, 0);
     for &i in leaves.iter().take(CANDIDATES_MAX) {
         let candidate = word::octant(words[i as usize]);
@@ -169,13 +179,13 @@ fn by_rays(leaves: Vec<u32>, words: &[u64], parity: &Parity) -> Component {
         let odd = votes.iter().filter(|&&v| v).count();
         if odd == 0 || odd == 6 {
             let side = if odd == 6 { Side::Inside } else { Side::Outside };
-            return component(leaves, words, side, Decision::Rays(candidate, candidates));
+            return (side, Decision::Rays(candidate));
         }
         candidates += 1;
         inside += odd;
     }
     let side = if inside > 3 * candidates { Side::Inside } else { Side::Outside };
-    component(leaves, words, side, Decision::Majority(candidates, inside))
+    (side, Decision::Majority(candidates, inside))
 }
 
 #[cfg(test)]
@@ -260,8 +270,8 @@ mod tests {
         for (outer, enclosed) in [([14, 146], true), ([-14, 174], false)] {
             let body = [&inner[..], &cuboid([outer; 3])].concat();
             let words = contract::testing::base_tree(&body, 4);
-            let mut terms = Terms::of_manifest(&contract::testing::leaf_set(vec![]).manifest);
-            let of_cavity = |terms: &Terms| {
+            let mut terms = contract::testing::leaf_set(vec![]).manifest;
+            let of_cavity = |terms: &Manifest| {
                 let cavity = leaf_at(&words, [8 * CELL; 3]).unwrap() as u32;
                 let found = find(&words, terms, &body);
                 assert_eq!(
@@ -280,7 +290,7 @@ mod tests {
     /// A box around some leaves. A face that is given twice stops no ray, so the rays of all leaves within disagree.
     #[test]
     fn the_majority_of_all_rays_decides_where_the_rays_of_every_candidate_disagree() {
-        let terms = Terms::of_manifest(&contract::testing::leaf_set(vec![]).manifest);
+        let terms = contract::testing::leaf_set(vec![]).manifest;
         for twice in 0..=6 {
             let faces = cuboid([[33, 97], [35, 111], [31, 96]]);
             let body = [&faces[..], &faces[..2 * twice]].concat();

@@ -3,68 +3,31 @@
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Kinds, Neighbourhood, Tree};
 
-/// A visit of leaves with the kinds of their neighbours across faces.
-pub struct Contacts<'a> {
-    /// The mesh.
-    pub tree: &'a Tree,
-    /// Only leaves whose parent contains or adjoins one of these kinds are visited.
-    pub sought: Kinds,
-    /// Selects the leaves to visit, by kind and level.
-    pub matters: &'a dyn Fn(Kind, u8) -> bool,
+/// Visits leaves with their kinds, and with the kinds of everything that shares part of a face with them, holes included: all leaves
+/// whose parent contains or adjoins one of the kinds that are sought.
+pub fn visit(tree: &Tree, sought: Kinds, visit: &mut dyn FnMut(Octant, Kind, Kinds)) {
+    below(tree, sought, &Neighbourhood::root(tree), visit);
 }
 
-impl Contacts<'_> {
-    /// Calls `visit` with the octant and the kind of every selected leaf, and with the kinds of everything that
-    /// shares part of a face with it, holes included.
-    pub fn visit(&self, visit: &mut dyn FnMut(Octant, Kind, Kinds)) {
-        let neighbourhood = Neighbourhood::root(self.tree);
-        match neighbourhood.centre().as_leaf() {
-            Some(kind) if (self.matters)(kind, 0) => visit(neighbourhood.octant, kind, 0),
-            Some(_) => {}
-            None => self.below(&neighbourhood, visit),
-        }
+fn below(
+    tree: &Tree,
+    sought: Kinds,
+    around: &Neighbourhood,
+    visit: &mut dyn FnMut(Octant, Kind, Kinds),
+) {
+    let across = |axis: usize, by: i32| {
+        let mut offset = [0; 3];
+        offset[axis] = by;
+        around.at_offset(offset)
+    };
+    if let Some(kind) = around.centre().as_leaf() {
+        let faces = (0..3).flat_map(|axis| [(axis, -1, 1), (axis, 1, 0)]);
+        let kinds = faces.map(|(axis, by, facing)| on_face(tree, across(axis, by), axis, facing));
+        return visit(around.octant, kind, kinds.fold(0, |all, kinds| all | kinds));
     }
-
-    fn below(&self, neighbourhood: &Neighbourhood, visit: &mut dyn FnMut(Octant, Kind, Kinds)) {
-        if !neighbourhood.centre().is_node() || self.near(neighbourhood) & self.sought == 0 {
-            return;
-        }
-        for digit in 0..8 {
-            let child = self.tree.child(neighbourhood.centre(), digit, neighbourhood.octant.level);
-            if child.is_node() {
-                self.below(&neighbourhood.child(self.tree, digit), visit);
-            } else if let Some(kind) = child.as_leaf()
-                && (self.matters)(kind, neighbourhood.octant.level + 1)
-            {
-                visit(
-                    neighbourhood.octant.child(digit),
-                    kind,
-                    self.across_faces(neighbourhood, digit),
-                );
-            }
-        }
-    }
-
-    /// Kinds of all leaves in an octant and in its neighbours across faces.
-    fn near(&self, neighbourhood: &Neighbourhood) -> Kinds {
-        const ACROSS: [usize; 7] = [4, 10, 12, 13, 14, 16, 22];
-        ACROSS.iter().fold(0, |kinds, &i| kinds | self.tree.kinds(neighbourhood.handles[i]))
-    }
-
-    /// Kinds of everything that shares part of a face with a child.
-    fn across_faces(&self, neighbourhood: &Neighbourhood, digit: u8) -> Kinds {
-        let mut kinds = 0;
-        for axis in 0..3 {
-            for (by, facing) in [(-1, 1), (1, 0)] {
-                kinds |= on_face(
-                    self.tree,
-                    neighbourhood.across(self.tree, digit, axis, by),
-                    axis,
-                    facing,
-                );
-            }
-        }
-        kinds
+    let mut near = (0..3).flat_map(|axis| [0, -1, 1].map(|by| across(axis, by)));
+    if around.centre().is_node() && near.any(|handle| tree.kinds(handle) & sought != 0) {
+        (0..8).for_each(|digit| below(tree, sought, &around.child(tree, digit), visit));
     }
 }
 
@@ -103,14 +66,12 @@ mod tests {
     proptest! {
         #[test]
         fn contacts_agree_with_a_comparison_of_all_pairs(
-            words in random_words(3), matter in prop::array::uniform3(any::<bool>()), deepest in 0u8..=3,
+            words in random_words(3), sought in 0u8..32,
         ) {
             let tree = Tree::of_words(&words);
-            let mut seen = 0;
-            let matters = |kind: Kind, level| matter[usize::from(kind)] && level <= deepest;
-            let contacts = Contacts { tree: &tree, sought: !0, matters: &matters };
-            contacts.visit(&mut |octant, kind, kinds| {
-                assert!(matters(kind, octant.level), "{octant}");
+            let mut touching = 0;
+            visit(&tree, sought, &mut |octant, kind, kinds| {
+                assert_eq!(tree.locate(octant.corner), Some((octant, kind)));
                 let mut expected = 0;
                 let mut area = 0;
                 for &w in &words {
@@ -127,10 +88,14 @@ mod tests {
                     expected |= HOLES;
                 }
                 assert_eq!(kinds, expected, "{octant}");
-                seen += 1;
+                touching += u64::from(kinds & sought != 0);
             });
-            let selected = words.iter().filter(|&&w| matters((w & 3) as Kind, word::level(w)));
-            prop_assert_eq!(seen, selected.count());
+            let mut all = 0;
+            visit(&tree, !0, &mut |_, _, kinds| all += u64::from(kinds & sought != 0));
+            prop_assert_eq!(touching, all);
+            let mut seen = 0;
+            visit(&tree, !0, &mut |_, _, _| seen += 1);
+            prop_assert_eq!(seen, words.len());
         }
     }
 }

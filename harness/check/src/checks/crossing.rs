@@ -34,9 +34,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if !subject.promises.definition {
         return by_itself(subject, &Crossed::new(facets, &subject.terms, None), result);
     }
-    of_truth("", subject.tree(), truth, subject, result);
-    if let Some(base) = subject.tree_base() {
-        of_truth("T0: ", base, truth, subject, result);
+    for (prefix, _, pass) in subject.meshes() {
+        of_truth(prefix, pass.tree(), truth, subject, result);
     }
 }
 
@@ -113,7 +112,7 @@ mod tests {
             let mesh = leaf_set(vec![words]);
             let result = check(Subject::new(&case, &mesh));
             assert_eq!(result.examined, 64);
-            result.findings.into_iter().map(|finding| finding.detail).collect::<Vec<_>>()
+            result.findings
         };
         assert_eq!(findings(|path| path.starts_with('0')), Vec::<String>::new());
         let [missing] = &findings(|path| path != "0.0" && path.starts_with('0'))[..] else {
@@ -133,7 +132,7 @@ mod tests {
             |o: &Octant| Some(if is_crossing(o.path()) { Side::Crossing } else { Side::Outside });
         let mesh = leaf_set(vec![words_with_sides(|o| ["root", "0"].contains(&&*o.path()), side)]);
         let result = check(Subject::new(&case, &mesh));
-        let text = &result.findings[0].detail;
+        let text = &result.findings[0];
         assert!(result.findings_total == 1 && text.contains("octant 1 "), "{result}");
     }
 }

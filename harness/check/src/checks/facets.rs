@@ -1,19 +1,8 @@
-//! The octants of a mesh that facets cross, found by descent through the sorted words with shrinking lists of
-//! facets.
+//! The facets that meet octants, found by descent with shrinking lists.
 
 use contract::lattice::FacetLattice;
 use contract::octant::Octant;
 use contract::triangle::Triangle;
-use contract::word;
-
-/// An octant that is a leaf or contains leaves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Visit {
-    /// The leaf with this index.
-    Leaf(usize),
-    /// A split octant.
-    Split,
-}
 
 /// Facets, prepared for any number of walks.
 #[derive(Debug)]
@@ -40,38 +29,23 @@ impl Facets {
         candidates.iter().copied().find(|&i| self.0[i as usize].meets(low, high))
     }
 
-    /// Visits every octant that is a leaf or contains leaves, parents first, with whether a facet crosses it.
-    /// The words must be sorted leaves without overlap.
-    pub fn walk(&self, words: &[u64], visit: &mut dyn FnMut(Visit, &Octant, bool)) {
-        self.descend(words, 0, Octant::ROOT, &self.all(), visit);
+    /// Visits octants in Morton order, parents first, each with the facets that meet it if it is enlarged by `margin` lattice units on all
+    /// sides: the root, and the children of octants for which `enter` returns true.
+    pub fn walk(&self, margin: i64, enter: &mut dyn FnMut(Octant, &[u32]) -> bool) {
+        self.walk_below(Octant::ROOT, &self.all(), margin, enter);
     }
 
-    fn descend(
+    fn walk_below(
         &self,
-        words: &[u64],
-        first: usize,
         octant: Octant,
         candidates: &[u32],
-        visit: &mut dyn FnMut(Visit, &Octant, bool),
+        margin: i64,
+        enter: &mut dyn FnMut(Octant, &[u32]) -> bool,
     ) {
-        let Some(&word) = words.first() else {
-            return;
-        };
         let (low, high) = octant.bounds();
-        if word::level(word) <= octant.level {
-            let crossed = self.first_meeting(candidates, low, high).is_some();
-            visit(Visit::Leaf(first), &octant, crossed);
-            return;
-        }
-        let crossing = self.meeting(candidates, low, high);
-        visit(Visit::Split, &octant, !crossing.is_empty());
-        let mut from = 0;
-        for digit in 0..8 {
-            let child = octant.child(digit);
-            let end = word::key_of(child.corner) + word::span(child.level);
-            let until = from + words[from..].partition_point(|&w| word::key(w) < end);
-            self.descend(&words[from..until], first + from, child, &crossing, visit);
-            from = until;
+        let near = self.meeting(candidates, low.map(|c| c - margin), high.map(|c| c + margin));
+        if enter(octant, &near) {
+            (0..8).for_each(|digit| self.walk_below(octant.child(digit), &near, margin, enter));
         }
     }
 }
@@ -79,30 +53,29 @@ impl Facets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::testing::{octants_of, random_words};
+    use contract::testing::words_of;
+    use contract::word;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn a_walk_visits_leaves_and_their_ancestors_with_what_crosses_them(
-            words in random_words(3),
+        fn a_walk_visits_octants_with_the_facets_that_meet_them_or_their_margin(
             facets in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(0i64..1 << 27)), 0..3),
+            margin in 0i64..1 << 24,
         ) {
-            let crossed_by_any = |octant: &Octant| {
-                let (low, high) = octant.bounds();
-                facets.iter().any(|facet| Triangle::new(facet).meets(low, high))
-            };
             let mut visited = Vec::new();
-            Facets::new(&facets).walk(&words, &mut |visit, octant, crossed| {
-                assert_eq!(crossed, crossed_by_any(octant), "{octant}");
-                match visit {
-                    Visit::Leaf(i) => assert_eq!(word::octant(words[i]), *octant),
-                    Visit::Split => assert!(words.iter().all(|&w| word::octant(w) != *octant)),
+            Facets::new(&facets).walk(margin, &mut |octant, near| {
+                let (low, high) = octant.bounds();
+                let (low, high) = (low.map(|c| c - margin), high.map(|c| c + margin));
+                let meeting = (0..).zip(&facets).filter(|(_, facet)| Triangle::new(facet).meets(low, high));
+                assert_eq!(near, meeting.map(|(i, _)| i).collect::<Vec<u32>>(), "{octant}");
+                if octant.level == 2 {
+                    visited.push(octant);
                 }
-                visited.push(*octant);
+                octant.level < 2
             });
-            visited.sort_unstable_by_key(|o| (o.level, o.corner));
-            prop_assert_eq!(visited, octants_of(&words));
+            let all: Vec<Octant> = words_of(|o| o.level < 2).into_iter().map(word::octant).collect();
+            prop_assert_eq!(visited, all);
         }
     }
 }

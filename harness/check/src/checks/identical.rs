@@ -80,7 +80,7 @@ mod tests {
         assert!(compare(&fine, &fine, &ROOT).holds());
         let result = compare(&coarse, &fine, &ROOT);
         assert_eq!(result.findings_total, 2);
-        let detail = &result.findings[0].detail;
+        let detail = &result.findings[0];
         assert!(detail.contains("mesh has inside leaf: octant 3 (level 1)"), "{detail}");
         assert!(detail.contains("it should have outside leaf: octant 3 (level 1)"), "{detail}");
         assert_eq!(compare(&fine[..7], &fine, &ROOT).findings_total, 1);

@@ -8,13 +8,12 @@
 //! thick nor, without T0, missing layers around deleted crossing leaves. With n = 1, the minimum distance is that of the
 //! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
 
-use super::gap::{ALL_AXES, Gap};
+use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::surface::Crossed;
-use super::trail::Trail;
-use super::{Check, CheckResult, Subject, Terms, contact, several_levels, some_leaves};
-use contract::manifest::{Keep, Tree as MeshKind};
-use contract::octant::CELLS_PER_EDGE;
-use contract::tree::{DELETED, Kind, Kinds, Region, Tree};
+use super::{Check, CheckResult, Subject, contact, several_levels, some_leaves};
+use contract::manifest::{Keep, Manifest, Tree as MeshKind};
+use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::tree::{DELETED, Handle, Kind, Kinds, Tree};
 use contract::word::Side;
 
 pub(super) const CHECK: Check = Check {
@@ -46,7 +45,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     }
 }
 
-fn check_tree(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
+fn check_tree(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
         let required = terms.keep == Keep::All || level < terms.level_surface;
@@ -54,10 +53,9 @@ fn check_tree(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
     };
     if n > 1 {
         let what = &format!("a layer is thinner than {n} cells");
-        Gap { tree, root: &terms.root, margin: &margin, directions: &ALL_AXES, levels: 1, what }
-            .check(result);
+        check_gap(tree, (&terms.root, what), &margin, &ALL_AXES, 1, result);
     }
-    SurfaceLayer { tree, terms }.check_children(&mut Trail::new(tree), result);
+    check_surface_layer(tree, terms, result);
 }
 
 /// Edge of a cell of this level, in level-19 cells.
@@ -65,106 +63,72 @@ fn cell(level: u8) -> i64 {
     i64::from(CELLS_PER_EDGE >> level)
 }
 
-impl Terms {
-    /// Minimum distance between a crossing or deleted leaf of this level and any leaf coarser than the surface level,
-    /// in level-19 cells.
-    fn surface_margin(&self, kind: Kind, level: u8) -> i64 {
-        let layer = i64::from(self.layer_cells_min) - 1;
-        // One cell at least, if crossing leaves are deleted.
-        let extra = i64::from(!self.keep_crossing);
-        let cells = match kind {
-            // The leaf may have been refined before it was deleted, so only adjacent leaves are constrained.
-            DELETED => extra,
-            _ if level == self.level_surface => layer.max(extra),
-            _ => extra,
-        };
-        cells * cell(level)
-    }
+/// Minimum distance between a crossing or deleted leaf of this level and any leaf coarser than the surface level,
+/// in level-19 cells.
+fn surface_margin(terms: &Manifest, kind: Kind, level: u8) -> i64 {
+    let layer = i64::from(terms.layer_cells_min) - 1;
+    // One cell at least, if crossing leaves are deleted.
+    let extra = i64::from(!terms.keep_crossing);
+    let cells = match kind {
+        // The leaf may have been refined before it was deleted, so only adjacent leaves are constrained.
+        DELETED => extra,
+        _ if level == terms.level_surface => layer.max(extra),
+        _ => extra,
+    };
+    cells * cell(level)
 }
 
 const CROSSING_OR_DELETED: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
 
-/// Requires that no leaf near a crossing leaf is coarser than the surface level.
-struct SurfaceLayer<'a> {
-    tree: &'a Tree,
-    terms: &'a Terms,
-}
-
-impl SurfaceLayer<'_> {
-    /// Checks the children of the current octant. One search around all selected children comes first; it usually finds
-    /// nothing.
-    fn check_children(&self, trail: &mut Trail, result: &mut CheckResult) {
-        let (tree, surface) = (self.tree, self.terms.level_surface);
-        let (handle, octant) = (trail.current().centre(), trail.current().octant);
-        let margin_max = self.terms.surface_margin(Side::Crossing as Kind, surface);
-        let selected =
-            trail.select_children(tree, |child| tree.kinds(child) & CROSSING_OR_DELETED != 0);
-        if selected == 0 || margin_max == 0 {
-            return;
-        }
-        let region = Region::around_children(&octant, selected, margin_max);
-        if trail.coarsest_nearby(tree, margin_max, &region, surface) >= surface {
-            return;
-        }
-        for digit in (0..8).filter(|d| selected >> d & 1 == 1) {
-            let child = tree.child(handle, digit, octant.level);
-            trail.descend(tree, digit);
-            match child.as_leaf() {
-                Some(kind) if octant.level + 1 >= surface => self.check_leaf(trail, kind, result),
-                // `spacing` reports crossing leaves coarser than the surface.
-                Some(_) => {}
-                None => self.check_children(trail, result),
-            }
-            trail.ascend();
-        }
-    }
-
-    /// Reports a leaf coarser than the surface level within the margin of the current leaf.
-    fn check_leaf(&self, trail: &Trail, kind: Kind, result: &mut CheckResult) {
-        let (octant, surface) = (trail.current().octant, self.terms.level_surface);
-        let margin = self.terms.surface_margin(kind, octant.level);
-        let found = trail.search(self.tree, margin, &Region::around(&octant, margin), surface);
-        if let Some(coarse) = found.leaf(self.tree) {
-            result.report_with(|| {
-                let (what, cells) = (contact::name(1 << kind), margin / cell(octant.level));
-                let (leaf, coarse) =
-                    (self.terms.root.describe(&octant), self.terms.root.describe(&coarse));
-                format!(
-                    "a leaf less than {cells} cells from the {what} leaf {leaf} is coarser than the surface level: {coarse}"
-                )
-            });
-        }
-    }
+/// No leaf near a crossing leaf is coarser than the surface level. Of crossing leaves that are coarser themselves, `spacing` reports.
+fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
+    let bound = terms.level_surface;
+    let required = |margin: i64| (margin > 0).then_some(Required { margin, bound });
+    let is_source = |handle: Handle| tree.kinds(handle) & CROSSING_OR_DELETED != 0;
+    let of = |handle: Handle, level: u8| {
+        let kind = handle.as_leaf().filter(|_| level >= bound && is_source(handle))?;
+        required(surface_margin(terms, kind, level))
+    };
+    let within = |handle: Handle, _| {
+        let most = surface_margin(terms, Side::Crossing as Kind, bound);
+        required(most).filter(|_| is_source(handle))
+    };
+    let text = |leaf: &Octant, _: &Octant, coarse: &Octant| {
+        let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
+        let cells = surface_margin(terms, kind, leaf.level) / cell(leaf.level);
+        let (what, place) = (contact::name(1 << kind), |octant| terms.root.describe(octant));
+        format!(
+            "a leaf less than {cells} cells from the {what} leaf {} is coarser than the surface level: {}",
+            place(leaf),
+            place(coarse)
+        )
+    };
+    Clearance { tree, of: &of, within: &within, directions: &ALL_AXES, text: &text }.check(result);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use contract::lattice::Root;
-    use contract::manifest::Enclosed;
-    use contract::octant::Octant;
     use contract::testing::{graded_words, words_of};
     use contract::tree::Builder;
     use contract::word;
     use proptest::prelude::*;
 
-    fn terms(n: u32, level_surface: u8, keep: Keep, keep_crossing: bool) -> Terms {
+    fn terms(n: u32, level_surface: u8, keep: Keep, keep_crossing: bool) -> Manifest {
         let root = Root { origin: [0.0; 3], edge: 1.0 };
-        Terms {
+        Manifest {
             root,
             level_surface,
             layer_cells_min: n,
             keep,
             keep_crossing,
-            boxes: Vec::new(),
-            seeds: Vec::new(),
-            enclosed: Enclosed::Delete,
-            sides: Default::default(),
+            ..Manifest::default()
         }
     }
 
     /// Whether a layer is too thin, literally by the definition and over all pairs of leaves.
-    fn is_thin(words: &[u64], terms: &Terms) -> bool {
+    fn is_thin(words: &[u64], terms: &Manifest) -> bool {
         let n = i64::from(terms.layer_cells_min);
         let leaves: Vec<_> = words.iter().map(|&w| (word::octant(w), word::side(w))).collect();
         let all = terms.keep == Keep::All;
@@ -185,7 +149,7 @@ mod tests {
 
     /// Leaves of level 2, and in one octant of level 3, the surface's: the first of them is crossing or deleted, and one cell
     /// away from a coarser leaf.
-    fn checked(tree: &Tree, terms: &Terms) -> CheckResult {
+    fn checked(tree: &Tree, terms: &Manifest) -> CheckResult {
         let mut result = CheckResult::new("layer");
         check_tree(tree, terms, &mut result);
         result
@@ -226,8 +190,9 @@ mod tests {
         };
         assert_eq!(findings(Side::Crossing), findings(Side::Outside));
         // The margin of a crossing leaf of the surface's level.
-        let of_surface =
-            |level| terms(5, level, Keep::Outside, true).surface_margin(Side::Crossing as Kind, 3);
+        let of_surface = |level| {
+            surface_margin(&terms(5, level, Keep::Outside, true), Side::Crossing as Kind, 3)
+        };
         assert_eq!([of_surface(2), of_surface(3)], [0, 4 * cell(3)]);
     }
 

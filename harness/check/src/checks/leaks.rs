@@ -2,43 +2,28 @@
 
 use super::components::{self, Component};
 use super::facets::Facets;
-use super::terms::Terms;
 use super::truth::Truth;
+use crate::oracle::is_watertight;
 use contract::case::Case;
-use contract::lattice::FacetLattice;
+use contract::manifest::Manifest;
 use contract::manifest::{Keep, Leak};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, Side};
-use std::collections::HashSet;
 
 /// The leaks of a case with this T0.
-pub(super) fn find(case: &Case, facets: &Facets, terms: &Terms, truth: &Truth) -> Vec<Leak> {
-    if !terms.seeds.is_empty() && is_closed(&case.facets_lattice) {
+pub(super) fn find(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth) -> Vec<Leak> {
+    if !terms.seeds.is_empty() && is_watertight(&case.facets_lattice) {
         return Vec::new();
     }
     let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
     levels.flat_map(|level| between(case, facets, terms, truth, level)).collect()
 }
 
-/// Whether every edge belongs to an even number of facets.
-fn is_closed(facets: &[FacetLattice]) -> bool {
-    let mut odd = HashSet::new();
-    for [a, b, c] in facets {
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            let edge = [from.min(to), from.max(to)];
-            if from != to && !odd.remove(&edge) {
-                odd.insert(edge);
-            }
-        }
-    }
-    odd.is_empty()
-}
-
 /// The leaks between T0 cut at a level, and T0.
-fn between(case: &Case, facets: &Facets, terms: &Terms, truth: &Truth, level: u8) -> Vec<Leak> {
-    let mut cut = Terms { level_surface: level, ..terms.clone() };
+fn between(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
+    let mut cut = Manifest { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
-    let make = |terms: &Terms| {
+    let make = |terms: &Manifest| {
         let coarse = Truth::new(facets, &case.facets_lattice, terms);
         coarse.expect("T0 that is cut has no more leaves than T0")
     };
@@ -47,7 +32,7 @@ fn between(case: &Case, facets: &Facets, terms: &Terms, truth: &Truth, level: u8
     let is_crossing =
         |&(leaf, _): &(u32, usize)| word::side(coarse.words[leaf as usize]) == Side::Crossing;
     if seeded.iter().any(is_crossing) {
-        coarse = make(&Terms { seeds: Vec::new(), ..cut });
+        coarse = make(&Manifest { seeds: Vec::new(), ..cut });
     }
     let edge = |level: u8| terms.root.edge / f64::from(1u32 << level);
     let leak = |component: &Component| {

@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use super::{Check, CheckResult, Pass, Subject, Terms, always, json, nothing};
+use super::{Check, CheckResult, Pass, Subject, always, json, nothing};
 use contract::lattice::Root;
 use contract::manifest::{BySide, Components, Geometry, Leak, Manifest, Sides, Tree};
 
@@ -17,24 +17,14 @@ pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothi
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     result.examined = 0;
-    of_leaves("", subject.manifest, &subject.pass, result);
-    of_inputs("", subject.manifest, &subject.inputs, result);
+    for (prefix, manifest, pass) in subject.meshes() {
+        of_mesh(prefix, manifest, pass, subject, result);
+    }
     of_leaks(subject.manifest, result);
-    if let Some((base, pass)) = &subject.base {
+    if let Some((base, _)) = &subject.base {
         // A mesh with an engine's T0 beside it is a final one.
         same("", "tree", &subject.manifest.tree, &Tree::Final, result);
         same("T0: ", "tree", &base.manifest.tree, &Tree::Base, result);
-        of_leaves("T0: ", &base.manifest, pass, result);
-        of_inputs("T0: ", &base.manifest, &subject.inputs, result);
-    }
-    for (prefix, manifest) in [
-        ("", Some(subject.manifest)),
-        ("T0: ", subject.base.as_ref().map(|(base, _)| &base.manifest)),
-    ] {
-        // A mesh of another geometry, or one that is older than its geometry.
-        if let (Some(case), Some(claimed)) = (subject.case, manifest.and_then(|m| m.geometry)) {
-            same(prefix, "geometry", &claimed, &Geometry::of(&case.facets_lattice), result);
-        }
     }
     // Of different leaves, `identical` reports the cause.
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
@@ -48,35 +38,55 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 /// the counts in a mesh whose T0 is not known, such as one made on several ranks.
 fn of_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
     let mesh = subject.manifest;
-    let mut place = |field: &str, claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| {
-        let equal = match (claimed, found) {
-            (Some(a), Some(b)) => subject.terms.same_place(a, b),
-            (a, b) => a == b,
-        };
-        if !equal {
-            result.report(format!(
-                "{field}: {} in the manifest, but {} in the reference's",
-                json(&claimed),
-                json(&found)
-            ));
-        }
-    };
     let (a, b) = (&mesh.components_ambiguous, &reference.components_ambiguous);
-    place("example of an ambiguous component", a.example, b.example);
-    if let (Some(a), Some(b)) = (&mesh.components, &reference.components) {
-        place("example of an enclosed component", a.enclosed.example, b.enclosed.example);
-        let counts = |c: &Components| [c.outside, c.inside, c.enclosed.count, c.enclosed.leaves];
-        same(
-            "",
-            "components (outside, inside, enclosed, their leaves)",
-            &counts(a),
-            &counts(b),
-            result,
-        );
-    }
     same("", "components_ambiguous.count", &a.count, &b.count, result);
+    same_place(("", "an ambiguous", "the reference's"), (a.example, b.example), mesh, result);
+    if let (Some(claimed), Some(found)) = (&mesh.components, &reference.components) {
+        same_components("", claimed, found, mesh, result);
+    }
     if let (Some(claimed), Some(found)) = (&mesh.leaks, &reference.leaks) {
         same("", "leaks", claimed, found, result);
+    }
+}
+
+/// A manifest counts these components, and places an enclosed one where the first is.
+pub(super) fn same_components(
+    prefix: &str,
+    claimed: &Components,
+    found: &Components,
+    inputs: &Manifest,
+    result: &mut CheckResult,
+) {
+    let (a, b) = (&claimed.enclosed, &found.enclosed);
+    let numbers = [
+        ("outside components", claimed.outside, found.outside),
+        ("inside components", claimed.inside, found.inside),
+        ("enclosed components", a.count, b.count),
+        ("leaves of T0 in enclosed components", a.leaves, b.leaves),
+    ];
+    for (what, claimed, found) in numbers.into_iter().filter(|(_, claimed, found)| claimed != found)
+    {
+        result.report(format!("{prefix}the manifest counts {claimed} {what}, and T0 has {found}"));
+    }
+    same_place((prefix, "an enclosed", "the first"), (a.example, b.example), inputs, result);
+}
+
+/// Whether a manifest places a component where one is.
+fn same_place(
+    (prefix, what, which): (&str, &str, &str),
+    (claimed, found): (Option<[f64; 3]>, Option<[f64; 3]>),
+    inputs: &Manifest,
+    result: &mut CheckResult,
+) {
+    let agree = match (claimed, found) {
+        (Some(a), Some(b)) => inputs.same_place(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    if !agree {
+        let [claimed, found] = [claimed, found].map(|at| json(&at));
+        result.report(format!(
+            "{prefix}the manifest places {what} component at {claimed}, and {which} one is at {found}"
+        ));
     }
 }
 
@@ -98,26 +108,35 @@ fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
     }
 }
 
-/// The inputs in the manifest are those of the case.
-fn of_inputs(prefix: &str, manifest: &Manifest, terms: &Terms, result: &mut CheckResult) {
-    let claimed = Terms::of_manifest(manifest);
-    same(prefix, "root", &claimed.root, &terms.root, result);
-    same(prefix, "level_surface", &claimed.level_surface, &terms.level_surface, result);
-    same(prefix, "layer_cells_min", &claimed.layer_cells_min, &terms.layer_cells_min, result);
-    same(prefix, "keep", &claimed.keep, &terms.keep, result);
-    same(prefix, "keep_crossing", &claimed.keep_crossing, &terms.keep_crossing, result);
-    same(prefix, "boxes", &claimed.boxes, &terms.boxes, result);
-    same(prefix, "seeds", &claimed.seeds, &terms.seeds, result);
-    same(prefix, "enclosed", &claimed.enclosed, &terms.enclosed, result);
-}
+/// The inputs, by their keys.
+pub(crate) const INPUTS: [&str; 8] = [
+    "root",
+    "level_surface",
+    "layer_cells_min",
+    "keep",
+    "keep_crossing",
+    "boxes",
+    "seeds",
+    "enclosed",
+];
 
-fn of_leaves(prefix: &str, manifest: &Manifest, pass: &Pass, result: &mut CheckResult) {
+/// The manifest has the counts and digests of the leaves, and the inputs and facets of the case.
+fn of_mesh(
+    prefix: &str,
+    manifest: &Manifest,
+    pass: &Pass,
+    subject: &Subject,
+    result: &mut CheckResult,
+) {
     let Pass { tally, parts, .. } = pass;
     result.examined += tally.leaves;
-    same(prefix, "leaves", &manifest.leaves, &tally.leaves, result);
-    same(prefix, "leaves_by_level", &manifest.leaves_by_level, &tally.by_level, result);
-    same(prefix, "leaves_by_side", &manifest.leaves_by_side, &tally.by_side, result);
-    same(prefix, "digest", &manifest.digest, &tally.digest, result);
+    let mut right = subject.inputs.clone();
+    right.set_tally(tally.clone());
+    let [claimed, right] = [manifest, &right].map(|m| serde_json::to_value(m).expect("JSON"));
+    let of_leaves = ["leaves", "leaves_by_level", "leaves_by_side", "digest"];
+    for key in of_leaves.into_iter().chain(INPUTS) {
+        same(prefix, key, &claimed[key], &right[key], result);
+    }
     let BySide { outside, inside, crossing } = tally.by_side;
     if manifest.sides == Sides::Unknown && outside < tally.leaves {
         result.report(format!(
@@ -131,6 +150,10 @@ fn of_leaves(prefix: &str, manifest: &Manifest, pass: &Pass, result: &mut CheckR
     for (claimed, &(leaves, digest)) in manifest.parts.iter().zip(parts) {
         same(prefix, &format!("leaves of {}", claimed.file), &claimed.leaves, &leaves, result);
         same(prefix, &format!("digest of {}", claimed.file), &claimed.digest, &digest, result);
+    }
+    // A mesh of another geometry, or one that is older than its geometry.
+    if let (Some(case), Some(claimed)) = (subject.case, manifest.geometry) {
+        same(prefix, "geometry", &claimed, &Geometry::of(&case.facets_lattice), result);
     }
 }
 

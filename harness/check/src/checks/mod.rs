@@ -6,19 +6,17 @@
 //! with that one.
 
 pub mod balance;
+pub(crate) mod clearance;
 pub mod complete;
 pub mod components;
 pub mod contact;
 pub mod crossing;
 pub mod facets;
-pub mod gap;
 pub mod identical;
 pub mod kept;
 pub mod layer;
 mod leaks;
-pub mod linear;
 pub mod manifest;
-mod outcome;
 mod pass;
 mod region;
 mod result;
@@ -27,14 +25,10 @@ pub mod spacing;
 mod splits;
 mod subject;
 mod surface;
-pub mod terms;
-pub(crate) mod trail;
 pub mod truth;
 
-pub use outcome::Outcome;
-pub use result::{CheckResult, FILES, FINDINGS_LISTED, Finding};
+pub use result::{CheckResult, FILES, FINDINGS_LISTED, Outcome};
 pub use subject::{CAPACITY, Subject};
-pub use terms::Terms;
 
 use serde::Serialize;
 
@@ -64,7 +58,7 @@ pub struct Check {
 /// All checks, in the order in which findings are most helpful.
 pub const CHECKS: [Check; 13] = [
     manifest::CHECK,
-    linear::CHECK,
+    pass::CHECK,
     complete::CHECK,
     spacing::CHECK,
     surface::CHECK,
@@ -90,7 +84,7 @@ pub fn only(subject: &Subject, names: &[&str]) -> Vec<CheckResult> {
 
 fn run(subject: &Subject, choose: impl Fn(&Check) -> bool) -> Vec<CheckResult> {
     let is_of_files =
-        |check: &Check| [manifest::CHECK.name, linear::CHECK.name].contains(&check.name);
+        |check: &Check| [manifest::CHECK.name, pass::CHECK.name].contains(&check.name);
     let chosen = CHECKS.iter().filter(|check| choose(check));
     // Counts and digests need no tree.
     let possible = chosen.filter(|check| subject.capacity().is_none() || is_of_files(check));

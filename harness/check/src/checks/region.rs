@@ -14,8 +14,9 @@ mod tests;
 use super::components::Component;
 use super::facets::Facets;
 use super::truth::Truth;
-use super::{CheckResult, NO_GEOMETRY, Subject, Terms, contact};
+use super::{CheckResult, NO_GEOMETRY, Subject, contact};
 use contract::lattice::UNITS_PER_EDGE;
+use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::parity::Parity;
 use contract::tree::{Handle, Kind, Tree};
@@ -36,7 +37,7 @@ const CROSSING: Kind = Side::Crossing as Kind;
 
 /// The leaves and holes of a mesh, with their positions.
 pub struct Survey<'a> {
-    terms: &'a Terms,
+    terms: &'a Manifest,
     tree: &'a Tree,
     truth: &'a Truth,
     facets: &'a Facets,
@@ -145,13 +146,40 @@ impl<'a> Survey<'a> {
     /// Visits every leaf, and every hole in the largest octants that have one position. Holes near the geometry are
     /// divided down to the level of the surface.
     fn visit(&self, visit: Visit) {
-        self.descend(self.tree.root(), Octant::ROOT, &self.facets.all(), visit);
+        let surface = self.terms.level_surface;
+        self.facets.walk(self.band(), &mut |octant, near| {
+            let handle = self.tree.at(&octant);
+            let kind = handle.as_leaf();
+            if near.is_empty() {
+                let position = self.position(octant);
+                self.tree.walk_below(octant, handle, &mut |part, content| {
+                    if !content.is_node() {
+                        visit(part, content.as_leaf(), position);
+                    }
+                    true
+                });
+                return false;
+            }
+            let is_whole = kind.is_some() || handle == Handle::HOLE && octant.level >= surface;
+            if is_whole {
+                let (low, high) = octant.bounds();
+                let crossed = self.facets.first_meeting(near, low, high).is_some();
+                let may_be_coarse = !crossed && octant.level < surface;
+                let beyond = may_be_coarse.then(|| self.beyond_band(octant, near)).flatten();
+                visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
+            }
+            !is_whole
+        });
+    }
+
+    /// Half the width of the band, in lattice units.
+    fn band(&self) -> i64 {
+        (self.band_cells * (UNITS_PER_EDGE >> self.terms.level_surface) as f64) as i64
     }
 
     /// The facets that meet an octant or the band around it.
     fn near(&self, octant: &Octant, candidates: &[u32]) -> Vec<u32> {
-        let (low, high) = octant.bounds();
-        let band = (self.band_cells * (UNITS_PER_EDGE >> self.terms.level_surface) as f64) as i64;
+        let ((low, high), band) = (octant.bounds(), self.band());
         self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band))
     }
 
@@ -164,36 +192,5 @@ impl<'a> Survey<'a> {
         let children = if octant.level < self.terms.level_surface { 0..8 } else { 0..0 };
         let mut parts = children.map(|digit| octant.child(digit));
         parts.find_map(|part| self.beyond_band(part, &near))
-    }
-
-    fn descend(&self, handle: Handle, octant: Octant, candidates: &[u32], visit: Visit) {
-        let surface = self.terms.level_surface;
-        let near = self.near(&octant, candidates);
-        if near.is_empty() {
-            return self.uniform(handle, octant, self.position(octant), visit);
-        }
-        let kind = handle.as_leaf();
-        if kind.is_some() || handle == Handle::HOLE && octant.level >= surface {
-            let (low, high) = octant.bounds();
-            let crossed = self.facets.first_meeting(&near, low, high).is_some();
-            let may_be_coarse = !crossed && octant.level < surface;
-            let beyond = may_be_coarse.then(|| self.beyond_band(octant, &near)).flatten();
-            return visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
-        }
-        for digit in 0..8 {
-            let child = self.tree.child(handle, digit, octant.level);
-            self.descend(child, octant.child(digit), &near, visit);
-        }
-    }
-
-    /// Visits the leaves and holes of an octant that lies in one component.
-    fn uniform(&self, handle: Handle, octant: Octant, position: Position, visit: Visit) {
-        if !handle.is_node() {
-            return visit(octant, handle.as_leaf(), position);
-        }
-        for digit in 0..8 {
-            let child = self.tree.child(handle, digit, octant.level);
-            self.uniform(child, octant.child(digit), position, visit);
-        }
     }
 }

@@ -1,27 +1,18 @@
 //! The result of a check.
 //!
-//! Invariants: the listed findings are the first ones, and as many as there are, up to a limit; each is one of this check; a
+//! Invariants: the listed findings are the first ones, and as many as there are, up to a limit, each with a text; a
 //! check that had nothing to check has examined nothing and found nothing; one that holds has examined something. `identical` counts leaves and lists one difference.
 
-use std::fmt;
-
-use super::Outcome;
 use contract::failure::Unusable;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::num::NonZeroU64;
 
 /// Findings that are listed in full; further ones are counted only, so that a check takes five lines.
 pub const FINDINGS_LISTED: usize = 4;
 
 /// Name of the check that a directory can be read as a leaf set.
 pub const FILES: &str = "files";
-
-/// One violation.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// Name of the check.
-    pub check: &'static str,
-    /// The violation and its position: octant path and coordinates.
-    pub detail: String,
-}
 
 /// The result of a check on one mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,8 +21,8 @@ pub struct CheckResult {
     pub name: &'static str,
     /// Number of objects examined: leaves, unless the note names something else.
     pub examined: u64,
-    /// The first [`FINDINGS_LISTED`] findings.
-    pub findings: Vec<Finding>,
+    /// The first [`FINDINGS_LISTED`] findings: the violation and its position, by octant path and coordinates.
+    pub findings: Vec<String>,
     /// Number of all findings.
     pub findings_total: u64,
     /// Numbers and limitations that are of interest even if the check passes.
@@ -90,8 +81,8 @@ impl CheckResult {
             findings.len()
         );
         assert!(
-            findings.iter().all(|finding| finding.check == *name && !finding.detail.is_empty()),
-            "{name} has a finding of another check, or without text: {findings:?}"
+            !findings.contains(&String::new()),
+            "{name} has a finding without text: {findings:?}"
         );
         assert!(
             nothing_to_check.is_some() || *findings_total > 0 || *examined > 0,
@@ -121,10 +112,14 @@ impl CheckResult {
         if self.holds() {
             return Outcome::held(self.examined);
         }
-        let listed = self.findings.iter().map(|finding| finding.detail.clone());
+        let listed = self.findings.iter().cloned();
+        Outcome::fail(listed.chain(self.unlisted()).collect::<Vec<_>>().join("\n"))
+    }
+
+    /// How many findings are not listed, as text.
+    fn unlisted(&self) -> Option<String> {
         let unlisted = self.findings_total - self.findings.len() as u64;
-        let more = (unlisted > 0).then(|| format!("and {unlisted} more"));
-        Outcome::fail(listed.chain(more).collect::<Vec<_>>().join("\n"))
+        (unlisted > 0).then(|| format!("and {unlisted} more"))
     }
 
     /// Adds a finding.
@@ -136,7 +131,7 @@ impl CheckResult {
     pub fn report_with(&mut self, detail: impl FnOnce() -> String) {
         self.findings_total += 1;
         if self.findings.len() < FINDINGS_LISTED {
-            self.findings.push(Finding { check: self.name, detail: detail() });
+            self.findings.push(detail());
         }
     }
 }
@@ -155,14 +150,59 @@ impl fmt::Display for CheckResult {
         if !self.note.is_empty() {
             write!(f, "; {}", self.note)?;
         }
-        for finding in &self.findings {
-            write!(f, "\n    {}", finding.detail)?;
+        let mut lines = self.findings.iter().cloned().chain(self.unlisted());
+        lines.try_for_each(|line| write!(f, "\n    {line}"))
+    }
+}
+
+/// The outcome of a check.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "outcome")]
+pub enum Outcome {
+    /// It holds.
+    Pass {
+        /// Number of things compared: leaves, unless the check's documentation names something else.
+        compared: NonZeroU64,
+    },
+    /// It does not hold.
+    Fail {
+        /// The reason.
+        why: String,
+    },
+    /// It shows nothing about the mesh.
+    LeftOut {
+        /// The reason.
+        why: String,
+    },
+}
+
+impl Outcome {
+    /// A check without findings, which was left out if it compared nothing.
+    pub fn held(compared: u64) -> Self {
+        match NonZeroU64::new(compared) {
+            Some(compared) => Self::Pass { compared },
+            None => Self::left_out("there was nothing to compare"),
         }
-        let unlisted = self.findings_total - self.findings.len() as u64;
-        if unlisted > 0 {
-            write!(f, "\n    and {unlisted} more")?;
-        }
-        Ok(())
+    }
+
+    /// A check that failed.
+    pub fn fail(why: impl Into<String>) -> Self {
+        Self::Fail { why: why.into() }
+    }
+
+    /// A check that was left out.
+    pub fn left_out(why: impl Into<String>) -> Self {
+        Self::LeftOut { why: why.into() }
+    }
+
+    /// Whether it holds.
+    pub fn holds(&self) -> bool {
+        matches!(self, Self::Pass { .. })
+    }
+
+    /// Whether it failed.
+    pub fn failed(&self) -> bool {
+        matches!(self, Self::Fail { .. })
     }
 }
 
@@ -198,10 +238,9 @@ mod tests {
         (0..2 * FINDINGS_LISTED).for_each(|i| correct.report(format!("finding {i}")));
         correct.check_invariants();
         type Fault = fn(&mut CheckResult);
-        let faults: [Fault; 5] = [
+        let faults: [Fault; 4] = [
             |r| r.findings_total = 3,
             |r| drop(r.findings.pop()),
-            |r| r.findings[0].check = "balance",
             |r| r.lacks("nothing"),
             |r| *r = CheckResult::new("sides"),
         ];
@@ -210,5 +249,21 @@ mod tests {
             fault(&mut wrong);
             assert!(std::panic::catch_unwind(|| wrong.check_invariants()).is_err(), "{wrong}");
         }
+    }
+}
+
+#[cfg(test)]
+mod outcomes {
+    use super::*;
+
+    #[test]
+    fn nothing_that_compared_nothing_holds() {
+        assert!(!Outcome::held(0).holds() && Outcome::held(1).holds());
+        assert!(serde_json::from_str::<Outcome>(r#"{"outcome": "pass", "compared": 0}"#).is_err());
+        assert!(serde_json::from_str::<Outcome>(r#"{"outcome": "pass"}"#).is_err());
+        let text = serde_json::to_string(&Outcome::held(3)).unwrap();
+        assert_eq!(text, r#"{"outcome":"pass","compared":3}"#);
+        let text = serde_json::to_string(&Outcome::left_out("x")).unwrap();
+        assert_eq!(text, r#"{"outcome":"left_out","why":"x"}"#);
     }
 }

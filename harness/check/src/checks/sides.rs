@@ -9,13 +9,12 @@
 //! definition is judged beyond a band around the geometry ([`super::region`]).
 
 use super::components::Component;
-use super::contact::{self, Contacts};
+use super::contact;
 use super::region::Survey;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, Terms, json, some_leaves};
+use super::{Check, CheckResult, Subject, json, some_leaves};
 use contract::manifest::{Ambiguous, Manifest, Sides};
-use contract::octant::Octant;
-use contract::tree::{HOLES, Handle, Kind, Tree};
+use contract::tree::{HOLES, Kind, Tree};
 use contract::word::Side;
 
 pub(super) const CHECK: Check = Check {
@@ -41,47 +40,39 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         return Survey::of(subject, result, Survey::check_sides);
     }
     let terms = &subject.terms;
-    not_kept(subject.tree(), subject.tree().root(), Octant::ROOT, terms, result);
+    not_kept(subject.tree(), terms, result);
     of_neighbours(subject.tree(), terms, result);
     let Some(truth) = subject.truth() else { return };
-    of_components("", subject.tree(), truth, subject, result);
-    ambiguous("", subject.manifest, &truth.components, terms, result);
-    if let (Some(tree), Some((base, _))) = (subject.tree_base(), &subject.base) {
-        of_components("T0: ", tree, truth, subject, result);
-        ambiguous("T0: ", &base.manifest, &truth.components, terms, result);
+    for (prefix, manifest, pass) in subject.meshes() {
+        of_components(prefix, pass.tree(), truth, subject, result);
+        ambiguous(prefix, manifest, &truth.components, terms, result);
     }
     stated_leaks(subject, truth, result);
-    let undecided = truth.components.iter().filter(|c| c.is_ambiguous()).count();
-    result.note = format!("{} components, {undecided} ambiguous", truth.components.len());
 }
 
 /// The manifests state the leaks of T0, if they state any or none.
 fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
-    let base = subject.base.as_ref().map(|(base, _)| &base.manifest);
-    let stated = [("", Some(subject.manifest)), ("T0: ", base)];
-    let stated = stated.map(|(prefix, manifest)| (prefix, manifest.and_then(|m| m.leaks.as_ref())));
     let (Some(case), Some(facets)) = (subject.case, subject.facets()) else { return };
-    if stated.iter().all(|(_, leaks)| leaks.is_none()) {
-        return;
-    }
-    let leaks = super::leaks::find(case, facets, &subject.inputs, truth);
-    for (prefix, stated) in stated {
-        if let Some(stated) = stated.filter(|stated| **stated != leaks) {
+    let mut leaks = None;
+    for (prefix, manifest, _) in subject.meshes() {
+        let Some(stated) = &manifest.leaks else { continue };
+        let find = || super::leaks::find(case, facets, &subject.inputs, truth);
+        let leaks = leaks.get_or_insert_with(find);
+        if stated != leaks {
             result.report(format!(
                 "{prefix}the manifest states the leaks {}, but T0 has {}",
                 json(stated),
-                json(&leaks)
+                json(leaks)
             ));
         }
     }
 }
 
 /// Inside and outside leaves share no face.
-fn of_neighbours(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
+fn of_neighbours(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let inside = 1 << Side::Inside as u8;
-    let matters = |kind: Kind, _: u8| kind == Side::Outside as Kind;
-    Contacts { tree, sought: inside, matters: &matters }.visit(&mut |outside, _, across| {
-        if across & inside != 0 {
+    contact::visit(tree, inside, &mut |outside, kind, across| {
+        if kind == Side::Outside as Kind && across & inside != 0 {
             let leaf = terms.root.describe(&outside);
             result.report_with(|| {
                 format!("an inside leaf shares a face with the outside leaf {leaf}")
@@ -118,22 +109,18 @@ fn of_components(
 }
 
 /// Reports leaves whose side is deleted.
-fn not_kept(tree: &Tree, handle: Handle, octant: Octant, terms: &Terms, result: &mut CheckResult) {
+fn not_kept(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let kept = (0..3).filter(|&k| terms.keeps(k)).fold(HOLES, |all, k| all | 1 << k);
-    let deleted = tree.kinds(handle) & !kept;
-    if deleted == 0 {
-        return;
-    }
-    if handle.is_node() {
-        for d in 0..8 {
-            not_kept(tree, tree.child(handle, d, octant.level), octant.child(d), terms, result);
+    tree.walk(&mut |octant, handle| {
+        let deleted = tree.kinds(handle) & !kept;
+        if deleted != 0 && !handle.is_node() {
+            result.report_with(|| {
+                let (side, leaf) = (contact::name(deleted), terms.root.describe(&octant));
+                format!("{side} leaves are deleted, but one still exists: {leaf}")
+            });
         }
-    } else {
-        result.report_with(|| {
-            let (side, leaf) = (contact::name(deleted), terms.root.describe(&octant));
-            format!("{side} leaves are deleted, but one still exists: {leaf}")
-        });
-    }
+        deleted != 0
+    });
 }
 
 /// The manifest states the number of ambiguous components, and its example is in one of them.
@@ -141,7 +128,7 @@ fn ambiguous(
     prefix: &str,
     manifest: &Manifest,
     components: &[Component],
-    terms: &Terms,
+    terms: &Manifest,
     result: &mut CheckResult,
 ) {
     let Ambiguous { count, example } = manifest.components_ambiguous;

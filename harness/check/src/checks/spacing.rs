@@ -6,10 +6,9 @@
 //! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `splits`
 //! detects needless refinement.
 
-use super::{Check, CheckResult, Subject, Terms, for_definition, some_leaves};
-use contract::manifest::ExtentBox;
-use contract::octant::Octant;
-use contract::tree::{Handle, Tree};
+use super::{Check, CheckResult, Subject, for_definition, some_leaves};
+use contract::manifest::Manifest;
+use contract::tree::Tree;
 use contract::word::Side;
 
 pub(super) const CHECK: Check = Check {
@@ -36,7 +35,7 @@ pub(super) const BOXES: Check = Check {
 fn run(subject: &Subject, result: &mut CheckResult) {
     let (tree, terms) = (subject.tree(), &subject.terms);
     boxes_met(tree, terms, result);
-    crossing_fine(tree, tree.root(), Octant::ROOT, terms, result);
+    crossing_fine(tree, terms, result);
     let (Some(base), Some(truth)) = (subject.tree_base(), subject.truth()) else { return };
     truth.compare(base, &mut |found| {
         let what = match found.base {
@@ -49,57 +48,31 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 }
 
 /// Every leaf that meets a box has at least the level of the box.
-fn boxes_met(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
+fn boxes_met(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     for extent in &terms.boxes {
-        box_met(tree, tree.root(), Octant::ROOT, extent, &mut |leaf| {
-            result.report_with(|| {
-                let (leaf, level) = (terms.root.describe(&leaf), extent.level);
-                format!("the leaf {leaf} meets a box that requires level {level}")
-            });
+        tree.walk(&mut |octant, handle| {
+            let is_fine = tree.coarsest_level(handle, octant.level) >= extent.level;
+            let may_be_coarse = !is_fine && extent.meets(&octant);
+            if may_be_coarse && !handle.is_node() {
+                result.report_with(|| {
+                    let (leaf, level) = (terms.root.describe(&octant), extent.level);
+                    format!("the leaf {leaf} meets a box that requires level {level}")
+                });
+            }
+            may_be_coarse
         });
     }
 }
 
-/// Reports every leaf that meets a box and is coarser than its level.
-fn box_met(
-    tree: &Tree,
-    handle: Handle,
-    octant: Octant,
-    extent: &ExtentBox,
-    report: &mut dyn FnMut(Octant),
-) {
-    let fine_enough = tree.coarsest_level(handle, octant.level) >= extent.level;
-    if fine_enough || !extent.meets(&octant) {
-        return;
-    }
-    if handle.is_node() {
-        for d in 0..8 {
-            box_met(tree, tree.child(handle, d, octant.level), octant.child(d), extent, report);
-        }
-    } else {
-        report(octant);
-    }
-}
-
 /// Every crossing leaf has at least the level of the surface.
-fn crossing_fine(
-    tree: &Tree,
-    handle: Handle,
-    octant: Octant,
-    terms: &Terms,
-    result: &mut CheckResult,
-) {
-    let crossing = tree.kinds(handle) & 1 << Side::Crossing as u8 != 0;
-    if !crossing || octant.level >= terms.level_surface {
-        return;
-    }
-    if handle.is_node() {
-        for d in 0..8 {
-            let child = tree.child(handle, d, octant.level);
-            crossing_fine(tree, child, octant.child(d), terms, result);
+fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
+    tree.walk(&mut |octant, handle| {
+        let has_crossing = tree.kinds(handle) & 1 << Side::Crossing as u8 != 0;
+        let may_be_coarse = has_crossing && octant.level < terms.level_surface;
+        if may_be_coarse && !handle.is_node() {
+            let (leaf, level) = (terms.root.describe(&octant), terms.level_surface);
+            result.report(format!("the crossing leaf {leaf} is coarser than level {level}"));
         }
-    } else {
-        let (leaf, level) = (terms.root.describe(&octant), terms.level_surface);
-        result.report(format!("the crossing leaf {leaf} is coarser than level {level}"));
-    }
+        may_be_coarse
+    });
 }

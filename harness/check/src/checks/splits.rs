@@ -9,6 +9,7 @@ use std::fs;
 
 use super::{Check, CheckResult, FINDINGS_LISTED, NO_GEOMETRY, Subject, nothing};
 use crate::why::Mesh;
+use contract::manifest::Manifest;
 
 pub(crate) const NAME: &str = "splits";
 
@@ -33,7 +34,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
         return result.lacks(&why);
     }
-    let mesh = Mesh::new(subject.manifest, subject.tree(), subject.inputs.clone(), Some(body));
+    let inputs = Manifest { tree: subject.manifest.tree, ..subject.inputs.clone() };
+    let mesh = Mesh::new(subject.tree(), inputs, Some(body));
     let found = match mesh.least(FINDINGS_LISTED) {
         Ok(found) => found,
         Err(why) => return result.lacks(&why),

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use super::facets::Facets;
 use super::truth::Truth;
-use super::{CheckResult, Pass, Terms};
+use super::{CheckResult, Pass};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -23,9 +23,9 @@ pub struct Subject<'a> {
     /// The case, if it is known.
     pub case: Option<&'a Case>,
     /// The inputs of the case or, without one, of the manifest.
-    pub inputs: Terms,
+    pub inputs: Manifest,
     /// The inputs as far as they concern the leaves: T0 precedes deletion.
-    pub terms: Terms,
+    pub terms: Manifest,
     /// What the mesh must keep.
     pub promises: Promises,
     /// The mesh in memory, if it is there.
@@ -54,11 +54,11 @@ impl<'a> Subject<'a> {
 
     /// A mesh by the pass over its leaves.
     pub(crate) fn of(manifest: &'a Manifest, pass: Pass, case: Option<&'a Case>) -> Self {
-        let inputs = case.map_or_else(|| Terms::of_manifest(manifest), Terms::of_case);
-        let inputs = Terms { sides: manifest.sides, ..inputs };
+        let inputs = case.map_or_else(|| manifest.clone(), Case::inputs);
+        let inputs = Manifest { sides: manifest.sides, ..inputs };
         let terms = match manifest.tree {
             Kind::Final => inputs.clone(),
-            Kind::Base => Terms { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
+            Kind::Base => Manifest { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
         };
         Self {
             manifest,
@@ -93,19 +93,24 @@ impl<'a> Subject<'a> {
 
     /// The mesh as a tree.
     pub fn tree(&self) -> &Tree {
-        self.pass.tree.as_ref().expect("without a tree, no check of it runs")
+        self.pass.tree()
+    }
+
+    /// The mesh, and the engine's T0 with a prefix for findings: manifests, and what a pass found.
+    pub(super) fn meshes(&self) -> impl Iterator<Item = (&'static str, &Manifest, &Pass)> {
+        let base = self.base.as_ref().map(|(base, pass)| ("T0: ", &base.manifest, pass));
+        std::iter::once(("", self.manifest, &self.pass)).chain(base)
     }
 
     /// The engine's T0 as a tree.
     pub(super) fn tree_base(&self) -> Option<&Tree> {
-        self.base.as_ref().and_then(|(_, pass)| pass.tree.as_ref())
+        self.base.as_ref().map(|(_, pass)| pass.tree())
     }
 
     /// A finding if the tree of the mesh or T0 exceeds its limit, so that the checks that need it cannot run.
     pub(super) fn capacity(&self) -> Option<CheckResult> {
         let mut result = CheckResult::new(CAPACITY);
-        let trees = [Some(&self.pass), self.base.as_ref().map(|(_, pass)| pass)];
-        if trees.into_iter().flatten().any(|pass| pass.tree.is_none()) {
+        if self.meshes().any(|(.., pass)| pass.tree.is_none()) {
             result.report(
                 "a tree has more distinct octants than the limit and was not checked; increase the limit".to_owned(),
             );

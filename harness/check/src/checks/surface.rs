@@ -5,11 +5,12 @@
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::facets::Facets;
-use super::{Check, CheckResult, NO_GEOMETRY, Terms, nothing};
+use super::{Check, CheckResult, NO_GEOMETRY, nothing};
 use crate::promises::Surface;
 use contract::lattice::UNITS_PER_EDGE;
+use contract::manifest::Manifest;
 use contract::octant::Octant;
-use contract::tree::{Builder, Handle, Kind, Tree};
+use contract::tree::{Builder, Kind, Tree};
 use contract::word::{self, Side};
 
 pub(super) const CHECK: Check = Check {
@@ -28,7 +29,7 @@ pub(super) const CHECK: Check = Check {
 /// The facets and the depth to which they may reach into a leaf.
 pub struct Crossed<'a> {
     facets: &'a Facets,
-    terms: &'a Terms,
+    terms: &'a Manifest,
     /// The depth, in lattice units.
     tolerance: i64,
     /// Whether it is that of leaves coarser than the surface alone.
@@ -37,7 +38,7 @@ pub struct Crossed<'a> {
 
 impl<'a> Crossed<'a> {
     /// The crossed leaves of a mesh, by this promise; without one, the tolerance is 0.
-    pub fn new(facets: &'a Facets, terms: &'a Terms, surface: Option<Surface>) -> Self {
+    pub fn new(facets: &'a Facets, terms: &'a Manifest, surface: Option<Surface>) -> Self {
         let cells = surface.map_or(0.0, |surface| surface.tolerance_cells);
         let tolerance = (cells * (UNITS_PER_EDGE >> terms.level_surface) as f64) as i64;
         Self { facets, terms, tolerance, of_coarser: false }
@@ -84,35 +85,20 @@ impl<'a> Crossed<'a> {
 
     /// Visits every leaf in Morton order, with a facet that reaches into it deeper than the tolerance.
     pub fn visit(&self, tree: &Tree, visit: &mut dyn FnMut(Octant, Kind, Option<u32>)) {
-        self.descend(tree, tree.root(), Octant::ROOT, &self.facets.all(), visit);
-    }
-
-    fn descend(
-        &self,
-        tree: &Tree,
-        handle: Handle,
-        octant: Octant,
-        candidates: &[u32],
-        visit: &mut dyn FnMut(Octant, Kind, Option<u32>),
-    ) {
-        let (low, high) = octant.bounds();
-        if let Some(kind) = handle.as_leaf() {
-            let is_exact = self.of_coarser && octant.level >= self.terms.level_surface;
-            let tolerance = if is_exact { 0 } else { self.tolerance };
-            let (low, high) = (low.map(|c| c + tolerance), high.map(|c| c - tolerance));
-            // A leaf far below the surface level may be smaller than the tolerance.
-            let is_box = low[0] <= high[0];
-            let found = is_box.then(|| self.facets.first_meeting(candidates, low, high)).flatten();
-            return visit(octant, kind, found);
-        }
-        if !handle.is_node() {
-            return;
-        }
-        let near = self.facets.meeting(candidates, low, high);
-        for digit in 0..8 {
-            let child = tree.child(handle, digit, octant.level);
-            self.descend(tree, child, octant.child(digit), &near, visit);
-        }
+        self.facets.walk(0, &mut |octant, near| {
+            let handle = tree.at(&octant);
+            if let Some(kind) = handle.as_leaf() {
+                let is_exact = self.of_coarser && octant.level >= self.terms.level_surface;
+                let tolerance = if is_exact { 0 } else { self.tolerance };
+                let (low, high) = octant.bounds();
+                let (low, high) = (low.map(|c| c + tolerance), high.map(|c| c - tolerance));
+                // A leaf far below the surface level may be smaller than the tolerance.
+                let is_box = low[0] <= high[0];
+                let found = is_box.then(|| self.facets.first_meeting(near, low, high)).flatten();
+                visit(octant, kind, found);
+            }
+            handle.is_node()
+        });
     }
 }
 
@@ -130,10 +116,10 @@ mod tests {
         Tree::of_words(&words_of(|o| o.level == 0 || o.level == 1 && o.digit() == 0))
     }
 
-    fn terms() -> Terms {
+    fn terms() -> Manifest {
         let mut manifest = leaf_set(vec![]).manifest;
         manifest.level_surface = 2;
-        Terms::of_manifest(&manifest)
+        manifest.clone()
     }
 
     fn facet(corners: [[f64; 3]; 3]) -> FacetLattice {
@@ -160,7 +146,7 @@ mod tests {
         let coarse = facet([[6.5, 6.5, 6.5], [7.5, 6.5, 6.5], [6.5, 7.5, 6.5]]);
         let result = checked(coarse, 0.0);
         assert_eq!((result.examined, result.findings_total), (1, 1));
-        let text = &result.findings[0].detail;
+        let text = &result.findings[0];
         assert!(text.starts_with("facet 0 crosses the leaf") && text.contains(" 7 "), "{text}");
         let beyond = facet([[9.0, 1.0, 1.0], [9.5, 1.0, 1.0], [9.0, 2.0, 1.0]]);
         assert!(!checked(beyond, 0.0).was_run());

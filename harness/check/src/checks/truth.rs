@@ -6,8 +6,8 @@
 
 use super::components::{self, Component};
 use super::facets::Facets;
-use super::terms::Terms;
 use contract::lattice::FacetLattice;
+use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};
 use contract::word::{self, Leaf, Side};
@@ -53,9 +53,18 @@ impl Truth {
     pub const LEAVES_MAX: usize = 1 << 26;
 
     /// T0 of the inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
-    pub fn new(facets: &Facets, lattice: &[FacetLattice], terms: &Terms) -> Option<Self> {
+    pub fn new(facets: &Facets, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
         let mut words = Vec::new();
-        if !base_tree(facets, terms, Octant::ROOT, &facets.all(), &mut words) {
+        facets.walk(0, &mut |octant, near| {
+            let by_surface = !near.is_empty() && octant.level < terms.level_surface;
+            let splits = by_surface || terms.box_that_splits(&octant).is_some();
+            if !splits {
+                let side = if near.is_empty() { Side::Outside } else { Side::Crossing };
+                words.push(word::encode(&Leaf { octant, side }));
+            }
+            splits && words.len() <= Self::LEAVES_MAX
+        });
+        if words.len() > Self::LEAVES_MAX {
             return None;
         }
         let components = components::find(&words, terms, lattice);
@@ -82,7 +91,7 @@ impl Truth {
     }
 
     /// Whether a leaf of T0 of this kind is kept.
-    pub fn keeps(kind: Kind, terms: &Terms) -> bool {
+    pub fn keeps(kind: Kind, terms: &Manifest) -> bool {
         (kind != ENCLOSED || !terms.deletes_enclosed()) && terms.keeps(Self::side(kind) as Kind)
     }
 
@@ -132,23 +141,4 @@ impl Truth {
             self.descend(mesh, below, octant.child(digit), every_leaf, visit);
         }
     }
-}
-
-/// Appends the leaves of T0 in an octant; false if they are too many.
-fn base_tree(
-    facets: &Facets,
-    terms: &Terms,
-    octant: Octant,
-    candidates: &[u32],
-    words: &mut Vec<u64>,
-) -> bool {
-    let (low, high) = octant.bounds();
-    let near = facets.meeting(candidates, low, high);
-    let surface_splits = !near.is_empty() && octant.level < terms.level_surface;
-    if !surface_splits && terms.box_that_splits(&octant).is_none() {
-        let side = if near.is_empty() { Side::Outside } else { Side::Crossing };
-        words.push(word::encode(&Leaf { octant, side }));
-        return words.len() <= Truth::LEAVES_MAX;
-    }
-    (0..8).all(|digit| base_tree(facets, terms, octant.child(digit), &near, words))
 }

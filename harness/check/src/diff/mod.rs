@@ -9,20 +9,22 @@
 #[cfg(test)]
 mod tests;
 
-pub mod fields;
 mod rule;
 
 use std::fmt;
 use std::path::Path;
 
-use crate::checks::Terms;
+use crate::checks::identical::describe;
+use crate::checks::manifest::INPUTS;
 use crate::why::{self, Body};
 use contract::case::Case;
 use contract::failure::Unusable;
-use contract::manifest::{Sides, Tally};
+use contract::lattice::Root;
+use contract::manifest::{ExtentBox, Manifest, Sides, Tally};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word;
+use serde_json::{Value, json};
 
 /// The differences of two leaf sets.
 #[derive(Clone, Debug, Default)]
@@ -31,8 +33,6 @@ pub struct DiffReport {
     pub without_sides: Option<&'static str>,
     /// Number of leaves of the first mesh.
     pub leaves: u64,
-    /// Manifests with counts or digests that their leaves do not have, one sentence each.
-    pub contradictions: Vec<String>,
     /// Manifest fields that differ, with both values.
     pub fields: Vec<String>,
     /// Level-3 octants whose digests differ.
@@ -68,28 +68,19 @@ impl DiffReport {
     }
 }
 
-/// Number of octants whose paths are listed; the others are counted only.
-const OCTANTS_LISTED: usize = 8;
-
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(mesh) = self.without_sides {
             writeln!(f, "the sides of {mesh} are unknown: only the cells are compared")?;
         }
-        for line in self.contradictions.iter().chain(&self.fields) {
-            writeln!(f, "{line}")?;
+        self.fields.iter().try_for_each(|line| writeln!(f, "{line}"))?;
+        match (self.same_leaves(), self.same_mesh()) {
+            (true, true) => write!(f, "the leaves are the same ({} compared)", self.leaves)?,
+            (true, false) => {
+                write!(f, "the leaves are the same, but in other roots, so the cells differ")?
+            }
+            _ => write!(f, "the leaves differ in {} of 512 level-3 octants", self.octants.len())?,
         }
-        if self.same_leaves() {
-            write!(f, "the leaves are the same ({} compared)", self.leaves)?;
-            return match self.same_mesh() {
-                true => Ok(()),
-                false => write!(f, ", but in other roots, so the cells differ"),
-            };
-        }
-        let paths: Vec<_> = self.octants.iter().take(OCTANTS_LISTED).map(Octant::path).collect();
-        let more = if self.octants.len() > OCTANTS_LISTED { ", ..." } else { "" };
-        let (count, paths) = (self.octants.len(), paths.join(", "));
-        write!(f, "the leaves differ in {count} of 512 level-3 octants: {paths}{more}")?;
         self.leaf.iter().try_for_each(|leaf| write!(f, "\n{leaf}"))?;
         self.rule.iter().try_for_each(|rule| write!(f, "\n  rule: {rule}"))
     }
@@ -104,50 +95,27 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Unusa
     let unknown = meshes.iter().find(|(_, mesh)| mesh.manifest.sides == Sides::Unknown);
     let without_sides = unknown.map(|(name, _)| *name);
     let mut report = DiffReport { without_sides, ..DiffReport::default() };
-    // The digests in the manifests include the sides.
     let mask = if without_sides.is_some() { !word::SIDE_BITS } else { u64::MAX };
-    for (name, mesh) in &mut meshes {
-        if recount(mesh, mask)? {
-            report.contradictions.push(format!(
-                "the manifest of {name} contradicts its leaves: run harness audit on the directory"
-            ));
-        }
+    for (_, mesh) in &mut meshes {
+        let mut tally = Tally::default();
+        mesh.visit(&mut |words| words.iter().for_each(|&word| tally.add(word & mask)))?;
+        tally.finish();
+        mesh.manifest.set_tally(tally);
     }
     let [(_, a), (_, b)] = meshes;
     report.leaves = a.manifest.leaves;
-    report.fields = fields::differing(&a.manifest, &b.manifest);
+    report.fields = differing(&a.manifest, &b.manifest);
     let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests);
     let differing = (0..).zip(digests).filter(|(_, (x, y))| x != y);
     report.octants = differing.map(|(index, _)| level_3(index)).collect();
     if let Some(octant) = report.octants.first() {
         let (x, y) = first_difference(&a, &b, octant, mask)?;
         let sides_known = without_sides.is_none();
-        report.leaf = Some(rule::leaves(x, y, sides_known, &a.manifest.root));
-        report.rule = sides_known.then(|| rule(&a, &b, case, (x, y))).transpose()?;
+        report.leaf = Some(leaves(x, y, sides_known, &a.manifest.root));
+        report.rule = sides_known.then(|| rule(&a, &b, case, (x, y)));
     }
     report.check_invariants();
     Ok(report)
-}
-
-/// Replaces the counts and digests in a manifest by those of the leaves, of whose words only the bits of `mask` count. Returns
-/// whether the manifest contradicts the whole words.
-fn recount(mesh: &mut Mesh, mask: u64) -> Result<bool, Unusable> {
-    let (mut whole, mut masked) = (Tally::default(), Tally::default());
-    mesh.visit(&mut |words| {
-        words.iter().for_each(|&word| whole.add(word));
-        if mask != u64::MAX {
-            words.iter().for_each(|&word| masked.add(word & mask));
-        }
-    })?;
-    whole.finish();
-    masked.finish();
-    let stated = mesh.manifest.clone();
-    mesh.manifest.set_tally(whole);
-    let contradicts = mesh.manifest != stated;
-    if mask != u64::MAX {
-        mesh.manifest.set_tally(masked);
-    }
-    Ok(contradicts)
 }
 
 /// The level-3 octant with this index.
@@ -168,24 +136,73 @@ fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Di
     Ok((a.get(first).copied(), b.get(first).copied()))
 }
 
+/// The leaves of both meshes at the first difference, as text.
+fn leaves(a: Option<u64>, b: Option<u64>, sides_known: bool, root: &Root) -> String {
+    let text = |word: Option<u64>| match word {
+        None => "no more leaves".to_owned(),
+        Some(word) if sides_known => describe(word, root),
+        Some(word) => root.describe(&word::octant(word)),
+    };
+    format!("first difference:\n  A has {}\n  B has {}", text(a), text(b))
+}
+
 /// The rule that decides which mesh is right, or why none does.
-fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> Result<String, Unusable> {
-    let undecided = |why: &str| Ok(why.to_owned());
-    if a.manifest.tree != b.manifest.tree {
-        return undecided("none: one is a base tree, the other a final mesh");
-    }
-    let terms = &Terms::of_manifest(&a.manifest);
-    if *terms != Terms::of_manifest(&b.manifest) {
-        return undecided("none: the inputs differ as listed above, so both meshes may be right");
+fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
+    if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
+        return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
     let (body, caveat) = match case.map(|case| Body::of(case, &a.manifest)).transpose() {
         Ok(body) => (body, String::new()),
         Err(why) => (None, format!("without the case, because {why}: ")),
     };
-    let (Some(of_a), Some(of_b)) = (a.small_tree()?, b.small_tree()?) else {
-        return undecided("unknown: the meshes are too large to be held in memory");
+    let (of_a, of_b) = match (a.tree(), b.tree()) {
+        (Ok(a), Ok(b)) => (a, b),
+        (Err(why), _) | (_, Err(why)) => return format!("unknown: {why}"),
     };
     let [a, b] = [(a, &of_a), (b, &of_b)]
         .map(|(mesh, tree)| why::Mesh::of(&mesh.manifest, tree, body.as_ref()).distrusting());
-    Ok(caveat + &rule::Dispute { a, b, terms }.rule(x, y))
+    caveat + &rule::at(&a, &b, x, y)
+}
+
+/// Counts that follow from the sides.
+const OF_SIDES: [&str; 3] = ["components", "components_ambiguous", "leaves_by_side"];
+
+/// A manifest with its owner's name.
+type Owned<'a> = (&'a str, &'a Manifest);
+
+/// The differences of inputs, one line each, with names for the owners of both manifests.
+pub(crate) fn differing_inputs(a: Owned, b: Owned) -> Vec<String> {
+    let geometry = a.1.geometry.is_some() && b.1.geometry.is_some();
+    let keys = ["tree"].into_iter().chain(INPUTS).chain(geometry.then_some("geometry"));
+    compare(&keys.collect::<Vec<_>>(), a, b)
+}
+
+/// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
+fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
+    let have_sides = a.sides == Sides::Known && b.sides == Sides::Known;
+    let (a, b) = (("A", a), ("B", b));
+    let mut fields = differing_inputs(a, b);
+    fields.extend(compare(&["leaves", "leaves_by_level"], a, b));
+    fields.extend(compare(if have_sides { &OF_SIDES } else { &[] }, a, b));
+    fields
+}
+
+fn compare(keys: &[&str], (owner_a, a): Owned, (owner_b, b): Owned) -> Vec<String> {
+    let (a, b) = (stated(a), stated(b));
+    let line = |key: &&str| {
+        let (x, y) = (&a[*key], &b[*key]);
+        (x != y).then(|| format!("{key}: {x} in {owner_a}; {y} in {owner_b}"))
+    };
+    keys.iter().filter_map(line).collect()
+}
+
+/// The manifest as JSON, with boxes and seeds in the user's units.
+fn stated(manifest: &Manifest) -> Value {
+    let root = &manifest.root;
+    let user = |at: [i64; 3]| root.rounded(root.to_user(at));
+    let mut stated = serde_json::to_value(manifest).expect("a manifest is representable in JSON");
+    let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
+    stated["boxes"] = manifest.boxes.iter().map(extent).collect();
+    stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
+    stated
 }

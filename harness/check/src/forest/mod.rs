@@ -18,6 +18,7 @@ use crate::checks::{CheckResult, NO_LEAVES};
 use crate::promises::Touching;
 use contract::import::forest::{Forest, Quadrant};
 use isometry::LENGTH;
+use std::cmp::Ordering;
 use std::time::Instant;
 use topology::Topology;
 
@@ -44,28 +45,13 @@ impl Leaf {
     }
 }
 
-/// The bits of every byte, spread to every second or third bit.
-static SPREAD: [[u32; 256]; 2] = [spread_bytes(2), spread_bytes(3)];
-
-const fn spread_bytes(dimension: usize) -> [u32; 256] {
-    let mut spread = [0; 256];
-    let mut bit = 0;
-    while bit < 8 * 256 {
-        let (byte, place) = (bit / 8, bit % 8);
-        spread[byte] |= (byte as u32 >> place & 1) << (place * dimension);
-        bit += 1;
-    }
-    spread
-}
-
 /// The Morton code of a point in a tree.
 fn key(dimension: usize, point: [i64; 3]) -> u128 {
-    let of_axis = |axis: usize| {
-        let bytes = (point[axis] as u32).to_le_bytes().into_iter().enumerate();
-        let spread = |(i, byte)| (SPREAD[dimension - 2][byte as usize], 8 * i * dimension);
-        bytes.map(spread).map(|(bits, shift)| u128::from(bits) << (shift + axis)).sum::<u128>()
+    let of_bit = |bit: usize| {
+        let of_axis = |axis: usize| (point[axis] as u128 >> bit & 1) << (dimension * bit + axis);
+        (0..dimension).map(of_axis).sum::<u128>()
     };
-    (0..dimension).map(of_axis).sum()
+    (0..LENGTH.trailing_zeros() as usize).map(of_bit).sum()
 }
 
 /// The length of a tree, which is that of the version of p4est: most quadrants are octants of such trees.
@@ -95,54 +81,47 @@ fn named(
     format!("tree {tree}, quadrant {index} (level {level} at {x}, {y}, {z})")
 }
 
-/// Checks of the leaves of each tree, of which all later ones assume that the earlier ones hold.
-struct Trees {
-    leaves: Vec<Vec<Leaf>>,
-    valid: CheckResult,
-    linear: CheckResult,
-    complete: CheckResult,
-}
-
-impl Trees {
-    fn of(forest: &Forest) -> Self {
-        let [valid, linear, complete] = ["valid", "linear", "complete"].map(CheckResult::new);
-        let mut trees = Self { leaves: Vec::new(), valid, linear, complete };
-        let (dimension, length) = (forest.connectivity.dimension, length(forest));
-        for (tree, quadrants) in forest.leaves.iter().enumerate() {
-            let mut next = 0;
-            let mut leaves = Vec::with_capacity(quadrants.len());
-            for (index, quadrant) in quadrants.iter().enumerate() {
-                let Some(leaf) = leaf(dimension, length, quadrant) else {
-                    let why = "is no octant of a tree whose length is";
-                    trees
-                        .valid
-                        .report_with(|| format!("{} {why} {length}", named(tree, index, quadrant)));
-                    continue;
-                };
-                let name = || named(tree, index, quadrant);
-                if leaf.key < next {
-                    let why = "begins before the end of the one before it";
-                    trees.linear.report_with(|| format!("{} {why}", name()));
-                } else if leaf.key > next {
-                    let why = "does not begin where the one before it ends, or the tree begins";
-                    trees.complete.report_with(|| format!("{} {why}", name()));
-                }
-                next = leaf.end(dimension);
-                leaves.push(leaf);
-            }
-            if next != 1 << (dimension * LENGTH.trailing_zeros() as usize) {
-                let last = quadrants.last().map(|last| named(tree, quadrants.len() - 1, last));
-                trees.complete.report(match last {
-                    Some(last) => {
-                        format!("{last} is the last and does not end where the tree ends")
-                    }
-                    None => format!("tree {tree} has no quadrants"),
+/// The leaves of each tree, and the checks `valid`, `linear` and `complete`.
+fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
+    let [mut valid, mut linear, mut complete] =
+        ["valid", "linear", "complete"].map(CheckResult::new);
+    let (dimension, length) = (forest.connectivity.dimension, length(forest));
+    let mut all = Vec::new();
+    for (tree, quadrants) in forest.leaves.iter().enumerate() {
+        let (mut next, mut leaves) = (0, Vec::with_capacity(quadrants.len()));
+        for (index, quadrant) in quadrants.iter().enumerate() {
+            let name = || named(tree, index, quadrant);
+            let Some(leaf) = leaf(dimension, length, quadrant) else {
+                valid.report_with(|| {
+                    format!("{} is no octant of a tree whose length is {length}", name())
                 });
+                continue;
+            };
+            match leaf.key.cmp(&next) {
+                Ordering::Less => linear.report_with(|| {
+                    format!("{} begins before the end of the one before it", name())
+                }),
+                Ordering::Greater => complete.report_with(|| {
+                    let why = "does not begin where the one before it ends, or the tree begins";
+                    format!("{} {why}", name())
+                }),
+                Ordering::Equal => {}
             }
-            trees.leaves.push(leaves);
+            next = leaf.end(dimension);
+            leaves.push(leaf);
         }
-        trees
+        if next != 1 << (dimension * LENGTH.trailing_zeros() as usize) {
+            complete.report(match quadrants.last() {
+                Some(last) => {
+                    let last = named(tree, quadrants.len() - 1, last);
+                    format!("{last} is the last and does not end where the tree ends")
+                }
+                None => format!("tree {tree} has no quadrants"),
+            });
+        }
+        all.push(leaves);
     }
+    (all, [valid, linear, complete])
 }
 
 /// Which leaves touch.
@@ -202,7 +181,7 @@ pub fn audit(forest: &Forest, touching: Touching, start: Instant) -> AuditReport
     let mut connectivity = CheckResult::new("connectivity");
     let topology = Topology::of(&forest.connectivity, &mut connectivity);
     let mut balance = CheckResult::new("balance");
-    let Trees { leaves: of_trees, mut valid, mut linear, mut complete } = Trees::of(forest);
+    let (of_trees, [mut valid, mut linear, mut complete]) = trees(forest);
     let leaves = forest.leaves.iter().map(|leaves| leaves.len() as u64).sum();
     let is_tree = [&valid, &linear, &complete].iter().all(|result| result.holds());
     match topology {

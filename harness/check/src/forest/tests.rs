@@ -245,7 +245,7 @@ proptest! {
         }
         let found = diff(&forest, &changed);
         prop_assert!(found[0].holds() && found[1].findings_total == 1);
-        let detail = &found[1].findings[0].detail;
+        let detail = &found[1].findings[0];
         let place = format!("tree {tree}");
         prop_assert!(detail.contains(&place), "{}", detail);
         let report = audited(&changed, Touching::Corner);
@@ -254,7 +254,7 @@ proptest! {
 }
 
 fn found(report: &AuditReport) -> Vec<(&str, &str)> {
-    report.checks.iter().flat_map(|c| &c.findings).map(|f| (f.check, f.detail.as_str())).collect()
+    report.checks.iter().flat_map(|c| c.findings.iter().map(|f| (c.name, f.as_str()))).collect()
 }
 
 #[test]

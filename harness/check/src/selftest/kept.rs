@@ -6,7 +6,7 @@
 use super::SelftestCase;
 use super::edit::{has_side, with_side};
 use super::mutant::{AUDITED, INFORMED, Mutant, Mutation, both, sets, words};
-use crate::checks::{Terms, components};
+use crate::checks::components;
 use contract::manifest::{Components, Keep};
 use contract::word::{self, Side};
 
@@ -24,7 +24,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         applies.then(|| removed(s, |_| true)).flatten()
     }),
     both("side flipped against the seeds in mesh and T0", "sides", INFORMED, |s| {
-        let flow = Terms::of_case(&s.case).side_of_flow();
+        let flow = s.case.inputs().side_of_flow();
         let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
         let flip = |&w: &u64| if has_side(w, flow) { with_side(w, other) } else { w };
         let flipped: [Vec<u64>; 2] =

@@ -1,13 +1,12 @@
-//! The answer to a question about a point; JSON of the schema `octree-why/4` when serialised.
+//! The answer to a question about a point.
 //!
 //! The size of a leaf is explained by the split of its parent: whatever requires that split requires those of all coarser octants,
 //! too. A chain goes from the parent to the parent of a leaf that forces it to split, until T0 or the extra layer splits one. Of the
 //! leaves that do, the first one of the finest level is taken, so that chains are short. Levels rise from link to link, so a chain ends.
 //!
-//! Invariants: the leaf and the leaf of T0 contain the point; the octant that is split is the parent of the leaf. A chain begins
-//! with this octant; each leaf is finer and near enough for its rule; each further octant is the parent of
-//! the leaf before it, and the cause is one of the last octant. A cause has a facet or a box. Only a point without a leaf is
-//! in a deleted part.
+//! Invariants: the leaf and the leaf of T0 contain the point; the octant that is split is the parent of the leaf. In a chain each leaf is
+//! finer than the octant that it forces to split, which is the parent of the leaf before it, and near enough for its rule; the cause is one
+//! of the last octant, and has a facet or a box. Only a point without a leaf is in a deleted part.
 
 use super::Mesh;
 pub use super::gradation::Rule;
@@ -15,98 +14,53 @@ use super::gradation::parent;
 use crate::checks::components::{Component, Decision};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
-use contract::word::Side;
-use serde::Serialize;
+use contract::word::{Leaf, Side};
+use std::fmt;
 
-/// Name and version of the JSON form.
-const SCHEMA: &str = "octree-why/4";
-
-/// Facets that are listed for a cause; further ones are counted only.
+/// Facets that are listed; further ones are counted only.
 const FACETS_LISTED: usize = 8;
 
-/// An octant with its bounds in the user's units.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Place {
-    /// The octant.
-    #[serde(skip)]
-    pub octant: Octant,
-    /// The digits from the root to the octant, such as `3.1.4`; `root` for the root.
-    pub path: String,
-    /// Its level.
-    pub level: u8,
-    /// Minimum corner, with the decimals that the lattice needs.
-    pub min: [f64; 3],
-    /// Maximum corner.
-    pub max: [f64; 3],
-}
-
-impl Place {
-    pub(super) fn new(octant: &Octant, root: &Root) -> Self {
-        let (low, high) = octant.bounds();
-        let [min, max] = [low, high].map(|corner| root.rounded(root.to_user(corner)));
-        Self { octant: *octant, path: octant.path(), level: octant.level, min, max }
-    }
-}
-
 /// The answer.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Answer {
-    /// Name and version of the JSON form.
-    pub schema: &'static str,
     /// The point, in the user's units.
     pub point: [f64; 3],
     /// The leaf at the point; none if the point lies in a deleted part.
-    pub leaf: Option<Place>,
+    pub leaf: Option<Leaf>,
     /// The leaf of T0 at the point; none if the surface is not known.
-    pub base_leaf: Option<Place>,
-    /// The side of the leaf in the mesh.
-    pub side: Option<Side>,
+    pub base_leaf: Option<Octant>,
     /// What decides the side; none if the facets are not known.
     pub side_decided_by: Option<SideReason>,
     /// Deleted parts: the rule that deletes the leaf of T0.
     pub deleted_by: Option<String>,
     /// The split of the leaf's parent; none for the root.
     pub split: Option<Split>,
-    /// What could not be explained, and why.
-    pub left_out: Vec<String>,
-    #[serde(skip)]
+    /// Whether the facets are known.
+    pub knows_facets: bool,
+    root: Root,
     layer_cells_min: u32,
 }
 
 /// An octant that is split, and why.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Split {
     /// The octant.
-    pub octant: Place,
-    /// The leaves from the octant to the cause; none if T0 splits the octant.
-    pub links: Vec<Link>,
+    pub octant: Octant,
+    /// The leaves from the octant to the cause, each with the rule by which it forces the octant before it to split: the one that is
+    /// asked about, then the parent of the leaf before. None if T0 splits the octant.
+    pub links: Vec<(Rule, Octant)>,
     /// The cause in the inputs; none if no rule requires the split.
     pub cause: Option<Cause>,
 }
 
-/// A leaf that forces the previous octant of a chain to split.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Link {
-    /// The rule.
-    pub rule: Rule,
-    /// The octant that is forced to split: that of the chain, or the parent of the previous leaf.
-    pub octant: Place,
-    /// The leaf that forces it.
-    pub leaf: Place,
-    /// Distance of leaf and octant in cells of the leaf's level.
-    pub distance_cells: i64,
-}
-
 /// A cause in the inputs (section 3). Each facet and each box alone is sufficient.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cause {
     /// The octant that facets cross and boxes meet: the split octant, the parent of the last leaf, or the last leaf itself after
     /// the extra layer.
-    pub octant: Place,
-    /// The first facets, counted from 0.
+    pub octant: Octant,
+    /// The facets, counted from 0; none if no facet crosses the octant or facets are not known.
     pub facets: Vec<u32>,
-    /// Number of facets; 0 if no facet crosses the octant or facets are not known.
-    pub facets_count: u64,
     /// Whether the surface is a cause, which is known without facets if crossing leaves are kept.
     pub is_crossed: bool,
     /// Boxes, counted from 0.
@@ -114,14 +68,12 @@ pub struct Cause {
 }
 
 /// What decides the side of a leaf (section 4).
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SideReason {
     /// The side.
     pub side: Side,
     /// What decides it, in words.
     pub decision: String,
-    /// Number of leaves of the component; none for a crossing leaf.
-    pub leaves: Option<u64>,
 }
 
 /// The rule in place of one that deletes a leaf.
@@ -130,61 +82,135 @@ pub(crate) const LOST: &str = "no rule deletes it: the mesh has lost a leaf";
 impl Answer {
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
-        let Self { point, leaf, base_leaf, side, deleted_by, split, .. } = self;
-        for place in leaf.iter().chain(base_leaf) {
-            // The point is rounded to the lattice, and printed coordinates to some decimals.
-            let near = |a: usize| {
-                let slack = (place.max[a] - place.min[a]) / 128.0;
-                (place.min[a] - slack..=place.max[a] + slack).contains(&point[a])
-            };
-            assert!((0..3).all(near), "{point:?} is not in the {place}");
+        let Self { point, leaf, base_leaf, deleted_by, split, root, .. } = self;
+        let leaf = leaf.map(|leaf| leaf.octant);
+        for octant in leaf.iter().chain(base_leaf) {
+            let ((low, high), at) = (octant.bounds(), root.quantise_seed(*point));
+            let holds = |at: [i64; 3]| (0..3).all(|a| (low[a]..high[a]).contains(&at[a]));
+            assert!(at.is_some_and(holds), "{point:?} is not in the {octant}");
         }
-        if let (Some(leaf), Some(base)) = (leaf, base_leaf) {
-            let (leaf, base) = (&leaf.octant, &base.octant);
-            let is_nested = leaf.contains(base) || base.contains(leaf);
-            assert!(is_nested, "{leaf} is apart from {base} of T0");
-        }
-        assert_eq!(leaf.is_some(), side.is_some(), "a leaf has a side, and only a leaf");
         let is_apart = deleted_by.is_none() || leaf.is_none();
         assert!(is_apart, "the leaf {leaf:?} was deleted: {deleted_by:?}");
-        let end = leaf.as_ref().or(base_leaf.as_ref()).map(|place| place.octant);
+        let end = leaf.or(*base_leaf);
         let above = end.filter(|end| end.level > 0).map(|end| parent(&end));
-        let octant = split.as_ref().map(|split| split.octant.octant);
-        assert_eq!(octant, above, "the split above {end:?}");
+        assert_eq!(split.as_ref().map(|split| split.octant), above, "the split above {end:?}");
         split.iter().for_each(|split| split.check_invariants(self.layer_cells_min));
     }
 }
 
 impl Split {
     fn check_invariants(&self, layer_cells_min: u32) {
-        let Some(cause) = &self.cause else {
+        let Some(Cause { octant: at, facets, is_crossed, boxes }) = &self.cause else {
             return assert!(self.links.is_empty(), "a chain of {:?} leads to no cause", self.links);
         };
-        let (mut octant, mut is_source, mut ends) = (self.octant.octant, false, false);
-        for link in &self.links {
-            let leaf = link.leaf.octant;
-            assert!(link.octant.octant == octant && !ends, "{link:?} does not follow {octant}");
+        let (mut octant, mut is_source, mut ends) = (self.octant, false, false);
+        for &(rule, leaf) in &self.links {
             let distance = octant.distance(&leaf);
             let reach = i64::from(layer_cells_min - 1) * i64::from(leaf.edge());
-            let is_right = match link.rule {
+            let is_right = match rule {
                 Rule::Layer => leaf.level > octant.level && distance < reach,
                 Rule::Balance => leaf.level > octant.level + 1 && distance == 0,
                 Rule::ExtraLayer => distance == 0,
             };
-            ends = link.rule == Rule::ExtraLayer;
+            assert!(is_right && !ends, "{rule:?} of {leaf} does not force the split of {octant}");
+            ends = rule == Rule::ExtraLayer;
             // The parent of a source is split before the layer of the source's level is made.
             let is_early = !is_source || leaf.level > octant.level + 1 || ends;
-            assert!(is_right && is_early, "{link:?} does not force the split of {octant}");
-            assert_eq!(link.distance_cells, distance / i64::from(leaf.edge()), "{link:?}");
-            is_source = link.rule == Rule::Layer;
+            assert!(is_early, "{leaf} is too coarse for {octant}");
+            is_source = rule == Rule::Layer;
             octant = if ends { leaf } else { parent(&leaf) };
         }
-        let Cause { octant: at, facets, facets_count, is_crossed, boxes } = cause;
-        assert_eq!(octant, at.octant, "the cause of {octant} is one of {}", at.octant);
+        assert_eq!(octant, *at, "the cause of {octant} is one of {at}");
         assert!(*is_crossed || !boxes.is_empty(), "{octant} is split without a facet or a box");
-        let listed = (*facets_count).min(FACETS_LISTED as u64);
-        assert_eq!(facets.len() as u64, listed, "facets of {octant}");
-        assert!(*is_crossed || *facets_count == 0, "{facets_count} facets do not cross {octant}");
+        assert!(*is_crossed || facets.is_empty(), "{facets:?} do not cross {octant}");
+    }
+
+    /// The clauses of the chain, from what forces the split to the cause; empty if no rule requires the split.
+    pub(crate) fn clauses(&self, root: &Root) -> Vec<String> {
+        let Some(cause) = &self.cause else { return Vec::new() };
+        let (mut octant, mut subject, mut clauses) = (self.octant, "", Vec::new());
+        for (rule, leaf) in &self.links {
+            let near = match rule {
+                Rule::Layer => {
+                    let edges = octant.distance(leaf) / i64::from(leaf.edge());
+                    format!("section 6, step 2 (layer): {edges} of its edges away is the leaf")
+                }
+                Rule::Balance => {
+                    let levels = leaf.level - octant.level;
+                    format!(
+                        "section 6, step 3 (balance): it touches, {levels} levels finer, the leaf"
+                    )
+                }
+                Rule::ExtraLayer => {
+                    "section 6 (extra layer): it touches the deleted crossing leaf".to_owned()
+                }
+            };
+            clauses.push(format!("{subject}by {near} {}", root.describe(leaf)));
+            (octant, subject) = (parent(leaf), "its parent is split ");
+        }
+        let end = match self.links.last() {
+            Some((Rule::ExtraLayer, _)) => "it is crossing by section 4".to_owned(),
+            _ => format!("{subject}by section 3"),
+        };
+        let surface = match cause.facets.is_empty() {
+            true => "the surface crosses it".to_owned(),
+            false => that_cross(&cause.facets),
+        };
+        let surface = cause.is_crossed.then_some(surface).into_iter();
+        let boxes = cause.boxes.iter().map(|index| format!("box {index} meets it"));
+        let causes: Vec<String> = surface.chain(boxes).collect();
+        clauses.push(format!("{end}: {}", causes.join("; ")));
+        clauses
+    }
+}
+
+/// Facets that cross an octant, as a clause.
+fn that_cross(facets: &[u32]) -> String {
+    let numbers: Vec<String> = facets.iter().take(FACETS_LISTED).map(u32::to_string).collect();
+    let more = facets.len() - numbers.len();
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("facets that cross it: {}{more}", numbers.join(", "))
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = |octant: &Octant| self.root.describe(octant);
+        let Self { point, leaf, base_leaf, side_decided_by, deleted_by, split, .. } = self;
+        match leaf {
+            Some(leaf) => {
+                writeln!(f, "{point:?} lies in the {} leaf {}", leaf.side, place(&leaf.octant))?
+            }
+            None => writeln!(f, "{point:?} lies in a part of the root that was deleted")?,
+        }
+        if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|leaf| leaf.octant != *base)) {
+            writeln!(f, "  leaf of T0: {}", place(&base))?;
+        }
+        if let Some(rule) = deleted_by {
+            writeln!(f, "  deleted by {rule}")?;
+        }
+        if let Some(split) = split {
+            writeln!(f, "size\n  its parent, {}, is split", place(&split.octant))?;
+            match &split.cause {
+                None => writeln!(
+                    f,
+                    "    by no rule that is known (harness audit --case finds all such splits)"
+                )?,
+                Some(_) => split
+                    .clauses(&self.root)
+                    .iter()
+                    .try_for_each(|clause| writeln!(f, "    {clause}"))?,
+            }
+        }
+        if let Some(SideReason { side, decision }) = side_decided_by {
+            writeln!(f, "side\n  {side} by section 4: {decision}")?;
+        }
+        match self.knows_facets {
+            true => Ok(()),
+            false => writeln!(
+                f,
+                "left out: what depends on facets, which the mesh does not contain: give the case with --case"
+            ),
+        }
     }
 }
 
@@ -192,30 +218,30 @@ impl Mesh<'_> {
     /// Explains the leaf at a point, in the user's units.
     ///
     /// # Errors
-    /// One sentence, if the point lies outside the root or the mesh is invalid.
+    /// One sentence, if the point lies outside the root.
     pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
-        let root = &self.terms.root;
+        let root = self.inputs.root;
         let lattice = root.quantise_seed(point).ok_or_else(|| {
             let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
             format!("the point {point:?} lies outside the root, which is from {from:?} to {to:?}; give a point inside")
         })?;
         let corner = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
         let leaf = self.tree.locate(corner);
+        let leaf = leaf.map(|(octant, kind)| Leaf { octant, side: Side::ALL[usize::from(kind)] });
         let cell = Octant { corner, level: LEVEL_MAX };
-        let base = self.knows_surface().then(|| self.base_leaf(&cell).expect("never split"));
-        let octant = leaf.map(|(octant, _)| octant).or(base).filter(|octant| octant.level > 0);
-        let (side_decided_by, deletion) = base.and_then(|base| self.side_of(&base)).unzip();
+        let base_leaf = self.knows_surface().then(|| self.base_leaf(&cell).expect("never split"));
+        let octant = leaf.map(|leaf| leaf.octant).or(base_leaf).filter(|octant| octant.level > 0);
+        let (side_decided_by, deletion) = base_leaf.and_then(|base| self.side_of(&base)).unzip();
         let answer = Answer {
-            schema: SCHEMA,
             point,
-            leaf: leaf.map(|(octant, _)| self.place(&octant)),
-            base_leaf: base.map(|base| self.place(&base)),
-            side: leaf.map(|(_, kind)| Side::ALL[usize::from(kind)]),
+            leaf,
+            base_leaf,
             side_decided_by,
             deleted_by: deletion.filter(|_| leaf.is_none()),
             split: octant.map(|octant| self.split(&parent(&octant))),
-            left_out: self.left_out(),
-            layer_cells_min: self.terms.layer_cells_min,
+            knows_facets: self.body.is_some(),
+            root,
+            layer_cells_min: self.inputs.layer_cells_min,
         };
         answer.check_invariants();
         Ok(answer)
@@ -229,15 +255,15 @@ impl Mesh<'_> {
                 break Some(self.cause(&at));
             }
             if let Some(leaf) = self.extra_layer(&at) {
-                links.push(self.link(Rule::ExtraLayer, &at, &leaf));
+                links.push((Rule::ExtraLayer, leaf));
                 break Some(self.cause(&leaf));
             }
             let Some((rule, leaf)) = self.finest_that_forces(&at, is_deep) else { break None };
-            links.push(self.link(rule, &at, &leaf));
+            links.push((rule, leaf));
             // After balance, any leaf may follow that may follow after a layer.
             (at, is_deep) = (parent(&leaf), rule == Rule::Layer);
         };
-        Split { octant: self.place(octant), links, cause }
+        Split { octant: *octant, links, cause }
     }
 
     /// A leaf of the finest possible level that forces the split of an octant, which must be deep or not.
@@ -253,22 +279,15 @@ impl Mesh<'_> {
         found
     }
 
-    fn link(&self, rule: Rule, octant: &Octant, leaf: &Octant) -> Link {
-        let distance_cells = octant.distance(leaf) / i64::from(leaf.edge());
-        Link { rule, octant: self.place(octant), leaf: self.place(leaf), distance_cells }
-    }
-
     /// What splits an octant of T0, or makes a leaf of it a crossing one.
     fn cause(&self, octant: &Octant) -> Cause {
-        let may_cross = octant.level < self.terms.level_surface || !self.base_splits(octant);
+        let may_cross = octant.level < self.inputs.level_surface || !self.base_splits(octant);
         let is_crossed = may_cross && self.is_crossed(octant);
-        let facets = if is_crossed { self.facets_of(octant) } else { Vec::new() };
-        let boxes = (0..).zip(&self.terms.boxes);
+        let boxes = (0..).zip(&self.inputs.boxes);
         let splits = boxes.filter(|(_, b)| b.level > octant.level && b.meets(octant));
         Cause {
-            octant: self.place(octant),
-            facets_count: facets.len() as u64,
-            facets: facets.into_iter().take(FACETS_LISTED).collect(),
+            octant: *octant,
+            facets: if is_crossed { self.facets_of(octant) } else { Vec::new() },
             is_crossed,
             boxes: splits.map(|(index, _)| index).collect(),
         }
@@ -277,39 +296,33 @@ impl Mesh<'_> {
     /// What decides the side of a leaf of T0, and the rule that deletes it if it was deleted.
     fn side_of(&self, base: &Octant) -> Option<(SideReason, String)> {
         let (_, truth) = self.body?;
-        let Some(component) = truth.component_at(base) else {
-            let facets = self.facets_of(base);
-            let listed = &facets[..facets.len().min(FACETS_LISTED)];
-            let decision = format!("{} it", facets_that_cross(listed, facets.len() as u64));
-            let rule = match self.terms.keep_crossing {
-                false => "keep_crossing is false, so crossing leaves are deleted after gradation",
-                true => LOST,
-            };
-            let reason = SideReason { side: Side::Crossing, decision, leaves: None };
-            return Some((reason, format!("section 7: {rule}")));
+        let (side, decision, rule) = match truth.component_at(base) {
+            Some(component) => (component.side, self.decision(component), self.deletion(component)),
+            None => {
+                let rule = match self.inputs.keep_crossing {
+                    false => {
+                        "keep_crossing is false, so crossing leaves are deleted after gradation"
+                    }
+                    true => LOST,
+                };
+                let rule = format!("section 7: {rule}");
+                (Side::Crossing, that_cross(&self.facets_of(base)), rule)
+            }
         };
-        let reason = SideReason {
-            side: component.side,
-            decision: self.decision(component),
-            leaves: Some(component.leaves.len() as u64),
-        };
-        Some((reason, format!("section 5: {}", self.deletion(component))))
+        Some((SideReason { side, decision }, rule))
     }
 
     /// What decides the side of a component, as a sentence.
     fn decision(&self, component: &Component) -> String {
         match component.decision {
+            Decision::Stated => "the words of its leaves state it".to_owned(),
             Decision::Seed(index) => format!("seed {index} lies in its component"),
             Decision::NoSeed => "no seed lies in its component".to_owned(),
-            Decision::Rays(candidate, before) => {
+            Decision::Rays(candidate) => {
                 let parity = if component.side == Side::Inside { "an odd" } else { "an even" };
-                let skipped = match before {
-                    0 => String::new(),
-                    n => format!(", after {n} candidates whose rays disagree"),
-                };
-                let candidate = self.place(&candidate);
+                let candidate = self.inputs.root.describe(&candidate);
                 format!(
-                    "each of the six rays of the candidate {candidate} intersects {parity} number of facets{skipped}"
+                    "each of the six rays of the candidate {candidate} intersects {parity} number of facets"
                 )
             }
             Decision::Majority(candidates, odd) => format!(
@@ -322,39 +335,15 @@ impl Mesh<'_> {
 
     /// The rule that deletes the leaves of a component.
     fn deletion(&self, &Component { side, enclosed, .. }: &Component) -> String {
-        let keep = format!("{:?}", self.terms.keep).to_lowercase();
-        if !self.terms.keeps(side as u8) {
-            format!("keep is {keep}, so leaves that are {side} are deleted")
-        } else if enclosed {
-            "enclosed is delete, and no leaf of its component has a face on the root's boundary"
-                .to_owned()
-        } else {
-            LOST.to_owned()
-        }
-    }
-
-    /// What an answer lacks, and why.
-    fn left_out(&self) -> Vec<String> {
-        let of_case = match (self.body, self.knows_surface()) {
-            (Some(_), _) => None,
-            (None, true) => {
-                Some("facet numbers and the decision on the side: give the case with --case")
+        let keep = format!("{:?}", self.inputs.keep).to_lowercase();
+        let why = match (self.inputs.keeps(side as u8), enclosed) {
+            (false, _) => format!("keep is {keep}, so leaves that are {side} are deleted"),
+            (true, true) => {
+                "enclosed is delete, and no leaf of its component has a face on the root's boundary"
+                    .to_owned()
             }
-            (None, false) => Some(
-                "everything that depends on facets or on crossing leaves, which the mesh does not contain: give the case with --case",
-            ),
+            (true, false) => LOST.to_owned(),
         };
-        let of_base = self.is_base.then_some("gradation: the mesh is a base tree");
-        of_case.into_iter().chain(of_base).map(str::to_owned).collect()
-    }
-}
-
-/// The first of all facets as subject and verb.
-pub(super) fn facets_that_cross(facets: &[u32], count: u64) -> String {
-    let numbers: Vec<String> = facets.iter().map(ToString::to_string).collect();
-    match (count, count - facets.len() as u64) {
-        (1, _) => format!("facet {} crosses", numbers[0]),
-        (_, 0) => format!("facets {} cross", numbers.join(", ")),
-        (_, more) => format!("facets {} and {more} more cross", numbers.join(", ")),
+        format!("section 5: {why}")
     }
 }

@@ -16,18 +16,19 @@
 //!
 //! Crossing leaves that were deleted after gradation are sources. They are the crossing leaves of T0, which the facets
 //! determine. Only near a box finer than D they may have been split, which the same recursion decides.
-
-use std::ops::RangeInclusive;
+//!
+//! T0 is that of the case or, without one, where the crossing leaves of the mesh show it. If section 3 requires the split of an octant, it
+//! requires the split of its ancestors. So the leaf of T0 at a point is the first octant on the way down that no rule splits.
 
 use super::Mesh;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::{Handle, OFFSETS};
 use contract::word;
-use serde::Serialize;
+use contract::word::Side;
+use std::ops::RangeInclusive;
 
 /// The rule by which a leaf forces an octant to split (section 6 of reference/DEFINITION.md).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// The leaf is a deleted crossing leaf of T0, and the octant touches it.
     ExtraLayer,
@@ -57,7 +58,7 @@ enum Question {
 impl Mesh<'_> {
     /// Distance from a source of this level within which its layer reaches, in level-19 cells.
     pub(super) fn layer_reach(&self, level: u8) -> i64 {
-        i64::from(self.terms.layer_cells_min - 1) * edge(level)
+        i64::from(self.inputs.layer_cells_min - 1) * edge(level)
     }
 
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
@@ -180,7 +181,7 @@ impl Search<'_, '_> {
                 Some(_) => {}
             }
         }
-        match self.mesh.terms.has_box_finer_than_surface() && self.counts_as_split(&at) {
+        match self.mesh.inputs.has_box_finer_than_surface() && self.counts_as_split(&at) {
             true => self.descend(&at, content, true),
             false => self.leaf(at),
         }
@@ -208,5 +209,68 @@ impl Search<'_, '_> {
     fn is_far(&self, at: &Octant) -> bool {
         let distance = self.octant.distance(at);
         distance > 0 && distance >= self.mesh.layer_reach(at.level.max(self.first))
+    }
+}
+
+impl Mesh<'_> {
+    /// Whether the surface crosses an octant that is a leaf of T0 or contains some. Without facets the answer holds for octants coarser
+    /// than D only: such an octant contains a crossing leaf iff a facet crosses it.
+    pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
+        let tree = self.body.map_or(self.tree, |(_, truth)| &truth.tree);
+        tree.kinds(tree.at(octant)) & 1 << Side::Crossing as u8 != 0
+    }
+
+    /// Whether T0 splits an octant.
+    pub(super) fn base_splits(&self, octant: &Octant) -> bool {
+        match self.body {
+            Some((_, truth)) => truth.tree.at(octant).is_node(),
+            None => {
+                octant.level < LEVEL_MAX
+                    && (self.inputs.box_that_splits(octant).is_some()
+                        || octant.level < self.inputs.level_surface && self.is_crossed(octant))
+            }
+        }
+    }
+
+    /// The facets that cross an octant, ascending; empty if facets are not known.
+    pub(super) fn facets_of(&self, octant: &Octant) -> Vec<u32> {
+        let (low, high) = octant.bounds();
+        self.body.map_or(Vec::new(), |(facets, _)| facets.meeting(&facets.all(), low, high))
+    }
+
+    /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.
+    pub(super) fn base_leaf(&self, octant: &Octant) -> Option<Octant> {
+        if self.base_splits(octant) {
+            return None;
+        }
+        let split_above = (0..octant.level).rev().find(|&l| self.base_splits(&octant.ancestor(l)));
+        Some(octant.ancestor(split_above.map_or(0, |level| level + 1)))
+    }
+
+    /// Whether crossing leaves were deleted after gradation and are known from the facets.
+    pub(super) fn has_deleted_crossing(&self) -> bool {
+        !self.inputs.keep_crossing && self.body.is_some()
+    }
+
+    /// A crossing leaf of T0 that by touching an octant forces it to split: the extra layer of section 6.
+    pub(super) fn extra_layer(&self, octant: &Octant) -> Option<Octant> {
+        let applies = self.has_deleted_crossing() && self.inputs.layer_cells_min < 3;
+        if !applies || octant.level >= self.inputs.level_surface || self.base_splits(octant) {
+            return None;
+        }
+        let around = OFFSETS.iter().filter(|offset| **offset != [0; 3]);
+        let mut neighbours = around.filter_map(|&offset| octant.neighbour(offset));
+        neighbours.find_map(|neighbour| self.crossing_leaf_touching(octant, &neighbour))
+    }
+
+    /// The first crossing leaf of T0 below `below` that touches an octant.
+    fn crossing_leaf_touching(&self, octant: &Octant, below: &Octant) -> Option<Octant> {
+        if octant.distance(below) > 0 || !self.is_crossed(below) {
+            return None;
+        }
+        match self.base_splits(below) {
+            true => (0..8).find_map(|d| self.crossing_leaf_touching(octant, &below.child(d))),
+            false => Some(*below),
+        }
     }
 }

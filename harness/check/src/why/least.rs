@@ -7,7 +7,7 @@
 //! octant is needless, too; a leaf in a missing octant is counted once.
 
 use super::Mesh;
-use crate::checks::trail::Trail;
+use crate::checks::clearance::Trail;
 use contract::octant::Octant;
 use contract::tree::HOLES;
 

@@ -1,8 +1,7 @@
 //! Why a leaf has its size and its side, and which splits of a mesh are needless or missing.
 //!
-//! - [`base`](mod@base): T0 (section 3 of reference/DEFINITION.md); [`gradation`]: the leaves that force an octant to split (section 6);
-//! - [`answer`]: the answer about a point, with a chain of such leaves to a cause in T0; [`text`]: the answer for people;
-//! - [`least`]: the audit of a whole mesh.
+//! - [`gradation`]: T0 (section 3 of reference/DEFINITION.md), and the leaves that force an octant to split (section 6);
+//! - [`answer`]: the answer about a point, with a chain of such leaves to a cause in T0; [`least`]: the audit of a whole mesh.
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
 //! so their parents are split by T0, by the extra layer, or by a step of a deeper level. A chain therefore goes to ever
@@ -12,20 +11,16 @@ use std::cell::RefCell;
 
 use contract::case::Case;
 use contract::manifest::{self, Geometry, Manifest};
-use contract::octant::Octant;
 use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
 use crate::checks::facets::Facets;
-use crate::checks::terms::Terms;
 use crate::checks::truth::Truth;
-use crate::diff::fields::differing_inputs;
+use crate::diff::differing_inputs;
 
 pub mod answer;
-mod base;
 mod gradation;
 pub mod least;
-mod text;
 
 /// The body of a case: its facets, and T0 with the sides of its leaves.
 #[derive(Debug)]
@@ -39,14 +34,21 @@ impl Body {
     ///
     /// # Errors
     /// One sentence, if the case is not that of the mesh, or if its T0 is too large.
-    pub fn of(case: &Case, manifest: &Manifest) -> Result<Self, String> {
-        let (terms, geometry) = (Terms::of_case(case), Geometry::of(&case.facets_lattice));
-        if terms != Terms::of_manifest(manifest) || manifest.geometry.is_some_and(|g| g != geometry)
-        {
-            return Err(other_inputs(manifest, case));
+    pub fn of(case: &Case, of_mesh: &Manifest) -> Result<Self, String> {
+        let geometry = Some(Geometry::of(&case.facets_lattice));
+        let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
+        let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
+        if of_mesh.sides == manifest::Sides::Unknown {
+            differing.push("the sides of the mesh are unknown".to_owned());
+        }
+        if !differing.is_empty() {
+            return Err(format!(
+                "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
+                differing.join("; ")
+            ));
         }
         let facets = Facets::new(&case.facets_lattice);
-        let truth = Truth::new(&facets, &case.facets_lattice, &terms).ok_or_else(|| {
+        let truth = Truth::new(&facets, &case.facets_lattice, &inputs).ok_or_else(|| {
             format!("T0 of the case has more than {} leaves: omit --case", Truth::LEAVES_MAX)
         })?;
         Ok(Self { facets, truth })
@@ -57,7 +59,7 @@ impl Body {
 #[derive(Debug)]
 pub struct Mesh<'a> {
     tree: &'a Tree,
-    terms: Terms,
+    pub(crate) inputs: Manifest,
     /// The facets and T0, if the case is known.
     body: Option<(&'a Facets, &'a Truth)>,
     /// Whether the leaves are those of T0, which precedes gradation.
@@ -72,59 +74,33 @@ pub struct Mesh<'a> {
 
 impl<'a> Mesh<'a> {
     /// A mesh of this body. Without it, facets are not known.
-    pub fn of(manifest: &'a Manifest, tree: &'a Tree, body: Option<&'a Body>) -> Self {
-        let body = body.map(|Body { facets, truth }| (facets, truth));
-        Self::new(manifest, tree, Terms::of_manifest(manifest), body)
+    pub fn of(manifest: &Manifest, tree: &'a Tree, body: Option<&'a Body>) -> Self {
+        Self::new(tree, manifest.clone(), body.map(|Body { facets, truth }| (facets, truth)))
     }
 
     /// A mesh of these inputs.
     pub(crate) fn new(
-        manifest: &'a Manifest,
         tree: &'a Tree,
-        mut terms: Terms,
+        mut inputs: Manifest,
         body: Option<(&'a Facets, &'a Truth)>,
     ) -> Self {
-        let is_base = manifest.tree == manifest::Tree::Base;
+        let is_base = inputs.tree == manifest::Tree::Base;
         if is_base {
-            (terms.keep, terms.keep_crossing) = (manifest::Keep::All, true);
+            (inputs.keep, inputs.keep_crossing) = (manifest::Keep::All, true);
         }
-        let level_deepest = tree.finest_level(tree.root(), 0).max(required(&terms));
+        let level_deepest = tree.finest_level(tree.root(), 0).max(inputs.level_deepest());
         let known = RefCell::default();
-        Self { tree, terms, body, is_base, distrusts: false, level_deepest, known }
+        Self { tree, inputs, body, is_base, distrusts: false, level_deepest, known }
     }
 
     /// The same mesh, in which needless splits justify nothing.
     pub(crate) fn distrusting(self) -> Self {
-        let level_deepest = required(&self.terms);
+        let level_deepest = self.inputs.level_deepest();
         Self { distrusts: true, level_deepest, ..self }
     }
 
     /// Whether it is known where the surface is: from the facets, or from the crossing leaves of the mesh.
     pub(crate) fn knows_surface(&self) -> bool {
-        self.body.is_some() || self.terms.keep_crossing
+        self.body.is_some() || self.inputs.keep_crossing
     }
-
-    /// An octant as text, with its bounds in the user's units.
-    fn place(&self, octant: &Octant) -> answer::Place {
-        answer::Place::new(octant, &self.terms.root)
-    }
-}
-
-/// The error of a case that is not that of a mesh, with the inputs that differ.
-fn other_inputs(of_mesh: &Manifest, case: &Case) -> String {
-    let geometry = Some(Geometry::of(&case.facets_lattice));
-    let of_case = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
-    let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &of_case));
-    if of_mesh.sides == manifest::Sides::Unknown {
-        differing.push("the sides of the mesh are unknown".to_owned());
-    }
-    format!(
-        "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
-        differing.join("; ")
-    )
-}
-
-/// The deepest level that the surface or a box requires.
-fn required(terms: &Terms) -> u8 {
-    terms.boxes.iter().map(|extent| extent.level).fold(terms.level_surface, u8::max)
 }

@@ -1,7 +1,7 @@
 //! The self test's corruptions of leaves in a larger mesh whose many parts interleave, as ranks of a large run write them.
 
 use crate::support;
-use check::audit::{AuditOptions, audit_against};
+use check::audit::audit_against;
 use check::promises::Promises;
 use check::selftest;
 use contract::case::Case;
@@ -27,7 +27,7 @@ fn found(set: &LeafSet, case: Option<&Case>) -> Vec<&'static str> {
     let dir = tempfile::tempdir().unwrap();
     set.write(dir.path()).unwrap();
     let definition = Promises::of_definition();
-    let report = audit_against(dir.path(), &AuditOptions::default(), case, &definition);
+    let report = audit_against(dir.path(), case, &definition);
     report.checks.iter().filter(|check| !check.holds()).map(|check| check.name).collect()
 }
 

@@ -1,7 +1,7 @@
 //! No false alarms: every check passes on the reference's meshes of random bodies, also in the audit.
 
 use crate::support;
-use check::audit::{self, AuditOptions};
+use check::audit;
 use check::checks::{self, Subject};
 use check::promises::{Promises, Sides, Surface, Touching};
 use geometries::Facet;
@@ -93,7 +93,7 @@ proptest! {
             let dir = tempfile::tempdir().unwrap();
             set.write(dir.path()).unwrap();
             for case in [None, Some(&correct.case)] {
-                let report = audit::audit_against(dir.path(), &AuditOptions::default(), case, &definition);
+                let report = audit::audit_against(dir.path(), case, &definition);
                 prop_assert!(report.holds(), "{text}{report}");
             }
         }

@@ -27,7 +27,7 @@ fn enclosed_space_must_be_deleted_or_kept_as_the_case_requires() {
         let subject = Subject::new(&of.case, &mesh.mesh).promising(&complete);
         let [.., result] = &checks::all(&subject)[..] else { panic!("one promise is one check") };
         assert!(result.was_run(), "{result}");
-        let first = result.findings.first().map(|finding| finding.detail.as_str());
+        let first = result.findings.first().map(|finding| finding.as_str());
         match finding {
             Some(what) => assert!(first.is_some_and(|detail| detail.contains(what)), "{result}"),
             None => assert_eq!(first, None, "{result}"),

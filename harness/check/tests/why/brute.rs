@@ -1,14 +1,14 @@
 //! What splits an octant, by the definition: slow, simple, and without the search structures of the library.
 
-use check::checks::Terms;
 use contract::case::Case;
+use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::triangle::Triangle;
 
 /// All that decides chains in a mesh whose crossing leaves are kept.
 pub struct Brute<'a> {
     pub case: &'a Case,
-    pub terms: Terms,
+    pub terms: Manifest,
 }
 
 impl Brute<'_> {

@@ -2,14 +2,13 @@
 
 use super::brute::Brute;
 use super::*;
-use check::checks::Terms;
 use check::why::answer::{Answer, Rule, Split};
 use contract::octant::Octant;
 use contract::word::{self, Side};
 
 /// Checks one answer link by link, with the numbers of the definition.
 fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
-    let terms = Terms::of_case(&correct.case);
+    let terms = correct.case.inputs();
     let words = &correct.mesh.words;
     let brute = Brute { case: &correct.case, terms: terms.clone() };
     let crossing = |octant: &Octant| {
@@ -19,17 +18,15 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
     for split in answer.split.iter() {
         let cause = split.cause.as_ref();
         prop_assert!(cause.is_some(), "{answer}");
-        let (is_crossed, facets) = cause.map_or((false, 0), |c| (c.is_crossed, c.facets_count));
+        let (is_crossed, facets) = cause.map_or((false, 0), |c| (c.is_crossed, c.facets.len()));
         prop_assert_eq!(is_crossed, facets > 0, "{}", answer);
-        let mut octant = split.octant.octant;
+        let mut octant = split.octant;
         let mut is_source = false;
-        for link in &split.links {
-            let leaf = link.leaf.octant;
-            prop_assert_eq!(link.octant.octant, octant);
+        for &(rule, leaf) in &split.links {
             let in_mesh = words.iter().any(|&w| word::octant(w) == leaf);
             prop_assert!(in_mesh || !terms.keep_crossing && crossing(&leaf), "{answer}");
             let (layer, balance) = brute.forces(&leaf, &octant);
-            match link.rule {
+            match rule {
                 Rule::Layer => prop_assert!(layer, "{answer}"),
                 Rule::Balance => prop_assert!(balance, "{answer}"),
                 Rule::ExtraLayer => {
@@ -37,14 +34,13 @@ fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
                 }
             }
             // The extra layer precedes all levels of the sweep.
-            let is_early = link.rule == Rule::ExtraLayer || leaf.level > octant.level + 1;
+            let is_early = rule == Rule::ExtraLayer || leaf.level > octant.level + 1;
             prop_assert!(!is_source || is_early, "{answer}");
-            is_source = link.rule == Rule::Layer;
-            octant =
-                if link.rule == Rule::ExtraLayer { leaf } else { leaf.ancestor(leaf.level - 1) };
+            is_source = rule == Rule::Layer;
+            octant = if rule == Rule::ExtraLayer { leaf } else { leaf.ancestor(leaf.level - 1) };
         }
         match split.links.last() {
-            Some(link) if link.rule == Rule::ExtraLayer => prop_assert!(crossing(&octant)),
+            Some((Rule::ExtraLayer, _)) => prop_assert!(crossing(&octant)),
             _ => prop_assert!(brute.base_splits(&octant), "{answer}"),
         }
     }
@@ -72,7 +68,7 @@ proptest! {
         });
         for answer in &answers {
             check(answer, &correct)?;
-            let base = answer.base_leaf.as_ref().unwrap().octant;
+            let base = answer.base_leaf.unwrap();
             let word = correct.base.words.iter().find(|&&w| word::octant(w) == base);
             prop_assert!(word.is_some(), "{answer}");
             let side = word::side(*word.unwrap());
@@ -117,16 +113,14 @@ fn an_answer_that_contradicts_itself_is_a_bug() {
     fn chain(answer: &mut Answer) -> &mut Split {
         answer.split.as_mut().unwrap()
     }
-    let faults: [&dyn Fn(&mut Answer); 11] = [
+    let faults: [&dyn Fn(&mut Answer); 9] = [
         &|a| a.point[1] += 4.0,
         &|a| a.leaf = None,
-        &|a| a.base_leaf = Some(chain(a).links[0].leaf.clone()),
+        &|a| a.base_leaf = Some(chain(a).links[0].1),
         &|a| a.split = None,
-        &|a| chain(a).octant = chain(a).links[1].octant.clone(),
-        &|a| chain(a).links[0].leaf = a.leaf.clone().unwrap(),
-        &|a| chain(a).links[0].distance_cells += 1,
+        &|a| chain(a).links[0].1 = a.leaf.unwrap().octant,
         &|a| chain(a).links.swap(0, 1),
-        &|a| drop(chain(a).links.pop()),
+        &|a| _ = chain(a).links.pop(),
         &|a| chain(a).cause = None,
         &|a| chain(a).cause.as_mut().unwrap().is_crossed = false,
     ];
@@ -158,14 +152,15 @@ fn a_directory_alone_explains_the_same_sizes() {
     for (with, without) in explain(Some(&correct.case)).iter().zip(&explain(None)) {
         let links = |answer: &Answer| -> Vec<Vec<Octant>> {
             let links = answer.split.iter().map(|split| split.links.iter());
-            links.map(|links| links.map(|link| link.leaf.octant).collect()).collect()
+            links.map(|links| links.map(|&(_, leaf)| leaf).collect()).collect()
         };
         assert_eq!(links(with), links(without));
         let crossed = |answer: &Answer| -> Vec<bool> {
             answer.split.iter().map(|split| split.cause.as_ref().unwrap().is_crossed).collect()
         };
         assert_eq!(crossed(with), crossed(without));
-        assert!(with.left_out.is_empty() && without.left_out[0].contains("--case"), "{without}");
+        assert!(with.knows_facets && !without.knows_facets);
+        assert!(without.to_string().contains("--case"), "{without}");
     }
 }
 

@@ -1,7 +1,6 @@
 //! What decides a side: facets, the rays of a candidate, a seed; and what is enclosed.
 
 use super::*;
-use check::checks::Terms;
 use check::checks::components;
 use check::why::answer::{Answer, SideReason};
 use contract::octant::Octant;
@@ -18,7 +17,7 @@ fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
     correct.case.seeds_lattice =
         seeds.iter().map(|&seed| correct.case.root.quantise_seed(seed).unwrap()).collect();
     correct.base.manifest.seeds = correct.case.seeds_lattice.clone();
-    let terms = Terms::of_case(&correct.case);
+    let terms = correct.case.inputs();
     let mut words = correct.base.words.clone();
     for component in components::find(&words.clone(), &terms, &correct.case.facets_lattice) {
         for &i in &component.leaves {
@@ -32,7 +31,7 @@ fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
 /// The answers for the first leaf of every component, for its last, and for a crossing leaf.
 fn explain(correct: &SelftestCase) -> Vec<Answer> {
     let words = &correct.base.words;
-    let terms = Terms::of_case(&correct.case);
+    let terms = correct.case.inputs();
     let found = components::find(words, &terms, &correct.case.facets_lattice);
     let ends = found.iter().flat_map(|component| {
         [component.leaves[0], *component.leaves.last().unwrap()].map(|i| words[i as usize])
@@ -51,8 +50,8 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
     let mut seeds = Vec::new();
     for answer in explain(&correct) {
         let reason = answer.side_decided_by.unwrap();
-        assert_eq!(answer.side, Some(reason.side));
-        if reason.leaves.is_some() {
+        assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(reason.side));
+        if reason.side != Side::Crossing {
             assert_eq!(reason.decision.starts_with("seed "), reason.side == Side::Outside);
             seeds.push(reason.decision);
         }
@@ -65,12 +64,12 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
 #[test]
 fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
     let correct = with_seeds(&[]);
-    let terms = Terms::of_case(&correct.case);
+    let terms = correct.case.inputs();
     let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
     let mut sides = Vec::new();
     for answer in explain(&correct) {
         let reason = answer.side_decided_by.as_ref().unwrap();
-        if reason.leaves.is_some() {
+        if reason.side != Side::Crossing {
             let begins = |octant: &Octant| {
                 let text =
                     format!("each of the six rays of the candidate octant {} ", octant.path());
@@ -79,7 +78,7 @@ fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
             assert!(found.iter().any(|c| begins(&c.first) && c.side == reason.side), "{answer}");
             let parity = if reason.side == Side::Inside { "an odd" } else { "an even" };
             assert!(reason.decision.contains(parity), "{answer}");
-            assert_eq!(answer.side, Some(reason.side));
+            assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(reason.side));
             sides.push(reason.side);
         }
     }
@@ -139,12 +138,14 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
         let correct = made(&text, &body);
         let answer =
             with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
-        let SideReason { side, decision, leaves } = answer.side_decided_by.unwrap();
-        let leaves = leaves.expect("no facet crosses the leaf");
+        let SideReason { side, decision } = answer.side_decided_by.unwrap();
         let expected = if twice < 3 { Side::Inside } else { Side::Outside };
-        assert_eq!((side, answer.side), (expected, Some(expected)), "{twice}: {decision}");
+        assert_eq!((side, answer.leaf.unwrap().side), (expected, expected), "{twice}: {decision}");
         if (1..6).contains(&twice) {
-            let candidates = leaves.min(32) as usize;
+            let terms = correct.case.inputs();
+            let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
+            let leaves = |side| found.iter().find(|c| c.side == side && c.is_ambiguous());
+            let candidates = leaves(side).unwrap().leaves.len().min(32);
             let text = format!(
                 "the component is ambiguous: the rays of no candidate agree, and {} of the {} rays of {candidates} \
                  candidates are odd",

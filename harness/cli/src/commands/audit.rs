@@ -3,10 +3,10 @@
 use super::import::Source;
 use super::values::{Input, Output};
 use check::audit::record::AuditRecord;
-use check::audit::{AuditOptions, AuditReport, audit_against};
+use check::audit::{AuditReport, audit_against};
 use check::forest;
 use check::promises::{Promises, Touching};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
 use contract::files::named;
@@ -25,10 +25,8 @@ const LIMIT: Duration = Duration::from_secs(86_400);
 Examples:
   harness audit mesh                                   what the leaves alone show
   harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, every split
-  harness audit mesh --proved base                     a proof, given T0: see reference/proof
   harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
   harness audit mesh --case all.toml --promises p4est  a mesh that need not keep the whole definition (p4est deletes nothing)
-  harness audit mesh.vtu --balance faces               nothing but the balance
   harness audit forest.p8est --balance corners         every tree, and the balance across their faces, edges and corners
   harness audit mesh.vtu --promises 'complete = true'  nothing but these promises
 
@@ -44,16 +42,13 @@ pub struct Arguments {
     /// Check that leaves that touch in this way differ by at most one level, instead of the definition; in a forest of p4est also across
     /// the boundaries of trees [default for such a forest: corners]
     #[arg(long, value_enum, conflicts_with = "promises")]
-    balance: Option<Balance>,
+    balance: Option<Touching>,
     /// Also prove the mesh right by the checker of reference/proof, given the directory of T0 (mesher --ungraded --out BASE)
     #[arg(long, value_name = "BASE")]
     proved: Option<Input>,
     /// Exit code 3 if a check had nothing to check
     #[arg(long)]
     require_checks: bool,
-    /// Maximum number of distinct nodes in memory
-    #[arg(long)]
-    nodes_max: Option<usize>,
     /// Write verdict, times and memory as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
@@ -62,45 +57,23 @@ pub struct Arguments {
     source: Source,
 }
 
-/// In what leaves touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Balance {
-    /// In part of a face
-    Faces,
-    /// In part of a face or an edge
-    Edges,
-    /// In a face, an edge or a corner
-    Corners,
-}
-
-impl Balance {
-    fn touching(self) -> Touching {
-        match self {
-            Self::Faces => Touching::Face,
-            Self::Edges => Touching::Edge,
-            Self::Corners => Touching::Corner,
-        }
-    }
-}
-
 /// Audits, prints and writes; returns the exit code.
 ///
 /// # Errors
 /// If the mesh cannot be read, or the engine does not support the case.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { mesh, promises, balance, proved, require_checks, nodes_max, json, source } =
-        arguments;
+    let Arguments { mesh, promises, balance, proved, require_checks, json, source } = arguments;
     let start = Instant::now();
     if promises.is_none()
         && proved.is_none()
         && let Some(forest) = source.forest(mesh)?
         && (balance.is_some() || !forest.is_one_cube())
     {
-        if forest.connectivity.dimension == 2 && *balance == Some(Balance::Edges) {
+        if forest.connectivity.dimension == 2 && *balance == Some(Touching::Edge) {
             let why = "quadrants have no edges but their faces: choose --balance faces or corners";
             return Err(Failure::input(why));
         }
-        let touching = balance.unwrap_or(Balance::Corners).touching();
+        let touching = balance.unwrap_or(Touching::Corner);
         let report = forest::audit(&forest, touching, start);
         print(&report, json.as_deref())?;
         return Ok(verdict(&report, *require_checks));
@@ -115,18 +88,16 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     source.refuse_unused(&[mesh])?;
     let opened = source.open(mesh, case.as_ref())?;
     let directory = &opened.dir;
-    let default = AuditOptions::default();
-    let options = AuditOptions { nodes_max: nodes_max.unwrap_or(default.nodes_max) };
-    let otherwise = match balance {
-        Some(balance) => Promises { balance: Some(balance.touching()), ..Promises::default() },
+    let otherwise = match *balance {
         None => Promises::of_definition(),
+        balance => Promises { balance, ..Promises::default() },
     };
     let promises = engine.as_ref().map_or(&otherwise, |engine| &engine.promises);
     let checker = Paths::find().proven_checker;
     if let Some(why) = proved.as_ref().and_then(|_| proof::lacks(&checker)) {
         return Err(Failure::missing(why));
     }
-    let mut report = audit_against(directory, &options, case.as_ref(), promises);
+    let mut report = audit_against(directory, case.as_ref(), promises);
     let mut unproven = None;
     if let Some(base) = proved {
         match proof::check(&checker, (directory, base), report.leaves, LIMIT) {

@@ -8,8 +8,7 @@ use contract::failure::Failure;
 use contract::import::forest::{self, Forest};
 use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
-use contract::manifest::{self, Manifest, Sides};
-use contract::word::{self, KEY_END};
+use contract::manifest::{self, Manifest};
 use run::engine::paths::Paths;
 use run::import::{Imported, import};
 use std::path::{Path, PathBuf};
@@ -162,25 +161,7 @@ pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
     let case = source.read_case()?;
     let mut imported = source.read(mesh, case.as_ref())?;
     imported.create(out)?;
-    println!("{}: {}", out.display(), summary(imported.manifest()));
+    let Manifest { leaves, sides, .. } = imported.manifest();
+    println!("{}: {leaves} cells, sides {sides:?}", out.display());
     Ok(EXIT_HOLDS)
-}
-
-/// Number of cells, levels, sides, and the part of the root that they fill.
-fn summary(manifest: &Manifest) -> String {
-    let by_level: Vec<(u8, u64)> =
-        (0..).zip(manifest.leaves_by_level).filter(|&(_, n)| n > 0).collect();
-    let filled: u128 =
-        by_level.iter().map(|&(level, n)| u128::from(n) * u128::from(word::span(level))).sum();
-    let sides = match manifest.sides {
-        Sides::Known => "sides known",
-        Sides::Unknown => "sides unknown",
-    };
-    format!(
-        "{} cells of levels {} to {}, {sides}; they fill {:.6} % of the root",
-        manifest.leaves,
-        by_level.first().map_or(0, |(level, _)| *level),
-        by_level.last().map_or(0, |(level, _)| *level),
-        100.0 * filled as f64 / KEY_END as f64
-    )
 }

@@ -1,14 +1,12 @@
 //! `harness why`: explains the leaf at a point.
 
-use super::files::put;
 use super::meshed::MeshArguments;
-use super::values::{Output, Point};
+use super::values::Point;
 use check::why::{Body, Mesh};
 use clap::Args;
 use contract::failure::EXIT_HOLDS;
 use contract::failure::Failure;
 use contract::mesh;
-use report::json::pretty;
 use run::engine::layout::SERIAL;
 
 const EXAMPLES: &str = "Examples:
@@ -30,12 +28,9 @@ pub struct Arguments {
     /// The point to explain, in the user's units
     #[arg(value_name = "X,Y,Z", allow_hyphen_values = true)]
     point: Point,
-    /// Write the result as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<Output>,
 }
 
-/// Explains, prints and writes; returns the exit code.
+/// Explains and prints; returns the exit code.
 ///
 /// # Errors
 /// If the mesh cannot be made or read, or the point is outside its root.
@@ -48,9 +43,6 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
     let Point(point) = arguments.point;
     let answer = mesh.at(point)?;
-    println!("{answer}");
-    if let Some(path) = &arguments.json {
-        put(path, &pretty(&answer))?;
-    }
+    print!("{answer}");
     Ok(EXIT_HOLDS)
 }

@@ -19,7 +19,7 @@ fn boxes_are_clamped_to_the_root_and_have_their_own_level() {
     let expected =
         ExtentBox { min: [0, unit, 2 * unit], max: [4 * unit, 8 * unit, 3 * unit], level: 5 };
     assert_eq!(case.boxes, [expected]);
-    assert_eq!(case.level_deepest(), 5);
+    assert_eq!(case.inputs().level_deepest(), 5);
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Hyper-tree grids as this repository writes them, of any size: leaves are never in memory all at once. VTK reads other
 //! hyper-tree grids.
 
+use super::leaf_set;
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::failure::Unusable;
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset;
-use crate::manifest::{self, Manifest, Part, Sides, Tally, Tree};
+use crate::manifest::{self, Manifest, Part, Tally};
 use crate::npy;
 use crate::word;
 use std::fs;
@@ -56,15 +57,9 @@ impl ImportedTree {
         })
         .map_err(content)?;
         tally.finish();
-        let any = Manifest::without_leaves(Tree::Final, tree.root, program.clone());
         let finest = tally.by_level.iter().rposition(|&leaves| leaves > 0).unwrap_or(0);
-        let mut manifest = match case {
-            Some(case) => case.manifest(Tree::Final, program),
-            None => Manifest { level_surface: finest as u8, ..any },
-        };
+        let mut manifest = leaf_set::manifest(tree.root, finest as u8, case, program);
         manifest.set_tally(tally);
-        manifest.root = tree.root;
-        manifest.sides = Sides::Known;
         let imported = Self { tree, manifest };
         imported.check_invariants();
         Ok(Some(imported))

@@ -35,17 +35,22 @@ pub fn leaf_set(
     }
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };
-    let manifest = match case {
-        Some(case) => case.manifest(Tree::Final, program),
-        None => {
-            let any = Manifest::without_leaves(Tree::Final, root, program);
-            Manifest { level_surface: finest, ..any }
-        }
-    };
-    let manifest = Manifest { root, sides, ..manifest };
+    let manifest = Manifest { sides, ..manifest(root, finest, case, program) };
     let set = LeafSet::new(manifest, Vec::new()).with_parts(vec![words]);
     check_invariants(cells, &set);
     Ok(set)
+}
+
+/// The manifest of a mesh in a root, without leaves, whose finest leaf has this level.
+pub(super) fn manifest(root: Root, finest: u8, case: Option<&Case>, program: String) -> Manifest {
+    let required = match case {
+        Some(case) => case.manifest(Tree::Final, program),
+        None => Manifest {
+            level_surface: finest,
+            ..Manifest::without_leaves(Tree::Final, root, program)
+        },
+    };
+    Manifest { root, ..required }
 }
 
 /// Panics if an invariant of the answer does not hold: the leaves are a linear oct-tree, as many as there are cells, and fill

@@ -145,24 +145,14 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if text.trim_start().starts_with('{') {
         return Some(Format::Discretize);
     }
-    let first = text.lines().find(|line| !is_comment(line) && !line.starts_with('!'))?;
-    match fields(first).count() {
+    let mut lines = text.lines().map(str::trim);
+    let first = lines.find(|line| !line.is_empty() && !line.starts_with(['#', '!']))?;
+    let separator = |c: char| c == ',' || c == ';' || c.is_whitespace();
+    match first.split(separator).filter(|field| !field.trim_matches('"').is_empty()).count() {
         3 => Some(Format::Discretize),
         n if n > 3 => Some(Format::Table),
         _ => None,
     }
-}
-
-/// The fields of a line of a table.
-fn fields(line: &str) -> impl Iterator<Item = &str> {
-    let separator = |c: char| c == ',' || c == ';' || c.is_whitespace();
-    line.split(separator).filter(|field| !field.trim_matches('"').is_empty())
-}
-
-/// Whether a line of a table holds no cell.
-fn is_comment(line: &str) -> bool {
-    let line = line.trim();
-    line.is_empty() || line.starts_with('#')
 }
 
 /// The directory with an OpenFOAM mesh: the given one, or the one below it in a case or in `constant`.

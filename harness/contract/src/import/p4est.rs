@@ -11,10 +11,9 @@ use super::forest::{self, Connectivity, Quadrant, damaged};
 use super::{Request, root, side};
 use crate::failure::Unusable;
 use crate::lattice::Root;
-use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX};
+use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word;
 
-use std::ops::Range;
 use std::path::Path;
 
 /// The root of most forests, whatever the size of the body.
@@ -121,104 +120,46 @@ fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Unus
     Ok(trees)
 }
 
-/// Adds the quadrants of a tree.
+/// Lengths of a tree in integer coordinates, in the versions of p4est.
+const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
+
+/// Adds the quadrants of a tree, which are complete: each begins where the one before it ends, on the Morton curve.
 fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Unusable> {
-    let Some(&Quadrant { corner: [x, y, z], level, .. }) = quadrants.last() else {
-        return Err(damaged("a tree has no quadrants"));
+    let Some(last) = quadrants.last() else { return Err(damaged("a tree has no quadrants")) };
+    let ends_there = |&length: &i64| {
+        let edge = length.checked_shr(last.level.try_into().ok()?)?;
+        last.corner.iter().all(|&at| i64::from(at) + edge == length).then_some(length)
     };
-    let last = [x, y, z, level];
-    let length = tree_length(last).ok_or_else(|| {
+    let length = LENGTHS.iter().find_map(ends_there).ok_or_else(|| {
         damaged(&format!(
             "the last quadrant of a tree, {last:?}, does not end in the tree's last corner"
         ))
     })?;
     let mut next = 0;
-    for &Quadrant { corner: [x, y, z], level, data } in quadrants {
-        if level > i32::from(LEVEL_MAX) {
-            return Err(Unusable::because(format!(
-                "has a quadrant of level {level} at [{x}, {y}, {z}], and the levels of a mesh are 0 to {LEVEL_MAX}"
-            )));
-        }
-        let covered = interval([x, y, z, level], length);
-        next = covered.filter(|interval| interval.start == next).map(|i| i.end).ok_or_else(|| {
+    for &Quadrant { corner, level, data } in quadrants {
+        let octant =
+            u8::try_from(level).ok().filter(|&level| level <= LEVEL_MAX).and_then(|level| {
+                let fits = |&at: &i32| {
+                    (0..length).contains(&i64::from(at)) && i64::from(at) % (length >> level) == 0
+                };
+                let cell = |at: i32| (i64::from(at) * i64::from(CELLS_PER_EDGE) / length) as u32;
+                corner.iter().all(fits).then(|| Octant { corner: corner.map(cell), level })
+            });
+        let octant = octant.filter(|octant| word::key_of(octant.corner) == next).ok_or_else(|| {
             damaged(&format!(
-                "the quadrant with the corner [{x}, {y}, {z}] and the level {level} is not an octant of level 0 to \
+                "the quadrant with the corner {corner:?} and the level {level} is not an octant of level 0 to \
                  {LEVEL_MAX} that begins where the one before it ends"
             ))
         })?;
-        if let Some(sides) = &mut cells.sides {
-            match data {
-                FILLER => continue,
-                code => sides.push(side(f64::from(code), cells.edges.len())?),
-            }
+        next += word::span(octant.level);
+        match (&mut cells.sides, data) {
+            (Some(_), FILLER) => continue,
+            (Some(sides), code) => sides.push(side(f64::from(code), cells.edges.len())?),
+            (None, _) => {}
         }
-        let along = [x, y, z].map(|c| f64::from(c) / f64::from(length) * tree.edge);
-        cells.push(
-            [0, 1, 2].map(|a| tree.origin[a] + along[a]),
-            tree.edge / f64::from(1u32 << level),
-        );
+        let along = corner.map(|c| f64::from(c) / length as f64 * tree.edge);
+        let edge = tree.edge / f64::from(1u32 << octant.level);
+        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), edge);
     }
     Ok(())
-}
-
-/// The Morton codes, in units of level-19 cells, that a quadrant covers in a tree of this length; `None` if it is not an
-/// octant of a level that leaf words have.
-fn interval([x, y, z, level]: [i32; 4], length: u32) -> Option<Range<u64>> {
-    let level = u8::try_from(level).ok().filter(|&level| level <= LEVEL_MAX)?;
-    let edge = length >> level;
-    let mut corner = [0; 3];
-    for (cell, coordinate) in corner.iter_mut().zip([x, y, z]) {
-        let coordinate = u32::try_from(coordinate)
-            .ok()
-            .filter(|&c| c < length && c.checked_rem(edge) == Some(0))?;
-        *cell = (u64::from(coordinate) * u64::from(CELLS_PER_EDGE) / u64::from(length)) as u32;
-    }
-    let start = word::key_of(corner);
-    Some(start..start + word::span(level))
-}
-
-/// Length of a tree in integer coordinates, which differs between versions of p4est: a tree is complete, so its last
-/// quadrant ends where the tree ends.
-fn tree_length([x, y, z, level]: [i32; 4]) -> Option<u32> {
-    if x != y || y != z || x < 0 || !(0..=30).contains(&level) {
-        return None;
-    }
-    let (before, cells) = (x as u32, 1u32 << level);
-    match cells {
-        1 => (before == 0).then_some(1),
-        _ => Some(before.checked_div(cells - 1)? << level)
-            .filter(|&length| length.is_power_of_two() && length - length / cells == before),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_length_of_a_tree_is_that_of_the_version_that_wrote_it() {
-        for length in [1 << 19, 1 << 29, 1u32 << 30] {
-            for level in [1, 2, 5, 18] {
-                let last = (length - (length >> level)) as i32;
-                let length_found = tree_length([last, last, last, level]);
-                assert_eq!(length_found, Some(length), "level {level}");
-            }
-        }
-        assert_eq!(tree_length([0, 0, 0, 0]), Some(1));
-        // Not the last quadrant of any tree: off its diagonal, outside it, too fine, or not at its end.
-        for quadrant in [
-            [4, 4, 2, 1],
-            [4, 2, 4, 1],
-            [2, 4, 4, 1],
-            [-4, -4, -4, 1],
-            [4, 4, 4, -1],
-            [4, 4, 4, 31],
-            [4, 4, 4, 2],
-            [6, 6, 6, 1],
-            [1, 1, 1, 0],
-            [0, 0, 0, 1],
-        ] {
-            assert_eq!(tree_length(quadrant), None, "{quadrant:?}");
-        }
-    }
 }

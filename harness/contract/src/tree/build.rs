@@ -1,9 +1,12 @@
 //! Construction of a tree from sorted leaves, in one pass.
 
-use super::store::Store;
-use super::{Handle, Kind, Tree};
+use super::{DELETED, HOLES, Handle, Kind, NO_LEAF, Summary, Tree};
 use crate::octant::LEVEL_MAX;
-use crate::word::{self, WordError};
+use crate::word;
+use hashbrown::HashTable;
+use hashbrown::hash_table::Entry;
+use rustc_hash::FxBuildHasher;
+use std::hash::BuildHasher;
 
 /// Builds a tree from leaves in ascending order of their keys.
 ///
@@ -23,10 +26,10 @@ pub struct Builder {
 }
 
 /// Why a leaf was rejected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// The word is not a leaf.
-    Fault(WordError),
+    Fault(String),
     /// The leaf overlaps an earlier leaf, or is not in ascending order.
     Overlap,
 }
@@ -93,7 +96,7 @@ impl Builder {
 }
 
 /// Number of common ancestors of two level-19 cells, themselves excluded.
-pub fn shared_levels(a: u64, b: u64) -> usize {
+fn shared_levels(a: u64, b: u64) -> usize {
     match (a ^ b).checked_ilog2() {
         Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
         None => usize::from(LEVEL_MAX),
@@ -101,6 +104,70 @@ pub fn shared_levels(a: u64, b: u64) -> usize {
 }
 
 /// The digit of the child that contains this cell, among the children of its ancestor at `level`.
-pub fn digit(key: u64, level: usize) -> usize {
+fn digit(key: u64, level: usize) -> usize {
     (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
+}
+
+/// All nodes of a tree.
+#[derive(Debug, Default)]
+pub(super) struct Store {
+    children: Vec<[Handle; 8]>,
+    summaries: Vec<Summary>,
+    /// The indices of all nodes, by the hash of their children.
+    indices: HashTable<u32>,
+}
+
+impl Store {
+    pub(super) fn len(&self) -> usize {
+        self.children.len()
+    }
+
+    pub(super) fn children(&self, of: Handle) -> &[Handle; 8] {
+        &self.children[of.index()]
+    }
+
+    pub(super) fn summary(&self, of: Handle) -> Summary {
+        self.summaries[of.index()]
+    }
+
+    /// The node with these children, which is stored if it is new.
+    pub(super) fn intern(&mut self, children: [Handle; 8]) -> Handle {
+        let (all, hash) = (&self.children, |node: &[Handle; 8]| FxBuildHasher.hash_one(node));
+        let is_same = |&index: &u32| all[index as usize] == children;
+        match self.indices.entry(hash(&children), is_same, |&index| hash(&all[index as usize])) {
+            Entry::Occupied(known) => Handle::node(*known.get() as usize),
+            Entry::Vacant(vacant) => {
+                let index = all.len();
+                vacant.insert(u32::try_from(index).expect("fewer than 2^32 nodes"));
+                self.summaries.push(self.summarise(&children));
+                self.children.push(children);
+                Handle::node(index)
+            }
+        }
+    }
+
+    fn summarise(&self, children: &[Handle; 8]) -> Summary {
+        let mut all = Summary { finest: 0, coarsest: NO_LEAF, kinds: 0 };
+        for &child in children {
+            let below = self.summary_of_child(child);
+            all.finest = all.finest.max(below.finest);
+            all.coarsest = all.coarsest.min(below.coarsest);
+            all.kinds |= below.kinds;
+        }
+        all
+    }
+
+    /// The contribution of a child to its parent's summary, one level deeper.
+    fn summary_of_child(&self, child: Handle) -> Summary {
+        if child.is_node() {
+            let Summary { finest, coarsest, kinds } = self.summary(child);
+            let coarsest = if coarsest == NO_LEAF { NO_LEAF } else { coarsest + 1 };
+            return Summary { finest: finest + 1, coarsest, kinds };
+        }
+        match child.as_leaf() {
+            Some(DELETED) => Summary { finest: 1, coarsest: NO_LEAF, kinds: 1 << DELETED },
+            Some(kind) => Summary { finest: 1, coarsest: 1, kinds: 1 << kind },
+            None => Summary { finest: 0, coarsest: NO_LEAF, kinds: HOLES },
+        }
+    }
 }

@@ -10,14 +10,13 @@
 mod build;
 mod neighbourhood;
 mod region;
-mod store;
 #[cfg(test)]
 mod tests;
 
-pub use build::{Builder, Refusal, digit, shared_levels};
+use build::Store;
+pub use build::{Builder, Refusal};
 pub use neighbourhood::{Neighbourhood, OFFSETS};
 pub use region::{Coarsest, Region};
-use store::Store;
 
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::word;
@@ -75,11 +74,6 @@ impl Handle {
         self.0 >= FIRST_NODE
     }
 
-    /// The index of the node in [`Tree::distinct`], if the octant is split.
-    pub fn as_node(self) -> Option<usize> {
-        self.0.checked_sub(FIRST_NODE).map(|node| node as usize)
-    }
-
     fn index(self) -> usize {
         (self.0 - FIRST_NODE) as usize
     }
@@ -126,11 +120,6 @@ impl Tree {
         self.store.len()
     }
 
-    /// The children of every distinct node. A node follows its children.
-    pub fn distinct(&self) -> &[[Handle; 8]] {
-        self.store.all()
-    }
-
     /// The content of a child of an octant with content `of` at this level.
     pub fn child(&self, of: Handle, digit: u8, level: u8) -> Handle {
         if of.is_node() {
@@ -175,6 +164,26 @@ impl Tree {
             (Some(kind), _) | (_, Some((kind, _))) => 1 << kind,
             _ if of == Handle::HOLE => HOLES,
             _ => 0,
+        }
+    }
+
+    /// Visits octants in Morton order, parents first: the root, and the children of nodes for which `enter` returns true.
+    pub fn walk(&self, enter: &mut dyn FnMut(Octant, Handle) -> bool) {
+        self.walk_below(Octant::ROOT, self.root, enter);
+    }
+
+    /// The same from an octant with content `of` on.
+    pub fn walk_below(
+        &self,
+        octant: Octant,
+        of: Handle,
+        enter: &mut dyn FnMut(Octant, Handle) -> bool,
+    ) {
+        if enter(octant, of) && of.is_node() {
+            for digit in 0..8 {
+                let child = self.child(of, digit, octant.level);
+                self.walk_below(octant.child(digit), child, enter);
+            }
         }
     }
 

@@ -71,13 +71,6 @@ impl Neighbourhood {
         Self { octant: self.octant.child(digit), handles }
     }
 
-    /// The content across a face of a child, on the low (-1) or high (1) side of an axis.
-    pub fn across(&self, tree: &Tree, digit: u8, axis: usize, side: i32) -> Handle {
-        let neighbour = (SELF as i32 + side * [1, 3, 9][axis]) as usize;
-        let (index, digit) = DESCENT[usize::from(digit)][neighbour];
-        tree.child(self.handles[usize::from(index)], digit, self.octant.level)
-    }
-
     /// The neighbourhood of any octant, found by descent from the root.
     pub fn of(tree: &Tree, octant: Octant) -> Self {
         let mut neighbourhood = Self::root(tree);

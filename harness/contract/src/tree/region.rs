@@ -23,20 +23,6 @@ impl Region {
         Self { low, high: std::array::from_fn(|a| low[a] + edge + 2 * margins[a]) }
     }
 
-    /// The bounding box of some children of an octant, enlarged by `margin` on every side. Bit `d` of `digits`
-    /// selects the child with digit `d`.
-    pub fn around_children(parent: &Octant, digits: u8, margin: i64) -> Self {
-        let half = i64::from(parent.edge()) / 2;
-        // Children on the low and on the high side of each axis.
-        const LOW: [u8; 3] = [0x55, 0x33, 0x0f];
-        let skip = |side: u8| if digits & side == 0 { half } else { 0 };
-        let Self { low, high } = Self::around(parent, margin);
-        Self {
-            low: std::array::from_fn(|a| low[a] + skip(LOW[a])),
-            high: std::array::from_fn(|a| high[a] - skip(!LOW[a])),
-        }
-    }
-
     /// Whether the interior of an octant meets the box.
     fn meets(&self, corner: [i64; 3], edge: i64) -> bool {
         (0..3).all(|a| corner[a] < self.high[a] && self.low[a] < corner[a] + edge)

@@ -1,7 +1,7 @@
 //! Leaf-set directories.
 
 use crate::Scratch;
-use check::audit::{AuditOptions, audit};
+use check::audit::audit;
 use contract::import::{self, Format, Request};
 use contract::leafset;
 use contract::manifest;
@@ -39,7 +39,7 @@ pub(super) fn manifest(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     scratch.file("mesh/leaves-00000.npy", &part);
     let Ok(set) = leafset::read(&mesh) else { return false };
     assert_eq!(set.words.len() % (words.len() / 8).max(1), 0);
-    audit(&mesh, &AuditOptions { nodes_max: 100_000 });
+    audit(&mesh);
     true
 }
 

@@ -66,7 +66,7 @@ impl Description {
     /// Why the engine is not run on a case; `None` if it is.
     pub fn declines(&self, case: &Case) -> Option<String> {
         let (takes, limits) = (&self.takes, &self.limits);
-        let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
+        let (level, facets) = (case.inputs().level_deepest(), case.facets.len() as u64);
         let feature = |name: &str| format!("does not support {name} in [takes])");
         let keep = format!("keep = {:?} (keep", case.keep).to_lowercase();
         let beyond = [

@@ -4,10 +4,9 @@ use super::case::{CaseRun, SIDES};
 use super::report::{Check, Outcome};
 use super::serial::Base;
 use crate::engine::failure::{End, Failure};
-use crate::oracle::{self, ORACLES};
-use check::oracle::sample::{self, Sample};
+use crate::oracle::{ORACLES, ask};
 use check::oracle::vote::{self, Answer, Ballot};
-use check::oracle::watertight::{is_doubled, is_watertight};
+use check::oracle::{self, Sample, is_doubled, is_watertight};
 use contract::case::Case;
 use contract::catalogue::Size;
 use contract::parity::Parity;
@@ -38,7 +37,7 @@ impl CaseRun<'_> {
             Some(Size::Small) => POINTS_OF_SMALL,
             _ => POINTS,
         };
-        let sample = sample::choose(case, &base.tree.words, most, SEED);
+        let sample = oracle::choose(case, &base.tree.words, most, SEED);
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
         for answer in self.ask(case, &sample, &asked) {
             match answer {
@@ -69,7 +68,7 @@ impl CaseRun<'_> {
         let (services, paths) = (&self.all.needs.services, &self.all.programs.paths);
         let (question, limit) = ((&*sample.points, &*case.facets), self.all.options.limit());
         let answers = fs::create_dir_all(&place)
-            .and_then(|()| oracle::ask(oracles, question, &place, services, paths, limit));
+            .and_then(|()| ask(oracles, question, &place, services, paths, limit));
         answers.unwrap_or_else(|error| {
             let end = End::Unusable(format!("have no input files: {error}"));
             vec![Err(Failure::new("the oracles", end))]

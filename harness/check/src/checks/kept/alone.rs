@@ -9,14 +9,15 @@
 #[cfg(test)]
 mod tests;
 
-use crate::checks::{CheckResult, Terms, components, contact, json};
+use crate::checks::components::{self, Component};
+use crate::checks::{CheckResult, contact, json};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
 use contract::octant::{Octant, UNITS_PER_CELL};
-use contract::tree::{Handle, Tree};
+use contract::tree::Tree;
 use contract::word::{self, Leaf, Side};
 
 /// Checks a tree, final or T0, by itself.
-pub(super) fn check(tree: &Tree, terms: &Terms, manifest: &Manifest, result: &mut CheckResult) {
+pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut CheckResult) {
     seeds_in_flow(tree, terms, result);
     if let Some(counted) = &manifest.components {
         possible(tree, counted, manifest.tree, terms, result);
@@ -26,82 +27,43 @@ pub(super) fn check(tree: &Tree, terms: &Terms, manifest: &Manifest, result: &mu
             format!("components are not known: over {OCTANTS_MAX} octants have leaves of one side");
         return;
     };
-    let found = Found { terms, groups: components::groups(&octants), octants };
+    let found = components::stated(&octants, terms);
+    let place = |component: &Component| terms.root.describe(&component.first);
+    let enclosed = || found.iter().filter(|component| component.enclosed);
     if manifest.tree == Kind::Final {
-        found.check_enclosed(result);
-    }
-    if !terms.seeds.is_empty() {
-        found.check_seeds(result);
-    }
-    if let Some(counted) = &manifest.components {
-        found.check_counts(counted, manifest.tree, result);
-    }
-}
-
-/// The components of a tree's leaves, as lists of indices of [`uniform_octants`].
-struct Found<'a> {
-    terms: &'a Terms,
-    octants: Vec<u64>,
-    groups: Vec<Vec<u32>>,
-}
-
-impl Found<'_> {
-    fn of_side(&self, side: Side) -> impl Iterator<Item = &Vec<u32>> {
-        self.groups.iter().filter(move |group| word::side(self.octants[group[0] as usize]) == side)
-    }
-
-    fn describe(&self, group: &[u32]) -> String {
-        self.terms.root.describe(&word::octant(self.octants[group[0] as usize]))
-    }
-
-    /// Outside components without a face on the root's boundary, if another has one and they are to be deleted.
-    fn enclosed(&self) -> Vec<&Vec<u32>> {
-        let at_boundary = |group: &&Vec<u32>| components::touches_boundary(&self.octants, group);
-        let (far_field, enclosed): (Vec<_>, Vec<_>) =
-            self.of_side(Side::Outside).partition(at_boundary);
-        if self.terms.deletes_enclosed() && !far_field.is_empty() { enclosed } else { Vec::new() }
-    }
-
-    /// No enclosed component is left in a final mesh.
-    fn check_enclosed(&self, result: &mut CheckResult) {
-        for group in self.enclosed() {
+        for component in enclosed() {
             result.report_with(|| {
                 format!(
                     "an outside component has no face on the root's boundary, although another has, so it is enclosed \
                      and must be deleted; in it lies {}",
-                    self.describe(group)
+                    place(component)
                 )
             });
         }
     }
-
-    /// Every component of flow has a seed.
-    fn check_seeds(&self, result: &mut CheckResult) {
-        let seeded = components::seeded_leaves(&self.octants, self.terms);
-        let has_seed = |group: &[u32]| components::seed_in(group, &seeded).is_some();
-        for group in self.of_side(self.terms.side_of_flow()).filter(|group| !has_seed(group)) {
-            result.report_with(|| {
-                format!("no seed lies in a component of flow, that of {}", self.describe(group))
-            });
-        }
-    }
-
-    /// There are as many components as a manifest counts.
-    fn check_counts(&self, counted: &Components, kind: Kind, result: &mut CheckResult) {
-        for (side, expected) in counts_of_tree(counted, self.terms, kind) {
-            let found = self.of_side(side).count() as u64;
-            if found != expected {
-                result.report(format!(
-                    "the manifest leaves {expected} {side} components, and there are {found}"
-                ));
+    if !terms.seeds.is_empty() {
+        let seeded = components::seeded_leaves(&octants, terms);
+        let is_flow = |component: &&Component| component.side == terms.side_of_flow();
+        for component in found.iter().filter(is_flow) {
+            if components::seed_in(&component.leaves, &seeded).is_none() {
+                let place = place(component);
+                result.report(format!("no seed lies in a component of flow, that of {place}"));
             }
         }
-        let (found, count) = (self.enclosed().len() as u64, counted.enclosed.count);
-        if kind == Kind::Base && found != count {
+    }
+    let Some(counted) = &manifest.components else { return };
+    for (side, expected) in counts_of_tree(counted, terms, manifest.tree) {
+        let found = found.iter().filter(|component| component.side == side).count() as u64;
+        if found != expected {
             result.report(format!(
-                "the manifest counts {count} enclosed components, and T0 has {found}"
+                "the manifest leaves {expected} {side} components, and there are {found}"
             ));
         }
+    }
+    let (found, count) = (enclosed().count() as u64, counted.enclosed.count);
+    if manifest.tree == Kind::Base && found != count {
+        result
+            .report(format!("the manifest counts {count} enclosed components, and T0 has {found}"));
     }
 }
 
@@ -111,22 +73,18 @@ const OCTANTS_MAX: usize = 4_000_000;
 /// The largest octants all of whose leaves have one side, crossing octants excluded, as sorted words; `None` if there
 /// are too many. Their components are those of the leaves.
 fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
-    fn below(tree: &Tree, handle: Handle, octant: Octant, words: &mut Vec<u64>) -> bool {
+    let mut words = Vec::new();
+    tree.walk(&mut |octant, handle| {
         let kinds = tree.kinds(handle);
         let one = [Side::Outside, Side::Inside].into_iter().find(|&s| kinds == 1 << s as u8);
-        if let Some(side) = one {
-            words.push(word::encode(&Leaf { octant, side }));
-            return words.len() <= OCTANTS_MAX;
-        }
-        let child = |d| tree.child(handle, d, octant.level);
-        !handle.is_node() || (0..8).all(|d| below(tree, child(d), octant.child(d), words))
-    }
-    let mut words = Vec::new();
-    below(tree, tree.root(), Octant::ROOT, &mut words).then_some(words)
+        words.extend(one.map(|side| word::encode(&Leaf { octant, side })));
+        one.is_none() && words.len() <= OCTANTS_MAX
+    });
+    (words.len() <= OCTANTS_MAX).then_some(words)
 }
 
 /// The sides of a tree's leaves, with the numbers of components that a manifest leaves of them.
-fn counts_of_tree(counted: &Components, terms: &Terms, kind: Kind) -> Vec<(Side, u64)> {
+fn counts_of_tree(counted: &Components, terms: &Manifest, kind: Kind) -> Vec<(Side, u64)> {
     let sides = [(Side::Outside, counted.outside), (Side::Inside, counted.inside)];
     let left = |(side, count): (Side, u64)| match (side, kind) {
         (_, Kind::Base) => Some((side, count)),
@@ -138,7 +96,7 @@ fn counts_of_tree(counted: &Components, terms: &Terms, kind: Kind) -> Vec<(Side,
 }
 
 /// Every seed lies in a leaf of flow.
-fn seeds_in_flow(tree: &Tree, terms: &Terms, result: &mut CheckResult) {
+fn seeds_in_flow(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let flow = terms.side_of_flow();
     for (i, &seed) in terms.seeds.iter().enumerate() {
         if !components::in_root(seed) {
@@ -170,7 +128,7 @@ fn possible(
     tree: &Tree,
     counted: &Components,
     kind: Kind,
-    terms: &Terms,
+    terms: &Manifest,
     result: &mut CheckResult,
 ) {
     let EnclosedComponents { count, leaves, example } = counted.enclosed;
@@ -200,7 +158,7 @@ fn possible(
 }
 
 /// Whether a point lies in a leaf that was deleted from a final mesh, or that is outside in T0.
-fn deleted_at(tree: &Tree, at: [f64; 3], kind: Kind, terms: &Terms) -> bool {
+fn deleted_at(tree: &Tree, at: [f64; 3], kind: Kind, terms: &Manifest) -> bool {
     let Some(point) = terms.root.quantise_seed(at) else { return false };
     let found = tree.locate(point.map(|q| (q / UNITS_PER_CELL) as u32));
     match kind {

@@ -4,7 +4,7 @@ use contract::word;
 
 /// What the surveys of a case share.
 struct Geometry {
-    terms: Terms,
+    terms: Manifest,
     facets: Facets,
     truth: Truth,
     lattice: Vec<contract::lattice::FacetLattice>,
@@ -12,7 +12,7 @@ struct Geometry {
 
 impl Geometry {
     fn of(case: &Case) -> Self {
-        let (terms, facets) = (Terms::of_case(case), Facets::new(&case.facets_lattice));
+        let (terms, facets) = (case.inputs(), Facets::new(&case.facets_lattice));
         let truth = Truth::new(&facets, &case.facets_lattice, &terms).unwrap();
         Self { terms, facets, truth, lattice: case.facets_lattice.clone() }
     }
@@ -103,7 +103,7 @@ fn places_within_the_band_are_not_judged() {
         assert_eq!((1..512).contains(&expected), band_cells > 0.0, "{expected}");
         let findings = result.findings;
         assert!(!findings.is_empty(), "{band_cells}");
-        for detail in findings.iter().map(|finding| &finding.detail) {
+        for detail in &findings {
             let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
             assert!(words.iter().any(names), "{detail}");
         }
@@ -177,7 +177,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         words[far] ^= 1;
         let (result, leaf) = (check(&words), case.root.describe(&word::octant(words[far])));
         let expected = format!("the inside leaf {leaf} is in a component that is outside");
-        assert_eq!((result.findings_total, &result.findings[0].detail), (1, &expected));
+        assert_eq!((result.findings_total, &result.findings[0]), (1, &expected));
         // A label of its own: a crossing leaf where no facet is, even if the rays disagree, and a crossed leaf without it.
         let (mut spurious, mut lost) = (labelled(&space), labelled(&space));
         let at = |of: Position| words.iter().position(|w| position(w) == of);
@@ -187,10 +187,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         lost[at(CROSSED).unwrap()] &= !3;
         for (words, text) in [(spurious, "the crossing leaf"), (lost, "is crossed by a facet")] {
             let result = check(&words);
-            assert!(
-                result.findings_total == 1 && result.findings[0].detail.contains(text),
-                "{result}"
-            );
+            assert!(result.findings_total == 1 && result.findings[0].contains(text), "{result}");
         }
     }
 }
@@ -225,7 +222,7 @@ fn crossed_leaves_are_kept_or_deleted_as_the_case_says_unless_the_band_hides_the
             for band_cells in [0.0, 1.0] {
                 let result = check(&words, band_cells, true);
                 assert_eq!(result.findings_total, wrong.len() as u64, "{result}");
-                assert_eq!(result.findings[0].detail, format!("{what}: {octant}"));
+                assert_eq!(result.findings[0], format!("{what}: {octant}"));
                 assert_eq!(check(&right, band_cells, true).findings_total, 0);
             }
             assert_eq!(check(&words, 0.1, false).findings_total, 0);

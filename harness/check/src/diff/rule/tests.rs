@@ -5,6 +5,7 @@ use crate::why::Body;
 use contract::case::Case;
 use contract::manifest;
 use contract::tree::Tree;
+use contract::word::Side;
 
 const ROOT: &str = "root = { origin = [-4.0, -4.0, -4.0], edge = 8.0 }";
 /// In octant 0.7.0, which has the level of the surface.
@@ -30,16 +31,14 @@ fn rule(case: &Case, is_given: bool, a: &[u64], b: &[u64]) -> String {
     let trees = [a, b].map(Tree::of_words);
     let [of_a, of_b] =
         trees.each_ref().map(|tree| Mesh::of(&manifest, tree, body.as_ref()).distrusting());
-    let terms = Terms::of_manifest(&manifest);
     let first = a.iter().zip(b).take_while(|(x, y)| x == y).count();
-    let dispute = Dispute { a: of_a, b: of_b, terms: &terms };
-    dispute.rule(a.get(first).copied(), b.get(first).copied())
+    at(&of_a, &of_b, a.get(first).copied(), b.get(first).copied())
 }
 
 /// T0 with these leaves split.
 fn split(case: &Case, paths: &[&[u8]]) -> Vec<u64> {
     let facets = Facets::new(&case.facets_lattice);
-    let truth = Truth::new(&facets, &case.facets_lattice, &Terms::of_case(case)).unwrap();
+    let truth = Truth::new(&facets, &case.facets_lattice, &case.inputs()).unwrap();
     let mut words = truth.words;
     for path in paths {
         let i = words.iter().position(|&w| word::octant(w) == octant(path)).expect("a leaf");
@@ -54,8 +53,14 @@ fn split(case: &Case, paths: &[&[u8]]) -> Vec<u64> {
 fn a_split_that_facets_layers_or_balance_require_is_right() {
     for given in [true, false] {
         for (n, expected) in [
-            (1, "by section 6, step 3 (balance): it touches the leaf octant 0.7.1 (level 3)"),
-            (2, "by section 6, step 2 (layer): it touches the leaf octant 0.7.1 (level 3)"),
+            (
+                1,
+                "by section 6, step 3 (balance): it touches, 2 levels finer, the leaf octant 0.7.1 (level 3)",
+            ),
+            (
+                2,
+                "by section 6, step 2 (layer): 0 of its edges away is the leaf octant 0.7.1 (level 3)",
+            ),
         ] {
             let case = case(&format!("keep = 'all'\nlayer_cells_min = {n}"), &[FACET]);
             let text = rule(&case, given, &split(&case, &[]), &split(&case, &[&[1]]));
@@ -65,13 +70,13 @@ fn a_split_that_facets_layers_or_balance_require_is_right() {
             );
             assert!(text.contains(expected) && text.ends_with("B is right"), "{text}");
             let end =
-                if given { "section 3: facet 0 crosses it" } else { "the surface crosses it" };
+                if given { "section 3: facets that cross it: 0" } else { "the surface crosses it" };
             assert!(text.contains(end), "{text}");
         }
     }
     let case = case("keep = 'all'", &[FACET]);
     let text = rule(&case, true, &[leaf(&[0])], &[leaf(&[0, 0])]);
-    assert!(text.ends_with("split it by section 3: facet 0 crosses it: B is right"), "{text}");
+    assert!(text.ends_with("split it by section 3: facets that cross it: 0: B is right"), "{text}");
 }
 
 #[test]
@@ -107,10 +112,13 @@ fn facets_and_rays_of_the_case_decide_on_sides() {
     let case = case("keep = 'all'", &[FACET]);
     let (at, far) = (leaf(&[0, 7, 0]), leaf(&[7]));
     let of = |a: u64, b: u64| rule(&case, true, &[a], &[b]);
-    assert_eq!(of(at | 2, at), "section 4: facet 0 crosses it, so it is crossing: A is right");
-    assert!(of(at, at | 2).ends_with("crossing: B is right"));
-    assert!(of(far | 1, far).ends_with("an even number of facets, so it is outside: B is right"));
-    assert!(of(far | 1, far | 2).ends_with("so it is outside: neither is right"));
+    assert_eq!(
+        of(at | 2, at),
+        "section 4 (facets that cross it: 0): it is crossing, and A is right"
+    );
+    assert!(of(at, at | 2).ends_with("crossing, and B is right"));
+    assert!(of(far | 1, far).ends_with("an even number of facets): it is outside, and B is right"));
+    assert!(of(far | 1, far | 2).ends_with("it is outside, and neither is right"));
     let text = rule(&case, false, &[far | 1], &[far]);
     assert_eq!(text, "section 4 (side): give the case file (--case) to decide it");
 }
@@ -131,16 +139,10 @@ fn a_leaf_of_one_mesh_only_is_right_if_no_rule_deletes_it() {
     }
     let case = case("keep = 'outside'\nkeep_crossing = false", &body);
     let without = |word: u64| rule(&case, false, &[word], &[]);
-    assert_eq!(
-        without(inside + 1),
-        "section 7: keep_crossing is false, so A must not have a crossing leaf"
-    );
-    assert_eq!(
-        without(inside),
-        "section 5: keep is outside, so A must not have a leaf that is inside"
-    );
-    assert!(
-        without(outside)
-            .starts_with("section 5: keep is outside, so a leaf that is outside is kept; B lost")
-    );
+    let text = |side, what, right| {
+        format!("sections 5 and 7: a leaf that is {side} is {what}, so {right} is right, unless")
+    };
+    assert!(without(inside + 1).starts_with(&text("crossing", "deleted", "B")));
+    assert!(without(inside).starts_with(&text("inside", "deleted", "B")));
+    assert!(without(outside).starts_with(&text("outside", "kept", "A")));
 }

@@ -17,8 +17,8 @@ fn findings(change: impl Fn(&mut Manifest)) -> Vec<String> {
     manifest.keep = Keep::Outside;
     change(&mut manifest);
     let mut result = CheckResult::new("kept");
-    check(&cavity(), &Terms::of_manifest(&manifest), &manifest, &mut result);
-    result.findings.into_iter().map(|finding| finding.detail).collect()
+    check(&cavity(), &manifest.clone(), &manifest, &mut result);
+    result.findings
 }
 
 /// Asserts that there is one finding, with this text.
@@ -129,7 +129,7 @@ fn a_deleted_leaf_is_missing_from_a_mesh_and_outside_in_its_base_tree() {
         },
     );
     let tree = Tree::of_words(&words);
-    let terms = Terms::of_manifest(&leaf_set(vec![]).manifest);
+    let terms = leaf_set(vec![]).manifest;
     let deleted = |at, kind| deleted_at(&tree, at, kind, &terms);
     for (at, in_base, in_final) in [
         ([2.0, 2.0, 2.0], true, false),

@@ -1,66 +1,13 @@
-//! The properties that a mesh must have, as numbers.
+//! What the inputs in a manifest require of a mesh (reference/DEFINITION.md, sections 3 to 5).
 
-use contract::case::Case;
-use contract::lattice::Root;
-use contract::manifest::{Enclosed, ExtentBox, Keep, Manifest, Sides};
-use contract::octant::Octant;
-use contract::tree::Kind;
-use contract::word::Side;
+use crate::lattice::FacetLattice;
+use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest};
+use crate::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
+use crate::tree::Kind;
+use crate::triangle::Triangle;
+use crate::word::Side;
 
-/// The required properties of a mesh, from its case or, in an audit, from its manifest.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Terms {
-    /// The root cube, for coordinates in findings.
-    pub root: Root,
-    /// D: the level of crossing leaves.
-    pub level_surface: u8,
-    /// n: minimum thickness of a layer, in cells.
-    pub layer_cells_min: u32,
-    /// The side that is kept.
-    pub keep: Keep,
-    /// Whether crossing leaves are kept.
-    pub keep_crossing: bool,
-    /// Extent boxes on the lattice.
-    pub boxes: Vec<ExtentBox>,
-    /// Seeds on the lattice.
-    pub seeds: Vec<[i64; 3]>,
-    /// The treatment of enclosed components.
-    pub enclosed: Enclosed,
-    /// Whether the sides in the leaf words have a meaning.
-    pub sides: Sides,
-}
-
-impl Terms {
-    /// The requirements of a case.
-    pub fn of_case(case: &Case) -> Self {
-        Self {
-            root: case.root,
-            level_surface: case.level_surface,
-            layer_cells_min: case.layer_cells_min,
-            keep: case.keep,
-            keep_crossing: case.keep_crossing,
-            boxes: case.boxes.clone(),
-            seeds: case.seeds_lattice.clone(),
-            enclosed: case.enclosed,
-            sides: Sides::Known,
-        }
-    }
-
-    /// The requirements that a manifest states.
-    pub fn of_manifest(manifest: &Manifest) -> Self {
-        Self {
-            root: manifest.root,
-            level_surface: manifest.level_surface,
-            layer_cells_min: manifest.layer_cells_min,
-            keep: manifest.keep,
-            keep_crossing: manifest.keep_crossing,
-            boxes: manifest.boxes.clone(),
-            seeds: manifest.seeds.clone(),
-            enclosed: manifest.enclosed,
-            sides: manifest.sides,
-        }
-    }
-
+impl Manifest {
     /// Whether leaves of this kind belong in the final mesh.
     pub fn keeps(&self, kind: Kind) -> bool {
         match self.keep {
@@ -87,14 +34,42 @@ impl Terms {
         (0..3).all(|axis| (a[axis] - b[axis]).abs() <= 1e-9 * self.root.edge)
     }
 
+    /// Deepest level that the surface or a box requires.
+    pub fn level_deepest(&self) -> u8 {
+        self.boxes.iter().map(|b| b.level).fold(self.level_surface, u8::max)
+    }
+
     /// Whether a box requires leaves finer than the surface. Gradation may then refine crossing leaves.
     pub fn has_box_finer_than_surface(&self) -> bool {
-        self.boxes.iter().any(|b| b.level > self.level_surface)
+        self.level_deepest() > self.level_surface
     }
 
     /// A box that requires the octant to be split.
     pub fn box_that_splits(&self, octant: &Octant) -> Option<&ExtentBox> {
         self.boxes.iter().find(|b| b.level > octant.level && b.meets(octant))
+    }
+
+    /// The leaf of T0 that contains a lattice point of the root's half-open cube, and the first facet that crosses it.
+    ///
+    /// If a rule of section 3 requires the split of an octant, it requires the split of its ancestors, so the leaf is
+    /// the first octant on the way down that no rule splits.
+    pub fn base_leaf_at(
+        &self,
+        point: [i64; 3],
+        facets: &[FacetLattice],
+    ) -> (Octant, Option<usize>) {
+        let cell = Octant { corner: point.map(|q| (q / UNITS_PER_CELL) as u32), level: LEVEL_MAX };
+        let mut crossing: Vec<_> = facets.iter().map(Triangle::new).enumerate().collect();
+        let mut octant = Octant::ROOT;
+        loop {
+            let (low, high) = octant.bounds();
+            crossing.retain(|(_, facet)| facet.meets(low, high));
+            let by_surface = !crossing.is_empty() && octant.level < self.level_surface;
+            if !by_surface && self.box_that_splits(&octant).is_none() {
+                return (octant, crossing.first().map(|(i, _)| *i));
+            }
+            octant = cell.ancestor(octant.level + 1);
+        }
     }
 }
 
@@ -102,37 +77,37 @@ impl Terms {
 mod tests {
     use super::*;
 
-    fn terms() -> Terms {
-        let mut manifest = contract::testing::leaf_set(vec![]).manifest;
+    fn inputs() -> Manifest {
+        let mut manifest = crate::testing::leaf_set(vec![]).manifest;
         (manifest.root.edge, manifest.level_surface) = (2.0, 3);
-        Terms::of_manifest(&manifest)
+        manifest
     }
 
     #[test]
     fn sides_are_kept_as_the_case_requires() {
         let kinds = |keep, keep_crossing| {
-            [0, 1, 2].map(|kind| Terms { keep, keep_crossing, ..terms() }.keeps(kind))
+            [0, 1, 2].map(|kind| Manifest { keep, keep_crossing, ..inputs() }.keeps(kind))
         };
         assert_eq!(kinds(Keep::Outside, true), [true, false, true]);
         assert_eq!(kinds(Keep::Outside, false), [true, false, false]);
         assert_eq!(kinds(Keep::Inside, false), [false, true, false]);
         assert_eq!(kinds(Keep::All, false), [true, true, false]);
         assert_eq!(kinds(Keep::All, true), [true, true, true]);
-        let flow = |keep| Terms { keep, ..terms() }.side_of_flow();
+        let flow = |keep| Manifest { keep, ..inputs() }.side_of_flow();
         assert_eq!(
             [Keep::Outside, Keep::Inside, Keep::All].map(flow),
             [Side::Outside, Side::Inside, Side::Outside]
         );
-        let deletes = Terms { keep: Keep::Outside, ..terms() };
-        assert!(deletes.deletes_enclosed() && !terms().deletes_enclosed());
-        assert!(!Terms { seeds: vec![[0; 3]], ..deletes.clone() }.deletes_enclosed());
-        assert!(!Terms { enclosed: Enclosed::Keep, ..deletes }.deletes_enclosed());
+        let deletes = Manifest { keep: Keep::Outside, ..inputs() };
+        assert!(deletes.deletes_enclosed() && !inputs().deletes_enclosed());
+        assert!(!Manifest { seeds: vec![[0; 3]], ..deletes.clone() }.deletes_enclosed());
+        assert!(!Manifest { enclosed: Enclosed::Keep, ..deletes }.deletes_enclosed());
     }
 
     #[test]
     fn a_box_splits_octants_that_it_meets_and_that_are_coarser() {
         let extent = |level| ExtentBox { min: [0; 3], max: [1 << 20; 3], level };
-        let with = |level| Terms { boxes: vec![extent(1), extent(level)], ..terms() };
+        let with = |level| Manifest { boxes: vec![extent(1), extent(level)], ..inputs() };
         let near = Octant::ROOT.child(0).child(0);
         assert_eq!(with(3).box_that_splits(&near), Some(&extent(3)));
         assert_eq!(with(2).box_that_splits(&near), None);
@@ -147,7 +122,7 @@ mod tests {
                 .map(|axis| {
                     let mut moved = [1.0; 3];
                     moved[axis] += by;
-                    terms().same_place([1.0; 3], moved)
+                    inputs().same_place([1.0; 3], moved)
                 })
                 .collect::<Vec<_>>()
         };

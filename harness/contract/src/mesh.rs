@@ -3,19 +3,19 @@
 //! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`] and [`Mesh::tree`] refuse words that are
 //! not a linear oct-tree, for all who rely on one.
 
-mod merge;
-
-use std::path::{Path, PathBuf};
-
-pub use crate::directory::NODES_MAX;
-use crate::directory::{self, of_tree};
 use crate::failure::Unusable;
 use crate::htg::TreeFile;
+pub use crate::leafset::NODES_MAX;
+
+use crate::leafset::{self, of_part, of_tree};
 use crate::manifest::Manifest;
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::tree::{Builder, Tree};
 use crate::word;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::path::{Path, PathBuf};
 
 /// A leaf-set directory whose manifest and files were opened. No leaf has been read.
 #[derive(Debug)]
@@ -35,18 +35,18 @@ impl Mesh {
     /// # Errors
     /// If the directory is not a leaf set.
     pub fn open(dir: &Path) -> Result<Self, Unusable> {
-        let manifest = directory::read_manifest(dir)?;
+        let manifest = leafset::read_manifest(dir)?;
         let tree_file = match manifest.parts.is_empty() {
-            true => directory::open_tree(dir, &manifest)?,
+            true => leafset::open_tree(dir, &manifest)?,
             false => None,
         };
         let mut parts = Vec::new();
         for part in &manifest.parts {
             let path = dir.join(&part.file);
-            parts.push(directory::open_part(&path)?);
+            parts.push(leafset::open_part(&path)?);
         }
         if tree_file.is_none() {
-            directory::refuse_extra_parts(dir, &manifest)?;
+            leafset::refuse_extra_parts(dir, &manifest)?;
         }
         Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file })
     }
@@ -72,7 +72,7 @@ impl Mesh {
     pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Unusable> {
         match &self.tree_file {
             Some(tree) => tree.words(&mut |words| run(0, words)).map_err(|why| of_tree(tree, &why)),
-            None => merge::merge(&self.parts, run),
+            None => merge(&self.parts, run),
         }
     }
 
@@ -98,24 +98,21 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
     pub fn tree(&self) -> Result<Tree, Unusable> {
-        let why = format!(
-            "more than {NODES_MAX} distinct octants, which is the limit: use a part of the mesh"
-        );
-        self.small_tree()?.ok_or_else(|| Unusable::at(&self.dir, why))
-    }
-
-    /// The same; `None` if it has too many.
-    ///
-    /// # Errors
-    /// As [`Mesh::visit`].
-    pub fn small_tree(&self) -> Result<Option<Tree>, Unusable> {
         let mut builder = Builder::default();
         self.visit(&mut |words| {
             if builder.nodes() <= NODES_MAX {
                 words.iter().for_each(|&w| builder.push(w).expect("a visit is linear"));
             }
         })?;
-        Ok((builder.nodes() <= NODES_MAX).then(|| builder.finish()))
+        match builder.nodes() <= NODES_MAX {
+            true => Ok(builder.finish()),
+            false => Err(Unusable::at(
+                &self.dir,
+                format!(
+                    "more than {NODES_MAX} distinct octants, which is the limit: use a part of the mesh"
+                ),
+            )),
+        }
     }
 
     /// The sorted words of the leaves in an octant, found among all.
@@ -155,6 +152,65 @@ impl Order {
         self.0 = begin + word::span(word::level(word));
         None
     }
+}
+
+/// Words per read: large enough for streaming, small enough for thousands of parts.
+const CHUNK: usize = 1 << 15;
+
+/// A part and its buffer.
+struct Reader<'a> {
+    file: &'a PartFile,
+    /// Index in the file of the first word after the buffer.
+    next: u64,
+    words: Vec<u64>,
+    /// Index in the buffer of the next word.
+    position: usize,
+}
+
+impl Reader<'_> {
+    /// Refills an exhausted buffer; false at the end of the part.
+    fn fill(&mut self) -> Result<bool, Unusable> {
+        if self.position == self.words.len() {
+            let left = self.file.len() - self.next;
+            self.words.resize(usize::try_from(left).unwrap_or(usize::MAX).min(CHUNK), 0);
+            let read = self.file.read_at(self.next, &mut self.words);
+            read.map_err(|error| of_part(self.file, error))?;
+            (self.next, self.position) = (self.next + self.words.len() as u64, 0);
+        }
+        Ok(!self.words.is_empty())
+    }
+}
+
+/// Passes the words of all parts to `run` in runs, until it returns false. Each run comes from the part with
+/// the given index, and the next word of every other part is at least as large. If every part is sorted, so is
+/// the stream.
+///
+/// # Errors
+/// If a part cannot be read.
+fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Unusable> {
+    let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
+    let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
+    let mut heads = BinaryHeap::new();
+    for (part, reader) in readers.iter_mut().enumerate() {
+        if reader.fill()? {
+            heads.push(Reverse((reader.words[0], part)));
+        }
+    }
+    while let Some(Reverse((_, part))) = heads.pop() {
+        let limit = heads.peek().map_or(u64::MAX, |Reverse((head, _))| *head);
+        let reader = &mut readers[part];
+        let buffered = &reader.words[reader.position..];
+        // At least one word, so that equal heads and unsorted parts make progress.
+        let len = 1 + buffered[1..].iter().take_while(|&&w| w < limit).count();
+        if !run(part, &buffered[..len]) {
+            return Ok(());
+        }
+        reader.position += len;
+        if reader.fill()? {
+            heads.push(Reverse((reader.words[reader.position], part)));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -219,5 +275,73 @@ mod tests {
         let mut set = leaf_set(vec![words_of(|o| o.level < 1), vec![]]);
         set.manifest.leaves = u64::MAX;
         assert_eq!(opened(&set).1.len(), 8);
+    }
+}
+
+#[cfg(test)]
+mod merging {
+    use super::*;
+    use crate::digest::mix;
+    use crate::npy;
+
+    fn parts(words: &[Vec<u64>]) -> (tempfile::TempDir, Vec<PartFile>) {
+        let dir = tempfile::tempdir().unwrap();
+        let open = |(i, words): (usize, &Vec<u64>)| {
+            let path = dir.path().join(format!("{i}.npy"));
+            npy::write(&path, words).unwrap();
+            PartFile::open(&path).unwrap()
+        };
+        let files = words.iter().enumerate().map(open).collect();
+        (dir, files)
+    }
+
+    #[test]
+    fn the_words_of_sorted_parts_become_one_sorted_stream() {
+        // One part exceeds the buffer, one is empty, and words are repeated within and across parts.
+        let random = |count: u64, salt: u64| {
+            let mut words: Vec<u64> =
+                (0..count).map(|i| (mix(i ^ salt << 40) >> 64) as u64 % 50_000).collect();
+            words.sort_unstable();
+            words
+        };
+        let given = [
+            random(2 * CHUNK as u64 + 5, 1),
+            vec![],
+            random(300, 2),
+            vec![7; 3],
+            random(CHUNK as u64, 3),
+        ];
+        let (_dir, files) = parts(&given);
+        let (mut found, mut by_part) = (Vec::new(), vec![Vec::new(); given.len()]);
+        merge(&files, &mut |part, run| {
+            assert!(!run.is_empty());
+            by_part[part].extend_from_slice(run);
+            found.extend_from_slice(run);
+            true
+        })
+        .unwrap();
+        let mut expected = given.concat();
+        expected.sort_unstable();
+        assert!(found == expected && by_part == given);
+        let mut runs = 0;
+        merge(&files, &mut |_, _| {
+            runs += 1;
+            runs < 3
+        })
+        .unwrap();
+        assert_eq!(runs, 3);
+    }
+
+    #[test]
+    fn words_of_unsorted_parts_are_all_passed_on() {
+        let given = [vec![9, 1, 5], vec![2, u64::MAX, 0]];
+        let (_dir, files) = parts(&given);
+        let mut by_part = vec![Vec::new(); 2];
+        merge(&files, &mut |part, run| {
+            by_part[part].extend_from_slice(run);
+            true
+        })
+        .unwrap();
+        assert_eq!(by_part, given);
     }
 }
