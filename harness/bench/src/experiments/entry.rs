@@ -208,8 +208,9 @@ pub struct Phase {
     pub message_bytes: Spread,
 }
 
-/// A run's parameters.
+/// A run's parameters. A line with another one is not read: runs that differ in it are no repetitions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Setup {
     /// The experiment: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
@@ -232,9 +233,6 @@ pub struct Setup {
     pub level_base: Option<u32>,
     /// `unit`, `area` or `rebalance`; empty if the choice was left to the program.
     pub weights: String,
-    /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub weight_exposed: Option<u32>,
     /// Cells that a series of several meshes was asked for, so that two such series of a case are apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub series_cells: Option<f64>,
@@ -247,17 +245,14 @@ impl Setup {
         Self { engine, case, spacing_min, layer_cells_min, ranks: 1, ..Self::default() }
     }
 
-    /// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
+    /// Returns partitioner and weights, or `default`.
     pub fn division(&self) -> String {
         let chosen = match (self.partitioner.as_str(), self.weights.as_str()) {
             ("", "") => "default".to_owned(),
             (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
         };
         let depth = self.level_base.map_or(String::new(), |level| format!(" depth {level}"));
-        match self.weight_exposed {
-            None | Some(0) => chosen + &depth,
-            Some(weight) => format!("{chosen}{depth} W={weight}"),
-        }
+        chosen + &depth
     }
 }
 

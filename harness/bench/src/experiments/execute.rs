@@ -197,9 +197,8 @@ fn layout(setup: &Setup) -> Layout {
     };
     let choice = |value: &String| Some(value.clone()).filter(|value| !value.is_empty());
     let (partitioner, weights) = (choice(&setup.partitioner), choice(&setup.weights));
-    let (weight_exposed, level_base) = (setup.weight_exposed, setup.level_base);
-    let level_base = level_base.map(|level| level.to_string());
-    Layout { partitioner, weights, weight_exposed, level_base, ..Layout::on(ranks) }
+    let level_base = setup.level_base.map(|level| level.to_string());
+    Layout { partitioner, weights, level_base, ..Layout::on(ranks) }
 }
 
 /// The measurements in a run report.

@@ -106,7 +106,6 @@ impl Plan<'_> {
                         comm,
                         weights: choice.0.to_owned(),
                         partitioner: choice.1.to_owned(),
-                        weight_exposed: choice.2,
                         series_cells: cells.filter(|_| series.experiment.has_several_meshes()),
                         ..Setup::serial(&base.name, spacing, n)
                     },

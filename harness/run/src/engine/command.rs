@@ -58,7 +58,6 @@ fn add_values_of_run(values: &mut Values, case: &Path, layout: &Layout, options:
     for (name, choice) in choices {
         values.extend(choice.clone().map(|choice| (name, choice)));
     }
-    values.extend(layout.weight_exposed.map(|weight| ("weight_exposed", weight.to_string())));
 }
 
 /// The words that start the engine on these ranks.
@@ -104,7 +103,6 @@ fn appended<'a>(
         (layout.partitioner.is_some(), templates.partitioner.as_ref()),
         (layout.level_base.is_some(), templates.level_base.as_ref()),
         (layout.weights.is_some(), templates.weights.as_ref()),
-        (layout.weight_exposed.is_some(), templates.weight_exposed.as_ref()),
         (layout.threads.is_some(), templates.threads.as_ref()),
     ];
     let requested = parts.into_iter().filter(|(needed, _)| *needed);

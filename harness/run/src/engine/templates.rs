@@ -42,8 +42,6 @@ pub struct Templates {
     pub level_base: Option<Vec<String>>,
     /// Appended to choose the `{weights}` of the partition.
     pub weights: Option<Vec<String>>,
-    /// Appended to count the exposed faces of every rank and to weigh each like `{weight_exposed}` leaves.
-    pub weight_exposed: Option<Vec<String>>,
     /// Appended to choose the number of `{threads}`.
     pub threads: Option<Vec<String>>,
     /// Variables to add to the environment.
@@ -114,7 +112,7 @@ impl Templates {
             None => (&["out"], &["seed", "out"]),
             Some(_) => (&[], &["seed"]),
         };
-        let templates: [(_, _, &[&str]); 14] = [
+        let templates: [(_, _, &[&str]); 13] = [
             ("serial", Some(&self.serial), in_command),
             ("parallel", self.parallel.as_ref(), in_command),
             ("serve", self.serve.as_ref(), &[]),
@@ -126,7 +124,6 @@ impl Templates {
             ("partitioner", self.partitioner.as_ref(), &["partitioner"]),
             ("level_base", self.level_base.as_ref(), &["level_base"]),
             ("weights", self.weights.as_ref(), &["weights"]),
-            ("weight_exposed", self.weight_exposed.as_ref(), &["weight_exposed"]),
             ("threads", self.threads.as_ref(), &[]),
             ("environment", Some(&environment), &[]),
         ];

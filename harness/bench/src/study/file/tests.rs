@@ -106,7 +106,7 @@ fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out(
     assert!(of(&weak, &serial, false).is_empty());
     let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
     assert!(of(&weights, &parallel, false).is_empty());
-    assert_eq!((weights.choices().len(), strong.choices()), (7, &[("", "", None)][..]));
+    assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "")][..]));
 }
 
 #[test]
