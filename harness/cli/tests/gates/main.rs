@@ -158,7 +158,7 @@ fn tracked_commits_form_a_history_with_a_change_point() {
         let outcome = fixture.harness(&format!("track history.jsonl --value case/words={value}"));
         assert_eq!(outcome.code, 0, "{}", outcome.printed);
     }
-    let forms = "--page trend.html --csv trend.csv --bencher b.json --github-benchmark g.json --junit t.xml";
+    let forms = "--page trend.html --json trend.json --junit t.xml";
     let outcome = fixture.harness(&format!("track history.jsonl --fail-recent 6 {forms}"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(outcome.printed.contains("case/words: 40 -> 44 (+10.00 %) in "), "{}", outcome.printed);
@@ -167,7 +167,8 @@ fn tracked_commits_form_a_history_with_a_change_point() {
     for wrong in ["words=1", "case/words=1e200", "case/words=nan"] {
         assert_eq!(fixture.harness(&format!("track history.jsonl --value {wrong}")).code, 2);
     }
-    assert_eq!(fs::read_to_string(fixture.path("trend.csv")).unwrap().lines().count(), 17);
+    let series = fs::read_to_string(fixture.path("trend.json")).unwrap();
+    assert!(series.contains("\"first_new\"") && series.contains("44.0"), "{series}");
     assert!(fs::read_to_string(fixture.path("trend.html")).unwrap().contains("commit-10"));
     assert_eq!(fixture.harness("track history.jsonl --fail-recent 5").code, 0);
     // The last line but five has the first commit with the new values.
