@@ -167,7 +167,7 @@ impl Groups {
                     None => runs.push((&**run, &line.session)),
                     Some(why) => left_out.push(LeftOut { setup: run.setup.clone(), why }),
                 },
-                Entry::Audit(_) | Entry::Target(_) => {}
+                Entry::Former => {}
             }
         }
         let group = |(setup, runs): (Setup, Vec<(&Run, &String)>)| {

@@ -51,6 +51,7 @@ pub fn read(path: &Path) -> io::Result<Content> {
     let (mut lines, mut broken) = Content::default();
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
+            Ok(Line { entry: Entry::Former, .. }) => {}
             Ok(line) if line.schema == SCHEMA => match line.fault() {
                 None => lines.push(line),
                 Some(why) => broken.push((number, why)),

@@ -4,10 +4,10 @@
 //! a wrong mesh is not a result.
 
 use super::file::{Row, Series, Study};
-use super::judge::{judge, unjudged};
+use super::judge::{Judged, Verdict, judge, unjudged};
 use super::plan::{Plan, Planned, SessionOptions};
 use crate::experiments::entry::{
-    Comm, Entry, Failure as Failed, Judged, LeftOut, Line, Run, Session as Opening, Setup, Verdict,
+    Comm, Entry, Failure as Failed, LeftOut, Line, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
 use crate::experiments::record::Record;
@@ -106,7 +106,6 @@ impl Session<'_> {
             let [name, target, value, how, verdict] = judged.fields();
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
             (self.plan.progress)(&format!("row {number} of {}: {line}", study.row.len()));
-            self.append(Entry::Target(judged.clone()))?;
             rows.push(judged);
         }
         Ok(())
@@ -228,13 +227,12 @@ impl Session<'_> {
         self.append(Entry::Network(network))
     }
 
-    /// Runs a point, or writes and audits its mesh, and records the result.
+    /// Runs a point and records the result.
     fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
         let s = &point.setup;
-        let repetition = match (point.audit, warm_up) {
-            (true, _) => "audit on disk".to_owned(),
-            (false, true) => "warm-up".to_owned(),
-            (false, false) => format!("{}, repeat {}", s.division(), repeat + 1),
+        let repetition = match warm_up {
+            true => "warm-up".to_owned(),
+            false => format!("{}, repeat {}", s.division(), repeat + 1),
         };
         (self.plan.progress)(&format!(
             "{} {} by {}: {} ranks ({}), spacing {:.3e}, n {}, {repetition}",
@@ -246,20 +244,12 @@ impl Session<'_> {
             s.spacing_min,
             s.layer_cells_min,
         ));
-        let entry = match point.audit {
-            true => {
-                // The mesh is written to the record's file system.
-                let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
-                let disk = disk.unwrap_or(Path::new("."));
-                self.plan.runner.audit(s, &point.case, disk).map(Entry::Audit)
-            }
-            false => self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
-                self.check_mesh(point, &run)?;
-                Ok(Entry::Run(Box::new(run)))
-            }),
-        };
-        match entry {
-            Ok(entry) => self.append(entry),
+        let run = self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
+            self.check_mesh(point, &run)?;
+            Ok(run)
+        });
+        match run {
+            Ok(run) => self.append(Entry::Run(Box::new(run))),
             Err(failure) if failure.is_interrupt() => Err(failure),
             Err(Failure { why, .. }) => {
                 (self.plan.progress)(&format!("failed: {why}"));
