@@ -4,10 +4,9 @@
 //! nothing to check is compared only if the baseline's had nothing either: what a mesh no longer states cannot be found wrong.
 
 use super::Bench;
-use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
+use super::measures::{LayerName, Numbers};
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::Selected;
-use super::subject::Baseline;
 use check::checks::CHECKS as CHECKS_OF_MESHES;
 use contract::failure::Failure;
 use run::engine::programs::Programs;
@@ -23,25 +22,17 @@ use std::collections::BTreeSet;
 ///
 /// # Errors
 /// If verification cannot start.
-pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Result<(), Failure> {
+pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
     for case in bench.cases_of(LayerName::Correctness) {
-        let name = &case.rule.name;
         let report = verified(bench, &bench.candidate, case)?;
-        let new = Known::of(&report);
-        let is_plain = new.findings.is_empty() && new.unchecked.iter().all(BTreeSet::is_empty);
+        let is_plain = report.checks.iter().all(|check| !check.failed() && !is_unchecked(check));
         let baseline = match &bench.baseline {
-            Baseline::Program(subject) if !is_plain => {
-                Known::of(&verified(bench, &subject.engine, case)?)
-            }
-            Baseline::Record(_, record) => {
-                record.cases.get(name).map(Known::of_record).unwrap_or_default()
-            }
-            Baseline::Program(_) => Known::default(),
-            Baseline::None => Known { is_absent: true, ..Known::default() },
+            // Nothing of it can be better.
+            Some(_) if is_plain => Some(Known::default()),
+            Some(subject) => Some(Known::of(&verified(bench, &subject.engine, case)?)),
+            None => None,
         };
-        let of_case = measures.case(name);
-        (of_case.findings, of_case.unchecked) = (new.findings, new.unchecked);
-        layer.findings.extend(findings(name, &case.mpi, &report, &baseline));
+        layer.findings.extend(findings(&case.rule.name, &case.mpi, &report, baseline.as_ref()));
     }
     Ok(())
 }
@@ -71,10 +62,8 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
 struct Known {
     /// Number of findings by failed check.
     findings: Numbers,
-    /// The checks of meshes that were left out; `None` if unknown.
+    /// The checks of meshes that were left out; `None` without a mesh, when no check of it is known to have been possible.
     unchecked: Option<BTreeSet<String>>,
-    /// Whether there is nothing to compare with.
-    is_absent: bool,
 }
 
 impl Known {
@@ -84,15 +73,8 @@ impl Known {
         let has_mesh = !case.checks.iter().any(|check| check.failed() && check.name == RUNS);
         Self {
             findings: failed.map(|check| (key(check), count(check))).collect(),
-            // Without a mesh, no check of it is known to have been possible.
             unchecked: has_mesh.then(|| unchecked.map(key).collect()),
-            is_absent: false,
         }
-    }
-
-    fn of_record(case: &CaseMeasures) -> Self {
-        let (findings, unchecked) = (case.findings.clone(), case.unchecked.clone());
-        Self { findings, unchecked, is_absent: false }
     }
 }
 
@@ -103,7 +85,12 @@ fn is_unchecked(check: &Check) -> bool {
 }
 
 /// A finding for the serial mesh, and one for each number of ranks.
-fn findings(case: &str, mpi: &[usize], report: &CaseReport, baseline: &Known) -> Vec<GateFinding> {
+fn findings(
+    case: &str,
+    mpi: &[usize],
+    report: &CaseReport,
+    baseline: Option<&Known>,
+) -> Vec<GateFinding> {
     if let Some(why) = &report.input_error {
         return vec![GateFinding::noted(case, CHECKS, Verdict::Regression, why)];
     }
@@ -115,21 +102,23 @@ fn findings(case: &str, mpi: &[usize], report: &CaseReport, baseline: &Known) ->
     std::iter::once(None).chain(mpi.iter().copied().map(Some)).map(of_ranks).collect()
 }
 
-fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Known) -> GateFinding {
+fn finding(case: &str, metric: &str, checks: &[&Check], baseline: Option<&Known>) -> GateFinding {
     let Tally { pass, fail, .. } = checks.iter().copied().collect();
-    let before = |check: &Check| baseline.findings.get(&key(check)).copied().unwrap_or(0);
+    let before = |check: &Check| {
+        baseline.and_then(|known| known.findings.get(&key(check))).copied().unwrap_or(0)
+    };
     let old: u64 = checks.iter().map(|check| before(check)).sum();
     let new: u64 = checks.iter().map(|check| count(check)).sum();
     let counts = format!("{fail} checks fail with {new} findings, {old} in the baseline");
     let without_mesh = checks.iter().find(|check| check.failed() && check.name == RUNS);
-    let was_checked =
-        |check: &&&Check| baseline.unchecked.as_ref().is_some_and(|u| !u.contains(&key(check)));
+    let known = baseline.and_then(|known| known.unchecked.as_ref());
+    let was_checked = |check: &&&Check| known.is_some_and(|known| !known.contains(&key(check)));
     let unchecked = checks.iter().filter(|check| is_unchecked(check)).find(was_checked);
     let worse = checks.iter().find(|check| count(check) > before(check));
     let (verdict, note) = match (worse, unchecked) {
         (Some(worse), _) => {
             let (check, why) = (key(worse), first_line(worse));
-            let what = match baseline.is_absent {
+            let what = match baseline.is_none() {
                 true => format!("{fail} checks fail with {new} findings: {check}: {why}"),
                 false => format!("{counts}; worse than the baseline: {check}: {why}"),
             };
@@ -194,7 +183,7 @@ mod tests {
     }
 
     fn against(case: &CaseReport, baseline: &Known) -> GateFinding {
-        findings("c", &[], case, baseline).remove(0)
+        findings("c", &[], case, Some(baseline)).remove(0)
     }
 
     #[test]
@@ -220,7 +209,7 @@ mod tests {
         assert!(missing.note.ends_with("the sides of the leaves are unknown"), "{}", missing.note);
         let verdict = |known: &Known| against(&without, known).verdict;
         assert_eq!(verdict(&Known::of(&without)), Verdict::Unchanged);
-        assert_eq!(verdict(&Known::default()), Verdict::Unchanged, "an old record");
+        assert_eq!(verdict(&Known::default()), Verdict::Unchanged, "no mesh");
         assert_eq!(against(&all, &Known::of(&without)).verdict, Verdict::Unchanged);
     }
 

@@ -12,7 +12,6 @@ use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
-use super::subject::Baseline;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
@@ -47,14 +46,10 @@ struct Quantity {
 
 /// Compares the times of candidate and baseline.
 pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
-    let left_out = match &bench.baseline {
-        Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
-        Baseline::Record(..) => {
-            "a record cannot be run, and times of different sessions are not comparable"
-        }
-        Baseline::None => "no baseline was given",
-    };
-    layer.left_out = Some(left_out.to_owned());
+    match &bench.baseline {
+        Some(baseline) => compared(bench, &baseline.engine, layer),
+        None => layer.left_out = Some("no baseline was given".to_owned()),
+    }
 }
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
