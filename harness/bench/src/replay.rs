@@ -1,5 +1,5 @@
 //! What the runs of a record must give when they are repeated elsewhere: digests and counts exactly, ratios within bands. Times are
-//! those of a machine, so they are shown and not judged.
+//! those of a machine.
 //!
 //! Invariants, executed by [`expected`] and [`Replayed::check_invariants`] before anything is printed: a quantity of a run is there
 //! once; a band contains its value; a ratio is inside if and only if its band contains it, and an exact value is equal if and only if it
@@ -44,8 +44,6 @@ pub enum Found {
         /// `measured`, `projected` ...: only the same are compared.
         how: &'static str,
     },
-    /// Seconds, which are not compared.
-    Time(f64),
 }
 
 /// Returns what a repetition must give: the values of the runs of the last machine and program in a record.
@@ -98,7 +96,7 @@ pub enum Verdict {
     Inside,
     /// A ratio is not.
     Outside,
-    /// A time, or a ratio that was measured in another way.
+    /// A ratio that was measured in another way.
     NotCompared,
     /// The repetition does not have it.
     Missing,
@@ -202,8 +200,7 @@ fn of_group(groups: &Groups, group: &Group) -> Vec<Value> {
         let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
         Some((quantity.to_owned(), Found::Ratio { value, low, high, how }))
     };
-    let time = ("time".to_owned(), Found::Time(group.time_s.value));
-    let all = exact.chain(ratios.into_iter().filter_map(ratio)).chain([time]);
+    let all = exact.chain(ratios.into_iter().filter_map(ratio));
     all.map(|(quantity, found)| Value { run: run.clone(), quantity, found }).collect()
 }
 
@@ -243,9 +240,9 @@ mod tests {
     fn a_record_replays_itself() {
         let replayed = repeated(&record([2.0, 2.0]));
         assert!(replayed.holds() && replayed.is_judged());
-        // Cells, digest and rays of two runs; memory of two, and imbalance, speedup and efficiency of one; times.
+        // Cells, digest and rays of two runs; memory of two, and imbalance, speedup and efficiency of one.
         let counts = [Verdict::Equal, Verdict::Inside, Verdict::NotCompared, Verdict::Missing];
-        assert_eq!(counts.map(|verdict| replayed.count(verdict)), [6, 5, 2, 0]);
+        assert_eq!(counts.map(|verdict| replayed.count(verdict)), [6, 5, 0, 0]);
         assert!(expected(&[]).is_err());
     }
 
@@ -271,7 +268,7 @@ mod tests {
         let replayed = repeated(&record([3.2, 0.8]));
         assert_eq!((replayed.count(Verdict::Outside), replayed.holds()), (3, false));
         let missing = repeated(&record([2.0, 2.0])[..1]);
-        assert_eq!(missing.count(Verdict::Missing), 8);
+        assert_eq!(missing.count(Verdict::Missing), 7);
     }
 
     proptest! {

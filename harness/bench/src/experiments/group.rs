@@ -13,7 +13,7 @@ use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{by_key, distinct};
 use crate::origin::Origins;
-use run::engine::lacks::EQUAL_RUNS;
+use run::engine::lacks::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median};
 use std::collections::{BTreeMap, HashMap};
 
@@ -270,7 +270,7 @@ impl Groups {
 }
 
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
-fn another_mesh(
+pub(crate) fn another_mesh(
     run: &Run,
     lacks: &BTreeMap<String, Vec<String>>,
     digests: &mut HashMap<String, String>,
@@ -282,7 +282,7 @@ fn another_mesh(
         return None;
     }
     let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
-    if !lacks.is_empty() {
+    if lacks.iter().any(|what| what == EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
     let first = digests.entry(mesh).or_insert_with(|| run.digest.clone());

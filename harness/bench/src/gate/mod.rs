@@ -69,15 +69,12 @@ pub struct GateOptions {
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
-    /// Where revisions are built and kept [default: target/gate in the repository]
-    #[arg(long, value_name = "DIR")]
-    pub cache: Option<PathBuf>,
 }
 
 impl GateOptions {
     /// Where revisions are built and kept.
     fn cache(&self) -> PathBuf {
-        self.cache.clone().unwrap_or_else(|| self.repository.join("target/gate"))
+        self.repository.join("target/gate")
     }
 
     /// Time limit of every single run.

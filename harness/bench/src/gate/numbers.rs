@@ -97,31 +97,13 @@ fn compare(
         let why = format!("other facets were read: their digest is {other}, and was {one}");
         return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
     }
-    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
+    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(metric, layer);
     let numbers = [old.of_layer(layer), new.of_layer(layer)];
     let mut findings = compared_numbers(name, layer, numbers, &tolerance);
-    if layer == LayerName::Counters {
-        findings.extend(without_counter(case, numbers));
-        if old.digest.is_some() || new.digest.is_some() {
-            findings.insert(0, same_mesh(name, &old.digest, &new.digest));
-        }
+    if layer == LayerName::Counters && (old.digest.is_some() || new.digest.is_some()) {
+        findings.insert(0, same_mesh(name, &old.digest, &new.digest));
     }
     findings
-}
-
-/// A finding for each tolerance of the case that has the name of no quantity.
-fn without_counter(case: &Selected, counters: [&Numbers; 2]) -> Vec<GateFinding> {
-    let of_layers = [CELLS, MEMORY, INSTRUCTIONS];
-    let is_known = |name: &String| {
-        let is = |other: &String| other == name || other.ends_with(&format!("/{name}"));
-        let last = name.rsplit('/').next().unwrap_or(name);
-        case.no_mpi.is_some()
-            || of_layers.contains(&last)
-            || counters.iter().any(|of| of.keys().any(is))
-    };
-    let unknown = case.rule.tolerance.keys().filter(|name| !is_known(name));
-    let why = "the rules have a tolerance for it, and neither program counts it";
-    unknown.map(|n| GateFinding::noted(&case.rule.name, n, Verdict::Missing, why)).collect()
 }
 
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct.

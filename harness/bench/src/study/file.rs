@@ -73,8 +73,6 @@ pub struct RunSpec {
     /// Number of repetitions; results are their medians.
     #[serde(default = "one")]
     pub repeats: usize,
-    /// Whether an uncounted run precedes the first run of a mesh. Default: true if the run is repeated.
-    pub warm_up: Option<bool>,
 }
 
 fn mpi() -> Comm {

@@ -176,7 +176,7 @@ impl Plan<'_> {
             level_base: spec.level_base,
             ..Setup::serial(&spec.mesh, spacing, n)
         };
-        let warm_up = spec.warm_up.unwrap_or(repeats > 1);
+        let warm_up = repeats > 1;
         Ok(Planned { setup, case: case?, repeats, warm_up, failed: false, declined: None })
     }
 

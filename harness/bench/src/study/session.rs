@@ -10,9 +10,9 @@ use crate::experiments::entry::{
     Comm, Entry, Failure as Failed, LeftOut, Line, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
+use crate::experiments::group::another_mesh;
 use crate::experiments::record::Record;
 use crate::experiments::{feasible, machine, network};
-use check::promises::Independence;
 use contract::failure::Failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
@@ -74,16 +74,13 @@ pub fn measure(
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
 
-/// Everything that a mesh, and so its digest, depends on: engine, case, spacing, n, and the partition unless the engine
-/// promises independence of it.
-type Digested = [String; 5];
-
 /// A running session.
 struct Session<'a> {
     plan: Plan<'a>,
     lines: Vec<Line>,
     record: Record,
-    digests: HashMap<Digested, String>,
+    /// Digests of the meshes.
+    digests: HashMap<String, String>,
     /// Whether the cost of messages is known.
     network: bool,
     /// Runs that are complete.
@@ -283,24 +280,8 @@ impl Session<'_> {
                 ));
             }
         }
-        let ranks = !promises.is_independent_of(Independence::Ranks);
-        let partitioner = !promises.is_independent_of(Independence::Partitioner);
-        let partition =
-            [ranks.then(|| s.ranks.to_string()), partitioner.then(|| s.partitioner.clone())];
-        let partition = partition.into_iter().flatten().collect();
-        let (spacing, n) = (format!("{:e}", s.spacing_min), s.layer_cells_min.to_string());
-        let mesh = [s.engine.clone(), s.case.clone(), spacing, n, partition];
-        // The run report of a timed run need not have one.
-        if run.digest.is_empty() {
-            return Ok(());
-        }
-        let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
-        match *first == run.digest || !promises.is_deterministic() {
-            true => Ok(()),
-            false => Err(format!(
-                "the mesh has digest {}, but that of an earlier run has {first}",
-                run.digest
-            )),
-        }
+        let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
+        let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.digests);
+        other.map_or(Ok(()), Err)
     }
 }

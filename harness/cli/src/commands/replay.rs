@@ -90,16 +90,16 @@ fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
 fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     let shown = |found: &Found| match found {
         Found::Exact(text) => text.clone(),
-        Found::Ratio { value, .. } | Found::Time(value) => format!("{value:.4}"),
+        Found::Ratio { value, .. } => format!("{value:.4}"),
     };
     let row = |row: &Row| {
-        let (band, how) = match (&row.expected.found, &row.measured) {
-            (Found::Exact(_), _) => ("exact".to_owned(), ""),
-            (Found::Ratio { low, high, .. }, Some(Found::Ratio { how, .. })) => {
-                (format!("{low:.3} to {high:.3}"), *how)
-            }
-            (Found::Ratio { low, high, .. }, _) => (format!("{low:.3} to {high:.3}"), ""),
-            (Found::Time(_), _) => ("not compared".to_owned(), ""),
+        let band = match &row.expected.found {
+            Found::Exact(_) => "exact".to_owned(),
+            Found::Ratio { low, high, .. } => format!("{low:.3} to {high:.3}"),
+        };
+        let how = match &row.measured {
+            Some(Found::Ratio { how, .. }) => *how,
+            _ => "",
         };
         let verdict = match row.verdict {
             Verdict::Equal => "equal",

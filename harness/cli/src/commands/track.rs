@@ -3,13 +3,13 @@
 use super::files::put_forms;
 use super::values::{Input, Output, percentage, probability};
 use bench::jsonl;
+use bench::track::analyse;
 use bench::track::history::{self, History, Record};
-use bench::track::{analyse, summary};
 use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use report::json::pretty;
-use report::track::{junit, page};
+use report::track::{junit, page, summary};
 use statistics::change_points::Rules;
 use std::path::{Path, PathBuf};
 

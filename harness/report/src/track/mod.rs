@@ -1,4 +1,4 @@
-//! The history as a page, with the steps as a table and a figure per metric, and as JUnit XML.
+//! The history as a page, with the steps as a table and a figure per metric, as text and as JUnit XML.
 
 mod figures;
 
@@ -7,7 +7,7 @@ use crate::figure::tick_label;
 use crate::junit::{suite, test, to_text, unsuccessful};
 use crate::page::{figure, page as whole_page, table};
 use bench::track::history::Record;
-use bench::track::{Change, Series, summary};
+use bench::track::{Change, Series};
 use figures::{of_metric, short_commit};
 use maud::{Markup, html};
 use quick_junit::NonSuccessKind::Failure;
@@ -69,15 +69,12 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     found.sort_by_key(|change| Reverse(first_new(change)));
     let row = |both: &(&Series, &Change)| {
         let (series, change) = *both;
-        let value = |value: f64| {
-            html! { (tick_label(value)) @if series.unit != "count" { " " (series.unit) } }
-        };
-        let by = change.percent.map_or("new".to_owned(), |by| format!("{by:+.2} %"));
+        let [before, after, by] = values(series, change);
         let sign = series.is_worse(change).map(|worse| if worse { "worse" } else { "better" });
         vec![
             html! { (series.name) },
-            value(change.before),
-            value(change.after),
+            html! { (before) },
+            html! { (after) },
             html! { span class=[sign] { (by) } },
             html! { (linked(&change.last_old, link)) ".." (linked(&change.first_new, link)) },
             html! { @if change.accepted { "accepted" } },
@@ -87,6 +84,38 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];
     let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
     html! { h2 { "Change points" } (table(&columns, &rows)) }
+}
+
+/// Both values of a step with their unit, and the change.
+fn values(series: &Series, change: &Change) -> [String; 3] {
+    let value = |value: f64| match series.unit {
+        // Counts are exact.
+        "count" => value.to_string(),
+        unit => format!("{} {unit}", tick_label(value)),
+    };
+    let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
+    [value(change.before), value(change.after), by]
+}
+
+/// A step per line.
+pub fn summary(all: &[Series]) -> String {
+    let line = |series: &Series, change: &Change| {
+        let [before, after, by] = values(series, change);
+        let commits = [&change.last_old, &change.first_new].map(|commit| short_commit(commit));
+        let accepted = if change.accepted { ", accepted" } else { "" };
+        format!(
+            "{}: {before} -> {after} ({by}) in {}, p = {:.2e}{accepted}\n",
+            series.name,
+            commits.join(".."),
+            change.p
+        )
+    };
+    let lines = |series| -> Vec<String> {
+        let series: &Series = series;
+        series.changes.iter().map(|change| line(series, change)).collect()
+    };
+    let text: String = all.iter().flat_map(lines).collect();
+    if text.is_empty() { "no change points\n".to_owned() } else { text }
 }
 
 /// A test per metric. It fails if the last change point is one for the worse among the last `recent` values.

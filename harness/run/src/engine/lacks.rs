@@ -5,6 +5,8 @@ use check::promises::{Independence, Touching};
 use contract::manifest::Keep;
 use contract::octant::LEVEL_MAX;
 
+/// What an engine lacks whose mesh depends on the number of ranks.
+pub const EQUAL_RANKS: &str = "equal meshes on any number of ranks";
 /// What an engine lacks that is not deterministic.
 pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
 
@@ -28,7 +30,7 @@ impl Description {
             (takes.seeds, "seeds"),
             (promises.is_deterministic(), EQUAL_RUNS),
             (parallel, "MPI"),
-            (!parallel || of_ranks, "equal meshes on any number of ranks"),
+            (!parallel || of_ranks, EQUAL_RANKS),
         ];
         let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
         let level = self.limits.level_max;
