@@ -64,8 +64,8 @@ pub struct GateOptions {
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
     pub timeout: u64,
     /// Time for one case in the layer of time [default: from the rules]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub budget: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
+    pub budget: Option<u64>,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
@@ -81,12 +81,6 @@ impl GateOptions {
     fn limit(&self) -> Duration {
         Duration::from_secs(self.timeout)
     }
-}
-
-/// Parses a time in seconds: more than 0, and at most a week.
-fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= 604_800.0);
-    number.ok_or_else(|| "give a number greater than 0 and at most 604800".to_owned())
 }
 
 /// A file that is read, and must not be written.

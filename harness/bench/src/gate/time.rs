@@ -16,10 +16,9 @@ use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
 use run::engine::runner::Engine;
-use statistics::comparison::{Comparison, Round, compare};
+use statistics::comparison::{Comparison, Round, compare, trimmed_mean};
 use statistics::false_discovery::adjusted;
 use statistics::random::Random;
-use statistics::trimmed_mean::trimmed_mean;
 
 /// CPU time of the whole process.
 pub const CPU: &str = "CPU time";
@@ -117,7 +116,7 @@ fn rounds(
     // The first run reads program and geometry from disk and is not counted.
     let (first, also) = (run(0)?, run(CANDIDATE)?);
     let rules = &bench.rules.time;
-    let budget_s = bench.options.budget.unwrap_or(rules.budget_s);
+    let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget as f64);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let seed = bench.options.seed.wrapping_add(u64::from(again));

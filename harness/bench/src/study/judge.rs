@@ -162,8 +162,7 @@ impl Judged {
     pub fn fields(&self) -> [String; 5] {
         let Row { name, measure, at_least, at_most, .. } = &self.row;
         let bounds = [("at least ", at_least), ("at most ", at_most)];
-        let shown =
-            |(word, b): (&str, &Option<f64>)| Some(word.to_owned() + &(measure.show)((*b)?));
+        let shown = |(word, b): (&str, &Option<f64>)| Some(word.to_owned() + &measure.show((*b)?));
         let target = bounds.into_iter().filter_map(shown).collect::<Vec<_>>().join(", ");
         let word = match self.verdict {
             Verdict::Met => "met",
@@ -175,7 +174,7 @@ impl Judged {
         let why = if self.why.is_empty() { "" } else { ": " };
         let target = if target.is_empty() { "-".to_owned() } else { target };
         let (value, how) = match self.measured {
-            Some((value, how)) => ((measure.show)(value), how),
+            Some((value, how)) => (measure.show(value), how),
             None => ("-".to_owned(), "-"),
         };
         [name.clone(), target, value, how.to_owned(), format!("{word}{why}{}", self.why)]

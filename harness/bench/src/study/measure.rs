@@ -13,8 +13,8 @@ pub struct Measure {
     pub name: &'static str,
     /// What it is measured of.
     pub(super) input: Input,
-    /// A value with its unit.
-    pub show: fn(f64) -> String,
+    /// How a value is shown.
+    unit: Unit,
     /// The value, or in one sentence what the runs do not report.
     pub(super) of: fn(&Sample) -> Result<f64, String>,
 }
@@ -49,24 +49,30 @@ impl<'a> Sample<'a> {
     }
 }
 
+/// A factor, a number of decimals, and what follows the number.
+type Unit = (f64, usize, &'static str);
+const PLAIN: Unit = (1.0, 3, "");
+const RATE: Unit = (1e-6, 2, " M cells/s");
+const PER_CELL: Unit = (1.0, 3, " B/cell");
+
 const fn measure(
     name: &'static str,
     input: Input,
-    show: fn(f64) -> String,
+    unit: Unit,
     of: fn(&Sample) -> Result<f64, String>,
 ) -> Measure {
-    Measure { name, input, show, of }
+    Measure { name, input, unit, of }
 }
 
 /// All measures.
 pub static MEASURES: [Measure; 15] = [
-    measure("cells_per_second_per_core", Alone, cells_rate, |s| Ok(s.run().rate())),
-    measure("facets_per_second_per_core", Alone, facets_rate, |s| {
+    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run().rate())),
+    measure("facets_per_second_per_core", Alone, (1e-6, 2, " M facets/s"), |s| {
         let run = s.run();
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
     }),
-    measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
-    measure("speed_up", Against, plain, |s| match [s.against.cells(), s.run().cells()] {
+    measure("seconds", Alone, (1.0, 3, " s"), |s| Ok(s.run().time_s.value)),
+    measure("speed_up", Against, PLAIN, |s| match [s.against.cells(), s.run().cells()] {
         [before, cells] if before != cells => Err(format!(
             "the runs are of different meshes, of {} and {} cells",
             grouped(before),
@@ -74,30 +80,36 @@ pub static MEASURES: [Measure; 15] = [
         )),
         _ => Ok(s.against.time_s.value / s.run().time_s.value),
     }),
-    measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against.rate())),
-    measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
-    measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),
-    measure("bytes_per_cell_beyond", Against, per_cell, |s| beyond(s.run(), s.against)),
-    measure("time_per_cell_growth", Series, plain, |s| Ok(growth(s.runs))),
-    measure("lambda_cells", Alone, plain, |s| lambda_cells(s.run())),
-    measure("lambda_cells_ratio", Against, plain, |s| {
+    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rate() / s.against.rate())),
+    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| Ok(peak(s.run()))),
+    measure("bytes_per_cell", Alone, PER_CELL, |s| Ok(s.run().bytes_per_cell().value)),
+    measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),
+    measure("time_per_cell_growth", Series, PLAIN, |s| Ok(growth(s.runs))),
+    measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run())),
+    measure("lambda_cells_ratio", Against, PLAIN, |s| {
         Ok(lambda_cells(s.run())? / lambda_cells(s.against)?)
     }),
-    measure("lambda_cpu", Alone, plain, |s| {
+    measure("lambda_cpu", Alone, PLAIN, |s| {
         Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
     }),
-    measure("efficiency", Against, plain, |s| match s.against.setup.ranks {
+    measure("efficiency", Against, PLAIN, |s| match s.against.setup.ranks {
         1 => Ok(s.run().efficiency(s.against).global()),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
-    measure("parallel_efficiency", Alone, plain, |s| Ok(s.run().efficiency(s.run()).parallel())),
-    measure("phase_share", Phases, |v| format!("{:.2} %", v * 100.0), share),
+    measure("parallel_efficiency", Alone, PLAIN, |s| Ok(s.run().efficiency(s.run()).parallel())),
+    measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];
 
 impl Measure {
     /// Returns the measure of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         MEASURES.iter().find(|measure| measure.name == name)
+    }
+
+    /// A value with its unit.
+    pub fn show(&self, value: f64) -> String {
+        let (factor, decimals, unit) = self.unit;
+        format!("{:.decimals$}{unit}", value * factor)
     }
 
     /// Whether it is an efficiency, which is 1 if nothing is lost.
@@ -113,27 +125,6 @@ pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure
         let all: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
         D::Error::custom(format!("unknown variant `{name}`, expected one of {}", all.join(", ")))
     })
-}
-
-fn plain(value: f64) -> String {
-    format!("{value:.3}")
-}
-
-fn cells_rate(value: f64) -> String {
-    format!("{:.2} M cells/s", value / 1e6)
-}
-
-fn facets_rate(value: f64) -> String {
-    format!("{:.2} M facets/s", value / 1e6)
-}
-
-fn per_cell(value: f64) -> String {
-    format!("{value:.3} B/cell")
-}
-
-fn gibibytes(bytes: f64) -> String {
-    let gib = bytes / f64::from(1 << 30);
-    if gib < 0.1 { format!("{:.1} MiB", gib * 1024.0) } else { format!("{gib:.2} GiB") }
 }
 
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.

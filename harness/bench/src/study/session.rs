@@ -128,8 +128,7 @@ impl Session<'_> {
     }
 
     fn append(&mut self, entry: Entry) -> Result<(), Failure> {
-        let line = self.record.append(entry);
-        let line = line.map_err(|error| contract::files::named(self.record.path(), &error))?;
+        let line = self.record.append(entry)?;
         self.lines.push(line);
         Ok(())
     }
