@@ -8,7 +8,6 @@ pub mod experiments;
 pub mod gate;
 pub mod jsonl;
 pub mod order;
-pub mod origin;
 pub mod replay;
 pub mod shrink;
 pub mod study;

@@ -152,7 +152,7 @@ fn what_cannot_be_meant_is_invalid_input() {
         (&["track", file, "--effect-min", "1e9"], "percentage"),
         (&["gate", "--baseline", file], "neither a program that can be executed nor"),
         (&["gate", "--candidate", file], "neither a program that can be executed nor"),
-        (&["gate", "--budget", "nan"], "greater than 0"),
+        (&["gate", "--budget", "nan"], "a whole number of seconds"),
     ] {
         let output = harness(arguments);
         let message = String::from_utf8(output.stderr).unwrap();

@@ -2,6 +2,7 @@
 
 use crate::junit::{skipped, suite, test, to_text, unsuccessful};
 use crate::markdown::escaped;
+use bench::gate::measures::LayerName;
 use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
 use quick_junit::NonSuccessKind::{Error, Failure};
 use quick_junit::TestCaseStatus;
@@ -91,10 +92,9 @@ fn summary(layer: &Layer) -> String {
     format!("{} ({:.1} s)", present.join(", "), layer.time_s)
 }
 
-/// Unchanged values are shown for the layers whose notes matter then, too: they state how certain a time is.
+/// Unchanged times are shown, too: their notes state how certain they are.
 fn is_shown(layer: &Layer, finding: &GateFinding) -> bool {
-    use bench::gate::measures::LayerName::{Correctness, Time};
-    finding.verdict != Verdict::Unchanged || matches!(layer.name, Time | Correctness)
+    finding.verdict != Verdict::Unchanged || layer.name == LayerName::Time
 }
 
 fn line(finding: &GateFinding) -> String {

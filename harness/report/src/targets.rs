@@ -2,7 +2,7 @@
 
 use crate::markdown::escaped;
 use crate::table::Table;
-use bench::experiments::entry::{Judged, Verdict};
+use bench::study::judge::{Judged, Verdict};
 
 fn table(rows: &[Judged]) -> Table {
     Table {
@@ -50,8 +50,7 @@ mod tests {
         .unwrap();
         let row = &targets.row[0];
         let missed = Judged {
-            measured: Some(99.5e6),
-            how: "measured".into(),
+            measured: Some((99.5e6, "measured")),
             ..unjudged(row, Verdict::Missed, String::new())
         };
         let failed = unjudged(row, Verdict::Failed, "run a failed: <no memory>".into());

@@ -62,14 +62,9 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             comm,
             partitioner: if weights.is_empty() { String::new() } else { "morton".into() },
             weights: weights.into(),
-            weight_exposed: (experiment == "weights").then_some(0),
             ..Setup::default()
         };
         let both_phases: Vec<f64> = times(repeat).iter().map(|t| 2.0 * t).collect();
-        // The first rank has three times as many exposed faces as any other.
-        let exposed: Vec<f64> = (0..ranks).map(|r| if r == 0 { 3.0 } else { 1.0 }).collect();
-        let exposed =
-            setup.weight_exposed.map(|_| ("exposed_faces".to_owned(), Spread::of(&exposed)));
         let counters = [
             ("leaves".to_owned(), Spread::of(&vec![cells as f64 / ranks as f64; ranks])),
             ("base_leaf_cells_max".to_owned(), Spread::of(&vec![cells as f64 / 500.0; ranks])),
@@ -91,7 +86,7 @@ fn run(experiment: &str, comm: Comm, ranks: usize, cells: u64, n: u32, weights: 
             peak_rss_bytes: Spread::of(&vec![1e6; ranks]),
             useful_s: Spread::of(&both_phases),
             phases: vec![phase("refine"), phase("grade")],
-            counters: counters.into_iter().chain(exposed).collect(),
+            counters: counters.into_iter().collect(),
         })))
     };
     (0..6).map(one).collect()
@@ -160,7 +155,6 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         "per-rank-uav-32",
         "per-rank-uav-64",
         "balance-uav-4M-64",
-        "balance-exposed-uav-4M-64",
         "rate",
         "memory",
     ] {
@@ -183,16 +177,6 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
     let balance =
         std::fs::read_to_string(place.path().join("figures/balance-uav-4M-64.csv")).unwrap();
     assert!(balance.contains(",morton former,mesher: by cells,measured\n"), "{balance}");
-    let exposed =
-        std::fs::read_to_string(place.path().join("figures/balance-exposed-uav-4M-64.csv"));
-    let exposed = exposed.unwrap();
-    assert!(
-        has_row(&exposed, "1", ",morton area,mesher: by faces,measured")
-            && exposed.contains(",1,2.909"),
-        "{exposed}"
-    );
-    let page = std::fs::read_to_string(written.page).unwrap();
-    assert_eq!(page.matches("<td>2.909</td>").count(), 3, "one run of each of three weights");
 }
 
 #[test]

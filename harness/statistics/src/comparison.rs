@@ -7,7 +7,6 @@
 //! random sign changes of the differences between the two baseline runs.
 
 use super::random::Random;
-use super::trimmed_mean::trimmed_mean;
 
 /// Minimum number of rounds for significance level `alpha`. With n rounds, a quarter of which the trimmed mean ignores at
 /// each end, no p-value is below 3^-(n - n/4): relabelling an ignored round does not change the effect. At least 8.
@@ -116,6 +115,18 @@ fn deviation(values: &[f64]) -> f64 {
     (squares / values.len() as f64).sqrt()
 }
 
+/// Fraction of the values discarded at either end.
+const TRIM: f64 = 0.25;
+
+/// Returns the mean of the middle half of the values: robust against the few rounds that other processes disturb.
+pub fn trimmed_mean(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let cut = (sorted.len() as f64 * TRIM) as usize;
+    let kept = &sorted[cut..sorted.len() - cut];
+    kept.iter().sum::<f64>() / kept.len().max(1) as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,5 +171,11 @@ mod tests {
     fn the_same_seed_gives_the_same_result() {
         let rounds = rounds(10, 1.02, 3);
         assert_eq!(compare(&rounds, 0.001, 9), compare(&rounds, 0.001, 9));
+    }
+
+    #[test]
+    fn outliers_at_either_end_are_discarded() {
+        assert_eq!(trimmed_mean(&[1.0, 2.0, 3.0, 1000.0]), 2.5);
+        assert_eq!(trimmed_mean(&[7.0]), 7.0);
     }
 }

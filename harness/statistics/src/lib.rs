@@ -2,9 +2,8 @@
 //!
 //! - [`mod@median`]: medians with intervals that assume no distribution;
 //! - [`comparison`]: candidate against baseline by a permutation test, for the gate;
-//! - [`mod@change_points`]: steps in a history, for `harness track`, from the segments of least cost;
+//! - [`mod@change_points`]: steps in a history, for `harness track`;
 //! - [`false_discovery`]: the rate of false alarms among many tests;
-//! - [`mod@trimmed_mean`]: the location estimate of the comparison;
 //! - [`random`]: the generator of permutations and samples.
 //!
 //! No crate offers these tests, and general statistics crates would add dependencies for a sort and a sum.
@@ -14,8 +13,5 @@ pub mod comparison;
 pub mod false_discovery;
 pub mod median;
 pub mod random;
-mod segments;
-pub mod trimmed_mean;
 
 pub use median::{Median, median, median_of};
-pub use trimmed_mean::trimmed_mean;

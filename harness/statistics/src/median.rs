@@ -47,14 +47,9 @@ pub fn median(values: &[f64]) -> Option<Median> {
 
 /// Returns the median of a non-empty slice.
 pub fn median_of(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
-    let n = values.len();
-    let (smaller, upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
-    if n % 2 == 1 {
-        return *upper;
-    }
-    let lower = smaller.iter().copied().max_by(f64::total_cmp).unwrap_or(*upper);
-    (lower + *upper) * 0.5
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    middle(&sorted)
 }
 
 /// Returns the median of values in ascending order.

@@ -75,10 +75,9 @@ pub enum Entry {
     Failure(Failure),
     /// A program was not run on a mesh.
     LeftOut(LeftOut),
-    /// A mesh was written and `harness audit` read it.
-    Audit(Audited),
-    /// A target was compared with measurements.
-    Target(Judged),
+    /// A verdict on a target, or the audit of a mesh, of records before 2026-11-24. It is not read.
+    #[serde(rename = "target", alias = "audit")]
+    Former,
 }
 
 /// The circumstances of a session.
@@ -208,8 +207,9 @@ pub struct Phase {
     pub message_bytes: Spread,
 }
 
-/// A run's parameters.
+/// A run's parameters. A line with another one is not read: runs that differ in it are no repetitions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Setup {
     /// The experiment: `strong`, `weak`, `spacing`, `layers`, `weights`; or `targets`.
     pub experiment: String,
@@ -232,9 +232,6 @@ pub struct Setup {
     pub level_base: Option<u32>,
     /// `unit`, `area` or `rebalance`; empty if the choice was left to the program.
     pub weights: String,
-    /// How many cells each exposed face weighs in the partition; 0 counts these faces only. `None`: they were not counted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub weight_exposed: Option<u32>,
     /// Cells that a series of several meshes was asked for, so that two such series of a case are apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub series_cells: Option<f64>,
@@ -247,17 +244,14 @@ impl Setup {
         Self { engine, case, spacing_min, layer_cells_min, ranks: 1, ..Self::default() }
     }
 
-    /// Returns partitioner and weights, or `default`, and the weight W of exposed faces if they have one.
+    /// Returns partitioner and weights, or `default`.
     pub fn division(&self) -> String {
         let chosen = match (self.partitioner.as_str(), self.weights.as_str()) {
             ("", "") => "default".to_owned(),
             (partitioner, weights) => format!("{partitioner} {weights}").trim().to_owned(),
         };
         let depth = self.level_base.map_or(String::new(), |level| format!(" depth {level}"));
-        match self.weight_exposed {
-            None | Some(0) => chosen + &depth,
-            Some(weight) => format!("{chosen}{depth} W={weight}"),
-        }
+        chosen + &depth
     }
 }
 
@@ -321,73 +315,6 @@ pub struct LeftOut {
     pub setup: Setup,
     /// The reason in a sentence.
     pub why: String,
-}
-
-/// A mesh that was written to disk and audited.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Audited {
-    /// The parameters of the run.
-    pub setup: Setup,
-    /// The audit's command line.
-    pub command: String,
-    /// Leaves of the mesh.
-    pub cells: u64,
-    /// Whether every check of the audit holds.
-    pub holds: bool,
-    /// Names of the checks with findings.
-    pub found: Vec<String>,
-    /// CPU time of the audit's process.
-    pub time_cpu_s: f64,
-    /// Its wall time.
-    pub time_wall_s: f64,
-    /// Its peak resident memory.
-    pub peak_rss_bytes: u64,
-}
-
-/// A row of a table of targets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
-    /// The row's name.
-    pub name: String,
-    /// Its runs, by their names in the file of targets.
-    pub runs: Vec<String>,
-    /// The run with which they are compared, if the measure has one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub against: Option<String>,
-    /// The measure.
-    pub measure: String,
-    /// Lower bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub at_least: Option<f64>,
-    /// Upper bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub at_most: Option<f64>,
-    /// The measured value; `None` if the row was left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub measured: Option<f64>,
-    /// `measured`, `oversubscribed`, `projected` or `audited`; empty if the row was left out.
-    pub how: String,
-    /// The verdict.
-    pub verdict: Verdict,
-    /// Why it was left out or failed, or why an efficiency is above 1.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub why: String,
-}
-
-/// The verdict on a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The value is within the bounds.
-    Met,
-    /// The value is outside the bounds.
-    Missed,
-    /// The row has no bounds.
-    ForComparison,
-    /// A run failed.
-    Failed,
-    /// The row was not measured: the user excluded it or a prerequisite is missing.
-    LeftOut,
 }
 
 #[cfg(test)]

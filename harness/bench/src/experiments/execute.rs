@@ -1,14 +1,12 @@
 //! Measured runs: one run of a setup, as a line of the record.
 
-use super::entry::{Audited, Comm, Phase, Run, Setup, Spread};
+use super::entry::{Comm, Phase, Run, Setup, Spread};
 use super::machine;
 use super::variant::Base;
 use check::audit::audit_against;
-use check::audit::record::AuditRecord;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::description::is_own;
-use run::engine::failure::{End, Failure as Ended};
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
@@ -119,42 +117,6 @@ impl Runner<'_> {
         self.programs.labelled(&setup.engine).with_launcher(self.launcher.clone())
     }
 
-    /// Writes the mesh of `setup` to a new directory in `disk`, runs `harness audit` on it, and removes it.
-    ///
-    /// # Errors
-    /// If the mesh or the audit fails. A mesh with findings is a result.
-    pub fn audit(&self, setup: &Setup, case: &Path, disk: &Path) -> Result<Audited, Failure> {
-        let place = tempfile::Builder::new().prefix("harness-audit-").tempdir_in(disk)?;
-        let mesh = place.path().join("mesh");
-        let options = RunOptions {
-            mesh: Some(&mesh),
-            report: false,
-            ..RunOptions::new(self.place, self.limit)
-        };
-        self.engine(setup).run(case, &layout(setup), &options)?;
-        let json = self.place.join("audit.json");
-        let _ = fs::remove_file(&json);
-        let mut command = Command::new(&self.programs.paths.harness);
-        command.arg("audit").arg(&mesh).arg("--json").arg(&json);
-        match process::run(&mut command, &Watch::new("audit", self.limit, self.place)) {
-            // 1: a check failed, which the record contains.
-            Ok(_) | Err(Ended { end: End::Exited { code: 1, .. }, .. }) => {}
-            Err(failure) => return Err(failure.into()),
-        }
-        let record = AuditRecord::read(&json)?;
-        let found = record.checks.iter().filter(|c| c.findings > 0).map(|c| c.name.clone());
-        Ok(Audited {
-            setup: setup.clone(),
-            command: shown(&command),
-            cells: record.leaves,
-            holds: record.holds,
-            found: found.collect(),
-            time_cpu_s: record.time_cpu_s,
-            time_wall_s: record.time_wall_s,
-            peak_rss_bytes: record.peak_rss_bytes,
-        })
-    }
-
     /// Runs the ping-pong on two ranks and returns its output.
     ///
     /// # Errors
@@ -194,9 +156,8 @@ fn layout(setup: &Setup) -> Layout {
     };
     let choice = |value: &String| Some(value.clone()).filter(|value| !value.is_empty());
     let (partitioner, weights) = (choice(&setup.partitioner), choice(&setup.weights));
-    let (weight_exposed, level_base) = (setup.weight_exposed, setup.level_base);
-    let level_base = level_base.map(|level| level.to_string());
-    Layout { partitioner, weights, weight_exposed, level_base, ..Layout::on(ranks) }
+    let level_base = setup.level_base.map(|level| level.to_string());
+    Layout { partitioner, weights, level_base, ..Layout::on(ranks) }
 }
 
 /// The measurements in a run report.

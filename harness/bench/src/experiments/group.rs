@@ -11,9 +11,8 @@ use super::cause::sentence;
 use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
-use crate::order::{by_key, distinct};
-use crate::origin::Origins;
-use run::engine::takes::EQUAL_RUNS;
+use crate::order::{Origins, by_key, distinct};
+use run::engine::takes::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median};
 use std::collections::{BTreeMap, HashMap};
 
@@ -167,7 +166,7 @@ impl Groups {
                     None => runs.push((&**run, &line.session)),
                     Some(why) => left_out.push(LeftOut { setup: run.setup.clone(), why }),
                 },
-                Entry::Audit(_) | Entry::Target(_) => {}
+                Entry::Former => {}
             }
         }
         let group = |(setup, runs): (Setup, Vec<(&Run, &String)>)| {
@@ -270,7 +269,7 @@ impl Groups {
 }
 
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
-fn another_mesh(
+pub(crate) fn another_mesh(
     run: &Run,
     lacks: &BTreeMap<String, Vec<String>>,
     digests: &mut HashMap<String, String>,
@@ -282,7 +281,7 @@ fn another_mesh(
         return None;
     }
     let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
-    if !lacks.is_empty() {
+    if lacks.iter().any(|what| what == EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
     let first = digests.entry(mesh).or_insert_with(|| run.digest.clone());

@@ -35,8 +35,6 @@ pub struct Efficiency {
     pub computation_scaling: f64,
     /// T.
     pub time_s: f64,
-    /// Whether the reference has as many facets and another number of cells.
-    pub has_fixed_facets: bool,
 }
 
 /// A factor of efficiency, or a product of factors.
@@ -119,7 +117,7 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     let (time_s, path_s) = (time_s(run, network), path_s(run));
     let before = per_cell(&reference.useful_s, reference);
-    factors([run, reference], &run.useful_s, path_s, time_s, before)
+    factors(run, &run.useful_s, path_s, time_s, before)
 }
 
 /// Returns the efficiencies of one phase relative to the same phase of the reference run, if it exists.
@@ -132,24 +130,17 @@ pub fn phase_efficiency(
     let time_s = phase_s(run, phase, network);
     let before = reference.phases.iter().find(|p| p.name == phase.name);
     let before = before.map_or(0.0, |p| per_cell(&p.useful_s, reference));
-    factors([run, reference], &phase.useful_s, phase.useful_s.max, time_s, before)
+    factors(run, &phase.useful_s, phase.useful_s.max, time_s, before)
 }
 
 /// Returns the factors of a time in which the ranks work so long, along a path, with the work per cell of the reference.
-fn factors(
-    [run, reference]: [&Run; 2],
-    useful_s: &Spread,
-    path_s: f64,
-    time_s: f64,
-    before: f64,
-) -> Efficiency {
+fn factors(run: &Run, useful_s: &Spread, path_s: f64, time_s: f64, before: f64) -> Efficiency {
     let efficiency = Efficiency {
         load_balance: 1.0 / useful_s.lambda(run.setup.ranks),
         serialisation: ratio(useful_s.max, path_s),
         transfer: ratio(path_s, time_s),
         computation_scaling: ratio(before, per_cell(useful_s, run)),
         time_s,
-        has_fixed_facets: run.facets == reference.facets && run.cells != reference.cells,
     };
     // A sum of stored times has the errors of all.
     let off = |of_s: f64| 1e-9 + ROUNDING_S * (run.phases.len() + 1) as f64 / of_s.max(ROUNDING_S);
@@ -166,15 +157,12 @@ fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
 /// # Panics
 /// If an efficiency exceeds 1 and no factor can be the reason: then a factor is wrong.
 pub fn above_one(all: &[Efficiency]) -> Option<String> {
-    let scaling = match all.iter().any(|e| e.has_fixed_facets) {
-        true => "the facets are fixed, and their cost does not grow with the mesh",
-        false => "smaller parts of a mesh fit into caches better, or the base case was disturbed",
-    };
-    let scaling = format!(
-        "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: {scaling}."
-    );
     let factors: [(Factor, &str); 3] = [
-        (|e| e.computation_scaling, &scaling),
+        (
+            |e| e.computation_scaling,
+            "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: the cost of the \
+             same facets does not grow with the mesh, smaller parts of a mesh fit into caches better, or the base case was disturbed.",
+        ),
         (
             |e| e.serialisation,
             "Serialisation is above 1 where CPU time outside of the phases is on the slowest rank.",
@@ -272,11 +260,6 @@ mod tests {
         let scaled = efficiency(&less, &one, &FREE);
         assert_eq!(above_one(&[ideal]), None);
         assert!(above_one(&[ideal, scaled]).unwrap().contains("caches"));
-        // Only where the mesh grows and the facets do not.
-        let large = |facets| Run { cells: 200, facets, ..less.clone() };
-        let weak = |facets| above_one(&[efficiency(&large(facets), &one, &FREE)]).unwrap();
-        assert!(weak(one.facets).contains("the facets are fixed"));
-        assert!(weak(2 * one.facets).contains("caches"));
         let mut overlapping = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0]), ("b", &[1.0, 3.0])]);
         overlapping.time_wall_s = 3.9;
         let early = Efficiency { serialisation: 1.1, ..efficiency(&overlapping, &one, &FREE) };

@@ -2,6 +2,7 @@
 
 use super::entry::{Entry, Line, SCHEMA};
 use crate::jsonl;
+use contract::files::named;
 use jiff::Timestamp;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,11 +21,6 @@ impl Record {
         Self { path: path.to_owned(), session }
     }
 
-    /// Returns the path of the file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Appends a line, and returns it.
     ///
     /// # Errors
@@ -36,7 +32,8 @@ impl Record {
             time_utc: now_utc(),
             entry,
         };
-        jsonl::append(&self.path, &line).map(|()| line)
+        let appended = jsonl::append(&self.path, &line);
+        appended.map(|()| line).map_err(|error| named(&self.path, &error))
     }
 }
 
@@ -51,6 +48,7 @@ pub fn read(path: &Path) -> io::Result<Content> {
     let (mut lines, mut broken) = Content::default();
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
+            Ok(Line { entry: Entry::Former, .. }) => {}
             Ok(line) if line.schema == SCHEMA => match line.fault() {
                 None => lines.push(line),
                 Some(why) => broken.push((number, why)),

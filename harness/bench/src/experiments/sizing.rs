@@ -1,25 +1,22 @@
-//! Finds the spacing that gives a requested number of cells by extrapolation from coarser meshes.
+//! Finds the spacing that gives a requested number of cells from coarser meshes.
 //!
-//! The number of cells follows a power of the spacing, close to -2 if cells fill layers around a surface. The exponent is
-//! estimated from the two nearest meshes so far, each a few times finer than the previous one.
+//! The number of cells follows a power of the spacing, close to -2 if cells fill layers around a surface. Meshes become finer until one
+//! has at least half of the requested cells; an overshooting mesh would cost more than the requested one. A large mesh is then
+//! extrapolated. Small ones grow unevenly, as levels begin, so that one is searched between its neighbours.
 
 /// Tolerated relative deviation of the number of cells.
 const TOLERANCE: f64 = 0.02;
-/// Up to this number of cells, the answer is the spacing of a mesh that was made: levels make small meshes grow unevenly.
+/// Up to this number of cells, the answer is the spacing of a mesh that was made.
 const MADE_MAX: f64 = 1e7;
 /// Maximum number of meshes for one answer.
 const MESHES_MAX: usize = 16;
-/// Two meshes within this factor of the requested size determine the exponent.
-const NEAR: f64 = 4.0;
-/// Size of the next mesh as a fraction of the requested size: an overshooting mesh would cost more than the requested one.
-const AIM: f64 = 0.5;
 /// Maximum growth of cells from mesh to mesh: a distant extrapolation may be far off.
 const STEP: f64 = 40.0;
 
 /// Known sizes of one case at one n.
 #[derive(Clone, Debug, Default)]
 pub struct Sizes {
-    /// Spacing and cells of the meshes so far, coarsest first.
+    /// Spacing and cells of the meshes so far.
     meshes: Vec<(f64, f64)>,
     /// Requested cells and the spacing returned, so that a repeated request returns the same spacing.
     answers: Vec<(f64, f64)>,
@@ -36,85 +33,65 @@ impl Sizes {
         coarse: f64,
         mut mesh: impl FnMut(f64) -> Result<u64, E>,
     ) -> Result<f64, E> {
-        if let Some(answer) = self.answers.iter().find(|a| a.0 == cells) {
+        if let Some(answer) = self.answers.iter().find(|answer| answer.0 == cells) {
             return Ok(answer.1);
         }
-        for _ in 0..MESHES_MAX {
-            if self.is_known(cells) {
-                break;
-            }
-            let next = match self.finest_below(cells) {
+        let mut answer = None;
+        for count in 0..MESHES_MAX {
+            let next = match self.nearest(cells, |_| true) {
                 None => coarse,
-                Some(_) if self.has_two_near(cells) => self.between(cells),
-                Some((spacing, count)) => {
-                    let more = AIM * cells / count;
-                    let more = if count < cells { more.clamp(1.5, STEP) } else { more.min(0.8) };
+                Some(made) if (made.1 / cells).ln().abs() < TOLERANCE => break,
+                Some(made) if made.1 < cells / 2.0 => {
+                    let more = (cells / 2.0 / made.1).clamp(1.5, STEP);
                     // The exponent grows with refinement up to about 2; a smaller one would overshoot.
-                    spacing / more.powf(1.0 / self.power(cells).max(2.0))
+                    made.0 / more.powf(1.0 / self.power(cells).max(2.0))
                 }
+                Some(_) if cells > MADE_MAX => {
+                    answer = Some(self.guess(cells));
+                    break;
+                }
+                Some(_) => self.between(cells, count),
             };
-            let count = mesh(next)?.max(1) as f64;
-            self.meshes.push((next, count));
-            self.meshes.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let made = mesh(next)?.max(1) as f64;
+            self.meshes.push((next, made));
         }
-        let nearest = self.nearest(cells).filter(|_| cells <= MADE_MAX);
-        let answer = nearest.map_or_else(|| self.guess(cells), |mesh| mesh.0);
+        let nearest = self.nearest(cells, |_| true);
+        let answer = answer.or(nearest.map(|made| made.0)).unwrap_or(coarse);
         self.answers.push((cells, answer));
         Ok(answer)
     }
 
-    /// Whether one mesh is close enough, or two determine the exponent and suffice.
-    fn is_known(&self, cells: f64) -> bool {
-        let is_close = self.nearest(cells).is_some_and(|m| off(m, cells) < TOLERANCE);
-        is_close || cells > MADE_MAX && self.has_two_near(cells)
-    }
-
-    fn has_two_near(&self, cells: f64) -> bool {
-        self.meshes.iter().filter(|m| off(**m, cells) < NEAR.ln()).count() > 1
-    }
-
-    fn nearest(&self, cells: f64) -> Option<(f64, f64)> {
-        let meshes = self.meshes.iter().copied();
-        meshes.min_by(|a, b| off(*a, cells).total_cmp(&off(*b, cells)))
+    /// Returns the mesh whose size is nearest, of those with such a number of cells.
+    fn nearest(&self, cells: f64, is_wanted: impl Fn(f64) -> bool) -> Option<(f64, f64)> {
+        let off = |made: &(f64, f64)| (made.1 / cells).ln().abs();
+        let made = self.meshes.iter().filter(|made| is_wanted(made.1)).copied();
+        made.min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     /// The spacing to try next. The number of cells jumps, so extrapolation alone may return to the same meshes: every second time, the middle
     /// between the nearest meshes with fewer and with more cells.
-    fn between(&self, cells: f64) -> f64 {
-        let nearest = |of: fn(f64, f64) -> bool| {
-            let meshes = self.meshes.iter().filter(|m| of(m.1, cells));
-            meshes.min_by(|a, b| off(**a, cells).total_cmp(&off(**b, cells)))
-        };
-        let ends = nearest(|count, cells| count < cells).zip(nearest(|count, cells| count > cells));
-        match ends.filter(|_| self.meshes.len() % 2 == 1) {
+    fn between(&self, cells: f64, count: usize) -> f64 {
+        let below = self.nearest(cells, |count| count < cells);
+        let ends = below.zip(self.nearest(cells, |count| count > cells));
+        match ends.filter(|_| count % 2 == 1) {
             Some((below, above)) => (below.0 * above.0).sqrt(),
             None => self.guess(cells),
         }
     }
 
+    /// The extrapolated spacing; there is a mesh.
     fn guess(&self, cells: f64) -> f64 {
-        let scaled = |m: (f64, f64)| m.0 * (m.1 / cells).powf(1.0 / self.power(cells));
-        self.nearest(cells).map_or(1.0, scaled)
-    }
-
-    fn finest_below(&self, cells: f64) -> Option<(f64, f64)> {
-        self.meshes.iter().rev().find(|m| m.1 < cells).copied().or(self.meshes.first().copied())
+        let near = self.nearest(cells, |_| true);
+        near.map_or(1.0, |made| made.0 * (made.1 / cells).powf(1.0 / self.power(cells)))
     }
 
     /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
     fn power(&self, cells: f64) -> f64 {
-        let mut near = self.meshes.clone();
-        near.sort_by(|a, b| off(*a, cells).total_cmp(&off(*b, cells)));
-        match near[..] {
-            [a, b, ..] if a.0 != b.0 => ((a.1 / b.1).ln() / (b.0 / a.0).ln()).clamp(1.0, 3.0),
-            _ => 2.0,
-        }
+        let ends = self.nearest(cells, |_| true);
+        let other = ends.and_then(|one| self.nearest(cells, |count| count != one.1));
+        let power = |(a, b): ((f64, f64), (f64, f64))| (a.1 / b.1).ln() / (b.0 / a.0).ln();
+        ends.zip(other).map_or(2.0, |both| power(both).clamp(1.0, 3.0))
     }
-}
-
-/// Relative deviation of a mesh from a number of cells, as a logarithm.
-fn off(mesh: (f64, f64), cells: f64) -> f64 {
-    (mesh.1 / cells).ln().abs()
 }
 
 #[cfg(test)]

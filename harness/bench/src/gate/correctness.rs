@@ -4,44 +4,35 @@
 //! nothing to check is compared only if the baseline's had nothing either: what a mesh no longer states cannot be found wrong.
 
 use super::Bench;
-use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
+use super::measures::LayerName;
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
 use super::rules::Selected;
-use super::subject::Baseline;
 use check::checks::CHECKS as CHECKS_OF_MESHES;
 use contract::failure::Failure;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
 use run::verify::options::Options;
-use run::verify::report::{CaseReport, Check, Outcome, Tally};
+use run::verify::report::{CaseReport, Check, Outcome};
 use run::verify::verify;
-use std::collections::BTreeSet;
+use std::cmp::Ordering;
 
 /// Verifies the candidate on the cases of this layer: every check of what it promises. Oracles and p4est are left to
 /// `harness verify`.
 ///
 /// # Errors
 /// If verification cannot start.
-pub fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) -> Result<(), Failure> {
+pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
     for case in bench.cases_of(LayerName::Correctness) {
-        let name = &case.rule.name;
         let report = verified(bench, &bench.candidate, case)?;
-        let new = Known::of(&report);
-        let is_plain = new.findings.is_empty() && new.unchecked.iter().all(BTreeSet::is_empty);
+        let is_plain = report.checks.iter().all(|check| !check.failed() && !is_unchecked(check));
         let baseline = match &bench.baseline {
-            Baseline::Program(subject) if !is_plain => {
-                Known::of(&verified(bench, &subject.engine, case)?)
-            }
-            Baseline::Record(_, record) => {
-                record.cases.get(name).map(Known::of_record).unwrap_or_default()
-            }
-            Baseline::Program(_) => Known::default(),
-            Baseline::None => Known { is_absent: true, ..Known::default() },
+            // Nothing of it can be better.
+            Some(_) if is_plain => Some(report.clone()),
+            Some(subject) => Some(verified(bench, &subject.engine, case)?),
+            None => None,
         };
-        let of_case = measures.case(name);
-        (of_case.findings, of_case.unchecked) = (new.findings, new.unchecked);
-        layer.findings.extend(findings(name, &case.mpi, &report, &baseline));
+        layer.findings.extend(findings(&case.rule.name, &case.mpi, &report, baseline.as_ref()));
     }
     Ok(())
 }
@@ -66,96 +57,60 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
     cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.rule.name)))
 }
 
-/// What is known of the checks of a program on a case.
-#[derive(Default)]
-struct Known {
-    /// Number of findings by failed check.
-    findings: Numbers,
-    /// The checks of meshes that were left out; `None` if unknown.
-    unchecked: Option<BTreeSet<String>>,
-    /// Whether there is nothing to compare with.
-    is_absent: bool,
-}
-
-impl Known {
-    fn of(case: &CaseReport) -> Self {
-        let failed = case.checks.iter().filter(|check| check.failed());
-        let unchecked = case.checks.iter().filter(|check| is_unchecked(check));
-        let has_mesh = !case.checks.iter().any(|check| check.failed() && check.name == RUNS);
-        Self {
-            findings: failed.map(|check| (key(check), count(check))).collect(),
-            // Without a mesh, no check of it is known to have been possible.
-            unchecked: has_mesh.then(|| unchecked.map(key).collect()),
-            is_absent: false,
-        }
-    }
-
-    fn of_record(case: &CaseMeasures) -> Self {
-        let (findings, unchecked) = (case.findings.clone(), case.unchecked.clone());
-        Self { findings, unchecked, is_absent: false }
-    }
-}
-
 /// Whether a mesh gave this check nothing to check.
 fn is_unchecked(check: &Check) -> bool {
     let is_of_mesh = CHECKS_OF_MESHES.iter().any(|of_mesh| of_mesh.name == check.name);
     is_of_mesh && matches!(check.outcome, Outcome::LeftOut { .. })
 }
 
-/// A finding for the serial mesh, and one for each number of ranks.
-fn findings(case: &str, mpi: &[usize], report: &CaseReport, baseline: &Known) -> Vec<GateFinding> {
+/// A finding for each check that was run, and for the serial mesh or a number of ranks without one.
+fn findings(
+    case: &str,
+    mpi: &[usize],
+    report: &CaseReport,
+    baseline: Option<&CaseReport>,
+) -> Vec<GateFinding> {
     if let Some(why) = &report.input_error {
         return vec![GateFinding::noted(case, CHECKS, Verdict::Regression, why)];
     }
-    let of_ranks = |ranks: Option<usize>| {
-        let checks: Vec<&Check> = report.checks.iter().filter(|c| c.ranks == ranks).collect();
-        let metric = ranks.map_or(CHECKS.to_owned(), |ranks| format!("{ranks} MPI ranks/{CHECKS}"));
-        finding(case, &metric, &checks, baseline)
-    };
-    std::iter::once(None).chain(mpi.iter().copied().map(Some)).map(of_ranks).collect()
+    let mut all = Vec::new();
+    for ranks in std::iter::once(None).chain(mpi.iter().copied().map(Some)) {
+        let checks = || report.checks.iter().filter(|check| check.ranks == ranks);
+        if checks().all(|check| count(check).is_none()) {
+            let metric = ranks.map_or(CHECKS.into(), |ranks| format!("{ranks} MPI ranks/{CHECKS}"));
+            let why = checks().next().map_or("no check was run", first_line);
+            all.push(GateFinding::noted(case, &metric, Verdict::Missing, why));
+        }
+        all.extend(checks().filter_map(|check| finding(case, check, baseline)));
+    }
+    all
 }
 
-fn finding(case: &str, metric: &str, checks: &[&Check], baseline: &Known) -> GateFinding {
-    let Tally { pass, fail, .. } = checks.iter().copied().collect();
-    let before = |check: &Check| baseline.findings.get(&key(check)).copied().unwrap_or(0);
-    let old: u64 = checks.iter().map(|check| before(check)).sum();
-    let new: u64 = checks.iter().map(|check| count(check)).sum();
-    let counts = format!("{fail} checks fail with {new} findings, {old} in the baseline");
-    let without_mesh = checks.iter().find(|check| check.failed() && check.name == RUNS);
-    let was_checked =
-        |check: &&&Check| baseline.unchecked.as_ref().is_some_and(|u| !u.contains(&key(check)));
-    let unchecked = checks.iter().filter(|check| is_unchecked(check)).find(was_checked);
-    let worse = checks.iter().find(|check| count(check) > before(check));
-    let (verdict, note) = match (worse, unchecked) {
-        (Some(worse), _) => {
-            let (check, why) = (key(worse), first_line(worse));
-            let what = match baseline.is_absent {
-                true => format!("{fail} checks fail with {new} findings: {check}: {why}"),
-                false => format!("{counts}; worse than the baseline: {check}: {why}"),
-            };
-            (Verdict::Regression, what)
-        }
-        (None, _) if without_mesh.is_some() => {
-            let why = without_mesh.map_or("", |check| first_line(check));
-            let note = format!("neither program makes a mesh: {why}");
-            return GateFinding::noted(case, metric, Verdict::Missing, note);
-        }
-        (None, Some(check)) => {
-            let (key, why) = (key(check), first_line(check));
-            let note =
-                format!("the baseline's {key} is checked, and the candidate's is not: {why}");
-            return GateFinding::noted(case, metric, Verdict::Missing, note);
-        }
-        (None, None) if new < old => (Verdict::Improvement, counts),
-        (None, None) if fail > 0 => (Verdict::Unchanged, counts),
-        (None, None) if pass > 0 => (Verdict::Unchanged, format!("{pass} checks hold")),
-        (None, None) => {
-            let why = checks.first().map_or("no check was run", |check| first_line(check));
-            (Verdict::Missing, why.to_owned())
-        }
+/// The comparison of a check; `None` of one that was left out.
+fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<GateFinding> {
+    let (metric, why) = (key(check), first_line(check));
+    let noted = |verdict, note: String| GateFinding::noted(case, &metric, verdict, note);
+    let old = baseline.and_then(|report| report.checks.iter().find(|old| key(old) == metric));
+    let old = old.and_then(count);
+    let Some(new) = count(check) else {
+        let note = || format!("the baseline's is checked, and the candidate's is not: {why}");
+        return (is_unchecked(check) && old.is_some()).then(|| noted(Verdict::Missing, note()));
     };
-    let compared = (pass + fail) as u64;
-    GateFinding { compared, ..GateFinding::noted(case, metric, verdict, note) }
+    let verdict = match new.cmp(&old.unwrap_or(0)) {
+        Ordering::Less => Verdict::Improvement,
+        Ordering::Equal => Verdict::Unchanged,
+        Ordering::Greater => Verdict::Regression,
+    };
+    Some(match baseline {
+        None => GateFinding { compared: 1, ..noted(verdict, why.to_owned()) },
+        Some(_) if check.name == RUNS && new > 0 && verdict == Verdict::Unchanged => {
+            noted(Verdict::Missing, format!("neither program makes a mesh: {why}"))
+        }
+        Some(_) => {
+            let values = [old.unwrap_or(0), new].map(|count| count as f64);
+            GateFinding::of_values(case, &metric, verdict, values, why.to_owned())
+        }
+    })
 }
 
 fn key(check: &Check) -> String {
@@ -170,9 +125,13 @@ fn first_line(check: &Check) -> &str {
     }
 }
 
-/// The number of findings of a check, at least 1 if it fails.
-fn count(check: &Check) -> u64 {
-    if check.failed() { check.findings.max(1) } else { 0 }
+/// The number of findings of a check, at least 1 if it fails; `None` if it was left out.
+fn count(check: &Check) -> Option<u64> {
+    match check.outcome {
+        Outcome::LeftOut { .. } => None,
+        Outcome::Fail { .. } => Some(check.findings.max(1)),
+        _ => Some(0),
+    }
 }
 
 #[cfg(test)]
@@ -193,43 +152,58 @@ mod tests {
         CaseReport { name: "c".into(), checks, ..CaseReport::default() }
     }
 
-    fn against(case: &CaseReport, baseline: &Known) -> GateFinding {
-        findings("c", &[], case, baseline).remove(0)
+    /// The worst finding.
+    fn against(case: &CaseReport, baseline: &CaseReport) -> GateFinding {
+        let all = findings("c", &[], case, Some(baseline));
+        all.into_iter().max_by_key(|finding| finding.verdict).unwrap()
     }
 
     #[test]
     fn only_new_and_more_findings_are_a_regression() {
-        let baseline = Known::of(&case(&[("layer", 7), ("spacing", 2)]));
+        let baseline = case(&[("layer", 7), ("spacing", 2)]);
         let of = |failed: &[(&str, u64)]| against(&case(failed), &baseline).verdict;
         assert_eq!(of(&[("layer", 7), ("spacing", 2)]), Verdict::Unchanged);
-        assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Improvement);
-        assert_eq!(of(&[("layer", 7)]), Verdict::Improvement);
+        assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Unchanged);
         assert_eq!(of(&[("layer", 8), ("spacing", 1)]), Verdict::Regression);
         assert_eq!(of(&[("layer", 1), ("sides", 1)]), Verdict::Regression);
-        let note = against(&case(&[("sides", 1)]), &baseline).note;
-        assert!(note.contains("worse than the baseline: serial: sides: here"), "{note}");
+        let better = findings("c", &[], &case(&[("layer", 6)]), Some(&baseline));
+        let improved = better.iter().filter(|found| found.verdict == Verdict::Improvement);
+        assert_eq!(improved.count(), 2);
+        let worse = against(&case(&[("sides", 1)]), &baseline);
+        assert_eq!((worse.metric.as_str(), worse.note.as_str()), ("serial: sides", "here"));
+    }
+
+    #[test]
+    fn without_a_baseline_a_failed_check_is_a_regression() {
+        let verdicts = |of: &CaseReport| -> Vec<Verdict> {
+            findings("c", &[], of, None).iter().map(|found| found.verdict).collect()
+        };
+        assert_eq!(verdicts(&case(&[])), [Verdict::Unchanged; 3]);
+        assert!(verdicts(&case(&[("layer", 1)])).contains(&Verdict::Regression));
     }
 
     #[test]
     fn a_check_that_the_baseline_has_and_the_candidate_leaves_out_is_missing() {
         let (all, mut without) = (case(&[]), case(&[]));
         without.checks[0].outcome = Outcome::left_out("the sides of the leaves are unknown");
-        let missing = against(&without, &Known::of(&all));
+        let missing = against(&without, &all);
         assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
-        assert!(missing.note.contains("serial: layer is checked"), "{}", missing.note);
+        assert_eq!(missing.metric, "serial: layer");
         assert!(missing.note.ends_with("the sides of the leaves are unknown"), "{}", missing.note);
-        let verdict = |known: &Known| against(&without, known).verdict;
-        assert_eq!(verdict(&Known::of(&without)), Verdict::Unchanged);
-        assert_eq!(verdict(&Known::default()), Verdict::Unchanged, "an old record");
-        assert_eq!(against(&all, &Known::of(&without)).verdict, Verdict::Unchanged);
+        assert_eq!(against(&without, &without).verdict, Verdict::Unchanged);
+        assert_eq!(against(&all, &without).verdict, Verdict::Unchanged);
+        let mut none = case(&[]);
+        none.checks.iter_mut().for_each(|check| check.outcome = Outcome::left_out("no mesh"));
+        assert_eq!(against(&none, &none).verdict, Verdict::Missing, "nothing was checked");
+        let ranks = findings("c", &[2], &all, Some(&all));
+        assert!(ranks.iter().any(|found| found.metric == "2 MPI ranks/checks"), "{ranks:?}");
     }
 
     #[test]
     fn two_programs_without_a_mesh_cannot_be_compared() {
-        let baseline = Known::of(&case(&[(RUNS, 1)]));
-        let finding = |known: &Known| against(&case(&[(RUNS, 1)]), known);
-        let missing = finding(&baseline);
+        let without = case(&[(RUNS, 1)]);
+        let missing = against(&without, &without);
         assert_eq!((missing.verdict, missing.compared), (Verdict::Missing, 0));
-        assert_eq!(finding(&Known::default()).verdict, Verdict::Regression);
+        assert_eq!(against(&without, &case(&[])).verdict, Verdict::Regression);
     }
 }

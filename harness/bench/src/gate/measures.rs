@@ -1,8 +1,7 @@
-//! The measures of one program: counters, digests, memory, instructions. Recorded, they are a baseline that needs no build,
-//! and a point in the history of `harness track`.
+//! The measures of one program: counters, digests, memory, instructions. Recorded, they are a point in the history of `harness track`.
 
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Version of the JSON form.
@@ -91,15 +90,6 @@ pub struct CaseMeasures {
     pub memory: Numbers,
     /// Counts by valgrind; deterministic except for hash seeds and addresses.
     pub counted: Numbers,
-    /// Instructions by function.
-    #[serde(skip)]
-    pub functions: Numbers,
-    /// Number of findings by failed check.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub findings: Numbers,
-    /// The checks of meshes that were left out; `None` if none was run, and in old records.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unchecked: Option<BTreeSet<String>>,
 }
 
 impl CaseMeasures {

@@ -8,7 +8,6 @@
 //! Invariant: times of different sessions are never compared.
 
 mod build;
-mod callgrind;
 mod correctness;
 pub mod measures;
 pub mod numbers;
@@ -35,12 +34,12 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use subject::{Baseline, Subject};
+use subject::Subject;
 
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
 pub struct GateOptions {
-    /// A revision (built and kept), a program, or a record of --record [default: none; the candidate is only measured]
+    /// A revision (built and kept), or a program [default: none; the candidate is only measured]
     #[arg(long, value_name = "REVISION|FILE")]
     pub baseline: Option<String>,
     /// A revision, a program, or `.` for the working tree [default: `.` against a revision, else --mesher]
@@ -65,32 +64,23 @@ pub struct GateOptions {
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
     pub timeout: u64,
     /// Time for one case in the layer of time [default: from the rules]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    pub budget: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
+    pub budget: Option<u64>,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
-    /// Where revisions are built and kept [default: target/gate in the repository]
-    #[arg(long, value_name = "DIR")]
-    pub cache: Option<PathBuf>,
 }
 
 impl GateOptions {
     /// Where revisions are built and kept.
     fn cache(&self) -> PathBuf {
-        self.cache.clone().unwrap_or_else(|| self.repository.join("target/gate"))
+        self.repository.join("target/gate")
     }
 
     /// Time limit of every single run.
     fn limit(&self) -> Duration {
         Duration::from_secs(self.timeout)
     }
-}
-
-/// Parses a time in seconds: more than 0, and at most a week.
-fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|n| *n > 0.0 && *n <= 604_800.0);
-    number.ok_or_else(|| "give a number greater than 0 and at most 604800".to_owned())
 }
 
 /// A file that is read, and must not be written.
@@ -105,7 +95,8 @@ struct Bench<'a> {
     cases: Vec<Selected>,
     programs: &'a Programs,
     candidate: Engine,
-    baseline: Baseline,
+    /// What the candidate is compared with; `None` if it is only measured.
+    baseline: Option<Subject>,
     /// Directory for the files of runs.
     place: &'a Path,
     /// Counters and memory, of which each layer takes its own, by program and case.
@@ -121,12 +112,13 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Fa
     let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
     let rules = Rules::read(&rules)?;
     let cases = rules.select(&options.case, programs)?;
-    let baseline = Baseline::find(options, &programs.engine)?;
-    let candidate = Subject::candidate(options, &programs.engine, &baseline)?;
+    let baseline = Subject::baseline(options, &programs.engine)?;
+    let candidate = Subject::candidate(options, &programs.engine, baseline.as_ref())?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir()?;
     let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
     let measures = Measures { machine, ..Measures::of_program(candidate.measured) };
-    let mut report = GateReport::new(baseline.measured(), measures);
+    let mut report =
+        GateReport::new(baseline.as_ref().map(|subject| subject.measured.clone()), measures);
     let (candidate, counted) = (candidate.engine, RefCell::default());
     let (rules, place) = (&rules, place.path());
     let bench = Bench { options, rules, cases, programs, candidate, baseline, place, counted };
@@ -154,7 +146,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
         let mut layer = Layer::new(name, cases);
         let measures = &mut report.candidate_measures;
         match name {
-            LayerName::Correctness => correctness::layer(bench, measures, &mut layer)?,
+            LayerName::Correctness => correctness::layer(bench, &mut layer)?,
             LayerName::Time => time::layer(bench, &mut layer),
             _ => numbers::layer(bench, measures, &mut layer),
         }

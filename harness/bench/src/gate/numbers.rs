@@ -2,11 +2,9 @@
 //! counts. Numbers are compared by name; one that the candidate no longer has is missing, and a new one is a change.
 
 use super::Bench;
-use super::callgrind::{Profile, differences};
 use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
 use super::report::{GateFinding, Layer, Verdict, change_percent};
 use super::rules::Selected;
-use super::subject::Baseline;
 use check::promises::Independence;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, SERIAL};
@@ -23,8 +21,6 @@ const CELLS: &str = "cells";
 pub const MEMORY: &str = "peak_rss_bytes";
 /// Growth of the memory that is never reported: addresses and the sharing of pages make that much difference.
 const MEMORY_NOISE_BYTES: u64 = 1 << 20;
-/// Number of functions named if instructions grew.
-const FUNCTIONS_SHOWN: usize = 3;
 const VALGRIND: &str = "valgrind";
 const INSTRUCTIONS: &str = "instructions";
 /// Beginning of the names of the profiles.
@@ -33,79 +29,56 @@ const PROFILE: &str = "callgrind.out";
 /// Compares the numbers of a layer.
 pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
     let name = layer.name;
-    layer.left_out = left_out(bench, name, &measures.machine);
-    if layer.left_out.is_some() {
+    if name == LayerName::Instructions && run::engine::paths::on_path(VALGRIND).is_none() {
+        layer.left_out = Some("valgrind is not on the PATH".to_owned());
         return;
     }
     for case in bench.cases_of(name) {
         let noted = |metric, verdict, why: String| {
-            vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
+            GateFinding::noted(&case.rule.name, metric, verdict, why)
         };
-        layer.findings.extend(match bench.measured(&bench.candidate, case, name) {
-            Err(why) if why.is_interrupt() => break,
-            Err(why) => {
-                let (verdict, why) = without_result(old(bench, case, name), name, &why);
-                noted("runs", verdict, why)
+        let baseline = bench.baseline.as_ref();
+        let old = baseline.map(|subject| bench.measured(&subject.engine, case, name));
+        match (bench.measured(&bench.candidate, case, name), old) {
+            (Err(why), _) if why.is_interrupt() => break,
+            (Err(why), old) => {
+                let (verdict, why) = without_result(old, name, &why);
+                layer.findings.push(noted("runs", verdict, why));
             }
-            Ok(new) => {
+            (Ok(new), old) => {
                 measures.case(&case.rule.name).add(new.clone());
-                match old(bench, case, name) {
-                    Err(why) => noted("baseline", Verdict::Missing, why),
-                    Ok(None) => {
+                match old {
+                    Some(Ok(old)) => layer.findings.extend(compare(bench, case, name, &old, &new)),
+                    Some(Err(why)) => {
+                        let why = format!("the baseline has no result: {why}");
+                        layer.findings.push(noted("baseline", Verdict::Missing, why));
+                    }
+                    None => {
                         let compared = new.of_layer(name).len() as u64;
                         let verdict =
                             if compared == 0 { Verdict::Missing } else { Verdict::Measured };
-                        let finding =
-                            noted(&name.to_string(), verdict, format!("{compared} quantities"));
-                        finding.into_iter().map(|f| GateFinding { compared, ..f }).collect()
+                        let note = format!("{compared} quantities");
+                        let finding = noted(&name.to_string(), verdict, note);
+                        layer.findings.push(GateFinding { compared, ..finding });
                     }
-                    Ok(Some(old)) => compare(bench, case, name, &old, &new),
                 }
             }
-        });
+        }
     }
 }
 
 /// The verdict on a candidate without a result, given what the baseline has.
 fn without_result(
-    old: Result<Option<CaseMeasures>, String>,
+    old: Option<Result<CaseMeasures, Failure>>,
     layer: LayerName,
     why: &Failure,
 ) -> (Verdict, String) {
     match old {
-        Ok(None) => (Verdict::Regression, why.to_string()),
-        Ok(Some(old)) if !old.of_layer(layer).is_empty() => {
+        None => (Verdict::Regression, why.to_string()),
+        Some(Ok(old)) if !old.of_layer(layer).is_empty() => {
             (Verdict::Regression, format!("the candidate has no result: {why}"))
         }
         _ => (Verdict::Missing, format!("neither program has a result: {why}")),
-    }
-}
-
-/// Why a layer cannot be run at all.
-fn left_out(bench: &Bench, name: LayerName, machine: &str) -> Option<String> {
-    if name == LayerName::Instructions && run::engine::paths::on_path(VALGRIND).is_none() {
-        return Some("valgrind is not on the PATH".to_owned());
-    }
-    let Baseline::Record(_, record) = &bench.baseline else { return None };
-    let is_of_machine = name != LayerName::Counters && bench.cases_of(name).next().is_some();
-    (is_of_machine && record.machine != machine).then(|| {
-        let of = if record.machine.is_empty() { "unknown" } else { &record.machine };
-        format!("the record is of another machine ({of}): {name} would differ without a change")
-    })
-}
-
-/// The measures of the baseline; `None` if there is nothing to compare with.
-fn old(bench: &Bench, case: &Selected, layer: LayerName) -> Result<Option<CaseMeasures>, String> {
-    match &bench.baseline {
-        Baseline::None => Ok(None),
-        Baseline::Record(_, record) => {
-            let measures = record.cases.get(&case.rule.name);
-            Ok(Some(measures.ok_or("the record does not contain this case")?.clone()))
-        }
-        Baseline::Program(subject) => {
-            let measured = bench.measured(&subject.engine, case, layer);
-            measured.map(Some).map_err(|why| format!("the baseline has no result: {why}"))
-        }
     }
 }
 
@@ -124,41 +97,13 @@ fn compare(
         let why = format!("other facets were read: their digest is {other}, and was {one}");
         return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
     }
-    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(&case.rule, metric, layer);
-    let measured: Vec<String> = case.layouts().map(prefix).collect();
+    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(metric, layer);
     let numbers = [old.of_layer(layer), new.of_layer(layer)];
-    let mut findings = compared_numbers(name, layer, numbers, &measured, &tolerance);
-    if layer == LayerName::Counters {
-        findings.extend(without_counter(case, [&old.exact, &new.exact]));
-    }
-    let is_known = old.digest.is_some() || new.digest.is_some();
-    if layer == LayerName::Counters && is_known {
+    let mut findings = compared_numbers(name, layer, numbers, &tolerance);
+    if layer == LayerName::Counters && (old.digest.is_some() || new.digest.is_some()) {
         findings.insert(0, same_mesh(name, &old.digest, &new.digest));
     }
-    let grown = |f: &&mut GateFinding| {
-        f.metric == INSTRUCTIONS && f.verdict == Verdict::Regression && !old.functions.is_empty()
-    };
-    if let Some(finding) = findings.iter_mut().find(grown) {
-        let grown = differences(&old.functions, &new.functions).into_iter().take(FUNCTIONS_SHOWN);
-        let grown: Vec<String> = grown.map(|(name, by)| format!("{by:+} in {name}")).collect();
-        finding.note.push_str(&format!("; mostly {}", grown.join(", ")));
-    }
     findings
-}
-
-/// A finding for each tolerance of the case that has the name of no quantity.
-fn without_counter(case: &Selected, counters: [&Numbers; 2]) -> Vec<GateFinding> {
-    let of_layers = [CELLS, MEMORY, INSTRUCTIONS];
-    let is_known = |name: &String| {
-        let is = |other: &String| other == name || other.ends_with(&format!("/{name}"));
-        let last = name.rsplit('/').next().unwrap_or(name);
-        case.no_mpi.is_some()
-            || of_layers.contains(&last)
-            || counters.iter().any(|of| of.keys().any(is))
-    };
-    let unknown = case.rule.tolerance.keys().filter(|name| !is_known(name));
-    let why = "the rules have a tolerance for it, and neither program counts it";
-    unknown.map(|n| GateFinding::noted(&case.rule.name, n, Verdict::Missing, why)).collect()
 }
 
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct.
@@ -174,43 +119,34 @@ fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFind
     GateFinding::noted(case, "digest", verdict, note)
 }
 
-/// Compares all numbers of both sides, of which those with these beginnings were measured now. If both sides together have numbers
-/// beside the cells, they must share one of them.
+/// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
 fn compared_numbers(
     case: &str,
     layer: LayerName,
     [old, new]: [&Numbers; 2],
-    measured: &[String],
     tolerance: &dyn Fn(&str) -> f64,
 ) -> Vec<GateFinding> {
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
-    let (count, of) = ([old.len(), new.len()], |name: &String| [old, new].map(|of| of.get(name)));
-    let mut counters = names.iter().filter(|name| **name != CELLS).map(|name| of(name)).peekable();
+    let is_in_both = |name: &String| old.contains_key(name) && new.contains_key(name);
+    let mut counters = names.iter().filter(|name| **name != CELLS).peekable();
     let mut findings = Vec::new();
-    if counters.peek().is_some() && !counters.any(|both| both.iter().all(Option::is_some)) {
-        let [old, new] = count;
+    if counters.peek().is_some() && !counters.any(|name| is_in_both(name)) {
         let why = format!(
-            "no quantity but {CELLS} is in both: the baseline has {old}, the candidate {new}"
+            "no quantity but {CELLS} is in both: the baseline has {}, the candidate {}",
+            old.len(),
+            new.len()
         );
         findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
     }
     findings.extend(names.into_iter().map(|metric| {
         let noted = |verdict, note| GateFinding::noted(case, metric, verdict, note);
-        // Names of counters may have a slash, too.
-        let of_ranks = metric.split_once('/').filter(|(ranks, _)| ranks.ends_with(" ranks"));
-        let is_measured = of_ranks.is_none_or(|_| {
-            measured.iter().any(|ranks| !ranks.is_empty() && metric.starts_with(ranks))
-        });
-        match of(metric) {
+        match [old, new].map(|of| of.get(metric)) {
             [Some(&old), Some(&new)] => {
                 let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
                 GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
             }
-            [Some(old), None] if is_measured => {
-                noted(Verdict::Missing, format!("the candidate does not report it; it was {old}"))
-            }
             [Some(old), None] => {
-                noted(Verdict::LeftOut, format!("not measured on these ranks now; it was {old}"))
+                noted(Verdict::Missing, format!("the candidate does not report it; it was {old}"))
             }
             [None, new] => noted(Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),
         }
@@ -313,25 +249,27 @@ pub(super) fn instructions(
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place));
     // A program that fails without valgrind, too, states the cause.
     counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
-    let profile = profile_of_all(&place).map_err(|why| engine.unusable(why))?;
-    let counted = [(INSTRUCTIONS.to_owned(), profile.instructions())].into();
-    Ok(CaseMeasures { counted, functions: profile.own, ..CaseMeasures::default() })
+    let count = counted_by_all(&place).map_err(|why| engine.unusable(why))?;
+    Ok(CaseMeasures { counted: [(INSTRUCTIONS.to_owned(), count)].into(), ..Default::default() })
 }
 
-/// The sum of the profiles of all processes.
-fn profile_of_all(place: &Path) -> Result<Profile, String> {
+/// The instructions of all processes. One that was replaced by another program has none.
+fn counted_by_all(place: &Path) -> Result<u64, String> {
     let wrong = |error: std::io::Error| format!("left no profile: {}: {error}", place.display());
-    let mut sum = Profile::default();
+    let mut sum = 0;
     for entry in std::fs::read_dir(place).map_err(wrong)? {
         let entry = entry.map_err(wrong)?;
         if entry.file_name().to_string_lossy().starts_with(PROFILE) {
-            sum.add(&std::fs::read_to_string(entry.path()).map_err(wrong)?);
+            sum += instructions_in(&std::fs::read_to_string(entry.path()).map_err(wrong)?);
         }
     }
-    match sum.instructions() {
-        0 => Err("has no profile with costs by valgrind".into()),
-        _ => Ok(sum),
-    }
+    if sum == 0 { Err("has no profile with costs by valgrind".into()) } else { Ok(sum) }
+}
+
+/// The total of a profile of callgrind, in its last line.
+fn instructions_in(profile: &str) -> u64 {
+    let total = profile.lines().rev().find_map(|line| line.strip_prefix("totals:"));
+    total.and_then(|total| total.trim().parse().ok()).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -344,8 +282,7 @@ mod tests {
 
     fn verdicts(layer: LayerName, old: &Numbers, new: &Numbers) -> Vec<(String, Verdict)> {
         let tolerance = |metric: &str| if metric.ends_with("messages") { 10.0 } else { 0.0 };
-        let measured = ["", "2 MPI ranks/", "4 ranks/"].map(String::from);
-        let found = compared_numbers("c", layer, [old, new], &measured, &tolerance);
+        let found = compared_numbers("c", layer, [old, new], &tolerance);
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 
@@ -356,7 +293,7 @@ mod tests {
         let new = numbers(&[("cells", 9), ("rays", 5), ("4 ranks/messages", 11), ("hops", 1)]);
         let expected = [
             ("4 ranks/messages", Verdict::Changed),
-            ("8 ranks/messages", Verdict::LeftOut),
+            ("8 ranks/messages", Verdict::Missing),
             ("by/phase", Verdict::Missing),
             ("cells", Verdict::Changed),
             ("hops", Verdict::Changed),
@@ -391,6 +328,12 @@ mod tests {
         assert_eq!(of([100, 99], 0.0), Verdict::Improvement);
         assert_eq!(of([0, 0], 0.0), Verdict::Unchanged);
         assert_eq!(of([0, 1], 50.0), Verdict::Regression);
+    }
+
+    #[test]
+    fn a_profile_has_its_total_at_its_end() {
+        let text = "version: 1\nevents: Ir\nsummary: 9\n\nfn=(1) main\n12 3\ntotals: 116\n";
+        assert_eq!((instructions_in(text), instructions_in("events: Ir\n")), (116, 0));
     }
 
     #[test]

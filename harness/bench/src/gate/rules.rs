@@ -37,7 +37,7 @@ pub struct Tolerance {
     pub instructions: f64,
     /// Default for peak memory.
     pub memory: f64,
-    /// By metric; tolerances of a case take precedence.
+    /// By metric.
     pub of: BTreeMap<String, f64>,
 }
 
@@ -95,9 +95,6 @@ pub struct CaseRule {
     /// Numbers of ranks on MPI on which correctness, counters, memory and time are also compared.
     #[serde(default)]
     pub mpi: Vec<usize>,
-    /// Tolerated growth in percent by counter, as named in the report, or `instructions`.
-    #[serde(default)]
-    pub tolerance: BTreeMap<String, f64>,
 }
 
 /// A selected case.
@@ -162,10 +159,7 @@ impl Rules {
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
         ])?;
         let Tolerance { counters, instructions, memory, of } = &self.tolerance;
-        let mut tolerances = [counters, instructions, memory]
-            .into_iter()
-            .chain(of.values())
-            .chain(self.cases.iter().flat_map(|case| case.tolerance.values()));
+        let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
         let is_percentage = tolerances.all(|percent| (0.0..=1e6).contains(percent));
         refuse(&[(!is_percentage, "a tolerance must be between 0 and 1000000 percent")])?;
         for (i, case) in self.cases.iter().enumerate() {
@@ -232,13 +226,11 @@ impl Rules {
 }
 
 impl Tolerance {
-    /// Returns the tolerated growth of a metric in percent: that of the case, else of the metric, else of the layer.
-    pub fn of_metric(&self, case: &CaseRule, metric: &str, layer: LayerName) -> f64 {
+    /// Returns the tolerated growth of a metric in percent: its own, else that of the layer.
+    pub fn of_metric(&self, metric: &str, layer: LayerName) -> f64 {
         // "4 ranks/messages" is also known as "messages".
         let plain = metric.rsplit('/').next().unwrap_or(metric);
-        let tables = [&case.tolerance, &self.of];
-        let own =
-            tables.into_iter().find_map(|table| table.get(metric).or_else(|| table.get(plain)));
+        let own = self.of.get(metric).or_else(|| self.of.get(plain));
         own.copied().unwrap_or(match layer {
             LayerName::Memory => self.memory,
             LayerName::Instructions => self.instructions,
@@ -266,13 +258,11 @@ mod tests {
     }
 
     #[test]
-    fn the_tolerance_of_a_case_precedes_that_of_the_metric() {
-        let text = "[tolerance.of]\nmessages = 9.0\nhalo = 8.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n\
-                    tolerance = { messages = 5.0, '2 ranks/rays' = 1.0 }";
+    fn the_tolerance_of_a_metric_precedes_that_of_the_layer() {
+        let text = "[tolerance.of]\nmessages = 5.0\n'2 ranks/rays' = 1.0\n[[case]]\nname = 'a'\nlayers = ['counters']\n";
         let rules = read(text).unwrap();
-        let of = |metric| rules.tolerance.of_metric(&rules.cases[0], metric, LayerName::Memory);
+        let of = |metric| rules.tolerance.of_metric(metric, LayerName::Memory);
         assert_eq!([of("4 ranks/messages"), of("2 ranks/rays"), of("rays")], [5.0, 1.0, 10.0]);
-        assert_eq!(of("3 ranks/halo"), 8.0);
     }
 
     /// Records of two checkouts continue each other.

@@ -2,7 +2,7 @@
 
 use super::GateOptions;
 use super::build::{self, revision_of};
-use super::measures::{Measured, Measures};
+use super::measures::Measured;
 use crate::experiments::machine::digest_of_file;
 use contract::failure::Failure;
 use run::engine::runner::Engine;
@@ -19,47 +19,6 @@ pub struct Subject {
     pub measured: Measured,
 }
 
-/// The baseline of a comparison.
-#[derive(Clone, Debug)]
-pub enum Baseline {
-    /// A program: it can be run, so times can be compared.
-    Program(Box<Subject>),
-    /// The recorded measurements of a program.
-    Record(Measured, Box<Measures>),
-    /// Nothing: the candidate is only recorded.
-    None,
-}
-
-impl Baseline {
-    /// Finds the baseline that the options name: a file, or else a revision.
-    ///
-    /// # Errors
-    /// If it is neither, or does not build.
-    pub fn find(options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
-        let Some(named) = &options.baseline else { return Ok(Self::None) };
-        let path = Path::new(named);
-        if path.is_file() {
-            let wrong = |why: String| Failure::input(format!("{named}: {why}"));
-            let bytes = contract::files::read(path).map_err(|error| wrong(error.to_string()))?;
-            if bytes.first() == Some(&b'{') {
-                let measures = Measures::parse(&bytes).map_err(wrong)?;
-                let measured = Measured { named: named.clone(), ..measures.of.clone() };
-                return Ok(Self::Record(measured, Box::new(measures)));
-            }
-        }
-        Ok(Self::Program(Box::new(Subject::find(named, options, engine)?)))
-    }
-
-    /// Its name in the report.
-    pub fn measured(&self) -> Option<Measured> {
-        match self {
-            Self::Program(subject) => Some(subject.measured.clone()),
-            Self::Record(measured, _) => Some(measured.clone()),
-            Self::None => None,
-        }
-    }
-}
-
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
         let program = digest_of_file(engine.program());
@@ -74,10 +33,9 @@ impl Subject {
     pub fn candidate(
         options: &GateOptions,
         engine: &Engine,
-        baseline: &Baseline,
+        baseline: Option<&Self>,
     ) -> Result<Self, Failure> {
-        let built =
-            matches!(baseline, Baseline::Program(subject) if subject.measured.revision.is_some());
+        let built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
         let named = options.candidate.clone();
         match named.or(built.then(|| ".".to_owned())) {
             Some(named) => Self::find(&named, options, engine),
@@ -95,6 +53,15 @@ impl Subject {
         }
     }
 
+    /// The baseline that the options name: a file, or else a revision.
+    ///
+    /// # Errors
+    /// If it is neither, or does not build.
+    pub fn baseline(options: &GateOptions, engine: &Engine) -> Result<Option<Self>, Failure> {
+        let named = options.baseline.as_ref();
+        named.map(|named| Self::find(named, options, engine)).transpose()
+    }
+
     fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         if Path::new(named).is_file() {
             let is_data =
@@ -104,7 +71,7 @@ impl Subject {
             let is_started =
                 engine.description().run.serial.first().is_some_and(|word| word == "{program}");
             if is_data || is_started && mode & 0o111 == 0 {
-                let why = "is neither a program that can be executed nor, as --baseline, a record of harness gate --record";
+                let why = "is neither a program that can be executed nor a revision";
                 return Err(Failure::input(format!("{named} {why}")));
             }
             let program =

@@ -12,16 +12,13 @@ use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
-use super::subject::Baseline;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks};
 use run::engine::options::RunOptions;
-use run::engine::runner::{Completed, Engine};
-use statistics::comparison::{Comparison, Round, compare};
+use run::engine::runner::Engine;
+use statistics::comparison::{Comparison, Round, compare, trimmed_mean};
 use statistics::false_discovery::adjusted;
 use statistics::random::Random;
-use statistics::trimmed_mean::trimmed_mean;
-use std::path::Path;
 
 /// CPU time of the whole process.
 pub const CPU: &str = "CPU time";
@@ -47,14 +44,10 @@ struct Quantity {
 
 /// Compares the times of candidate and baseline.
 pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
-    let left_out = match &bench.baseline {
-        Baseline::Program(subject) => return compared(bench, &subject.engine, layer),
-        Baseline::Record(..) => {
-            "a record cannot be run, and times of different sessions are not comparable"
-        }
-        Baseline::None => "no baseline was given",
-    };
-    layer.left_out = Some(left_out.to_owned());
+    match &bench.baseline {
+        Some(baseline) => compared(bench, &baseline.engine, layer),
+        None => layer.left_out = Some("no baseline was given".to_owned()),
+    }
 }
 
 fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
@@ -91,21 +84,15 @@ fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
     }
 }
 
-/// Why a case has no times: the baseline fails, or the candidate alone.
-enum NoTimes {
-    Baseline(Failure),
-    Candidate(Failure),
-}
+/// The verdict on a case without times, and why: the baseline fails, or the candidate alone.
+type NoTimes = (Verdict, Failure);
 
 /// The finding about runs that failed; none if the user interrupted them.
-fn failed(case: &Selected, ranks: Ranks, failure: &NoTimes) -> Option<GateFinding> {
-    let (verdict, who, why) = match failure {
-        NoTimes::Baseline(why) => (Verdict::Missing, "baseline", why),
-        NoTimes::Candidate(why) => (Verdict::Regression, "candidate", why),
-    };
+fn failed(case: &Selected, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
     let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
+    let who = if *verdict == Verdict::Missing { "baseline" } else { "candidate" };
     let note = || format!("the {who} has no result: {why}");
-    (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, verdict, note()))
+    (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, *verdict, note()))
 }
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
@@ -116,15 +103,20 @@ fn rounds(
     ranks: Ranks,
     again: bool,
 ) -> Result<[Quantity; 2], NoTimes> {
-    let path = bench.prepare(baseline, case, "time").map_err(NoTimes::Baseline)?;
-    let run = |index: usize| match index {
-        CANDIDATE => run(bench, &bench.candidate, &path, ranks).map_err(NoTimes::Candidate),
-        _ => run(bench, baseline, &path, ranks).map_err(NoTimes::Baseline),
+    let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
+    let run = |index: usize| {
+        let (engine, verdict) = match index {
+            CANDIDATE => (&bench.candidate, Verdict::Regression),
+            _ => (baseline, Verdict::Missing),
+        };
+        let place = bench.enter(engine, "time/run").map_err(|why| (verdict, why))?;
+        let options = RunOptions::new(&place, bench.options.limit());
+        engine.run(&path, &Layout::on(ranks), &options).map_err(|why| (verdict, why))
     };
     // The first run reads program and geometry from disk and is not counted.
     let (first, also) = (run(0)?, run(CANDIDATE)?);
     let rules = &bench.rules.time;
-    let budget_s = bench.options.budget.unwrap_or(rules.budget_s);
+    let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget as f64);
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let seed = bench.options.seed.wrapping_add(u64::from(again));
@@ -147,11 +139,6 @@ fn rounds(
         let found = compare(&rounds, rules.alpha.sqrt(), seed);
         Quantity { case, metric, rounds, found, first: None }
     }))
-}
-
-fn run(bench: &Bench, engine: &Engine, case: &Path, ranks: Ranks) -> Result<Completed, Failure> {
-    let place = bench.enter(engine, "time/run")?;
-    engine.run(case, &Layout::on(ranks), &RunOptions::new(&place, bench.options.limit()))
 }
 
 /// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.

@@ -73,11 +73,6 @@ pub struct RunSpec {
     /// Number of repetitions; results are their medians.
     #[serde(default = "one")]
     pub repeats: usize,
-    /// Whether an uncounted run precedes the first run of a mesh. Default: true if the run is repeated.
-    pub warm_up: Option<bool>,
-    /// Whether the mesh is written to the record's disk and audited, instead of timing the mesher.
-    #[serde(default)]
-    pub audit: bool,
 }
 
 fn mpi() -> Comm {
@@ -241,11 +236,8 @@ impl Study {
         }
         let (name, input) = (row.measure.name, row.measure.input);
         let [against, phase] = [input == Input::Against, input == Input::Phases];
-        let audit = input == Input::Audit;
-        let other = row.run.iter().find(|n| self.run[*n].audit != audit);
         let least = if input == Input::Series { 2 } else { 1 };
         let needs = |needs: bool| if needs { "requires" } else { "does not accept" };
-        let of = if audit { "a run with audit = true" } else { "no run with audit = true" };
         refuse(&[
             (
                 against != row.against.is_some(),
@@ -253,10 +245,6 @@ impl Study {
             ),
             (phase == row.phase.is_empty(), &format!("{name} {} a name in `phase`", needs(phase))),
             (row.run.len() < least, &format!("{name} requires {least} or more runs")),
-            (
-                other.is_some(),
-                &format!("{name} is measured of {of}, which {} is not", other.unwrap_or(&row.name)),
-            ),
         ])
     }
 }

@@ -1,15 +1,43 @@
 //! Judges rows from the declaration and the lines of a record alone.
 //!
-//! Invariants of a judged row, executed by `check_invariants` before it is printed or recorded: it has a value if and only if it is
-//! met, missed or for comparison, and then states how that was measured; met is within the bounds, missed is not, and for comparison
-//! has none; a row without a value, and an efficiency above 1, states the reason.
+//! Invariants of a judged row, executed by `check_invariants` before it is printed: it has a value if and only if it is met, missed or for
+//! comparison; met is within the bounds, missed is not, and for comparison has none; a row without a value, and an efficiency above 1,
+//! states the reason.
 
 use super::file::{Row, Study};
-use super::measure::{Input, Measure, Sample};
-use crate::experiments::entry::{Audited, Entry, Judged, Line, Verdict};
+use super::measure::Sample;
+use crate::experiments::entry::{Entry, Line};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{Efficiency, above_one};
 use std::collections::HashMap;
+
+/// A row of a table of targets.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// The row.
+    pub row: Row,
+    /// The measured value, and how it was measured: `serial`, `measured`, `oversubscribed` or `projected`.
+    pub measured: Option<(f64, &'static str)>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why it was left out or failed, or why an efficiency is above 1.
+    pub why: String,
+}
+
+/// The verdict on a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The value is within the bounds.
+    Met,
+    /// The value is outside the bounds.
+    Missed,
+    /// The row has no bounds.
+    ForComparison,
+    /// A run failed.
+    Failed,
+    /// The row was not measured: the user excluded it or a prerequisite is missing.
+    LeftOut,
+}
 
 /// Judges every row by the runs in these lines: those of the last machine and program, if there are several.
 pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
@@ -44,12 +72,9 @@ fn program(line: &Line) -> Option<(&String, &String)> {
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     let judged = match measured(study, row, lines) {
-        Ok((value, how, why)) => Judged {
-            measured: Some(value),
-            how: how.to_owned(),
-            verdict: verdict(row.at_least, row.at_most, value),
-            ..unjudged(row, Verdict::ForComparison, why)
-        },
+        Ok((value, how, why)) => {
+            Judged { measured: Some((value, how)), ..unjudged(row, verdict(row, value), why) }
+        }
         Err(why) => {
             let failed = study.runs_of(row).into_iter().find_map(|n| failure(study, n, lines));
             match failed {
@@ -63,19 +88,18 @@ pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
 }
 
 /// Executes the invariants at the head of this file.
-fn check_invariants(row: &Judged) {
-    use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
-    let Judged { name, at_least, at_most, measured, how, verdict: found, why, .. } = row;
-    let has_value = matches!(found, Met | Missed | ForComparison);
-    let is_measured = has_value == measured.is_some() && has_value != how.is_empty();
-    assert!(is_measured, "{name}: a value is measured: {row:?}");
-    assert!(has_value || !why.is_empty(), "{name}: a row without a value has a reason: {row:?}");
-    let Some(value) = *measured else { return assert!(matches!(found, Failed | LeftOut)) };
-    let expected = verdict(*at_least, *at_most, value);
-    assert_eq!(*found, expected, "{name}: the verdict is that of value and bounds: {row:?}");
-    let is_efficiency = Measure::named(&row.measure).is_some_and(Measure::is_efficiency);
-    let explained = !is_efficiency || value <= EXPLAINED || !why.is_empty();
-    assert!(explained, "{name}: an efficiency above 1 has a reason: {row:?}");
+fn check_invariants(judged: &Judged) {
+    use Verdict::{Failed, LeftOut};
+    let Judged { row, measured, verdict: found, why } = judged;
+    let name = &row.name;
+    let Some((value, _)) = *measured else {
+        assert!(matches!(found, Failed | LeftOut), "{name}: a value is measured: {judged:?}");
+        return assert!(!why.is_empty(), "{name}: a row without a value has a reason: {judged:?}");
+    };
+    let expected = verdict(row, value);
+    assert_eq!(*found, expected, "{name}: the verdict is that of value and bounds: {judged:?}");
+    let explained = !row.measure.is_efficiency() || value <= EXPLAINED || !why.is_empty();
+    assert!(explained, "{name}: an efficiency above 1 has a reason: {judged:?}");
 }
 
 /// Efficiencies up to this need no explanation.
@@ -83,25 +107,14 @@ const EXPLAINED: f64 = 1.01;
 
 /// Returns a row without a measured value.
 pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
-    Judged {
-        name: row.name.clone(),
-        runs: row.run.clone(),
-        against: row.against.clone(),
-        measure: row.measure.name.to_owned(),
-        at_least: row.at_least,
-        at_most: row.at_most,
-        measured: None,
-        how: String::new(),
-        verdict,
-        why,
-    }
+    Judged { row: row.clone(), measured: None, verdict, why }
 }
 
-fn verdict(at_least: Option<f64>, at_most: Option<f64>, value: f64) -> Verdict {
+fn verdict(row: &Row, value: f64) -> Verdict {
     // NaN is within no bounds.
-    let is_within =
-        at_least.is_none_or(|least| value >= least) && at_most.is_none_or(|most| value <= most);
-    match (at_least.is_some() || at_most.is_some(), is_within) {
+    let is_within = row.at_least.is_none_or(|least| value >= least)
+        && row.at_most.is_none_or(|most| value <= most);
+    match (row.at_least.is_some() || row.at_most.is_some(), is_within) {
         (false, _) => Verdict::ForComparison,
         (true, true) => Verdict::Met,
         (true, false) => Verdict::Missed,
@@ -114,29 +127,13 @@ fn measured(
     row: &Row,
     lines: &[Line],
 ) -> Result<(f64, &'static str, String), String> {
-    let absent = |name: &String| format!("run {name} is not in the record");
     let groups = Groups::of(lines);
-    let mut sample = Sample { runs: &[], against: None, phases: &row.phase, audits: &[] };
-    if row.measure.input == Input::Audit {
-        let name = &row.run[0];
-        let audit = |line: &'_ Line| match &line.entry {
-            Entry::Audit(audited) if study.is_run(name, &audited.setup) => Some(audited.clone()),
-            _ => None,
-        };
-        let audits: Vec<Audited> = lines.iter().filter_map(audit).collect();
-        if audits.is_empty() {
-            return Err(absent(name));
-        }
-        sample.audits = &audits;
-        return Ok(((row.measure.of)(&sample)?, "audited", String::new()));
-    }
     let find = |name: &String| {
         let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
-        found.ok_or_else(|| absent(name))
+        found.ok_or_else(|| format!("run {name} is not in the record"))
     };
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
     let against = row.against.as_ref().map_or(Ok(runs[0]), find)?;
-    (sample.runs, sample.against) = (&runs, Some(against));
     let efficiencies = runs.iter().map(|run| run.efficiency(against));
     let efficiencies: Vec<Efficiency> =
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
@@ -146,7 +143,8 @@ fn measured(
         ["serial", "measured", "oversubscribed", "projected"].iter().position(|h| h == how)
     };
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
-    Ok(((row.measure.of)(&sample)?, how, why))
+    let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
+    Ok((value, how, why))
 }
 
 /// Returns the reason for which a run failed, if it did.
@@ -162,11 +160,10 @@ fn failure(study: &Study, name: &str, lines: &[Line]) -> Option<String> {
 impl Judged {
     /// Returns name, target, measured value, how it was measured, and verdict.
     pub fn fields(&self) -> [String; 5] {
-        let measure = Measure::named(&self.measure);
-        let show = |value: f64| measure.map_or_else(|| value.to_string(), |m| (m.show)(value));
-        let bounds = [("at least ", self.at_least), ("at most ", self.at_most)];
-        let bounds = bounds.into_iter().filter_map(|(word, b)| Some(format!("{word}{}", show(b?))));
-        let target = bounds.collect::<Vec<_>>().join(", ");
+        let Row { name, measure, at_least, at_most, .. } = &self.row;
+        let bounds = [("at least ", at_least), ("at most ", at_most)];
+        let shown = |(word, b): (&str, &Option<f64>)| Some(word.to_owned() + &measure.show((*b)?));
+        let target = bounds.into_iter().filter_map(shown).collect::<Vec<_>>().join(", ");
         let word = match self.verdict {
             Verdict::Met => "met",
             Verdict::Missed => "MISSED",
@@ -175,16 +172,19 @@ impl Judged {
             Verdict::LeftOut => "left out",
         };
         let why = if self.why.is_empty() { "" } else { ": " };
-        let verdict = format!("{word}{why}{}", self.why);
-        let dash = |text: String| if text.is_empty() { "-".to_owned() } else { text };
-        let measured = dash(self.measured.map(show).unwrap_or_default());
-        [self.name.clone(), dash(target), measured, dash(self.how.clone()), verdict]
+        let target = if target.is_empty() { "-".to_owned() } else { target };
+        let (value, how) = match self.measured {
+            Some((value, how)) => (measure.show(value), how),
+            None => ("-".to_owned(), "-"),
+        };
+        [name.clone(), target, value, how.to_owned(), format!("{word}{why}{}", self.why)]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::file::EXPERIMENT;
+    use super::super::measure::Measure;
     use super::*;
     use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
     use crate::testing::line;
@@ -196,7 +196,6 @@ mod tests {
         mesh.cube.case = "cube-small"
         run.one = { mesh = "cube" }
         run.two = { mesh = "cube", ranks = 2 }
-        run.disk = { mesh = "cube", comm = "solo", audit = true }
         [[row]]
         name = "rate"
         run = "one"
@@ -213,11 +212,6 @@ mod tests {
         name = "seconds"
         run = "two"
         measure = "seconds"
-        [[row]]
-        name = "audit"
-        run = "disk"
-        measure = "audit_holds"
-        at_least = 1
     "#;
 
     fn setup(ranks: usize) -> Setup {
@@ -237,19 +231,6 @@ mod tests {
         line(Entry::Failure(Failure { setup: setup(ranks), command, why }))
     }
 
-    fn audited(holds: bool) -> Line {
-        line(Entry::Audit(Audited {
-            setup: Setup { comm: Comm::Solo, ..setup(1) },
-            command: String::new(),
-            cells: 9,
-            holds,
-            found: Vec::new(),
-            time_cpu_s: 1.0,
-            time_wall_s: 1.0,
-            peak_rss_bytes: 1,
-        }))
-    }
-
     #[test]
     fn bounds_are_met_and_missed() {
         let targets = read(FILE).unwrap();
@@ -257,17 +238,12 @@ mod tests {
             judged(&targets, lines).iter().map(|j| j.verdict).collect()
         };
         use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
-        assert_eq!(
-            verdicts(&[ran(1, 9.0), ran(2, 5.0), audited(true)]),
-            [Met, Met, ForComparison, Met]
-        );
+        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 5.0)]), [Met, Met, ForComparison]);
         // Too slow, then implausibly fast.
-        assert_eq!(
-            verdicts(&[ran(1, 9.1), ran(2, 5.1), audited(false)]),
-            [Missed, Missed, ForComparison, Missed]
-        );
-        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison, LeftOut]);
-        assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed, LeftOut]);
+        assert_eq!(verdicts(&[ran(1, 9.1), ran(2, 5.1)]), [Missed, Missed, ForComparison]);
+        assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison]);
+        assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed]);
+        assert_eq!(verdicts(&[ran(1, 9.0)]), [Met, LeftOut, LeftOut]);
     }
 
     #[test]
@@ -307,7 +283,7 @@ mod tests {
             session("b", "fast"),
             of("b", ran(1, 9.0)),
         ];
-        assert_eq!(judged(&targets, &lines)[0].measured, Some(100.0));
+        assert_eq!(judged(&targets, &lines)[0].measured, Some((100.0, "measured")));
     }
 
     proptest! {
@@ -328,22 +304,19 @@ mod tests {
     #[test]
     #[should_panic(expected = "the verdict is that of value and bounds")]
     fn a_row_that_is_met_outside_its_bounds_is_noticed() {
-        planted(|row| row.at_most = Some(1.0));
+        planted(|row| row.row.at_most = Some(1.0));
     }
 
     #[test]
     #[should_panic(expected = "a row without a value has a reason")]
     fn a_row_that_is_left_out_without_a_reason_is_noticed() {
-        let left_out = |row: &mut Judged| {
-            (row.measured, row.verdict, row.how) = (None, Verdict::LeftOut, String::new());
-        };
-        planted(left_out);
+        planted(|row| (row.measured, row.verdict) = (None, Verdict::LeftOut));
     }
 
     #[test]
     #[should_panic(expected = "an efficiency above 1 has a reason")]
     fn an_efficiency_above_1_without_a_reason_is_noticed() {
-        planted(|row| row.measure = "efficiency".into());
+        planted(|row| row.row.measure = Measure::named("efficiency").unwrap());
     }
 
     #[test]
@@ -351,10 +324,7 @@ mod tests {
         let targets = read(FILE).unwrap();
         let lines = [ran(1, 90.0), ran(1, 8.0), ran(1, 9.0)];
         let rate = judge(&targets, &targets.row[0], &lines);
-        assert_eq!(
-            (rate.measured, rate.verdict, rate.how.as_str()),
-            (Some(100.0), Verdict::Met, "measured")
-        );
+        assert_eq!((rate.measured, rate.verdict), (Some((100.0, "measured")), Verdict::Met));
     }
 
     #[test]
@@ -362,7 +332,6 @@ mod tests {
         let targets = read(FILE).unwrap();
         let all = judged(&targets, &[ran(1, 9.0), failed(2)]);
         assert_eq!(all[1].why, "run two failed: killed after 9 s");
-        assert_eq!(all[3].why, "run disk is not in the record");
         // Runs of other experiments do not count.
         let mut other = run(Comm::Mpi, 900, &[("a", &[9.0])]);
         other.setup = Setup { experiment: "strong".into(), ..setup(1) };

@@ -1,12 +1,10 @@
 //! The measures, each a function of the medians of the repetitions of runs. reports/README.md defines them.
 
-use crate::experiments::entry::Audited;
 use crate::experiments::group::Group;
 use crate::experiments::number::grouped;
 use crate::experiments::pop;
-use Input::{Against, Alone, Audit, Phases, Series};
+use Input::{Against, Alone, Phases, Series};
 use serde::de::{Deserialize, Deserializer, Error};
-use statistics::median_of;
 
 /// A quantity. Times are wall times by the program's own clock, or projected times for simulated ranks.
 #[derive(Debug)]
@@ -15,8 +13,8 @@ pub struct Measure {
     pub name: &'static str,
     /// What it is measured of.
     pub(super) input: Input,
-    /// A value with its unit.
-    pub show: fn(f64) -> String,
+    /// How a value is shown.
+    unit: Unit,
     /// The value, or in one sentence what the runs do not report.
     pub(super) of: fn(&Sample) -> Result<f64, String>,
 }
@@ -32,96 +30,86 @@ pub(super) enum Input {
     Series,
     /// Phases of a run.
     Phases,
-    /// A mesh on disk.
-    Audit,
 }
 
 /// The input of a row's measure.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<'a> {
-    /// The runs: one, unless the measure is that of a series; none for audits.
+    /// The runs: one, unless the measure is that of a series.
     pub runs: &'a [&'a Group],
-    /// The run with which it is compared.
-    pub against: Option<&'a Group>,
+    /// The run with which it is compared, or itself.
+    pub against: &'a Group,
     /// The requested phases, if any.
     pub phases: &'a [String],
-    /// The audits of a mesh on disk: at least one, or none for runs.
-    pub audits: &'a [Audited],
 }
 
 impl<'a> Sample<'a> {
     fn run(&self) -> &'a Group {
         self.runs[0]
     }
-
-    fn against(&self) -> &'a Group {
-        self.against.unwrap_or(self.run())
-    }
-
-    fn of_audits(&self, of: fn(&Audited) -> f64) -> Vec<f64> {
-        self.audits.iter().map(of).collect()
-    }
 }
+
+/// A factor, a number of decimals, and what follows the number.
+type Unit = (f64, usize, &'static str);
+const PLAIN: Unit = (1.0, 3, "");
+const RATE: Unit = (1e-6, 2, " M cells/s");
+const PER_CELL: Unit = (1.0, 3, " B/cell");
 
 const fn measure(
     name: &'static str,
     input: Input,
-    show: fn(f64) -> String,
+    unit: Unit,
     of: fn(&Sample) -> Result<f64, String>,
 ) -> Measure {
-    Measure { name, input, show, of }
+    Measure { name, input, unit, of }
 }
 
 /// All measures.
-pub static MEASURES: [Measure; 18] = [
-    measure("cells_per_second_per_core", Alone, cells_rate, |s| Ok(s.run().rate())),
-    measure("facets_per_second_per_core", Alone, facets_rate, |s| {
+pub static MEASURES: [Measure; 15] = [
+    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run().rate())),
+    measure("facets_per_second_per_core", Alone, (1e-6, 2, " M facets/s"), |s| {
         let run = s.run();
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
     }),
-    measure("seconds", Alone, |v| format!("{v:.3} s"), |s| Ok(s.run().time_s.value)),
-    measure("speed_up", Against, plain, |s| match [s.against().cells(), s.run().cells()] {
+    measure("seconds", Alone, (1.0, 3, " s"), |s| Ok(s.run().time_s.value)),
+    measure("speed_up", Against, PLAIN, |s| match [s.against.cells(), s.run().cells()] {
         [before, cells] if before != cells => Err(format!(
             "the runs are of different meshes, of {} and {} cells",
             grouped(before),
             grouped(cells)
         )),
-        _ => Ok(s.against().time_s.value / s.run().time_s.value),
+        _ => Ok(s.against.time_s.value / s.run().time_s.value),
     }),
-    measure("rate_ratio", Against, plain, |s| Ok(s.run().rate() / s.against().rate())),
-    measure("peak_bytes", Alone, gibibytes, |s| Ok(peak(s.run()))),
-    measure("bytes_per_cell", Alone, per_cell, |s| Ok(s.run().bytes_per_cell().value)),
-    measure("bytes_per_cell_beyond", Against, per_cell, |s| beyond(s.run(), s.against())),
-    measure("time_per_cell_growth", Series, plain, |s| Ok(growth(s.runs))),
-    measure("lambda_cells", Alone, plain, |s| lambda_cells(s.run())),
-    measure("lambda_cells_ratio", Against, plain, |s| {
-        Ok(lambda_cells(s.run())? / lambda_cells(s.against())?)
+    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rate() / s.against.rate())),
+    measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| Ok(peak(s.run()))),
+    measure("bytes_per_cell", Alone, PER_CELL, |s| Ok(s.run().bytes_per_cell().value)),
+    measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),
+    measure("time_per_cell_growth", Series, PLAIN, |s| Ok(growth(s.runs))),
+    measure("lambda_cells", Alone, PLAIN, |s| lambda_cells(s.run())),
+    measure("lambda_cells_ratio", Against, PLAIN, |s| {
+        Ok(lambda_cells(s.run())? / lambda_cells(s.against)?)
     }),
-    measure("lambda_cpu", Alone, plain, |s| {
+    measure("lambda_cpu", Alone, PLAIN, |s| {
         Ok(s.run().typical.useful_s.lambda(s.run().setup.ranks))
     }),
-    measure("efficiency", Against, plain, |s| match s.against().setup.ranks {
-        1 => Ok(s.run().efficiency(s.against()).global()),
+    measure("efficiency", Against, PLAIN, |s| match s.against.setup.ranks {
+        1 => Ok(s.run().efficiency(s.against).global()),
         ranks => Err(format!("the other run must be on 1 rank, and has {ranks}")),
     }),
-    measure("parallel_efficiency", Alone, plain, |s| Ok(s.run().efficiency(s.run()).parallel())),
-    measure("phase_share", Phases, |v| format!("{:.2} %", v * 100.0), share),
-    // A single failed audit is a failure.
-    measure("audit_holds", Audit, holds, |s| {
-        Ok(f64::from(u8::from(s.audits.iter().all(|a| a.holds))))
-    }),
-    measure("audit_cells_per_second_per_core", Audit, cells_rate, |s| {
-        Ok(median_of(&s.of_audits(|a| a.cells as f64 / a.time_cpu_s)))
-    }),
-    measure("audit_peak_bytes", Audit, gibibytes, |s| {
-        Ok(median_of(&s.of_audits(|a| a.peak_rss_bytes as f64)))
-    }),
+    measure("parallel_efficiency", Alone, PLAIN, |s| Ok(s.run().efficiency(s.run()).parallel())),
+    measure("phase_share", Phases, (100.0, 2, " %"), share),
 ];
 
 impl Measure {
     /// Returns the measure of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         MEASURES.iter().find(|measure| measure.name == name)
+    }
+
+    /// A value with its unit.
+    pub fn show(&self, value: f64) -> String {
+        let (factor, decimals, unit) = self.unit;
+        format!("{:.decimals$}{unit}", value * factor)
     }
 
     /// Whether it is an efficiency, which is 1 if nothing is lost.
@@ -137,31 +125,6 @@ pub(super) fn named<'a, D: Deserializer<'a>>(from: D) -> Result<&'static Measure
         let all: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
         D::Error::custom(format!("unknown variant `{name}`, expected one of {}", all.join(", ")))
     })
-}
-
-fn plain(value: f64) -> String {
-    format!("{value:.3}")
-}
-
-fn cells_rate(value: f64) -> String {
-    format!("{:.2} M cells/s", value / 1e6)
-}
-
-fn facets_rate(value: f64) -> String {
-    format!("{:.2} M facets/s", value / 1e6)
-}
-
-fn per_cell(value: f64) -> String {
-    format!("{value:.3} B/cell")
-}
-
-fn gibibytes(bytes: f64) -> String {
-    let gib = bytes / f64::from(1 << 30);
-    if gib < 0.1 { format!("{:.1} MiB", gib * 1024.0) } else { format!("{gib:.2} GiB") }
-}
-
-fn holds(value: f64) -> String {
-    (if value >= 1.0 { "all holds" } else { "findings" }).to_owned()
 }
 
 /// Median over repetitions of the sum of the ranks' peaks. Pages that ranks share count for each rank.
@@ -232,7 +195,7 @@ mod tests {
 
     fn value(name: &str, runs: &[&Group], against: Option<&Group>) -> Result<f64, String> {
         let phases = &["b".into()];
-        (named(name).of)(&Sample { runs, against, phases, audits: &[] })
+        (named(name).of)(&Sample { runs, against: against.unwrap_or(runs[0]), phases })
     }
 
     /// Returns a group with the given ranks, time and cells.
@@ -302,35 +265,11 @@ mod tests {
         assert!(value("efficiency", &[&weak], Some(&two)).is_err());
         let share = |phases: &[&str]| {
             let phases: Vec<String> = phases.iter().map(|p| (*p).to_owned()).collect();
-            let (runs, audits): (&[&Group], &[Audited]) = (&[&two], &[]);
-            let sample = Sample { runs, against: None, phases: &phases, audits };
+            let sample = Sample { runs: &[&two], against: &two, phases: &phases };
             (named("phase_share").of)(&sample)
         };
         assert_eq!(share(&["a", "b", "c"]), Ok(1.0));
         assert_eq!(share(&["c", "b"]), share(&["b"]));
         assert!(share(&["c"]).unwrap_err().contains("no phase c, but a, b"));
-    }
-
-    #[test]
-    fn one_failed_audit_is_a_failure() {
-        let audited = |holds, time_cpu_s, peak_rss_bytes| Audited {
-            setup: timed(1, 1.0, 9).setup,
-            command: String::new(),
-            cells: 900,
-            holds,
-            found: Vec::new(),
-            time_cpu_s,
-            time_wall_s: 50.0,
-            peak_rss_bytes,
-        };
-        let all = [audited(true, 3.0, 10), audited(false, 9.0, 30), audited(true, 2.0, 20)];
-        let of = |name: &str, audits: &[Audited]| {
-            let (runs, phases): (&[&Group], &[String]) = (&[], &[]);
-            (named(name).of)(&Sample { runs, against: None, phases, audits })
-        };
-        assert_eq!(of("audit_holds", &all), Ok(0.0));
-        assert_eq!(of("audit_holds", &all[..1]), Ok(1.0));
-        assert_eq!(of("audit_cells_per_second_per_core", &all), Ok(300.0));
-        assert_eq!(of("audit_peak_bytes", &all), Ok(20.0));
     }
 }

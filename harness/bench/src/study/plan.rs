@@ -48,8 +48,6 @@ pub(super) struct Planned {
     pub repeats: usize,
     /// Whether an uncounted run of its mesh comes first.
     pub warm_up: bool,
-    /// Whether the mesh is written and audited, instead of timing the program.
-    pub audit: bool,
     /// Why the program declines the case.
     pub declined: Option<String>,
     /// Whether a run failed, or none is possible.
@@ -106,14 +104,12 @@ impl Plan<'_> {
                         comm,
                         weights: choice.0.to_owned(),
                         partitioner: choice.1.to_owned(),
-                        weight_exposed: choice.2,
                         series_cells: cells.filter(|_| series.experiment.has_several_meshes()),
                         ..Setup::serial(&base.name, spacing, n)
                     },
                     case: case.clone(),
                     repeats: self.options.repeats(series.repeats),
                     warm_up: true,
-                    audit: false,
                     failed: declined.is_some(),
                     declined: declined.clone(),
                 }));
@@ -180,10 +176,8 @@ impl Plan<'_> {
             level_base: spec.level_base,
             ..Setup::serial(&spec.mesh, spacing, n)
         };
-        let warm_up = !spec.audit && spec.warm_up.unwrap_or(repeats > 1);
-        let case = case?;
-        let (audit, failed, declined) = (spec.audit, false, None);
-        Ok(Planned { setup, case, repeats, warm_up, audit, failed, declined })
+        let warm_up = repeats > 1;
+        Ok(Planned { setup, case: case?, repeats, warm_up, failed: false, declined: None })
     }
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.

@@ -69,20 +69,17 @@ pub struct Series {
     pub repeats: usize,
 }
 
-/// Weights and partitioner of a run, empty to leave the choice to the program, and how many cells an exposed face weighs, if these faces
-/// are counted.
-pub(super) type Choice = (&'static str, &'static str, Option<u32>);
+/// Weights and partitioner of a run, empty to leave the choice to the program.
+pub(super) type Choice = (&'static str, &'static str);
 
-/// The choices of the experiment on weights, which counts exposed faces. `rebalance` with METIS is identical to `area`;
-/// in the last row an exposed face weighs as much as ten cells.
-const CHOICES: [Choice; 7] = [
-    ("", "paper", Some(0)),
-    ("unit", "metis", Some(0)),
-    ("unit", "morton", Some(0)),
-    ("area", "metis", Some(0)),
-    ("area", "morton", Some(0)),
-    ("rebalance", "morton", Some(0)),
-    ("rebalance", "morton", Some(10)),
+/// The choices of the experiment on weights. `rebalance` with METIS is identical to `area`.
+const CHOICES: [Choice; 6] = [
+    ("", "paper"),
+    ("unit", "metis"),
+    ("unit", "morton"),
+    ("area", "metis"),
+    ("area", "morton"),
+    ("rebalance", "morton"),
 ];
 
 impl Series {
@@ -98,7 +95,7 @@ impl Series {
     pub(super) fn choices(&self) -> &'static [Choice] {
         match self.experiment {
             Experiment::Weights => &CHOICES,
-            _ => &[("", "", None)],
+            _ => &[("", "")],
         }
     }
 

@@ -4,15 +4,15 @@
 //! a wrong mesh is not a result.
 
 use super::file::{Row, Series, Study};
-use super::judge::{judge, unjudged};
+use super::judge::{Judged, Verdict, judge, unjudged};
 use super::plan::{Plan, Planned, SessionOptions};
 use crate::experiments::entry::{
-    Comm, Entry, Failure as Failed, Judged, LeftOut, Line, Run, Session as Opening, Setup, Verdict,
+    Comm, Entry, Failure as Failed, LeftOut, Line, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
+use crate::experiments::group::another_mesh;
 use crate::experiments::record::Record;
 use crate::experiments::{feasible, machine, network};
-use check::promises::Independence;
 use contract::failure::Failure;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
@@ -74,16 +74,13 @@ pub fn measure(
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
 
-/// Everything that a mesh, and so its digest, depends on: engine, case, spacing, n, and the partition unless the engine
-/// promises independence of it.
-type Digested = [String; 5];
-
 /// A running session.
 struct Session<'a> {
     plan: Plan<'a>,
     lines: Vec<Line>,
     record: Record,
-    digests: HashMap<Digested, String>,
+    /// Digests of the meshes.
+    digests: HashMap<String, String>,
     /// Whether the cost of messages is known.
     network: bool,
     /// Runs that are complete.
@@ -106,7 +103,6 @@ impl Session<'_> {
             let [name, target, value, how, verdict] = judged.fields();
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
             (self.plan.progress)(&format!("row {number} of {}: {line}", study.row.len()));
-            self.append(Entry::Target(judged.clone()))?;
             rows.push(judged);
         }
         Ok(())
@@ -132,8 +128,7 @@ impl Session<'_> {
     }
 
     fn append(&mut self, entry: Entry) -> Result<(), Failure> {
-        let line = self.record.append(entry);
-        let line = line.map_err(|error| contract::files::named(self.record.path(), &error))?;
+        let line = self.record.append(entry)?;
         self.lines.push(line);
         Ok(())
     }
@@ -228,13 +223,12 @@ impl Session<'_> {
         self.append(Entry::Network(network))
     }
 
-    /// Runs a point, or writes and audits its mesh, and records the result.
+    /// Runs a point and records the result.
     fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
         let s = &point.setup;
-        let repetition = match (point.audit, warm_up) {
-            (true, _) => "audit on disk".to_owned(),
-            (false, true) => "warm-up".to_owned(),
-            (false, false) => format!("{}, repeat {}", s.division(), repeat + 1),
+        let repetition = match warm_up {
+            true => "warm-up".to_owned(),
+            false => format!("{}, repeat {}", s.division(), repeat + 1),
         };
         (self.plan.progress)(&format!(
             "{} {} by {}: {} ranks ({}), spacing {:.3e}, n {}, {repetition}",
@@ -246,20 +240,12 @@ impl Session<'_> {
             s.spacing_min,
             s.layer_cells_min,
         ));
-        let entry = match point.audit {
-            true => {
-                // The mesh is written to the record's file system.
-                let disk = self.record.path().parent().filter(|p| !p.as_os_str().is_empty());
-                let disk = disk.unwrap_or(Path::new("."));
-                self.plan.runner.audit(s, &point.case, disk).map(Entry::Audit)
-            }
-            false => self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
-                self.check_mesh(point, &run)?;
-                Ok(Entry::Run(Box::new(run)))
-            }),
-        };
-        match entry {
-            Ok(entry) => self.append(entry),
+        let run = self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
+            self.check_mesh(point, &run)?;
+            Ok(run)
+        });
+        match run {
+            Ok(run) => self.append(Entry::Run(Box::new(run))),
             Err(failure) if failure.is_interrupt() => Err(failure),
             Err(Failure { why, .. }) => {
                 (self.plan.progress)(&format!("failed: {why}"));
@@ -293,24 +279,8 @@ impl Session<'_> {
                 ));
             }
         }
-        let ranks = !promises.is_independent_of(Independence::Ranks);
-        let partitioner = !promises.is_independent_of(Independence::Partitioner);
-        let partition =
-            [ranks.then(|| s.ranks.to_string()), partitioner.then(|| s.partitioner.clone())];
-        let partition = partition.into_iter().flatten().collect();
-        let (spacing, n) = (format!("{:e}", s.spacing_min), s.layer_cells_min.to_string());
-        let mesh = [s.engine.clone(), s.case.clone(), spacing, n, partition];
-        // The run report of a timed run need not have one.
-        if run.digest.is_empty() {
-            return Ok(());
-        }
-        let first = self.digests.entry(mesh).or_insert_with(|| run.digest.clone());
-        match *first == run.digest || !promises.is_deterministic() {
-            true => Ok(()),
-            false => Err(format!(
-                "the mesh has digest {}, but that of an earlier run has {first}",
-                run.digest
-            )),
-        }
+        let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
+        let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.digests);
+        other.map_or(Ok(()), Err)
     }
 }

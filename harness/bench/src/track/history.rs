@@ -21,7 +21,7 @@ use crate::gate::report::GateReport;
 use crate::gate::time::{CPU, WALL};
 use crate::git;
 use crate::jsonl::{self, Line};
-use crate::origin::Origins;
+use crate::order::Origins;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};

@@ -10,9 +10,6 @@
 //! commits are those of the history; p is a probability.
 
 pub mod history;
-mod summary;
-
-pub use summary::summary;
 
 use history::Record;
 use serde::Serialize;
@@ -201,7 +198,6 @@ mod tests {
         let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
         assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
         assert!((9.0..11.0).contains(&change.percent.unwrap()), "{change:?}");
-        assert!(summary(&all).starts_with("uav/words: 100"), "{}", summary(&all));
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use super::files::put;
 use super::programs::ProgramArguments;
-use bench::experiments::entry::{Entry, Judged, Line, Verdict};
+use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::record;
+use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, SessionOptions, Study};
 use clap::Args;
 use contract::failure::Failure;

@@ -20,7 +20,7 @@ pub struct Arguments {
     /// Name in harness/engines or path of an engine description
     #[arg(long, default_value = "mesher")]
     engine: String,
-    /// Write the exact measures of the candidate: a baseline for later and input of `harness track`
+    /// Write the exact measures of the candidate, for `harness track`
     #[arg(long, value_name = "FILE")]
     record: Option<Output>,
     /// Write the report as JUnit XML

@@ -2,7 +2,7 @@
 
 use super::programs::ProgramArguments;
 use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{Budget, bundle, fault, shrink};
+use bench::shrink::{Budget, fault, replaced, shrink, write};
 use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    if let Some(exists) = bundle::replaced(&out).filter(|_| !arguments.test_only) {
+    if let Some(exists) = replaced(&out).filter(|_| !arguments.test_only) {
         let exists = exists.display();
         let why =
             format!("{exists} would be replaced: remove it, or give another directory with --out");
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let shrunk = shrink(given, &first, &budget, |trial| probe.judge(trial))?;
     let mut options = vec!["--engine", &arguments.engine];
     options.extend(program.iter().flat_map(|program| ["--mesher", program]));
-    let readme = bundle::write(&shrunk, &options, &out).map_err(|error| named(&out, &error))?;
+    let readme = write(&shrunk, &options, &out).map_err(|error| named(&out, &error))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

@@ -3,13 +3,13 @@
 use super::files::put_forms;
 use super::values::{Input, Output, percentage, probability};
 use bench::jsonl;
+use bench::track::analyse;
 use bench::track::history::{self, History, Record};
-use bench::track::{analyse, summary};
 use clap::Args;
 use contract::failure::Failure;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
 use report::json::pretty;
-use report::track::{export, page};
+use report::track::{junit, page, summary};
 use statistics::change_points::Rules;
 use std::path::{Path, PathBuf};
 
@@ -39,15 +39,6 @@ pub struct Arguments {
     /// Address of a commit for the links of the page, with {commit}, such as https://host/name/repository/commit/{commit}
     #[arg(long, value_name = "URL")]
     link: Option<String>,
-    /// Write the last record in Bencher Metric Format
-    #[arg(long, value_name = "FILE")]
-    bencher: Option<Output>,
-    /// Write the last record for github-action-benchmark (customSmallerIsBetter)
-    #[arg(long, value_name = "FILE")]
-    github_benchmark: Option<Output>,
-    /// Write the whole history as CSV
-    #[arg(long, value_name = "FILE")]
-    csv: Option<Output>,
     /// Write a test per metric as JUnit XML
     #[arg(long, value_name = "FILE")]
     junit: Option<Output>,
@@ -110,8 +101,6 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         println!("not in the last record: {} metrics, such as {}", ended().count(), first.name);
     }
     print!("{}", summary(&all));
-    let none = Record::new(String::new());
-    let last = records.last().unwrap_or(&none);
     let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
     let worse: Vec<&str> = all
         .iter()
@@ -124,11 +113,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     put_forms(
         if worse.is_empty() { EXIT_HOLDS } else { EXIT_FAILED },
         &[
-            (&arguments.page, &|| page::page(&records, &all, link)),
-            (&arguments.bencher, &|| export::bencher(last)),
-            (&arguments.github_benchmark, &|| export::github(last)),
-            (&arguments.csv, &|| export::csv(&records)),
-            (&arguments.junit, &|| export::junit(&all, recent)),
+            (&arguments.page, &|| page(&records, &all, link)),
+            (&arguments.junit, &|| junit(&all, recent)),
             (&arguments.json, &|| pretty(&all)),
         ],
         None,

@@ -226,8 +226,8 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
         new(
             "track",
             Harness,
-            format!("{track} {repository} --page t.html --csv t.csv --junit t.xml --json t.json"),
-            &["history.jsonl", "t.html", "t.csv", "t.xml", "t.json"],
+            format!("{track} {repository} --page t.html --junit t.xml --json t.json"),
+            &["history.jsonl", "t.html", "t.xml", "t.json"],
         ),
         Program {
             varying: &["r.json", "g.xml", "g.json", "g.md"],

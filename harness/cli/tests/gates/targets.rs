@@ -25,7 +25,6 @@ const TARGETS: &str = r#"
 mesh.body.case = "case.toml"
 [run]
 one = { mesh = "body", comm = "solo", repeats = 2 }
-disk = { mesh = "body", comm = "solo", audit = true }
 three = { mesh = "body", comm = "sim", ranks = 3 }
 two = { mesh = "body", ranks = 2 }
 [[row]]
@@ -37,11 +36,6 @@ name = "rate"
 run = "one"
 measure = "cells_per_second_per_core"
 at_least = 500
-[[row]]
-name = "audit"
-run = "disk"
-measure = "audit_holds"
-at_least = 1
 [[row]]
 name = "mpi"
 run = "two"
@@ -62,20 +56,13 @@ const TARGETS_COMMAND: &str = "targets targets.toml --mesher ./mesher --network 
 #[test]
 fn met_targets_succeed_and_the_record_gives_the_same_table() {
     let fixture = scripted();
-    let only = "--only rate,audit --record out/r.jsonl";
+    let only = "--only rate --record out/r.jsonl";
     let outcome = fixture.harness(&format!("{TARGETS_COMMAND} {only}"));
     assert_eq!(outcome.code, 0, "{}", outcome.printed);
-    assert!(outcome.printed.contains("2 met, 0 missed"), "{}", outcome.printed);
-    // The audited mesh was removed after the audit.
-    let files: Vec<_> =
-        fs::read_dir(fixture.path("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(files, ["r.jsonl"]);
+    assert!(outcome.printed.contains("1 met, 0 missed"), "{}", outcome.printed);
     let shown = fixture.harness(&format!("{TARGETS_COMMAND} {only} --show"));
     assert_eq!(shown.code, 0, "{}", shown.printed);
     assert!(outcome.printed.contains(shown.printed.trim()), "{}", shown.printed);
-    let record = fs::read_to_string(fixture.path("out/r.jsonl")).unwrap();
-    assert_eq!(record.matches(r#""kind":"target""#).count(), 2);
-    assert_eq!(record.matches(r#""verdict":"met""#).count(), 2);
     // A text takes its numbers from the record.
     let check = |text: &str| {
         fixture.write("paper.tex", text);
@@ -106,21 +93,17 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     fixture.write("mine.toml", &format!("{}[[row]]{rate}", &TARGETS[..rows]));
     let bench = fixture.harness("bench mine.toml --mesher ./mesher --report out");
     assert_eq!(bench.code, 0, "{}", bench.printed);
-    let archive = "archive out mine.toml -o a --title T --author A --licence MIT";
+    let archive = "archive out mine.toml -o a";
     let inside = fixture.harness(&archive.replace("-o a", "-o out/a"));
     assert!(inside.code == 2 && inside.printed.contains("is in the report"), "{}", inside.printed);
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
-    let metadata = fs::read_to_string(fixture.path("a/ro-crate-metadata.json")).unwrap();
-    for name in
-        ["study/study.toml", "study/case.toml", "study/body.stl", "expected.json", "record.jsonl"]
-    {
-        assert!(
-            metadata.contains(&format!("\"@id\": \"{name}\""))
-                && fixture.path("a").join(name).is_file()
-        );
+    for name in ["study/study.toml", "study/case.toml", "study/body.stl", "record.jsonl"] {
+        assert!(fixture.path("a").join(name).is_file());
     }
+    let page = fs::read_to_string(fixture.path("a/README.md")).unwrap();
+    assert!(page.contains("Measured on "), "{page}");
     // What was measured with is not needed any more.
     for name in ["case.toml", "body.stl", "mine.toml"] {
         fs::remove_file(fixture.path(name)).unwrap();
@@ -133,17 +116,12 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
         "{}",
         equal.printed
     );
-    assert!(!equal.printed.contains("does not follow from the record"), "{}", equal.printed);
-    let expected = fs::read_to_string(fixture.path("a/expected.json")).unwrap();
-    fixture.write("a/expected.json", &expected.replacen("\"values\": [", "\"values\": [ ", 1));
-    let changed = replay();
-    assert!(changed.printed.contains("does not follow from the record"), "{}", changed.printed);
     fixture.write("mesher", &MESHER.replace("\"00\"", "\"01\""));
     let other = replay();
     assert!(other.code == 1 && other.printed.contains("DIFFERS"), "{}", other.printed);
     fixture.write("mesher", "#!/bin/sh\nexit 70\n");
     let nothing = replay();
-    assert!(nothing.code == 3 && nothing.printed.contains("4 missing"), "{}", nothing.printed);
+    assert!(nothing.code == 3 && nothing.printed.contains("3 missing"), "{}", nothing.printed);
 }
 
 #[test]
@@ -159,7 +137,7 @@ fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
         outcome.printed
     );
     assert!(
-        outcome.printed.contains("2 met, 0 missed, 1 failed, 1 left out"),
+        outcome.printed.contains("1 met, 0 missed, 1 failed, 1 left out"),
         "{}",
         outcome.printed
     );

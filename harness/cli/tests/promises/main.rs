@@ -61,7 +61,7 @@ fn every_broken_promise_is_reported_by_verify_audit_gate_and_shrink() {
         assert!(failed(&audited, "finding"), "{mesh}: {}", audited.printed);
         let gate = "gate --engine foreign.toml --rules gate.toml --layers correctness --reference ./engine";
         let gated = fixture.harness(gate);
-        assert!(failed(&gated, &format!("serial: {check}: ")), "{mesh}: {}", gated.printed);
+        assert!(failed(&gated, &format!("serial: {check}")), "{mesh}: {}", gated.printed);
         let shrink = "shrink case.toml --engine foreign.toml --test-only";
         let probed = fixture.harness(shrink);
         assert!(failed(&probed, &format!("{check}: serial: ")), "{mesh}: {}", probed.printed);

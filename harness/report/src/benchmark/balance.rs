@@ -27,8 +27,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     }
     for (subject, all) in by_subject(groups, "weights") {
         for (mesh, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
-            out.extend(imbalance(subject, mesh, &of, false));
-            out.extend(imbalance(subject, mesh, &of, true));
+            out.extend(imbalance(subject, mesh, &of));
         }
     }
     out
@@ -70,32 +69,15 @@ fn per_rank(subject: Subject, group: &Group) -> Option<Figure> {
     ))
 }
 
-/// Load imbalance of cells, or of exposed faces, for weights and partitioners; `None` if some run did not count them.
-fn imbalance(
-    subject: Subject,
-    (cells, ranks): (u64, usize),
-    of: &[&Group],
-    exposed: bool,
-) -> Option<Figure> {
-    let (counter, id, name, legend, note) = match exposed {
-        false => ("leaves", "balance", "cells", "by cells", ""),
-        true => (
-            "exposed_faces",
-            "balance-exposed",
-            "exposed faces",
-            "by faces",
-            " Exposed faces are those that the mesh shows to the body, where it meets a near-body mesh. The paper expects them to be distributed badly (section V).",
-        ),
-    };
-    let lambda = |g: &&Group| Some(g.typical.counters.get(counter)?.lambda(ranks));
+/// Load imbalance of cells for weights and partitioners; `None` if some run did not count them.
+fn imbalance(subject: Subject, (cells, ranks): (u64, usize), of: &[&Group]) -> Option<Figure> {
+    let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Option<Vec<f64>> = of.iter().map(lambda).collect();
-    let mut references = vec![("target, 1.10".to_owned(), 1.1)];
-    if !exposed {
-        // A base leaf is never divided, so no partition beats a rank that has only the largest one.
-        let largest = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical)).reduce(f64::min);
-        let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
-        references.extend(bound.map(|b| (format!("lower bound, {b:.2}"), b)));
-    }
+    // A base leaf is never divided, so no partition beats a rank that has only the largest one.
+    let largest = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical)).reduce(f64::min);
+    let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
+    let bound = bound.map(|b| (format!("lower bound, {b:.2}"), b));
+    let references = std::iter::once(("target, 1.10".to_owned(), 1.1)).chain(bound).collect();
     let baseline = match of.iter().any(|g| g.setup.partitioner == "paper") {
         true => {
             "The baseline is the paper's partition (paper) in the root of this case, which is ours; other depths are automatic."
@@ -104,19 +86,19 @@ fn imbalance(
     };
     let (millions, cells) = (cells as f64 / 1e6, grouped(cells));
     let caption = format!(
-        "Load imbalance λ = max/mean of the number of {name} per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
-         tree and the weights of its leaves. {baseline} With W, each exposed face weighs like so many cells in the last repartition.{note} The counts repeat exactly."
+        "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
+         tree and the weights of its leaves. {baseline} The counts repeat exactly."
     );
     let bars = Bars {
         categories: of.iter().map(|g| g.setup.division()).collect(),
-        segments: vec![(format!("{}: {legend}", subject.engine), lambdas?)],
+        segments: vec![(format!("{}: by cells", subject.engine), lambdas?)],
         references,
         provenance: Provenance::Measured,
     };
     Some(Figure::new(
-        format!("{id}-{}-{millions:.0}M-{ranks}", subject.file()),
+        format!("balance-{}-{millions:.0}M-{ranks}", subject.file()),
         format!(
-            "Load imbalance of {name} by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
+            "Load imbalance of cells by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
         ),
         caption,
         [Axis::linear("partitioner and weights"), Axis::linear("λ = max/mean over ranks")],

@@ -25,7 +25,7 @@ pub fn page(groups: &Groups, drawn: &[Drawn], broken: &[Broken], lines: &[Line])
         }
         @for (f, svg) in drawn { (figure(&f.id, &f.title, svg, &html! { (f.caption) })) }
         h2 id="tables" { "Tables" }
-        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions. Exposed faces are those that the mesh shows to the body; W is the number of cells that each weighs." }
+        p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." }
         @for table in tables::tables(groups) { (table.html()) }
         h2 id="rules" { "The twelve rules of Hoefler and Belli" }
         (rules(broken))

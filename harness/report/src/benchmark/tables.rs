@@ -40,8 +40,8 @@ type With<'a, T> = (&'a T, Efficiency);
 fn experiment(groups: &Groups, name: &str) -> Table {
     let of = groups.all.iter().filter(|g| g.setup.experiment == name);
     let of: Vec<With<Group>> = of.map(|g| (g, groups.efficiency(g))).collect();
-    let lambda = |group: &Group, counter: &str| {
-        let counted = group.typical.counters.get(counter);
+    let lambda = |group: &Group| {
+        let counted = group.typical.counters.get("leaves");
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
     };
     let of_base = |group: &Group, value: f64| match groups.has_reference(group) {
@@ -64,8 +64,7 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("coverage", &|(g, _)| format!("{:.0} %", g.time_s.coverage * 100.0)),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
             ("λ (time)", &|(_, e)| format!("{:.3}", 1.0 / e.load_balance)),
-            ("λ (cells)", &|(g, _)| lambda(g, "leaves")),
-            ("λ (exposed faces)", &|(g, _)| lambda(g, "exposed_faces")),
+            ("λ (cells)", &|(g, _)| lambda(g)),
             ("serialisation", &|(_, e)| format!("{:.3}", e.serialisation)),
             ("transfer", &|(_, e)| format!("{:.3}", e.transfer)),
             ("parallel efficiency", &|(_, e)| format!("{:.3}", e.parallel())),

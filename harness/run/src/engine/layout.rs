@@ -68,15 +68,12 @@ pub struct Layout {
     /// The weights of base leaves in the partition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
-    /// How many leaves each exposed face weighs in the partition; 0 counts these faces only. `None`: they are not counted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub weight_exposed: Option<u32>,
 }
 
 impl Layout {
     /// These ranks, with every choice left to the engine.
     pub const fn on(ranks: Ranks) -> Self {
-        Self { ranks, partitioner: None, level_base: None, weights: None, weight_exposed: None }
+        Self { ranks, partitioner: None, level_base: None, weights: None }
     }
 
     /// The number of ranks of a run on several; `None` for a serial run.
@@ -98,7 +95,7 @@ impl fmt::Display for Layout {
                 write!(f, ", {label}{choice}")?;
             }
         }
-        self.weight_exposed.iter().try_for_each(|w| write!(f, ", weight of exposed faces {w}"))
+        Ok(())
     }
 }
 

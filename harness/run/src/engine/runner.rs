@@ -350,11 +350,10 @@ mod tests {
         let simulated = Layout {
             partitioner: Some("metis".into()),
             weights: Some("area".into()),
-            weight_exposed: Some(4),
             ..Layout::on(Ranks::Simulated { ranks: 3, seed: 7 })
         };
         let expected = "mesher a.toml --comm sim:3:7 --quiet --json p/run.json \
-                        --partitioner metis --weights area --weight-exposed 4";
+                        --partitioner metis --weights area";
         assert_eq!(words(&mesher, &simulated, &plain), expected);
         let on_mpi = Layout { level_base: Some("2".into()), ..Layout::on(Ranks::Mpi(3)) };
         let expected = "mpirun -n 3 mesher a.toml --comm mpi --quiet --out mesh --status p/status \

@@ -8,6 +8,9 @@ use contract::octant::LEVEL_MAX;
 use contract::plain::StlForm;
 use serde::Deserialize;
 
+/// What an engine lacks whose meshes depend on the number of ranks.
+pub const EQUAL_RANKS: &str = "equal meshes on any number of ranks";
+
 /// What an engine lacks that is not deterministic.
 pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
 
@@ -119,7 +122,7 @@ impl Description {
             (takes.seeds, "seeds"),
             (promises.is_deterministic(), EQUAL_RUNS),
             (parallel, "MPI"),
-            (!parallel || of_ranks, "equal meshes on any number of ranks"),
+            (!parallel || of_ranks, EQUAL_RANKS),
         ];
         let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
         let level = self.limits.level_max;

@@ -22,8 +22,7 @@ const COMMON: [&str; 8] =
     ["program", "case", "ranks", "here", "root", "python", "mpirun", "target"];
 
 /// Those that have one in the template of the same name.
-const OWN: [&str; 7] =
-    ["out", "json", "status", "partitioner", "level_base", "weights", "weight_exposed"];
+const OWN: [&str; 6] = ["out", "json", "status", "partitioner", "level_base", "weights"];
 
 /// Command templates, as lists of words. A missing template is a capability that the engine does not have.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -61,8 +60,6 @@ pub struct Templates {
     pub level_base: Option<Vec<String>>,
     /// Appended to choose the `{weights}` of the partition.
     pub weights: Option<Vec<String>>,
-    /// Appended to count the exposed faces of every rank and to weigh each like `{weight_exposed}` leaves.
-    pub weight_exposed: Option<Vec<String>>,
 }
 
 impl Templates {
@@ -79,7 +76,6 @@ impl Templates {
             ("partitioner", &self.partitioner),
             ("level_base", &self.level_base),
             ("weights", &self.weights),
-            ("weight_exposed", &self.weight_exposed),
         ];
         let optional = optional.into_iter().filter_map(|(key, of)| Some((key, of.as_ref()?)));
         iter::once(("serial", &self.serial)).chain(optional)
@@ -198,7 +194,6 @@ impl Templates {
         };
         let mut words: Vec<String> = template.iter().flat_map(expand).collect();
         let text = |path: PathBuf| path.to_string_lossy().into_owned();
-        let weight_exposed = layout.weight_exposed.map(|weight| weight.to_string());
         for (key, value, template) in [
             ("out", out, &self.out),
             ("json", options.report.then(|| text(options.report_path())), &self.json),
@@ -207,7 +202,6 @@ impl Templates {
             ("partitioner", layout.partitioner.clone(), &self.partitioner),
             ("level_base", layout.level_base.clone(), &self.level_base),
             ("weights", layout.weights.clone(), &self.weights),
-            ("weight_exposed", weight_exposed, &self.weight_exposed),
         ] {
             if let Some(value) = value {
                 values.insert(key, value);

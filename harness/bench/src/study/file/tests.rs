@@ -10,7 +10,6 @@ const FILE: &str = r#"
     [run]
     one = { mesh = "cube", repeats = 3 }
     two = { mesh = "cube", ranks = 2, comm = "sim", weights = "area" }
-    disk = { mesh = "cube", audit = true }
     [[row]]
     name = "rate"
     run = ["one", "two"]
@@ -26,17 +25,13 @@ const FILE: &str = r#"
     run = ["one", "two"]
     measure = "time_per_cell_growth"
     at_most = 1.05
-    [[row]]
-    name = "audit"
-    run = "disk"
-    measure = "audit_holds"
 "#;
 
 #[test]
 fn several_runs_are_several_rows_except_for_a_series() {
     let mut study = read(FILE).unwrap();
     let names = |t: &Study| t.row.iter().map(|r| r.name.clone()).collect::<Vec<_>>();
-    assert_eq!(names(&study), ["rate: one", "rate: two", "speed-up", "growth", "audit"]);
+    assert_eq!(names(&study), ["rate: one", "rate: two", "speed-up", "growth"]);
     assert!(study.only(&["rat".to_owned()]).unwrap_err().contains("\"rat\""));
     study.only(&["rate".to_owned(), "growth".to_owned()]).unwrap();
     assert_eq!(names(&study), ["rate: one", "rate: two", "growth"]);
@@ -106,7 +101,7 @@ fn ranks_that_an_engine_does_not_offer_are_replaced_by_a_serial_run_or_left_out(
     assert!(of(&weak, &serial, false).is_empty());
     let weights = Series { experiment: Experiment::Weights, ..strong.clone() };
     assert!(of(&weights, &parallel, false).is_empty());
-    assert_eq!((weights.choices().len(), strong.choices()), (7, &[("", "", None)][..]));
+    assert_eq!((weights.choices().len(), strong.choices()), (6, &[("", "")][..]));
 }
 
 #[test]
@@ -138,7 +133,6 @@ fn contradictions_are_reported() {
         ("ranks = 2, comm = \"sim\"", "ranks = 2, comm = \"solo\"", "cannot have 2 ranks"),
         ("against = \"one\"", "", "\"speed-up\": speed_up requires a run in `against`"),
         ("against = \"one\"", "against = \"three\"", "no run is called \"three\""),
-        ("run = \"disk\"", "run = \"one\"", "which one is not"),
         ("\"speed_up\"", "\"phase_share\"", "does not accept a run"),
         ("spacing_min = 0.1", "spacing_min = 0.1\ncells = 1e6", "not both"),
         ("spacing_min = 0.1", "cells = 5", "from 1e3 to 1e12"),
