@@ -59,9 +59,6 @@ const DIFFERENCE_MAX: f64 = 2.5;
 /// Greatest autocorrelation: beyond it, noise and steps look alike.
 const CORRELATION_MAX: f64 = 0.9;
 
-/// Degrees of freedom of noise that few values have.
-const FREEDOM_OF_FEW: f64 = 6.0;
-
 /// Factor on a p-value, because the autocorrelation was estimated and intervals overlap: by simulation.
 const TRIED: f64 = 30.0;
 
@@ -88,10 +85,12 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     let middle = median_of(values);
     let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / size).collect();
     let clean = without_outliers(&scaled);
+    let [near, far] = [1, 2].map(|apart| spread(&clean, apart));
+    let correlation = if near > 0.0 { (far / near - 1.0).clamp(0.0, CORRELATION_MAX) } else { 0.0 };
     let least = rules.effect_min * middle.abs() / size;
-    // Below that, noise is not distinguished from none.
-    let (noise, freedom) = noise(&scaled, &clean);
-    let variance = noise + (least / 4.0).max(1e-9).powi(2);
+    // Of a sum of many values, for each of them; below the second term, noise is not distinguished from none.
+    let variance = far / (1.0 - correlation).powi(2) + (least / 4.0).max(1e-9).powi(2);
+    let freedom = 2.0 / 3.0 * n as f64;
     let p_value = |of: &Division| {
         let tail = (1.0 + of.gain / variance / freedom).powf(-freedom / 2.0);
         (TRIED * n as f64 * tail).clamp(P_MIN, 1.0)
@@ -117,24 +116,11 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     found.iter().zip(ends).map(step).collect()
 }
 
-/// Returns the variance of the noise that counts in a sum of many values, for each of them, and its degrees of freedom. Where most values
-/// equal their predecessor, the noise is in the few that do not last: their sums have heavy tails.
-fn noise(values: &[f64], clean: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let [near, far] = [1, 2].map(|apart| spread(clean, apart));
-    if near > 0.0 {
-        let correlation = (far / near - 1.0).clamp(0.0, CORRELATION_MAX);
-        return (far / (1.0 - correlation).powi(2), 2.0 / 3.0 * count);
-    }
-    let squares = values.iter().zip(clean).map(|(value, clean)| (value - clean).powi(2));
-    (squares.sum::<f64>() / count, FREEDOM_OF_FEW)
-}
-
 /// Returns half of the mean square of the differences of values that are so far apart. One across a step counts as a large one of the
 /// noise.
 fn spread(values: &[f64], apart: usize) -> f64 {
     let differences = values.iter().zip(&values[apart..]).map(|(a, b)| (b - a).abs());
-    let limit = DIFFERENCE_MAX * deviation(values, 1).max(deviation(values, apart));
+    let limit = DIFFERENCE_MAX * deviation(values, apart);
     let squares = differences.map(|difference| difference.min(limit).powi(2));
     squares.sum::<f64>() / (2 * (values.len() - apart)) as f64
 }

@@ -73,29 +73,6 @@ fn independent_noise_of_any_kind_rarely_has_a_step() {
     }
 }
 
-/// Most values equal their predecessor, as those of memory in pages do.
-#[test]
-fn a_value_that_flickers_rarely_has_a_step() {
-    for often in [5, 10, 20, 30, 40] {
-        let flickering = |count: usize, seed: u64| {
-            let mut random = Random(seed * 31 + often);
-            (0..count)
-                .map(|_| 100.0 + f64::from(u8::from(random.below(100) < often as usize)))
-                .collect()
-        };
-        for count in [20, 60, 200] {
-            let rate = alarms(|seed| flickering(count, seed));
-            assert!(rate <= 1.0, "{often} of 100 in {count} values: {rate} %");
-        }
-        let found = |seed: &u64| {
-            let mut values: Vec<f64> = flickering(60, *seed);
-            values[40..].iter_mut().for_each(|value| *value += 5.0);
-            matches!(places(&values)[..], [38..=42])
-        };
-        assert!((0..50).filter(found).count() >= 48, "{often}");
-    }
-}
-
 #[test]
 fn autocorrelated_noise_is_no_sequence_of_steps() {
     for count in [30, 100] {
