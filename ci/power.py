@@ -1,4 +1,4 @@
-"""What ci/power computes: the line of a gate, and the operating curve, beside public detectors.
+"""What ci/power computes: the line of a gate, the operating curve, and steps hidden by drifts, each beside public detectors.
 
 The detectors, with the rules of their documentation; each is given all times of the first measurement of the gate:
 
@@ -6,13 +6,18 @@ The detectors, with the rules of their documentation; each is given all times of
 - pyperf: the function with which `pyperf compare_to` decides, a t-test at 5 %
 - criterion: a bootstrapped t-test at 5 % and an interval of the change beyond 1 % (criterion.rs, its defaults)
 - alert200: github-action-benchmark, whose alert-threshold is 200 %
+- otava: Apache Otava, formerly hunter (E-divisive with t-tests; its defaults, but for one window over the whole history: with windows of
+  50 values it ends with a ValueError on some series)
+- pelt: ruptures, PELT with the l2 model and the penalty sigma^2 log n of its guide
 """
 
 import collections
 import glob
 import json
 import os
+import random
 import statistics
+import subprocess
 import sys
 
 COLUMNS = "kind percent trial red counters memory instructions time cpu wall first rounds cpu_percent wall_percent".split()
@@ -116,5 +121,48 @@ def table(path):
             print(f"    {which} time: {middle:+.2f} % in the median, {low:+.2f} to {high:+.2f} % in 95 of 100", file=sys.stderr)
 
 
+def steps_of(harness, place, values):
+    """The steps that harness track, Otava and PELT find."""
+    import math
+    import numpy as np
+    import ruptures
+    from otava.analysis import compute_change_points
+
+    path = f"{place}/history.jsonl"
+    with open(path, "w") as history:
+        for i, value in enumerate(values):
+            record = {"schema": "octree-track/1", "commit": f"{i:040x}", "time": f"2026-01-01T00:{i // 60:02}:{i % 60:02}Z"}
+            print(json.dumps({**record, "subject": "", "machine": "m", "metrics": {"c/seconds": value}}), file=history)
+    subprocess.run([harness, "track", path, "--json", f"{path}.json"], check=True, capture_output=True)
+    found = json.load(open(f"{path}.json"))
+    ours = [change["at"] for series in found for change in series["changes"]]
+    otava = [point.index for point in compute_change_points(np.array(values), window_len=2 * len(values))[0]]
+    sigma = statistics.median(abs(a - b) for a, b in zip(values, values[1:])) / (0.6745 * math.sqrt(2))
+    fitted = ruptures.Pelt(model="l2", min_size=2, jump=1).fit(np.array(values))
+    pelt = fitted.predict(pen=sigma**2 * math.log(len(values)))[:-1]
+    return {"track": ours, "otava": otava, "pelt": pelt}
+
+
+def track(harness, place, trials):
+    """Prints how often a step hidden by a drift is found within two commits, and how many steps are found where none is."""
+    print("| history of 120 commits, noise of 1 % | detector | found | steps found elsewhere, in how many histories |")
+    print("|---|---|---|---|")
+    for drift, step in [(0, 0), (20, 0), (20, 3), (20, 5), (-20, 5), (-5, 5)]:
+        found, wrong, histories = collections.Counter(), collections.Counter(), collections.Counter()
+        for trial in range(int(trials)):
+            draw = random.Random(f"{drift} {step} {trial}")
+            at = draw.randrange(30, 90)
+            mean = lambda i: (1 + drift / 100 * i / 120) * (1 + step / 100 * (i >= at))
+            values = [mean(i) * draw.gauss(1, 0.01) for i in range(120)]
+            for name, steps in steps_of(harness, place, values).items():
+                near = [s for s in steps if step and abs(s - at) <= 2]
+                found[name] += bool(near)
+                wrong[name] += len(steps) - len(near)
+                histories[name] += len(steps) > len(near)
+        for name in ("track", "otava", "pelt"):
+            of = f"{found[name]} of {trials}" if step else "-"
+            print(f"| drift {drift:+} %, step {step:+} % | {name} | {of} | {wrong[name]} in {histories[name]} |")
+
+
 if __name__ == "__main__":
-    {"gates": gates, "table": table}[sys.argv[1]](*sys.argv[2:])
+    {"gates": gates, "table": table, "track": track}[sys.argv[1]](*sys.argv[2:])

@@ -2,7 +2,7 @@
 //!
 //! - [`mod@median`]: medians with intervals that assume no distribution;
 //! - [`comparison`]: candidate against baseline by a permutation test, for the gate;
-//! - [`mod@change_points`]: steps in a history, for `harness track`;
+//! - [`mod@change_points`]: steps in a history, for `harness track`, from the segments of least cost;
 //! - [`false_discovery`]: the rate of false alarms among many tests;
 //! - [`random`]: the generator of permutations and samples.
 //!
@@ -13,5 +13,6 @@ pub mod comparison;
 pub mod false_discovery;
 pub mod median;
 pub mod random;
+mod segments;
 
 pub use median::{Median, median, median_of};
