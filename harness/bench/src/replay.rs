@@ -1,35 +1,54 @@
 //! What the runs of a record must give when they are repeated elsewhere: digests and counts exactly, ratios within bands. Times are
-//! those of a machine.
+//! those of a machine, so they are shown and not judged.
 //!
-//! Invariants, executed by [`expected`] and [`Replayed::check_invariants`] before anything is printed: a quantity of a run is there
-//! once; a band contains its value; a ratio is inside if and only if its band contains it, and an exact value is equal if and only if it
-//! is the same text.
+//! Invariants, executed by [`Expected::check_invariants`] and [`Replayed::check_invariants`] before anything is written or printed: a
+//! quantity of a run is there once; a band contains its value; a ratio is inside if and only if its band contains it, and an exact
+//! value is equal if and only if it is the same text.
 
-use crate::experiments::entry::{Line, Run, Setup};
+use crate::experiments::entry::{Entry, Line, Setup};
 use crate::experiments::group::{Group, Groups};
 use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
+use serde::Serialize;
 use statistics::Median;
 use std::collections::{BTreeMap, HashMap};
 
+/// Name and version of the schema.
+const SCHEMA: &str = "octree-replay/1";
 /// How far a ratio may be outside of the interval of its repetitions.
 pub const TOLERANCE: f64 = 0.25;
 /// The share of all ratios that must be inside of their bands.
 const INSIDE: f64 = 0.95;
 
+/// What a repetition must give.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Expected {
+    schema: String,
+    /// The commit of the programs; empty if it is unknown.
+    pub commit: String,
+    /// The time that all runs took, in seconds.
+    pub seconds: f64,
+    /// The time that one run of each took, with its warm-up.
+    pub seconds_once: f64,
+    /// The values, run by run.
+    pub values: Vec<Value>,
+}
+
 /// A quantity of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Value {
     /// The run.
     pub run: String,
     /// The quantity.
     pub quantity: String,
     /// Its value.
+    #[serde(flatten)]
     pub found: Found,
 }
 
 /// A value, by how it is compared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Found {
     /// The same everywhere.
     Exact(String),
@@ -42,47 +61,99 @@ pub enum Found {
         /// Upper end.
         high: f64,
         /// `measured`, `projected` ...: only the same are compared.
-        how: &'static str,
+        how: String,
     },
+    /// Seconds, which are not compared.
+    Time(f64),
 }
 
-/// Returns what a repetition must give: the values of the runs of the last machine and program in a record.
-///
-/// # Errors
-/// If it has no run.
-pub fn expected(lines: &[Line]) -> Result<Vec<Value>, Failure> {
-    let values = values(&of_last_origin(lines));
-    if values.is_empty() {
-        return Err(Failure::missing("the record has no run that could be repeated"));
+impl Expected {
+    /// The values of the runs of the last machine and program in a record.
+    ///
+    /// # Errors
+    /// If it has no run.
+    pub fn of(lines: &[Line]) -> Result<Self, Failure> {
+        let lines = of_last_origin(lines);
+        let groups = Groups::of(&lines);
+        if groups.all.is_empty() {
+            return Err(Failure::missing("the record has no run that could be repeated"));
+        }
+        let (mut seconds, mut once) = (0.0, 0.0);
+        let mut longest: HashMap<String, f64> = HashMap::new();
+        for line in &lines {
+            let (run, time_s) = match &line.entry {
+                Entry::Run(run) if run.warm_up => ("warm-up".to_owned(), run.time_launch_s),
+                Entry::Run(run) => (name(&run.setup), run.time_launch_s),
+                _ => continue,
+            };
+            seconds += time_s;
+            if run == "warm-up" {
+                once += time_s;
+            } else {
+                let longest = longest.entry(run).or_default();
+                *longest = longest.max(time_s);
+            }
+        }
+        once += longest.values().sum::<f64>();
+        let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
+        let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
+        let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
+        let expected = Self { schema, commit, seconds, seconds_once: once, values };
+        expected.check_invariants();
+        Ok(expected)
     }
-    let mut seen = BTreeMap::new();
-    for Value { run, quantity, found } in &values {
-        let before = seen.insert((run, quantity), found);
-        assert!(before.is_none(), "{run}: {quantity} is there twice");
-        if let Found::Ratio { value, low, high, .. } = found {
-            assert!(low <= value && value <= high, "{run}: {quantity} is not in its band");
+
+    /// The values as JSON.
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("plain data") + "\n"
+    }
+
+    /// How often each run may be repeated in that many seconds; `None` for as often as the study does.
+    ///
+    /// # Errors
+    /// If one repetition takes longer.
+    pub fn repeats_within(&self, limit_s: f64) -> Result<Option<u16>, Failure> {
+        if self.seconds <= limit_s {
+            return Ok(None);
+        }
+        match (limit_s / self.seconds_once) as u16 {
+            0 => Err(Failure::input(format!(
+                "one run of each took {:.0} minutes on the archive's machine: give --minutes",
+                (self.seconds_once / 60.0).ceil()
+            ))),
+            repeats => Ok(Some(repeats)),
         }
     }
-    Ok(values)
-}
 
-/// Compares with a record of the repetition.
-pub fn compare(expected: &[Value], lines: &[Line]) -> Replayed {
-    let measured = values(lines).into_iter().map(|v| ((v.run, v.quantity), v.found));
-    let measured: HashMap<(String, String), Found> = measured.collect();
-    let row = |expected: &Value| {
-        let measured = measured.get(&(expected.run.clone(), expected.quantity.clone())).cloned();
-        let verdict = verdict(&expected.found, measured.as_ref());
-        Row { expected: expected.clone(), measured, verdict }
-    };
-    let replayed = Replayed(expected.iter().map(row).collect());
-    replayed.check_invariants();
-    replayed
-}
+    /// Executes the invariants at the head of this file.
+    fn check_invariants(&self) {
+        let mut seen = BTreeMap::new();
+        for Value { run, quantity, found } in &self.values {
+            let before = seen.insert((run, quantity), found);
+            assert!(before.is_none(), "{run}: {quantity} is there twice");
+            if let Found::Ratio { value, low, high, .. } = found {
+                assert!(low <= value && value <= high, "{run}: {quantity} is not in its band");
+            }
+        }
+        assert!(self.seconds_once <= self.seconds + 1e-6, "one run takes longer than all");
+    }
 
-fn values(lines: &[Line]) -> Vec<Value> {
-    let groups = Groups::of(lines);
-    groups.all.iter().flat_map(|group| of_group(&groups, group)).collect()
+    /// Compares with a record of the repetition.
+    pub fn compare(&self, lines: &[Line]) -> Replayed {
+        let groups = Groups::of(lines);
+        let measured = groups.all.iter().flat_map(|group| values(&groups, group));
+        let measured: HashMap<(String, String), Found> =
+            measured.map(|v| ((v.run, v.quantity), v.found)).collect();
+        let row = |expected: &Value| {
+            let key = (expected.run.clone(), expected.quantity.clone());
+            let measured = measured.get(&key).cloned();
+            let verdict = verdict(&expected.found, measured.as_ref());
+            Row { expected: expected.clone(), measured, verdict }
+        };
+        let replayed = Replayed(self.values.iter().map(row).collect());
+        replayed.check_invariants();
+        replayed
+    }
 }
 
 /// The verdict on a value.
@@ -96,7 +167,7 @@ pub enum Verdict {
     Inside,
     /// A ratio is not.
     Outside,
-    /// A ratio that was measured in another way.
+    /// A time, or a ratio that was measured in another way.
     NotCompared,
     /// The repetition does not have it.
     Missing,
@@ -170,14 +241,14 @@ fn name(s: &Setup) -> String {
 }
 
 /// The values of a group.
-fn of_group(groups: &Groups, group: &Group) -> Vec<Value> {
+fn values(groups: &Groups, group: &Group) -> Vec<Value> {
     let (run, first) = (name(&group.setup), &group.runs[0]);
     let mut exact = vec![("cells".to_owned(), first.cells.to_string())];
     exact.push(("digest".to_owned(), first.digest.clone()));
     exact.push(("facets".to_owned(), first.geometry.clone().unwrap_or_default()));
     // A program may count what it does not promise to be the same.
     let is_exact = |name: &&String| {
-        let of = |run: &Run| run.counters.get(*name).map(|c| c.sum);
+        let of = |run: &crate::experiments::entry::Run| run.counters.get(*name).map(|c| c.sum);
         group.runs.iter().all(|run| of(run) == of(first))
     };
     let counters = first.counters.keys().filter(is_exact);
@@ -186,7 +257,7 @@ fn of_group(groups: &Groups, group: &Group) -> Vec<Value> {
     let exact = exact.into_iter().map(|(quantity, value)| (quantity, Found::Exact(value)));
 
     let base = groups.reference(group);
-    let (scales, how) = (base.setup.ranks < group.setup.ranks, group.how());
+    let (scales, how) = (base.setup.ranks < group.setup.ranks, group.how().to_owned());
     let efficiency = groups.efficiency(group);
     let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
     let ratios = [
@@ -198,16 +269,17 @@ fn of_group(groups: &Groups, group: &Group) -> Vec<Value> {
     let ratio = |(quantity, median): (&str, Option<Median>)| {
         let Median { value, low, high, .. } = median.filter(|m| m.value.is_finite())?;
         let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
-        Some((quantity.to_owned(), Found::Ratio { value, low, high, how }))
+        Some((quantity.to_owned(), Found::Ratio { value, low, high, how: how.clone() }))
     };
-    let all = exact.chain(ratios.into_iter().filter_map(ratio));
+    let time = ("time".to_owned(), Found::Time(group.time_s.value));
+    let all = exact.chain(ratios.into_iter().filter_map(ratio)).chain([time]);
     all.map(|(quantity, found)| Value { run: run.clone(), quantity, found }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Entry, Spread};
+    use crate::experiments::entry::{Comm, Run, Spread};
     use crate::testing::{line, run};
     use proptest::prelude::*;
 
@@ -215,6 +287,7 @@ mod tests {
     fn record(two: [f64; 2]) -> Vec<Line> {
         let counted = |run: Run| Run {
             counters: [("rays".to_owned(), Spread::of(&vec![6.0; run.setup.ranks]))].into(),
+            time_launch_s: 10.0,
             ..run
         };
         let runs = [&[4.0][..], &two].map(|times| run(Comm::Sim, 1000, &[("a", times)]));
@@ -231,57 +304,69 @@ mod tests {
         lines
     }
 
-    /// A repetition beside the record of equal times.
-    fn repeated(lines: &[Line]) -> Replayed {
-        compare(&expected(&record([2.0, 2.0])).unwrap(), lines)
+    fn expected() -> Expected {
+        Expected::of(&record([2.0, 2.0])).unwrap()
     }
 
     #[test]
     fn a_record_replays_itself() {
-        let replayed = repeated(&record([2.0, 2.0]));
+        let expected = expected();
+        let replayed = expected.compare(&record([2.0, 2.0]));
         assert!(replayed.holds() && replayed.is_judged());
-        // Cells, digest and rays of two runs; memory of two, and imbalance, speedup and efficiency of one.
+        // Cells, digest and rays of two runs; memory of two, and imbalance, speedup and efficiency of one; times.
         let counts = [Verdict::Equal, Verdict::Inside, Verdict::NotCompared, Verdict::Missing];
-        assert_eq!(counts.map(|verdict| replayed.count(verdict)), [6, 5, 0, 0]);
-        assert!(expected(&[]).is_err());
+        assert_eq!(counts.map(|verdict| replayed.count(verdict)), [6, 5, 2, 0]);
+        assert!(Expected::of(&[]).is_err());
     }
 
     #[test]
     fn other_meshes_and_counts_fail_and_slower_machines_do_not() {
+        let expected = expected();
         let slower = |run: &mut Run| {
             let slow =
                 |of: &Spread| Spread::of(&of.by_rank.iter().map(|t| t * 3.0).collect::<Vec<f64>>());
             run.useful_s = slow(&run.useful_s);
             run.phases[0].useful_s = slow(&run.phases[0].useful_s);
         };
-        assert!(repeated(&edited(slower)).holds());
+        assert!(expected.compare(&edited(slower)).holds());
         let faults: [fn(&mut Run); 3] = [
             |run| run.digest = "1".repeat(32),
             |run| run.counters.values_mut().for_each(|c| *c = Spread::of(&[7.0])),
             |run| run.cells += 1,
         ];
         for fault in faults {
-            let replayed = repeated(&edited(fault));
+            let replayed = expected.compare(&edited(fault));
             assert!(!replayed.holds() && replayed.count(Verdict::Differs) == 2, "{replayed:?}");
         }
         // An imbalance of 1.6, a speedup of 1.25.
-        let replayed = repeated(&record([3.2, 0.8]));
+        let replayed = expected.compare(&record([3.2, 0.8]));
         assert_eq!((replayed.count(Verdict::Outside), replayed.holds()), (3, false));
-        let missing = repeated(&record([2.0, 2.0])[..1]);
-        assert_eq!(missing.count(Verdict::Missing), 7);
+        let missing = expected.compare(&record([2.0, 2.0])[..1]);
+        assert_eq!(missing.count(Verdict::Missing), 8);
+    }
+
+    #[test]
+    fn a_replay_has_as_many_repetitions_as_time() {
+        let mut lines = record([2.0, 2.0]);
+        lines.extend(record([2.0, 2.0]));
+        let expected = Expected::of(&lines).unwrap();
+        assert_eq!((expected.seconds, expected.seconds_once), (40.0, 20.0));
+        let of = |limit_s: f64| expected.repeats_within(limit_s);
+        assert_eq!((of(40.0), of(39.0)), (Ok(None), Ok(Some(1))));
+        assert!(of(19.0).unwrap_err().why.contains("1 minutes"));
     }
 
     proptest! {
         #[test]
         fn the_invariants_hold_for_drawn_times(a in prop::array::uniform2(0.1..9.0f64), b in prop::array::uniform2(0.1..9.0f64)) {
-            compare(&expected(&record(a)).unwrap(), &record(b));
+            Expected::of(&record(a)).unwrap().compare(&record(b));
         }
     }
 
     #[test]
     #[should_panic(expected = "the verdict follows from both values")]
     fn a_wrong_verdict_is_noticed() {
-        let mut replayed = repeated(&record([3.2, 0.8]));
+        let mut replayed = expected().compare(&record([3.2, 0.8]));
         replayed.0.iter_mut().for_each(|row| row.verdict = Verdict::Inside);
         replayed.check_invariants();
     }

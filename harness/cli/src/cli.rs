@@ -30,7 +30,7 @@ pub enum Command {
     Bench(Box<commands::bench::Arguments>),
     /// Make figures, a web page, and a LaTeX fragment from benchmark records
     Report(commands::report::Arguments),
-    /// Put a report and its study into one directory that others can replay
+    /// Put a report, its study and what a repetition must give into one directory, an RO-Crate
     Archive(commands::archive::Arguments),
     /// Repeat the runs of an archive here, and compare: digests and counts exactly, ratios within bands
     Replay(Box<commands::replay::Arguments>),

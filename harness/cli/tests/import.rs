@@ -33,7 +33,7 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
     let (code, output, error) =
         result(&["import", &sample("unitcube.p8est"), "--out", first.to_str().unwrap()]);
     assert_eq!((code, error.as_str()), (0, ""));
-    assert!(output.ends_with(": 106 cells, sides Unknown\n"), "{output}");
+    assert!(output.ends_with(": 106 cells, sides unknown\n"), "{output}");
     let words = first.join("leaves-00000.npy");
     let arguments =
         ["import", words.to_str().unwrap(), "--root", "0,0,0,1", "--out", second.to_str().unwrap()];
@@ -44,6 +44,8 @@ fn a_mesh_is_imported_again_from_its_own_leaf_words() {
     let (code, output, error) = result(&["diff", &forest, second.to_str().unwrap()]);
     assert_eq!((code, error.as_str()), (0, ""), "{output}");
     assert!(output.contains("106 compared"), "{output}");
+    let (code, output, _) = result(&["diff", &forest, &sample("brick.p8est"), "--ignore-root"]);
+    assert!(code == 1 && output.contains("the leaves differ"), "{output}");
     // An existing mesh is not overwritten.
     let (code, _, error) = result(&arguments);
     assert!(code == 2 && error.contains("not empty"), "{error}");

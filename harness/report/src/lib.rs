@@ -7,6 +7,7 @@
 //! - [`targets`], [`gate`], [`track`]: their tables and pages;
 //! - [`picture`]: pictures of meshes.
 
+pub mod archive;
 pub mod benchmark;
 pub mod figure;
 pub mod gate;

@@ -2,22 +2,18 @@
 
 use super::report::{read, records_in};
 use super::values::Input;
-use bench::experiments::entry::{Entry, Line};
-use bench::order::distinct;
-use bench::replay::{TOLERANCE, expected};
+use bench::experiments::entry::Entry;
+use bench::experiments::record::now_utc;
+use bench::replay::Expected;
 use bench::study::Study;
 use bench::study::package::{copy, package};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::files::{Staging, named, nearest_directory, write_atomically};
+use report::archive::{About, EXPECTED, METADATA, Member, RECORD, STUDY, metadata, readme};
 use run::engine::paths::Paths;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// All records.
-pub(super) const RECORD: &str = "record.jsonl";
-/// Directory of the study, its cases and geometries.
-pub(super) const STUDY: &str = "study";
 
 /// `harness archive`.
 #[derive(Args, Debug)]
@@ -29,6 +25,15 @@ pub struct Arguments {
     /// Directory to make, which must not exist
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Title of the archive
+    #[arg(long)]
+    pub title: String,
+    /// Whoever made it
+    #[arg(long, value_name = "NAME")]
+    pub author: String,
+    /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
+    #[arg(long, value_name = "SPDX|URL")]
+    pub licence: String,
 }
 
 /// Makes the archive; returns the exit code.
@@ -36,7 +41,7 @@ pub struct Arguments {
 /// # Errors
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { report, study, out } = arguments;
+    let Arguments { report, study, out, title, author, licence } = arguments;
     if out.exists() {
         return Err(Failure::input(format!("{} exists: name another directory", out.display())));
     }
@@ -47,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     let records = records_in(report)?;
     let lines = read(&records)?;
-    let values = expected(&lines)?.len();
+    let expected = Expected::of(&lines)?;
     let of_study = Study::read(study)?;
     let other = lines.iter().find_map(|line| match &line.entry {
         Entry::Run(run) => Some(&run.setup.case).filter(|case| !of_study.has_case(case)),
@@ -70,6 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             .map_err(|error| Failure::at(&path, error))
     };
     put(RECORD, text.collect())?;
+    put(EXPECTED, expected.json())?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
     let catalogue = Paths::find().catalogue;
@@ -78,28 +84,20 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if sources.is_file() {
         copy(&sources, &of_study.join("SOURCES.md"))?;
     }
+    let day = now_utc().chars().take("2026-01-31".len()).collect();
+    let about =
+        About { title: title.clone(), author: author.clone(), licence: licence.clone(), day };
     let page = if place.join("README.md").exists() { "REPLAY.md" } else { "README.md" };
-    put(page, readme(&lines))?;
+    put(page, readme(&about, &lines, &expected))?;
+    let mut members = Vec::new();
+    list(place, "", &mut members)?;
+    members.sort();
+    let described = metadata(&about, &members, &lines);
+    put(METADATA, serde_json::to_string_pretty(&described).expect("plain data") + "\n")?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
-    println!("{}: {values} values to be met by a replay", out.display());
+    let (values, files) = (expected.values.len(), members.len() + 1);
+    println!("{}: {files} files, {values} values to be met by a replay", out.display());
     Ok(EXIT_HOLDS)
-}
-
-/// The page for whoever opens the archive.
-fn readme(lines: &[Line]) -> String {
-    let machines = distinct(lines.iter().filter_map(Line::session).map(|s| &s.machine));
-    let commits = machines.iter().map(|machine| machine.commit.trim_end_matches("-dirty"));
-    let commits = distinct(commits).join(" or ");
-    let machines: Vec<String> = machines.iter().map(ToString::to_string).collect();
-    format!(
-        "# Benchmarks that can be repeated\n\nMeasured on {}.\n\nTo repeat them, in a clone of the programs' repository at commit {commits}:\n\n\
-         ```\nharness replay THIS_DIRECTORY\n```\n\n\
-         It prints the values of `record.jsonl` beside measured ones: digests, cells and counters must be equal; ratios (speedup, efficiency, \
-         load imbalance, bytes per cell) lie within the interval of their repetitions and {:.0} % beyond it; times are those of a machine, and \
-         are not compared. `study/` has the study with its cases and geometries.\n",
-        machines.join(", and on "),
-        TOLERANCE * 100.0,
-    )
 }
 
 /// Copies the files of a directory and of those in it that are `wanted`. Links to directories, which may lead in a circle, are refused.
@@ -112,6 +110,19 @@ fn copy_tree(from: &Path, to: &Path, wanted: &dyn Fn(&PathBuf) -> bool) -> Resul
             copy_tree(&path, &copied, wanted)?;
         } else if wanted(&path) {
             copy(&path, &copied)?;
+        }
+    }
+    Ok(())
+}
+
+/// Lists the files below a directory, whose path begins with `prefix`.
+fn list(directory: &Path, prefix: &str, members: &mut Vec<Member>) -> Result<(), Failure> {
+    for entry in fs::read_dir(directory).map_err(|error| Failure::at(directory, error))? {
+        let entry = entry?;
+        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+        match entry.metadata()? {
+            file if file.is_file() => members.push((name, file.len())),
+            _ => list(&entry.path(), &format!("{name}/"), members)?,
         }
     }
     Ok(())

@@ -162,6 +162,7 @@ pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
     let mut imported = source.read(mesh, case.as_ref())?;
     imported.create(out)?;
     let Manifest { leaves, sides, .. } = imported.manifest();
-    println!("{}: {leaves} cells, sides {sides:?}", out.display());
+    let known = if *sides == manifest::Sides::Known { "known" } else { "unknown" };
+    println!("{}: {leaves} cells, sides {known}", out.display());
     Ok(EXIT_HOLDS)
 }

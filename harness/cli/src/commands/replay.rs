@@ -1,15 +1,15 @@
 //! `harness replay`: repeats the runs of an archive.
 
-use super::archive::{RECORD, STUDY};
 use super::bench::programs;
 use super::programs::ProgramArguments;
 use super::report::read;
 use super::values::Input;
 use bench::experiments::entry::{Line, Session};
-use bench::replay::{Found, Replayed, Row, Value, Verdict, compare, expected};
+use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::{self, SessionOptions, Study, package};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use report::archive::{EXPECTED, RECORD, STUDY};
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
@@ -22,6 +22,9 @@ use std::time::Instant;
 pub struct Arguments {
     /// The archive: a directory that `harness archive` made
     pub archive: Input,
+    /// Time that the runs may take, by the clock of the archive's machine; the number of repetitions follows from it
+    #[arg(long, value_name = "MINUTES", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
+    pub minutes: u16,
     /// File of JSON lines to append the runs to [default: none remain]
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
@@ -34,12 +37,19 @@ pub struct Arguments {
 /// Repeats the runs and prints expected values beside measured ones; returns the exit code.
 ///
 /// # Errors
-/// If the archive cannot be read, or a program is missing.
+/// If the archive cannot be read, a program is missing, or the time does not suffice for one repetition.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { archive, record, session, .. } = arguments;
-    let lines = read(&[archive.join(RECORD)])?;
-    let expected = expected(&lines)?;
+    let expected = Expected::of(&read(&[archive.join(RECORD)])?)?;
+    let path = archive.join(EXPECTED);
+    let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+    if text != expected.json() {
+        let why = "does not follow from the record: it was changed, or is of another version of the harness. The record's values are compared";
+        eprintln!("harness: {} {why}", path.display());
+    }
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
+    let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
+    let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };
     leave_out_missing(&mut study)?;
     let programs = programs(arguments.programs.given(), &mut study)?;
     let place = tempfile::tempdir()?;
@@ -47,22 +57,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let record = record.as_deref().unwrap_or(&temporary);
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(session, record, &study, &programs, &progress)?;
+    let outcome = study::measure(&session, record, &study, &programs, &progress)?;
     if outcome.interrupted {
         return Ok(EXIT_INTERRUPTED);
     }
     if let Some(missing) = &outcome.missing {
         eprintln!("harness: {missing}");
     }
-    let replayed = compare(&expected, &outcome.lines);
+    let replayed = expected.compare(&outcome.lines);
     let session = outcome.lines.iter().find_map(Line::session);
     print!("{}", table(&replayed, session).text());
-    let commit = |session: Option<&Session>| session.map(|s| s.machine.commit.clone());
-    let [old, here] = [commit(lines.iter().rev().find_map(Line::session)), commit(session)];
-    if old != here {
-        let [old, here] = [old, here].map(Option::unwrap_or_default);
+    let commit = session.map_or("", |session| &session.machine.commit);
+    if commit != expected.commit {
         println!(
-            "the archive is of commit {old}, and this repository is at {here}: counts may differ"
+            "the archive is of commit {}, and this repository is at {commit}: counts may differ",
+            expected.commit
         );
     }
     Ok(code(&replayed))
@@ -90,16 +99,16 @@ fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
 fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     let shown = |found: &Found| match found {
         Found::Exact(text) => text.clone(),
-        Found::Ratio { value, .. } => format!("{value:.4}"),
+        Found::Ratio { value, .. } | Found::Time(value) => format!("{value:.4}"),
     };
     let row = |row: &Row| {
-        let band = match &row.expected.found {
-            Found::Exact(_) => "exact".to_owned(),
-            Found::Ratio { low, high, .. } => format!("{low:.3} to {high:.3}"),
-        };
-        let how = match &row.measured {
-            Some(Found::Ratio { how, .. }) => *how,
-            _ => "",
+        let (band, how) = match (&row.expected.found, &row.measured) {
+            (Found::Exact(_), _) => ("exact".to_owned(), ""),
+            (Found::Ratio { low, high, .. }, Some(Found::Ratio { how, .. })) => {
+                (format!("{low:.3} to {high:.3}"), how.as_str())
+            }
+            (Found::Ratio { low, high, .. }, _) => (format!("{low:.3} to {high:.3}"), ""),
+            (Found::Time(_), _) => ("not compared".to_owned(), ""),
         };
         let verdict = match row.verdict {
             Verdict::Equal => "equal",

@@ -93,17 +93,21 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
     fixture.write("mine.toml", &format!("{}[[row]]{rate}", &TARGETS[..rows]));
     let bench = fixture.harness("bench mine.toml --mesher ./mesher --report out");
     assert_eq!(bench.code, 0, "{}", bench.printed);
-    let archive = "archive out mine.toml -o a";
+    let archive = "archive out mine.toml -o a --title T --author A --licence MIT";
     let inside = fixture.harness(&archive.replace("-o a", "-o out/a"));
     assert!(inside.code == 2 && inside.printed.contains("is in the report"), "{}", inside.printed);
     let made = fixture.harness(archive);
     assert_eq!(made.code, 0, "{}", made.printed);
     assert_eq!(fixture.harness(archive).code, 2, "it exists");
-    for name in ["study/study.toml", "study/case.toml", "study/body.stl", "record.jsonl"] {
-        assert!(fixture.path("a").join(name).is_file());
+    let metadata = fs::read_to_string(fixture.path("a/ro-crate-metadata.json")).unwrap();
+    for name in
+        ["study/study.toml", "study/case.toml", "study/body.stl", "expected.json", "record.jsonl"]
+    {
+        assert!(
+            metadata.contains(&format!("\"@id\": \"{name}\""))
+                && fixture.path("a").join(name).is_file()
+        );
     }
-    let page = fs::read_to_string(fixture.path("a/README.md")).unwrap();
-    assert!(page.contains("Measured on "), "{page}");
     // What was measured with is not needed any more.
     for name in ["case.toml", "body.stl", "mine.toml"] {
         fs::remove_file(fixture.path(name)).unwrap();
@@ -116,12 +120,17 @@ fn an_archive_is_replayed_and_another_mesh_is_noticed() {
         "{}",
         equal.printed
     );
+    assert!(!equal.printed.contains("does not follow from the record"), "{}", equal.printed);
+    let expected = fs::read_to_string(fixture.path("a/expected.json")).unwrap();
+    fixture.write("a/expected.json", &expected.replacen("\"values\": [", "\"values\": [ ", 1));
+    let changed = replay();
+    assert!(changed.printed.contains("does not follow from the record"), "{}", changed.printed);
     fixture.write("mesher", &MESHER.replace("\"00\"", "\"01\""));
     let other = replay();
     assert!(other.code == 1 && other.printed.contains("DIFFERS"), "{}", other.printed);
     fixture.write("mesher", "#!/bin/sh\nexit 70\n");
     let nothing = replay();
-    assert!(nothing.code == 3 && nothing.printed.contains("3 missing"), "{}", nothing.printed);
+    assert!(nothing.code == 3 && nothing.printed.contains("4 missing"), "{}", nothing.printed);
 }
 
 #[test]

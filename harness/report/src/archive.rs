@@ -1,0 +1,205 @@
+//! The metadata of an archive that can be replayed: an RO-Crate 1.1 (Research Object Crate).
+
+use crate::benchmark::machines;
+use bench::experiments::entry::{Entry, Line};
+use bench::order::{by_key, distinct};
+use bench::replay::{Expected, TOLERANCE};
+use bench::study::package;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// Name of the metadata's file, which the standard gives.
+pub const METADATA: &str = "ro-crate-metadata.json";
+
+/// All records.
+pub const RECORD: &str = "record.jsonl";
+/// The values that a repetition must give, with their bands.
+pub const EXPECTED: &str = "expected.json";
+/// Directory of the study, its cases and geometries.
+pub const STUDY: &str = "study";
+/// The entity of the author.
+const AUTHOR: &str = "#author";
+
+/// A file of the archive: its path, with `/` between directories, and its size in bytes.
+pub type Member = (String, u64);
+
+/// What the author says of the archive.
+#[derive(Clone, Debug)]
+pub struct About {
+    /// Its title.
+    pub title: String,
+    /// Whoever made it.
+    pub author: String,
+    /// Identifier of its licence in the list of SPDX, or an address.
+    pub licence: String,
+    /// The day, such as `2026-01-31`.
+    pub day: String,
+}
+
+impl About {
+    fn licence_address(&self) -> String {
+        match self.licence.contains("://") {
+            true => self.licence.clone(),
+            false => format!("https://spdx.org/licenses/{}", self.licence),
+        }
+    }
+}
+
+/// The metadata: files with their sizes and types, sessions with command, machine and time, programs with their digests.
+pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
+    let (licence, id) = (about.licence_address(), |id: &str| json!({ "@id": id }));
+    let files = members.iter().map(|(path, bytes)| {
+        let kind = media_type(path);
+        json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string(), "encodingFormat": kind})
+    });
+    let files: Vec<Value> = files.collect();
+    let programs = distinct(lines.iter().filter_map(|line| match &line.entry {
+        Entry::Run(run) if !run.program.is_empty() => {
+            Some((run.setup.engine.clone(), run.program.clone()))
+        }
+        _ => None,
+    }));
+    let program_id = |digest: &str| format!("#program-{digest}");
+    let program = |(engine, digest): &(String, String)| {
+        json!({"@id": program_id(digest), "@type": "SoftwareApplication", "name": engine, "identifier": digest,
+            "description": "The identifier is the digest of the program's file."})
+    };
+    let sessions = by_key(lines, |line| line.session.as_str());
+    let action = |(name, of): &(&str, Vec<&Line>)| {
+        let opening = of.iter().find_map(|line| line.session())?;
+        let used = programs.iter().filter(|(_, digest)| {
+            of.iter().any(|l| matches!(&l.entry, Entry::Run(run) if run.program == *digest))
+        });
+        let used = one_or_many(used.map(|(_, digest)| id(&program_id(digest))).collect());
+        Some(json!({
+            "@id": format!("#session-{name}"), "@type": "CreateAction",
+            "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
+            "description": opening.machine.to_string(),
+            "startTime": of.first()?.time_utc, "endTime": of.last()?.time_utc,
+            "instrument": used, "object": id(&format!("{STUDY}/{}", package::STUDY)), "result": id(RECORD),
+        }))
+    };
+    let actions: Vec<Value> = sessions.iter().filter_map(action).collect();
+    let ids = |of: &[Value]| one_or_many(of.iter().map(|e| json!({"@id": e["@id"]})).collect());
+    let root = json!({
+        "@id": "./", "@type": "Dataset", "name": about.title, "datePublished": about.day, "license": id(&licence),
+        "description": "Benchmarks of oct-tree meshers: the record, its figures, the study that made it, and what a repetition must give",
+        "author": id(AUTHOR), "hasPart": ids(&files), "mentions": ids(&actions),
+    });
+    let head = json!({
+        "@id": METADATA, "@type": "CreativeWork", "about": id("./"),
+        "conformsTo": id("https://w3id.org/ro/crate/1.1"),
+    });
+    let of_licence = json!({
+        "@id": licence, "@type": "CreativeWork", "name": about.licence,
+        "description": "The licence of this archive; those of geometries are in study/",
+    });
+    let author = json!({"@id": AUTHOR, "@type": "Person", "name": about.author});
+    let graph: Vec<Value> = [head, root, of_licence, author]
+        .into_iter()
+        .chain(files)
+        .chain(programs.iter().map(program))
+        .chain(actions)
+        .collect();
+    json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
+}
+
+/// A single value stands alone.
+fn one_or_many(mut values: Vec<Value>) -> Value {
+    if values.len() == 1 { values.remove(0) } else { Value::Array(values) }
+}
+
+/// The page for whoever opens the archive.
+pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
+    let About { title, author, licence, day } = about;
+    let mut text = format!("# {title}\n\n{author}, {day}, licence {licence}.\n\n");
+    let commits = machines(lines).into_iter().map(|machine| {
+        let _ = writeln!(text, "Measured on {machine}.");
+        machine.commit.trim_end_matches("-dirty").to_owned()
+    });
+    let commits = distinct(commits.collect::<Vec<_>>()).join(" or ");
+    let minutes = |seconds: f64| (seconds / 60.0).ceil();
+    let _ = write!(
+        text,
+        "\nTo repeat it, in a clone of the programs' repository at commit {commits}:\n\n```\nharness replay THIS_DIRECTORY\n```\n\n\
+         It prints expected values beside measured ones: digests, cells and counters must be equal; ratios (speedup, efficiency, load \
+         imbalance, bytes per cell) lie within the interval of their repetitions and {:.0} % beyond it; times are those of a machine, and \
+         are not compared. All runs took {} minutes, and one run of each {}.\n\n\
+         `study/` has the study with its cases and geometries, `record.jsonl` every run, `expected.json` the values and bands.\n",
+        TOLERANCE * 100.0,
+        minutes(expected.seconds),
+        minutes(expected.seconds_once)
+    );
+    text
+}
+
+/// A path as a relative address: bytes other than `A` to `Z`, `a` to `z`, digits and `/._-` are escaped.
+fn address(path: &str) -> String {
+    let escape = |byte: u8| match byte {
+        b'/' | b'.' | b'_' | b'-' => (byte as char).to_string(),
+        _ if byte.is_ascii_alphanumeric() => (byte as char).to_string(),
+        _ => format!("%{byte:02X}"),
+    };
+    path.bytes().map(escape).collect()
+}
+
+fn media_type(path: &str) -> &'static str {
+    match path.rsplit('.').next().unwrap_or_default() {
+        "csv" => "text/csv",
+        "html" => "text/html",
+        "json" => "application/json",
+        "jsonl" => "application/jsonl",
+        "md" => "text/markdown",
+        "pdf" => "application/pdf",
+        "png" => "image/png",
+        "stl" => "model/stl",
+        "svg" => "image/svg+xml",
+        "tex" => "text/x-tex",
+        "toml" => "application/toml",
+        "txt" => "text/plain",
+        _ => "application/octet-stream",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::experiments::entry::{Comm, Machine, Session};
+    use bench::testing::{line, run};
+
+    #[test]
+    fn every_entity_that_is_named_is_described() {
+        let command = vec!["harness".into(), "bench".into(), "my study.toml".into()];
+        let machine =
+            Machine { cpu: "chip".into(), commit: "abc-dirty".into(), ..Machine::default() };
+        let (nodes, lacks) = (String::new(), Default::default());
+        let session = Session { command, machine, nodes, load_average: 0.0, lacks };
+        let mut measured = run(Comm::Solo, 1000, &[("a", &[1.0])]);
+        measured.program = "7".repeat(32);
+        let lines = [Entry::Session(Box::new(session)), Entry::Run(Box::new(measured))].map(line);
+        let about = About {
+            title: "T".into(),
+            author: "A".into(),
+            licence: "CC-BY-4.0".into(),
+            day: "2026-01-31".into(),
+        };
+        let members = [("record.jsonl".to_owned(), 9), ("study/a wing_1.stl".to_owned(), 8)];
+        let crate_ = metadata(&about, &members, &lines);
+        let graph = crate_["@graph"].as_array().unwrap();
+        let ids: Vec<&str> = graph.iter().map(|entity| entity["@id"].as_str().unwrap()).collect();
+        assert!(ids.contains(&"study/a%20wing_1.stl"), "{ids:?}");
+        let named = graph[1]["hasPart"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .chain([&graph[1]["mentions"], &graph[1]["author"]]);
+        for part in named {
+            assert!(ids.contains(&part["@id"].as_str().unwrap()), "{part}");
+        }
+        let action = graph.last().unwrap();
+        assert_eq!(action["name"], "harness bench 'my study.toml'");
+        assert_eq!(action["instrument"]["@id"], format!("#program-{}", "7".repeat(32)));
+        let text = readme(&about, &lines, &Expected::of(&lines).unwrap());
+        assert!(text.contains("at commit abc:") && text.contains("chip"), "{text}");
+    }
+}
