@@ -155,14 +155,11 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         "speedup-uav-50M",
         "efficiency-strong-uav-50M",
         "efficiency-weak-uav",
-        "phases-strong-uav-50M",
         "per-rank-uav-16",
         "per-rank-uav-32",
         "per-rank-uav-64",
-        "balance-uav-4M-64",
-        "balance-exposed-uav-4M-64",
-        "rate",
-        "memory",
+        "rate-uav",
+        "memory-uav",
     ] {
         assert!(drawn.iter().any(|d| d == figure), "{figure} is missing among {drawn:?}");
     }
@@ -176,21 +173,11 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         assert!(has_row(&speedup, x, end), "{x} {end}: {speedup}");
     }
     assert!(speedup.contains(",32,11.28"), "{speedup}");
-    assert!(place.path().join("figures.tex").is_file());
     let numbers = std::fs::read_to_string(place.path().join("numbers.tex")).unwrap();
     assert!(numbers.contains("\\defresult{mesher/uav/strong/"), "{numbers}");
     assert!(written.broken.is_empty(), "{:?}", written.broken);
-    let balance =
-        std::fs::read_to_string(place.path().join("figures/balance-uav-4M-64.csv")).unwrap();
-    assert!(balance.contains(",morton former,mesher: by cells,measured\n"), "{balance}");
-    let exposed =
-        std::fs::read_to_string(place.path().join("figures/balance-exposed-uav-4M-64.csv"));
-    let exposed = exposed.unwrap();
-    assert!(
-        has_row(&exposed, "1", ",morton area,mesher: by faces,measured")
-            && exposed.contains(",1,2.909"),
-        "{exposed}"
-    );
+    let load = std::fs::read_to_string(place.path().join("figures/per-rank-uav-64.csv")).unwrap();
+    assert!(has_row(&load, "63", ",useful time,projected"), "{load}");
     let page = std::fs::read_to_string(written.page).unwrap();
     assert_eq!(page.matches("<td>2.909</td>").count(), 3, "one run of each of three weights");
 }
@@ -215,7 +202,7 @@ fn two_programs_are_never_in_one_series() {
     let read = |name: &str| {
         std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
     };
-    for name in ["time-over-cells-uav", "time-over-layers-uav", "rate", "memory"] {
+    for name in ["time-over-cells-uav", "time-over-layers-uav", "rate-uav", "memory-uav"] {
         let text = read(name);
         for engine in ["mesher", "other"] {
             for ranks in ["1 rank", "2 ranks"] {
@@ -225,7 +212,7 @@ fn two_programs_are_never_in_one_series() {
         }
     }
     assert!(has_row(&read("speedup-other-uav-50M"), "64", "other; projected,projected"));
-    assert!(read("phases-weak-other-uav").contains(",64,other: grade,projected\n"));
+    assert!(has_row(&read("efficiency-weak-other-uav"), "64", "other: global,projected"));
     let page = std::fs::read_to_string(&written.page).unwrap();
     assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
     assert!(page.contains("other does not provide: MPI"), "{page}");
@@ -253,9 +240,11 @@ fn figures_of_any_case_and_program_have_files_of_their_own() {
     let written = report(place.path(), &both).unwrap();
     let drawn = files(place.path(), "svg");
     assert_eq!(drawn.len(), written.figures);
-    for name in
-        ["phases-strong-p-4-a-b-50M", "phases-strong-p-4-a-b-50M-2", "speedup-p-4-a-b-50M-2"]
-    {
+    for name in [
+        "efficiency-strong-p-4-a-b-50M",
+        "efficiency-strong-p-4-a-b-50M-2",
+        "speedup-p-4-a-b-50M-2",
+    ] {
         assert!(drawn.iter().any(|d| d == name), "{name} is missing among {drawn:?}");
     }
     for name in &drawn {
@@ -283,8 +272,8 @@ fn an_efficiency_above_one_has_its_reason_in_figure_table_and_summary() {
     let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
     let reason =
         "Computation scaling is above 1 where all ranks together take less CPU time per cell";
-    // The figure of the efficiency, the table of the experiment, that of its phases, and the causes on 16, 32 and 64 ranks.
-    assert_eq!(page.matches(reason).count(), 6, "{page}");
+    // The figure of the efficiency, the table of the experiment, and the causes on 16, 32 and 64 ranks.
+    assert_eq!(page.matches(reason).count(), 5, "{page}");
     assert!(
         !std::fs::read_to_string(report(place.path(), &record()).unwrap().page)
             .unwrap()

@@ -255,7 +255,12 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             "picture mesh --case case.toml --out p.svg",
             &["p.svg", "p.csv"],
         ),
-        new("picture .html", Harness, "picture mesh --case case.toml --out p.html", &["p.html"]),
+        new(
+            "picture --view",
+            Harness,
+            "picture mesh --case case.toml --view --out p.svg",
+            &["p.svg"],
+        ),
         new(
             "near-body",
             Harness,

@@ -1,6 +1,6 @@
 //! The history for other programs: Bencher, github-action-benchmark, spreadsheets, readers of JUnit XML.
 
-use crate::figure::csv::table;
+use crate::figure::latex::table;
 use crate::json::pretty;
 use crate::junit::{suite, test, to_text, unsuccessful};
 use bench::track::history::Record;
