@@ -1,6 +1,6 @@
 //! `harness picture`: draws a slice of a mesh, a view in three dimensions, or the pictures of the paper.
 
-use super::meshed::{MeshArguments, Meshed};
+use super::meshed::MeshArguments;
 use super::paper;
 use super::selection::SelectionArguments;
 use clap::Args;
@@ -89,7 +89,15 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
         mesh.require_case(case)?;
     }
-    let picture = Picture::collect(&mesh, &request(arguments, &meshed, &mesh)?)?;
+    let request = Request {
+        selection: arguments.selection.of(&mesh)?,
+        body: meshed.case.as_ref().map(|case| &case.facets[..]),
+        colour: arguments.colour,
+        zoom: arguments.zoom,
+        level_max: LEVEL_MAX,
+        view: arguments.view,
+    };
+    let picture = Picture::collect(&mesh, &request)?;
     write(out, &format.bytes(&svg(&picture)).map_err(io::Error::other)?)?;
     println!("{}\n{}", picture.title(), out.display());
     if meshed.case.is_none() {
@@ -106,21 +114,6 @@ fn requested(out: &Path) -> Result<Format, String> {
         Some(missing) => Err(format!("{} is not a directory: create it", missing.display())),
         None => Ok(format),
     }
-}
-
-fn request<'a>(
-    arguments: &Arguments,
-    meshed: &'a Meshed,
-    mesh: &Mesh,
-) -> Result<Request<'a>, Failure> {
-    Ok(Request {
-        selection: arguments.selection.of(mesh)?,
-        body: meshed.case.as_ref().map(|case| &case.facets[..]),
-        colour: arguments.colour,
-        zoom: arguments.zoom,
-        level_max: LEVEL_MAX,
-        view: arguments.view,
-    })
 }
 
 fn zoom(text: &str) -> Result<f64, String> {

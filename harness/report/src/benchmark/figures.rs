@@ -3,6 +3,7 @@
 use super::groups::{Subject, point, provenance, repetitions};
 use super::scaling;
 use crate::figure::{Axis, Figure, Point, Provenance, Series};
+use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
 use contract::paper::number;
@@ -10,16 +11,25 @@ use statistics::Median;
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
-    let by_case = |experiment: &str| {
-        let of = groups.all.iter().filter(|g| g.setup.experiment == experiment);
+    let by_case = |is_of: &dyn Fn(&Group) -> bool| {
+        let of = groups.all.iter().filter(|group| is_of(group));
         by_key(of, |group| Subject::of_all(&group.setup))
     };
-    let mut all = Vec::new();
-    for (subject, of) in by_case("spacing") {
-        all.extend(by_spacing(&subject, &of));
-    }
-    all.extend(by_case("layers").iter().map(|(subject, of)| by_layers(subject, of)));
+    let of = |experiment: &'static str| by_case(&move |g| g.setup.experiment == experiment);
+    let mut all: Vec<Figure> = of("spacing").iter().map(|(of, all)| by_spacing(of, all)).collect();
+    all.extend(of("layers").iter().map(|(of, all)| by_layers(of, all)));
     all.extend(scaling::figures(groups));
+    // Wall times are meaningful with at most one rank per core.
+    let is_compared = |g: &Group| match g.setup.experiment.as_str() {
+        "spacing" => provenance(g) == Provenance::Measured,
+        "strong" => g.setup.comm == Comm::Solo && of("spacing").is_empty(),
+        _ => false,
+    };
+    for (subject, of) in by_case(&is_compared) {
+        if distinct(of.iter().map(|g| (&g.setup.engine, g.cells()))).len() > 1 {
+            all.extend(rate_and_memory(&subject, &of));
+        }
+    }
     all
 }
 
@@ -81,46 +91,52 @@ fn engines(groups: &[&Group]) -> String {
     distinct(groups.iter().map(|group| group.setup.engine.as_str())).join(", ")
 }
 
-/// Run time, of which the counterpart is the paper's Figure 17, rate, and memory. The last two are of groups with at most one rank per core, whose
-/// wall times are meaningful.
-fn by_spacing(subject: &Subject, all: &[&Group]) -> Vec<Figure> {
-    let (case, file, engines) = (subject.mesh(), subject.file(), engines(all));
-    let n = all[0].setup.layer_cells_min;
-    let of = format!(
-        "of {engines} over the number of cells of {case} at n = {n}. The spacing is halved from point to point; lines join meshes of one \
+/// The counterpart of the paper's Figure 17.
+fn by_spacing(subject: &Subject, all: &[&Group]) -> Figure {
+    let case = subject.mesh();
+    let mut caption = format!(
+        "Run time of {} over the number of cells of {case} at n = {}. The spacing is halved from point to point; lines join meshes of one \
          family of spacings. {}",
+        engines(all),
+        all[0].setup.layer_cells_min,
         repetitions(all)
     );
+    let mut series = series(all, |group| group.time_s);
+    if is_counterpart(subject.case) {
+        let (points, text) = paper(|_, _, time_s| time_s);
+        series.push(points);
+        caption += &format!(" The paper's Figure 17, which is linear, is the counterpart.{text}");
+    }
+    let id = format!("time-over-cells-{}", subject.file());
+    let title = format!("Run time over cells, by spacing: {case}");
+    over_cells([id, title], caption, "run time / s", series)
+}
+
+/// Rate and memory of meshes of several sizes or programs.
+fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
+    let (case, engines, repetitions) = (subject.mesh(), engines(all), repetitions(all));
+    let of = format!("of {engines} over the number of cells of {case}. {repetitions}");
     let rate = |cells: f64, ranks: f64, time_s: f64| cells / time_s / ranks / 1e6;
-    let rate_of = |g: &Group| {
+    let mut rates = series(all, |g| {
         let (cells, ranks) = (g.cells() as f64, g.setup.ranks as f64);
         g.time_s.falling(|time_s| rate(cells, ranks, time_s))
-    };
-    let is_measured = |g: &&&Group| provenance(g) == Provenance::Measured;
-    let measured: Vec<&Group> = all.iter().filter(is_measured).copied().collect();
-    let mut times = series(all, |group| group.time_s);
-    let mut rates = series(&measured, rate_of);
-    let [mut of_times, mut of_rates] =
-        [format!("Run time {of}"), format!("Cells per second and core {of}")];
+    });
+    let mut of_rates = format!("Cells per second and core {of} Rates are cells over median times.");
     if is_counterpart(subject.case) {
-        let [(time, text), (rate, _)] = [paper(|_, _, time_s| time_s), paper(rate)];
-        times.push(time);
-        rates.push(rate);
-        of_times += &format!(" The paper's Figure 17, which is linear, is the counterpart.{text}");
+        let (points, text) = paper(rate);
+        rates.push(points);
         of_rates += &text;
     }
     let of_memory = format!("Peak resident memory of all ranks, program and facets included, {of}");
-    let memory = series(&measured, Group::bytes_per_cell);
-    let names = |id: &str, title: &str| [format!("{id}-{file}"), format!("{title}: {case}")];
-    let time = names("time-over-cells", "Run time over cells, by spacing");
-    let mut figures = vec![over_cells(time, of_times, "run time / s", times)];
-    if !measured.is_empty() {
-        let rate = names("rate", "Cells per second and core");
-        figures.push(over_cells(rate, of_rates, "million cells / (s core)", rates));
-        let peak = names("memory", "Peak memory per cell");
-        figures.push(over_cells(peak, of_memory, "bytes per cell", memory));
-    }
-    figures
+    let memory = series(all, Group::bytes_per_cell);
+    let names =
+        |id: &str, title: &str| [format!("{id}-{}", subject.file()), format!("{title}: {case}")];
+    let of_rate = names("rate", "Cells per second and core");
+    let of_peak = names("memory", "Peak memory per cell");
+    [
+        over_cells(of_rate, of_rates, "million cells / (s core)", rates),
+        over_cells(of_peak, of_memory, "bytes per cell", memory),
+    ]
 }
 
 /// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: it has no number of ranks.

@@ -96,7 +96,9 @@ fn literals(code: &str) -> impl Iterator<Item = (usize, &str)> {
         let literal = code[at..end].trim_end_matches('.');
         let digits = literal.trim_start_matches(['0', '.']).replace('.', "").len();
         let is_number = literal.matches('.').count() == 1 && digits >= 3;
-        (is_number && !is_length(&code[end..]) && !is_name(&code[..at])).then_some((at, literal))
+        let line = code[..at].rfind('\n').map_or(0, |end| end + 1);
+        (is_number && !is_length(&code[end..]) && !is_name(&code[line..at]))
+            .then_some((at, literal))
     })
 }
 
@@ -109,20 +111,10 @@ fn is_length(rest: &str) -> bool {
     units.iter().any(|unit| rest.starts_with(unit)) || ends.iter().any(|end| name.ends_with(end))
 }
 
-/// Whether the text ends within an option `[...]` of a command, or within the argument of a command that names a label, a file or a
+/// Whether the begin of a line ends within an option `[...]` of a command, or within the argument of a command that names a label, a file or a
 /// source.
 fn is_name(before: &str) -> bool {
-    const NAMING: [&str; 9] = [
-        "label",
-        "ref",
-        "cite",
-        "input",
-        "result",
-        "includegraphics",
-        "url",
-        "usepackage",
-        "bibitem",
-    ];
+    const NAMING: &str = "label ref cite input result includegraphics url usepackage bibitem";
     let opened = |open: char, close: char| {
         let at = before.rfind(open).filter(|&at| !before[at..].contains(close));
         at.map(|at| &before[..at])
@@ -136,7 +128,7 @@ fn is_name(before: &str) -> bool {
             .strip_suffix(']')
             .and_then(|text| text.rsplit_once('['))
             .map_or(command, |c| c.0);
-        NAMING.iter().any(|name| command.ends_with(name))
+        NAMING.split(' ').any(|name| command.ends_with(name))
     };
     opened('[', ']').is_some_and(is_command) || opened('{', '}').is_some_and(names)
 }
@@ -183,6 +175,7 @@ mod tests {
             ("\\defresult{a/time}{1.234}{1.10--1.30}{ms}", "1.10--1.30 ms here"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
+            ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
             ("a factor of .987", ".987 is written by hand"),
             ("\\result[intervall]{a/time}", "no option intervall"),
             ("\\result[interval]{a/speedup}", "a/speedup has no interval"),

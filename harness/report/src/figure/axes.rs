@@ -10,7 +10,7 @@ const LEFT: f64 = 190.0;
 /// Space at the left of ticks.
 const BESIDE_TICKS: f64 = 100.0;
 /// Space below the data, for ticks and label.
-pub const BELOW: f64 = 130.0;
+pub const BELOW: f64 = 140.0;
 /// Length of a tick.
 const TICK: f64 = 12.0;
 /// Distances of labels of ticks from the horizontal and from the vertical axis: those at the corner do not touch.

@@ -88,7 +88,7 @@ pub fn document(title: &str, paint: impl FnOnce(&mut Canvas) -> f64) -> String {
     let height = paint(&mut canvas).ceil();
     let document = html! {
         svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label=(title) width=(WIDTH) height=(height)
-            viewBox=(format!("0 0 {WIDTH} {height}")) font-family=(FONT) font-size=(SIZE) fill=(INK) { (PreEscaped(canvas.0)) }
+            viewBox=(format!("0 0 {WIDTH} {height}")) font-family=(FONT) font-size=(SIZE) fill=(INK) stroke-linejoin="round" { (PreEscaped(canvas.0)) }
     };
     document.into_string() + "\n"
 }
@@ -123,7 +123,7 @@ impl Canvas {
         let d: String = polygons.iter().map(|polygon| path(polygon.as_ref()) + "z").collect();
         let style = match outline {
             Some(colour) => {
-                format!("stroke=\"{colour}\" stroke-width=\"0.7\" stroke-linejoin=\"round\"")
+                format!("stroke=\"{colour}\" stroke-width=\"0.7\"")
             }
             None => "shape-rendering=\"crispEdges\"".to_owned(),
         };

@@ -7,12 +7,12 @@
 use super::Planar;
 use contract::case::Facet;
 use geometry::tree::Point;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
-/// Greatest number of triangles: about two megabytes of SVG.
-const FACES_MAX: usize = 30_000;
+/// Greatest number of triangles: about three megabytes of SVG.
+const FACES_MAX: usize = 40_000;
 /// Edges of the largest triangle in an edge of the window.
-const DIVISIONS: f64 = 40.0;
+const DIVISIONS: f64 = 32.0;
 /// Points of the page in an edge of the window.
 const POINTS: f64 = 1600.0;
 
@@ -64,11 +64,11 @@ pub fn surface(
     let mut parts = Vec::new();
     for facet in facets {
         let corners = facet.map(|corner| Point::from_array(corner.map(f64::from)));
-        divide(corners, window, edge / DIVISIONS, &mut parts);
+        divide(corners, window, (axis, plane), edge / DIVISIONS, &mut parts);
     }
     let mut step = edge / POINTS;
     loop {
-        let mut nearest: HashMap<[[i64; 2]; 3], (f64, Face)> = HashMap::new();
+        let mut nearest: BTreeMap<[[i64; 2]; 3], (f64, Face)> = BTreeMap::new();
         for &[a, b, c] in &parts {
             let rounded =
                 |p: Point| projection.planar(p.to_array()).map(|c| (c / step).round() as i64);
@@ -96,15 +96,21 @@ pub fn surface(
         }
         if nearest.len() <= FACES_MAX {
             let mut faces: Vec<(f64, Face)> = nearest.into_values().collect();
-            faces.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            faces.sort_by(|a, b| a.0.total_cmp(&b.0));
             return faces.into_iter().map(|(_, face)| face).collect();
         }
         step *= 2.0;
     }
 }
 
-/// The parts of a triangle that meet the window, whose edges have at most this length.
-fn divide(corners: [Point; 3], window: &[[f64; 3]; 2], length: f64, parts: &mut Vec<[Point; 3]>) {
+/// The parts of a triangle that meet the window, whose edges have at most this length, or a tenth of it where the plane cuts them.
+fn divide(
+    corners: [Point; 3],
+    window: &[[f64; 3]; 2],
+    (axis, plane): (usize, f64),
+    length: f64,
+    parts: &mut Vec<[Point; 3]>,
+) {
     let is_beside = |a: usize| {
         corners.iter().all(|c| c[a] < window[0][a]) || corners.iter().all(|c| c[a] > window[1][a])
     };
@@ -113,11 +119,13 @@ fn divide(corners: [Point; 3], window: &[[f64; 3]; 2], length: f64, parts: &mut 
     }
     let edge = |i: usize| (corners[(i + 1) % 3] - corners[i]).length();
     let longest = (0..3).max_by(|&i, &j| edge(i).total_cmp(&edge(j))).unwrap_or(0);
-    if edge(longest) <= length {
+    let is_before = corners.map(|c| c[axis] < plane);
+    let is_cut = is_before.contains(&true) && is_before.contains(&false);
+    if edge(longest) <= if is_cut { length / 10.0 } else { length } {
         return parts.push(corners);
     }
     let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
     let middle = (a + b) / 2.0;
-    divide([a, middle, c], window, length, parts);
-    divide([middle, b, c], window, length, parts);
+    divide([a, middle, c], window, (axis, plane), length, parts);
+    divide([middle, b, c], window, (axis, plane), length, parts);
 }
