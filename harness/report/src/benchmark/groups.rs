@@ -28,9 +28,12 @@ pub fn point(x: f64, m: Median) -> Point {
 /// The number of repetitions and the meaning of the error bars, as a sentence.
 pub fn repetitions(groups: &[&Group]) -> String {
     let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
+    let projected = match groups.iter().any(|g| g.setup.comm == Comm::Sim) {
+        true => "; those of projections are of the projections of single runs",
+        false => "",
+    };
     format!(
-        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage, those of projections of the \
-         projections of single runs.",
+        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{projected}.",
         counts(groups),
         covered * 100.0
     )

@@ -251,10 +251,10 @@ fn facets_far_beyond_the_window_and_many_small_ones_are_drawn_fast() {
     assert!((1000..20_000).contains(&faces.len()), "{}", faces.len());
     assert!(faces.iter().all(|f| f.is_before));
     let small = |i: u32| {
-        let (x, y) = ((i % 400) as f32 / 400.0, (i / 400) as f32 / 400.0);
-        [[x, y, 0.1], [x + 0.0025, y, 0.1], [x, y + 0.0025, 0.1]]
+        let (x, y) = ((i % 250) as f32 / 250.0, (i / 250) as f32 / 250.0);
+        [[x, y, 0.1], [x + 0.004, y, 0.1], [x, y + 0.004, 0.1]]
     };
-    let many: Vec<Facet> = (0..160_000).map(small).collect();
+    let many: Vec<Facet> = (0..62_500).map(small).collect();
     assert!(surface(&many, &window, (2, 0.2), &Projection::OBLIQUE).len() <= 40_000);
     let again = || surface(&many, &window, (2, 0.05), &Projection::OBLIQUE);
     assert_eq!(again(), again(), "the order does not depend on chance");

@@ -7,7 +7,6 @@
 use super::Planar;
 use contract::case::Facet;
 use geometry::tree::Point;
-use std::collections::BTreeMap;
 
 /// Greatest number of triangles: about three megabytes of SVG.
 const FACES_MAX: usize = 40_000;
@@ -68,36 +67,30 @@ pub fn surface(
     }
     let mut step = edge / POINTS;
     loop {
-        let mut nearest: BTreeMap<[[i64; 2]; 3], (f64, Face)> = BTreeMap::new();
-        for &[a, b, c] in &parts {
+        let seen = |&[a, b, c]: &[Point; 3]| {
             let rounded =
                 |p: Point| projection.planar(p.to_array()).map(|c| (c / step).round() as i64);
             let mut at = [a, b, c].map(rounded);
             let side = |i: usize| [0, 1].map(|k| at[i][k] - at[0][k]);
             let area = side(1)[0] * side(2)[1] - side(1)[1] * side(2)[0];
-            if area == 0 {
-                continue;
-            }
             if area < 0 {
                 at.swap(1, 2);
             }
             let centroid = (a + b + c) / 3.0;
-            let depth = centroid.dot(toward);
             let face = Face {
                 corners: at.map(|corner| corner.map(|c| c as f64 * step)),
                 light: (b - a).cross(c - a).normalize_or_zero().dot(light).abs(),
                 is_before: (centroid[axis] - plane) * toward[axis] > 0.0,
             };
             at.sort_unstable();
-            let known = nearest.entry(at).or_insert((depth, face));
-            if depth > known.0 {
-                *known = (depth, face);
-            }
-        }
-        if nearest.len() <= FACES_MAX {
-            let mut faces: Vec<(f64, Face)> = nearest.into_values().collect();
-            faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-            return faces.into_iter().map(|(_, face)| face).collect();
+            (area != 0).then_some((at, centroid.dot(toward), face))
+        };
+        let mut faces: Vec<_> = parts.iter().filter_map(seen).collect();
+        faces.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+        faces.dedup_by_key(|(at, ..)| *at);
+        if faces.len() <= FACES_MAX {
+            faces.sort_by(|a, b| a.1.total_cmp(&b.1));
+            return faces.into_iter().map(|(.., face)| face).collect();
         }
         step *= 2.0;
     }
