@@ -155,6 +155,10 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         "speedup-uav-50M",
         "efficiency-strong-uav-50M",
         "efficiency-weak-uav",
+        "phases-strong-uav-50M",
+        "phases-weak-uav",
+        "balance-uav-4M-64",
+        "balance-exposed-uav-4M-64",
         "per-rank-uav-16",
         "per-rank-uav-32",
         "per-rank-uav-64",
@@ -173,9 +177,18 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         assert!(has_row(&speedup, x, end), "{x} {end}: {speedup}");
     }
     assert!(speedup.contains(",32,11.28"), "{speedup}");
+    assert!(place.path().join("figures.tex").is_file());
     let numbers = std::fs::read_to_string(place.path().join("numbers.tex")).unwrap();
     assert!(numbers.contains("\\defresult{mesher/uav/strong/"), "{numbers}");
     assert!(written.broken.is_empty(), "{:?}", written.broken);
+    let bars = |name: &str| {
+        std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
+    };
+    let balance = bars("balance-uav-4M-64");
+    assert!(balance.contains(",2,morton former,mesher: cells,measured\n"), "{balance}");
+    let exposed = bars("balance-exposed-uav-4M-64");
+    assert!(exposed.contains("0,2.909"), "{exposed}");
+    assert!(exposed.contains(",1,morton area,mesher: exposed faces,measured\n"), "{exposed}");
     let load = std::fs::read_to_string(place.path().join("figures/per-rank-uav-64.csv")).unwrap();
     assert!(has_row(&load, "63", ",useful time,projected"), "{load}");
     let page = std::fs::read_to_string(written.page).unwrap();
@@ -213,6 +226,7 @@ fn two_programs_are_never_in_one_series() {
     }
     assert!(has_row(&read("speedup-other-uav-50M"), "64", "other; projected,projected"));
     assert!(has_row(&read("efficiency-weak-other-uav"), "64", "other: global,projected"));
+    assert!(read("phases-weak-other-uav").contains(",64,other: grade,projected\n"));
     let page = std::fs::read_to_string(&written.page).unwrap();
     assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
     assert!(page.contains("other does not provide: MPI"), "{page}");
@@ -240,11 +254,9 @@ fn figures_of_any_case_and_program_have_files_of_their_own() {
     let written = report(place.path(), &both).unwrap();
     let drawn = files(place.path(), "svg");
     assert_eq!(drawn.len(), written.figures);
-    for name in [
-        "efficiency-strong-p-4-a-b-50M",
-        "efficiency-strong-p-4-a-b-50M-2",
-        "speedup-p-4-a-b-50M-2",
-    ] {
+    for name in
+        ["phases-strong-p-4-a-b-50M", "phases-strong-p-4-a-b-50M-2", "speedup-p-4-a-b-50M-2"]
+    {
         assert!(drawn.iter().any(|d| d == name), "{name} is missing among {drawn:?}");
     }
     for name in &drawn {

@@ -1,5 +1,6 @@
-//! `harness report DIR`: figures, a page and macros of the numbers from records.
+//! `harness report DIR`: figures, a page, a LaTeX fragment and macros of the numbers from records.
 
+mod bars;
 mod figures;
 mod groups;
 pub mod numbers;
@@ -34,7 +35,7 @@ pub struct Written {
     pub numbers: Vec<Number>,
 }
 
-/// Writes figures, page and macros of a record into `directory`.
+/// Writes figures, page, LaTeX fragment and macros of a record into `directory`.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -52,6 +53,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     let broken = rules::broken(&groups, lines);
     let page = directory.join("index.html");
     write(&page, page::page(&groups, &drawn, &broken, lines))?;
+    write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     let numbers = numbers(&groups);
     write(&directory.join("numbers.tex"), numbers::tex(&numbers))?;
     Ok(Written { page, figures: figures.len(), broken, numbers })

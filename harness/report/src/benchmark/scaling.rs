@@ -1,5 +1,6 @@
-//! Figures over ranks: speedup, efficiency and its factors; and over the ranks of a run: useful time.
+//! Figures over ranks: speedup, efficiency and its factors, time by phase; and over the ranks of a run: useful time, load imbalance.
 
+use super::bars::{balance, phases};
 use super::figures::{cited, is_counterpart};
 use super::groups::{
     Subject, by_subject, cells_label, point, provenance, range, rank_times, repetitions,
@@ -15,7 +16,8 @@ use contract::paper::{number, speedup as speedup_of_paper};
 /// Rank counts of the paper's Figures 21 to 23.
 const SHOWN: [usize; 3] = [16, 32, 64];
 
-/// Speedup and efficiencies of every mesh in strong scaling, and the load of one of them; efficiencies in weak scaling.
+/// Speedup, efficiencies and phases of every mesh in strong scaling, and the load of one of them; efficiencies and phases in weak scaling;
+/// load imbalance by weights and partitioner.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut out = Vec::new();
     for (subject, all) in by_subject(groups, "strong") {
@@ -27,6 +29,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
                 out.push(speedup(groups, subject, &all, &file));
             }
             out.extend(efficiency(groups, subject, &all, &file));
+            out.extend(phases(subject, &with(&all, "projected"), &file));
         }
         for ranks in SHOWN {
             let sims = all.iter().filter(|g| g.setup.ranks == ranks && g.setup.comm == Comm::Sim);
@@ -38,6 +41,14 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     }
     for (subject, all) in by_subject(groups, "weak") {
         out.extend(efficiency(groups, subject, &all, &subject.file()));
+        out.extend(phases(subject, &with(&all, "projected"), &subject.file()));
+    }
+    for (subject, all) in by_subject(groups, "weights") {
+        for (_, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
+            out.extend(
+                [false, true].into_iter().filter_map(|exposed| balance(subject, &of, exposed)),
+            );
+        }
     }
     out
 }

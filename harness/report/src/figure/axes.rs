@@ -1,94 +1,64 @@
-//! Axes around a rectangle of the page: ranges, ticks, labels.
+//! Ranges of axes, their ticks and labels.
 
 use super::Axis;
-use super::canvas::{Anchor, At, Canvas, FAINT, INK, Line, SIZE, WIDTH, width};
+use super::canvas::{WIDTH, width};
 use bench::order::distinct;
 use std::ops::Range;
 
 /// Least space at the left of the data, for ticks and label.
 const LEFT: f64 = 190.0;
 /// Space at the left of ticks.
-const BESIDE_TICKS: f64 = 100.0;
+const BESIDE_TICKS: f64 = 110.0;
 /// Space below the data, for ticks and label.
 pub const BELOW: f64 = 140.0;
-/// Length of a tick.
-const TICK: f64 = 12.0;
-/// Distances of labels of ticks from the horizontal and from the vertical axis: those at the corner do not touch.
-const TO_LABEL: [f64; 2] = [30.0, 18.0];
 
 /// The digits as exponents.
 pub const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// Space at the left of data on this axis.
-pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
-    let labels = tick_labels(&ticks(axis, ends));
-    labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
+/// An axis with its ends, and its ticks with their labels.
+pub struct Scale {
+    pub ends: Range<f64>,
+    pub ticks: Vec<f64>,
+    pub labels: Vec<String>,
 }
 
-/// Where values are on the page.
-pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
+impl Scale {
+    /// That of an axis which shows all `values`.
+    pub fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Self {
+        let ends = range(axis, values);
+        let ticks = ticks(axis, &ends);
+        Self { labels: tick_labels(&ticks), ends, ticks }
+    }
 
-/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values and perhaps a grid;
-/// returns where values are.
-pub fn axes(
-    canvas: &mut Canvas,
-    axes: [&Axis; 2],
-    ends: [Range<f64>; 2],
-    (from, to): (At, At),
-    grid: bool,
-) -> ToPage {
-    let limits = [[from.0, to.0], [to.1, from.1]];
-    let is_log = axes.map(|axis| axis.log);
-    let spans = ends.clone();
-    let at = move |i: usize, value: f64| {
-        let Range { start, end } = spans[i];
-        let place = |value: f64| if is_log[i] { value.log10() } else { value };
-        let within = value.clamp(start.min(end), start.max(end));
-        let part = (place(within) - place(start)) / (place(end) - place(start));
-        limits[i][0] + part * (limits[i][1] - limits[i][0])
-    };
-    let thin = Line { colour: INK, width: 2.0, dashes: "" };
-    // Right end of the last label below the horizontal axis.
-    let mut taken = 0.0;
-    let faint = Line { colour: FAINT, width: 1.0, ..thin };
-    for (i, axis) in axes.into_iter().enumerate() {
-        let ticks = ticks(axis, &ends[i]);
-        for (tick, label) in ticks.iter().zip(tick_labels(&ticks)) {
-            let place = at(i, *tick);
-            let (start, outer, end) = match i {
-                0 => ((place, to.1), (place, to.1 + TICK), (place, from.1)),
-                _ => ((from.0, place), (from.0 - TICK, place), (to.0, place)),
-            };
-            if grid {
-                canvas.line(&[start, end], faint);
-            }
-            canvas.line(&[start, outer], thin);
-            match i {
-                0 => {
-                    let half = width(&label) / 2.0;
-                    if place - half >= taken && place + half <= WIDTH {
-                        canvas.text(
-                            &label,
-                            (place, to.1 + TO_LABEL[0] + SIZE / 2.0),
-                            Anchor::Middle,
-                        );
-                        taken = place + half + 10.0;
-                    }
-                }
-                _ => canvas.text(&label, (from.0 - TO_LABEL[1], place), Anchor::End),
+    /// That of categories, from top to bottom, as many of which have labels as there are lines.
+    pub fn of_names(names: &[String], lines: usize) -> Self {
+        let every = names.len().div_ceil(lines).max(1);
+        let (ticks, labels) =
+            (0..).zip(names).step_by(every).map(|(i, name)| (f64::from(i), name.clone())).unzip();
+        Self { ends: names.len() as f64 - 0.5..-0.5, ticks, labels }
+    }
+
+    /// Space at the left of data, if this is the vertical axis.
+    pub fn left(&self) -> f64 {
+        self.labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
+    }
+
+    /// Clears the labels that have no room beside others, if this is the horizontal axis, whose values are at these places on the page.
+    pub fn clear_labels(&mut self, place: impl Fn(f64) -> f64) {
+        let mut taken = 0.0;
+        for (tick, label) in self.ticks.iter().zip(&mut self.labels) {
+            let (middle, half) = (place(*tick), width(label) / 2.0);
+            if middle - half < taken || middle + half > WIDTH {
+                label.clear();
+            } else {
+                taken = middle + half + 10.0;
             }
         }
     }
-    let middle = (from.0.midpoint(to.0), from.1.midpoint(to.1));
-    canvas.text(&axes[0].label, (middle.0, to.1 + BELOW - SIZE / 2.0 - 6.0), Anchor::Middle);
-    let beside = from.0 - left(axes[1], &ends[1]) + SIZE / 2.0 + 8.0;
-    canvas.text(&axes[1].label, (beside, middle.1), Anchor::Upwards);
-    canvas.line(&[from, (to.0, from.1), to, (from.0, to.1), from], thin);
-    Box::new(move |x, y| (at(0, x), at(1, y)))
 }
 
 /// The ends of an axis that shows all `values`. A logarithmic one ignores values that are not positive.
-pub fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
+fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
     if let Some((low, high)) = axis.range {
         return low..high;
     }
@@ -109,7 +79,7 @@ pub fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
 
 /// The positions of ticks: those that the axis has; else at most eight multiples of 1, 2 or 5 times a power of ten; on a logarithmic axis
 /// powers of ten and, where there are less than three of them, multiples.
-pub fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
+fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     let (low, high) = (range.start.min(range.end), range.start.max(range.end));
     let slack = |v: f64| if axis.log { v.abs() * 1e-9 } else { (high - low) * 1e-9 };
     let inside = |v: &f64| (low - slack(low)..=high + slack(high)).contains(v);

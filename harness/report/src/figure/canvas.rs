@@ -16,9 +16,6 @@ const LEADING: f64 = SIZE + 8.0;
 
 /// Colour of axes and text: that of the page's text where the drawing is part of a page, else black.
 pub const INK: &str = "currentColor";
-/// Colour of grid lines.
-pub const FAINT: &str = "#AAAAAA";
-
 /// Distinguishable with every kind of colour vision (Okabe and Ito), the first ones also in grey.
 pub const COLOURS: [[u8; 3]; 7] = [
     [0, 114, 178],
@@ -28,16 +25,6 @@ pub const COLOURS: [[u8; 3]; 7] = [
     [86, 180, 233],
     [230, 159, 0],
     [90, 90, 90],
-];
-
-/// Corners of the markers around their centre. The first one is a circle.
-pub const MARKERS: [&[At]; 6] = [
-    &[],
-    &[(-11.0, -11.0), (11.0, -11.0), (11.0, 11.0), (-11.0, 11.0)],
-    &[(0.0, -15.0), (14.0, 11.0), (-14.0, 11.0)],
-    &[(0.0, -16.0), (16.0, 0.0), (0.0, 16.0), (-16.0, 0.0)],
-    &[(0.0, 15.0), (14.0, -11.0), (-14.0, -11.0)],
-    &[(-14.0, -5.0), (0.0, -15.0), (14.0, -5.0), (9.0, 12.0), (-9.0, 12.0)],
 ];
 
 /// A point on the page; the origin is the upper left corner.
@@ -69,14 +56,25 @@ pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// The colour of a style.
-pub fn colour(style: usize) -> String {
-    hex(COLOURS[style % COLOURS.len()])
-}
-
 /// Estimated width of a text; exact widths depend on the reader's fonts.
 pub fn width(text: &str) -> f64 {
     text.chars().count() as f64 * SIZE * 0.58
+}
+
+/// The left ends of the symbols of a legend, which has as many rows as it needs, the first of which begins at `start` and the others at
+/// `left`; and its lower end. Names are beside the symbols.
+pub fn legend([left, start]: [f64; 2], names: &[&str]) -> (Vec<At>, f64) {
+    let (mut x, mut y) = (start, 36.0);
+    let mut places = Vec::new();
+    for name in names {
+        let entry = SYMBOL + width(name);
+        if x > left && x + entry > WIDTH {
+            (x, y) = (left, y + LEADING);
+        }
+        places.push((x, y));
+        x += entry + 40.0;
+    }
+    (places, y + 40.0)
 }
 
 /// The elements that are drawn so far, each on a line.
@@ -94,7 +92,8 @@ pub fn document(title: &str, paint: impl FnOnce(&mut Canvas) -> f64) -> String {
 }
 
 impl Canvas {
-    fn add(&mut self, element: &str) {
+    /// Adds elements.
+    pub fn add(&mut self, element: &str) {
         self.0 += element;
         self.0.push('\n');
     }
@@ -130,19 +129,6 @@ impl Canvas {
         self.add(&format!("<path d=\"{d}\" fill=\"{fill}\" {style}/>"));
     }
 
-    /// Draws the marker of a style, filled or hollow.
-    pub fn marker(&mut self, (x, y): At, style: usize, filled: bool) {
-        let ink = colour(style);
-        let fill = if filled { &ink } else { "none" };
-        let corners = MARKERS[style % MARKERS.len()].iter().map(|c| (x + c.0, y + c.1));
-        let corners: Vec<At> = corners.collect();
-        let shape = match &corners[..] {
-            [] => format!("<circle cx=\"{}\" cy=\"{}\" r=\"12\"", round(x), round(y)),
-            _ => format!("<path d=\"{}z\"", path(&corners)),
-        };
-        self.add(&format!("{shape} fill=\"{fill}\" stroke=\"{ink}\" stroke-width=\"4\"/>"));
-    }
-
     pub fn text(&mut self, text: &str, (x, y): At, anchor: Anchor) {
         let (side, turned) = match anchor {
             Anchor::Start => (None, None),
@@ -156,33 +142,6 @@ impl Canvas {
         let baseline = round(y + SIZE * 0.36);
         let text = html! { text x=(round(x)) y=(baseline) text-anchor=[side] transform=[turned] { (text) } };
         self.add(&text.into_string());
-    }
-
-    /// Draws a legend in as many rows as it needs, the first of which begins at `start` and the others at `left`: beside every name the
-    /// symbol of its index, which `symbol` draws at its left end. Returns its lower end.
-    pub fn legend(
-        &mut self,
-        [left, start]: [f64; 2],
-        names: &[&str],
-        symbol: impl Fn(&mut Self, At, usize),
-    ) -> f64 {
-        let (mut x, mut y) = (start, 36.0);
-        for (i, name) in names.iter().enumerate() {
-            let entry = SYMBOL + width(name);
-            if x > left && x + entry > WIDTH {
-                (x, y) = (left, y + LEADING);
-            }
-            symbol(self, (x, y), i);
-            self.text(name, (x + SYMBOL, y), Anchor::Start);
-            x += entry + 40.0;
-        }
-        y + 40.0
-    }
-
-    /// Draws a note that is shown while the pointer is near a point.
-    pub fn note(&mut self, (x, y): At, note: &str) {
-        let circle = html! { circle cx=(round(x)) cy=(round(y)) r="16" fill-opacity="0" { title { (note) } } };
-        self.add(&circle.into_string());
     }
 }
 

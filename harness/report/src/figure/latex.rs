@@ -1,8 +1,9 @@
 //! Figures for LaTeX, set in the fonts of the document: the values as CSV, and an axis of `pgfplots` that reads them.
 
-use super::axes::{SUPERSCRIPTS, range, tick_label, ticks};
-use super::canvas::{COLOURS, MARKERS};
-use super::{Axis, Figure, Point, Provenance, Series};
+use super::axes::{SUPERSCRIPTS, Scale};
+use super::canvas::COLOURS;
+use super::svg::MARKERS;
+use super::{Axis, Bars, Figure, Point, Provenance, Series};
 use std::fmt::Write;
 
 /// What a document needs before it can include figures.
@@ -19,9 +20,12 @@ const MARKS: [(&str, &str); MARKERS.len()] = [
 ];
 
 /// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes. Rows of one series have the same
-/// number `plot`. Numbers come first and text has no commas, so that `pgfplots` can read it.
+/// number `plot`, and so have those of one segment of bars. Numbers come first and text has no commas, so that `pgfplots` can read it.
 pub fn csv(figure: &Figure) -> String {
     let head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
+    if let Some(bars) = &figure.bars {
+        return head + &bars_csv(figure, bars);
+    }
     let columns = ["plot", "x", "y", "low", "high", "series", "how"];
     let point = |plot: usize, s: &Series, p: &Point| {
         let numbers = [plot as f64, p.x, p.y, p.low, p.high];
@@ -31,6 +35,26 @@ pub fn csv(figure: &Figure) -> String {
     let series = figure.series.iter().enumerate();
     let rows = series.flat_map(|(plot, s)| s.points.iter().map(move |p| point(plot, s, p)));
     head + &table(&columns, rows)
+}
+
+/// The segments of every bar, and the vertical lines between them.
+fn bars_csv(figure: &Figure, bars: &Bars) -> String {
+    let row = |plot: usize, at: [f64; 2], text: [&str; 3]| {
+        let numbers = [plot as f64, at[0], at[1]].map(|number| number.to_string());
+        numbers.into_iter().chain(text.map(plain)).collect()
+    };
+    let mut rows = Vec::new();
+    for (plot, (part, values)) in bars.segments.iter().enumerate() {
+        for (i, name) in bars.names.iter().enumerate() {
+            let text = [name, part, bars.provenance.word()];
+            rows.push(row(plot, [values[i], i as f64], text));
+        }
+    }
+    for (plot, mark) in (bars.segments.len()..).zip(&figure.marks) {
+        let ends = [-0.5, bars.names.len() as f64 - 0.5];
+        rows.extend(ends.map(|y| row(plot, [mark.x, y], ["", &mark.name, "bound"])));
+    }
+    table(&["plot", "x", "y", "bar", "part", "how"], rows)
 }
 
 /// A name without what ends a field or means something to TeX.
@@ -63,14 +87,38 @@ pub fn tex(figure: &Figure) -> String {
         // Writing into a string cannot fail, here and below.
         let _ = writeln!(out, "\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}");
     }
-    let all = || figure.series.iter().flat_map(|s| &s.points);
+    let [x, y] = figure.scales();
+    let kind = match figure.bars {
+        Some(_) => "xbar stacked, bar width=8pt, ",
+        None => "",
+    };
     let _ = writeln!(
         out,
-        "\\begin{{axis}}[\n  width=\\linewidth, height=0.65\\linewidth, grid=major, legend cell align=left,\n  \
+        "\\begin{{axis}}[\n  width=\\linewidth, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
          legend style={{at={{(0.5,1.03)}},anchor=south,legend columns=2,draw=none,font=\\footnotesize}},\n  {},\n  {}\n]",
-        axis_options("x", &figure.x, all().map(|p| p.x)),
-        axis_options("y", &figure.y, all().flat_map(|p| [p.y, p.low, p.high]))
+        axis_options("x", &figure.x, &x),
+        axis_options("y", &figure.y, &y)
     );
+    for (plot, (name, _)) in figure.bars.iter().flat_map(|bars| &bars.segments).enumerate() {
+        let style = plot % COLOURS.len();
+        let tint = if plot % 2 == 1 { "!35" } else { "" };
+        let _ = writeln!(
+            out,
+            "\\addplot+[fill=style{style}{tint}, draw=style{style}] table[{}, x=x, y=y] {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
+            rows(plot),
+            figure.id,
+            escape(name)
+        );
+    }
+    for mark in &figure.marks {
+        let (style, x) = (mark.style % COLOURS.len(), mark.x);
+        let _ = writeln!(
+            out,
+            "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
+             \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{}}}",
+            escape(&mark.name)
+        );
+    }
     for (plot, s) in figure.series.iter().enumerate() {
         let (style, (filled, hollow)) = (s.style % COLOURS.len(), MARKS[s.style % MARKS.len()]);
         let (line, mark) = match s.provenance {
@@ -86,10 +134,10 @@ pub fn tex(figure: &Figure) -> String {
         };
         let _ = writeln!(
             out,
-            "\\addplot[{options}] table[col sep=comma, comment chars={{\\#}}, \
-             restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, x=x, y=y, \
+            "\\addplot[{options}] table[{}, x=x, y=y, \
              y error plus expr=\\thisrow{{high}}-\\thisrow{{y}}, y error minus expr=\\thisrow{{y}}-\\thisrow{{low}}] \
              {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
+            rows(plot),
             figure.id,
             escape(&s.name)
         );
@@ -97,21 +145,45 @@ pub fn tex(figure: &Figure) -> String {
     out + "\\end{axis}\n\\end{tikzpicture}\n"
 }
 
-/// Label, kind, ends and ticks of an axis.
-fn axis_options(name: &str, axis: &Axis, values: impl Iterator<Item = f64>) -> String {
-    let ends = range(axis, values);
-    let all = ticks(axis, &ends);
-    let at: Vec<String> = all.iter().map(f64::to_string).collect();
-    let labels: Vec<String> = all.iter().map(|tick| escape(&tick_label(*tick))).collect();
+/// The rows of a plot in the CSV file.
+fn rows(plot: usize) -> String {
     format!(
-        "{name}label={{{}}}, {name}mode={}, {name}min={}, {name}max={}, {name}tick={{{}}}, {name}ticklabels={{{}}}",
+        "col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}"
+    )
+}
+
+/// Label, kind, ends and ticks of an axis. Names of bars are from top to bottom.
+fn axis_options(name: &str, axis: &Axis, scale: &Scale) -> String {
+    let at: Vec<String> = scale.ticks.iter().map(f64::to_string).collect();
+    let labels: Vec<String> = scale.labels.iter().map(|label| escape(label)).collect();
+    let (start, end) = (scale.ends.start, scale.ends.end);
+    format!(
+        "{name}label={{{}}}, {name}mode={}, {name}min={}, {name}max={}, {}{name}tick={{{}}}, {name}ticklabels={{{}}}",
         escape(&axis.label),
         if axis.log { "log" } else { "linear" },
-        ends.start,
-        ends.end,
+        start.min(end),
+        start.max(end),
+        if start > end { format!("{name} dir=reverse, ") } else { String::new() },
         at.join(","),
         labels.join(",")
     )
+}
+
+/// The figures with captions and labels, for `\input` in a document.
+pub fn fragment(figures: &[Figure]) -> String {
+    let mut out = format!(
+        "% Made by `harness report`. Requires {PREAMBLE}.\n\
+         % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
+         \\providecommand{{\\figures}}{{figures}}\n"
+    );
+    for Figure { id, caption, .. } in figures {
+        let _ = write!(
+            out,
+            "\n\\begin{{figure}}\n  \\centering\n  \\input{{\\figures/{id}.tex}}\n  \\caption{{{}}}\n  \\label{{fig:{id}}}\n\\end{{figure}}\n",
+            escape(caption)
+        );
+    }
+    out
 }
 
 /// The text with what is special to LaTeX escaped.
@@ -140,7 +212,7 @@ fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{figure, series};
+    use super::super::samples::{bars, figure, series};
     use super::*;
 
     #[test]
@@ -162,6 +234,23 @@ mod tests {
         );
         assert_eq!(text.matches('{').count(), text.matches('}').count(), "{text}");
         assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count(), "{text}");
+    }
+
+    #[test]
+    fn segments_of_bars_are_plots_and_the_fragment_has_captions_and_labels() {
+        let figure = bars();
+        let text = csv(&figure);
+        assert!(text.contains("\n1,3,0,1,grade,projected\n"), "{text}");
+        assert!(text.contains("\n2,3,1.5,,mean; 3,bound\n"), "{text}");
+        let text = tex(&figure);
+        assert!(text.contains("xbar stacked") && text.contains("y dir=reverse"), "{text}");
+        assert!(text.contains("ytick={0,1}, yticklabels={1,2}"), "{text}");
+        assert!(text.contains("({axis cs:3,0}|-{rel axis cs:0,0})"), "{text}");
+        assert_eq!(text.matches('{').count(), text.matches('}').count(), "{text}");
+        let text = fragment(&[figure]);
+        assert!(text.contains("\\input{\\figures/speedup.tex}"), "{text}");
+        assert!(text.contains("\\label{fig:speedup}"), "{text}");
+        assert!(text.contains("Speedup \\& \\textless{}more\\textgreater{}"), "{text}");
     }
 
     #[test]

@@ -1,11 +1,12 @@
-//! The model of a figure: axes, series of points, vertical lines. SVG ([`svg`]) is drawn from it, PNG and PDF from the SVG ([`format`](mod@format)), and for
-//! LaTeX the values as CSV and an axis of `pgfplots` that reads them ([`latex`]).
+//! The model of a figure: axes, series of points or stacked bars, vertical lines. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
+//! ([`format`](mod@format)), and for LaTeX the values as CSV and an axis of `pgfplots` that reads them ([`latex`]).
 //!
 //! Points are joined only where interpolation between them is meaningful; captions state the confidence intervals. The rest of the invariants is asserted before
 //! figures are drawn ([`check_invariants`]):
 //!
 //! - Names of figures are those of files and differ; axes have labels.
 //! - Numbers are finite; a point is within its interval; on a logarithmic axis it is positive, because it would be missing there.
+//! - Bars have a value for each name and segment, and none is negative.
 //! - A point above the ideal line has a reason in the caption.
 
 pub mod axes;
@@ -16,6 +17,7 @@ pub mod svg;
 #[cfg(all(test, feature = "figures"))]
 pub(crate) mod tests;
 
+use axes::Scale;
 pub use axes::tick_label;
 
 use std::collections::BTreeSet;
@@ -124,6 +126,16 @@ impl Series {
     }
 }
 
+/// Stacked bars from left to right, one below the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bars {
+    /// Names of the bars, from top to bottom.
+    pub names: Vec<String>,
+    /// Segments from left to right: name, and one value per bar.
+    pub segments: Vec<(String, Vec<f64>)>,
+    pub provenance: Provenance,
+}
+
 /// A vertical line, such as a change point. Those of the same name have one entry in the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
@@ -132,6 +144,9 @@ pub struct Mark {
     /// Index of the colour.
     pub style: usize,
 }
+
+/// Greatest number of bars that have names.
+const LINES: usize = 12;
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,6 +160,7 @@ pub struct Figure {
     pub x: Axis,
     pub y: Axis,
     pub series: Vec<Series>,
+    pub bars: Option<Bars>,
     pub marks: Vec<Mark>,
     /// Height in units of which the width has [`canvas::WIDTH`].
     pub height: u32,
@@ -159,7 +175,20 @@ impl Figure {
         [x, y]: [Axis; 2],
         series: Vec<Series>,
     ) -> Self {
-        Self { id, title, caption, x, y, series, marks: Vec::new(), height: 1040 }
+        Self { id, title, caption, x, y, series, bars: None, marks: Vec::new(), height: 1040 }
+    }
+
+    /// The axes with their ends and ticks.
+    fn scales(&self) -> [Scale; 2] {
+        let marks = self.marks.iter().map(|mark| mark.x);
+        if let Some(bars) = &self.bars {
+            let total = |i: usize| bars.segments.iter().map(|(_, values)| values[i]).sum();
+            let ends = (0..bars.names.len()).map(total).chain(marks);
+            return [Scale::of(&self.x, ends), Scale::of_names(&bars.names, LINES)];
+        }
+        let all = || self.series.iter().flat_map(|s| &s.points);
+        let values = all().flat_map(|p| [p.y, p.low, p.high]);
+        [Scale::of(&self.x, all().map(|p| p.x).chain(marks)), Scale::of(&self.y, values)]
     }
 
     /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
@@ -213,6 +242,13 @@ pub fn check_invariants(figures: &[Figure]) {
         }
         assert!(figure.marks.iter().all(|m| m.x.is_finite()), "figure {id}: a mark is nowhere");
         figure.series.iter().for_each(|s| check_series(figure, s));
+        if let Some(bars) = &figure.bars {
+            let values = bars.segments.iter().flat_map(|(_, values)| values);
+            let is_length = |v: &f64| v.is_finite() && *v >= 0.0;
+            assert!({ values }.all(is_length), "figure {id}: a bar has no length");
+            let is_complete = |(_, values): &(String, Vec<f64>)| values.len() == bars.names.len();
+            assert!(bars.segments.iter().all(is_complete), "figure {id}: a bar lacks a segment");
+        }
         check_ideal(figure);
     }
 }
@@ -256,6 +292,15 @@ pub mod samples {
         )
     }
 
+    pub(crate) fn bars() -> Figure {
+        let segments = vec![("read".into(), vec![1.0, 2.0]), ("grade".into(), vec![3.0, 0.0])];
+        let names = vec!["1".into(), "2".into()];
+        let bars = Bars { names, segments, provenance: Provenance::Projected };
+        let marks = vec![Mark { name: "mean, 3".into(), x: 3.0, style: 6 }];
+        let [x, y] = ["s", "ranks"].map(Axis::linear);
+        Figure { bars: Some(bars), marks, x, y, ..figure(Vec::new()) }
+    }
+
     pub(crate) fn series(provenance: Provenance) -> Series {
         let points =
             [1.0, 2.0, 4.0].map(|x| Point { low: x * 0.9, high: x * 1.1, ..Point::exact(x, x) });
@@ -294,6 +339,16 @@ mod invariants {
         assert_noticed("nowhere", |f| {
             f.marks.push(Mark { name: "m".into(), x: f64::NAN, style: 0 })
         });
+        let change = |of: fn(&mut Vec<f64>)| {
+            move |f: &mut Figure| {
+                let mut bars = samples::bars().bars;
+                bars.iter_mut().for_each(|bars| of(&mut bars.segments[0].1));
+                f.bars = bars;
+            }
+        };
+        check_invariants(&[samples::bars()]);
+        assert_noticed("no length", change(|values| values[1] = -1.0));
+        assert_noticed("lacks a segment", change(|values| values.truncate(1)));
         assert_noticed("gives no reason", |f| {
             let ends = [1.0, 4.0].map(|x| Point::exact(x, x / 2.0)).to_vec();
             f.series.push(Series::new("ideal", Provenance::Bound, 0, ends));

@@ -1,105 +1,270 @@
-//! A figure as SVG: legend, axes, data. The legend is above the data in as many rows as it needs, so that it hides none.
+//! A figure as SVG, by `plotters`: a chart with its mesh and its series.
+//!
+//! The legend is ours, above the data in as many rows as it needs, because that of `plotters` is within the chart, where it hides data.
+//! Logarithmic axes are given their key points, because `plotters` drops the lowest tick.
 
-use super::axes::{BELOW, ToPage, axes, left, range};
-use super::canvas::{At, Canvas, INK, Line, SYMBOL, WIDTH, colour, document};
-use super::{Figure, Mark, Provenance, Series};
+use super::axes::{BELOW, Scale};
+use super::canvas::{COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
+use super::{Bars, Figure, Mark, Provenance, Series};
+use maud::html;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::ops::Range;
+
+/// Corners of the markers around their centre. The first one is a circle.
+pub const MARKERS: [&[(i32, i32)]; 6] = [
+    &[],
+    &[(-11, -11), (11, -11), (11, 11), (-11, 11)],
+    &[(0, -15), (14, 11), (-14, 11)],
+    &[(0, -16), (16, 0), (0, 16), (-16, 0)],
+    &[(0, 15), (14, -11), (-14, -11)],
+    &[(-14, -5), (0, -15), (14, -5), (9, 12), (-9, 12)],
+];
 
 /// Length of a line in the legend.
-const LENGTH: f64 = SYMBOL - 18.0;
-/// Space at the right of the data.
-const RIGHT: f64 = 40.0;
+const LENGTH: i32 = SYMBOL as i32 - 18;
+/// Space at the right of the data, and between the label of the vertical axis and the edge of the page.
+const BESIDE: [f64; 2] = [40.0, 14.0];
+/// Length of a tick. Labels at the corner do not touch.
+const TICK: i32 = 16;
 /// Width of lines of data.
-const WIDE: f64 = 4.0;
+const WIDE: u32 = 4;
+/// Colour of grid lines.
+const FAINT: RGBColor = RGBColor(170, 170, 170);
+/// Part of a bar's width that is between it and the next.
+const GAP: f64 = 0.2;
+/// Why drawing cannot fail.
+const DRAWN: &str = "a string accepts every element";
+
+type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A name in the legend, and what draws the symbol beside it at its left end.
+type Entry<'a> = (&'a str, Box<dyn Fn(i32, i32) + 'a>);
 
 /// The figure as an SVG document.
 pub fn svg(figure: &Figure) -> String {
+    let mut drawn = String::new();
+    let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, figure.height));
+    let notes = draw(figure, &backend.into_drawing_area());
+    let (_, elements) = drawn.split_once('\n').expect("an element begins the document");
+    let elements = elements.trim_end().strip_suffix("</svg>").expect("it ends the document");
+    let elements = elements.replace("\"#000000\"", &format!("\"{INK}\""));
+    // A text is on the line of its element.
+    let elements = elements.replace(" opacity=\"1\"", "").replace("\n</text>", "</text>");
+    let end = |line: &str| if line.starts_with("<text") { "" } else { "\n" };
+    let lines: String = elements.lines().flat_map(|line| [line, end(line)]).collect();
     document(&figure.title, |canvas| {
-        draw(canvas, figure);
+        canvas.add(lines.trim_end());
+        notes.iter().for_each(|note| canvas.add(note));
         f64::from(figure.height)
     })
 }
 
-fn draw(canvas: &mut Canvas, figure: &Figure) {
-    let Figure { x, y, series, .. } = figure;
+/// Draws a figure, and returns the notes that are shown while the pointer is near a point.
+fn draw(figure: &Figure, page: &Page) -> Vec<String> {
+    let Figure { series, bars, .. } = figure;
     let mut marks: Vec<&Mark> = Vec::new();
     for mark in &figure.marks {
         if !marks.iter().any(|other| other.name == mark.name) {
             marks.push(mark);
         }
     }
-    let all = || series.iter().flat_map(|s| s.points.iter());
-    let ends = [range(x, all().map(|p| p.x)), range(y, all().flat_map(|p| [p.y, p.low, p.high]))];
-    let left = left(y, &ends[1]);
-    let names = series.iter().map(|s| &*s.name).chain(marks.iter().map(|m| &*m.name));
-    let names: Vec<&str> = names.collect();
-    let top = canvas.legend([left; 2], &names, |canvas, (x, y), i| {
-        let middle = x + LENGTH / 2.0;
-        match series.get(i) {
-            Some(s) => {
-                draw_line(canvas, s, &[(x, y), (x + LENGTH, y)]);
-                draw_marker(canvas, s, (middle, y));
-            }
-            None => draw_mark(
-                canvas,
-                marks[i - series.len()],
-                [y - 18.0, y + 18.0].map(|y| (middle, y)),
-            ),
-        }
-    });
-    let frame = ((left, top), (WIDTH - RIGHT, f64::from(figure.height) - BELOW));
-    let to_page = axes(canvas, [x, y], ends.clone(), frame, true);
-    for mark in &figure.marks {
-        draw_mark(canvas, mark, [ends[1].start, ends[1].end].map(|y| to_page(mark.x, y)));
+    let mut symbols: Vec<Entry> = Vec::new();
+    for s in series {
+        let symbol = |x, y| {
+            put(page, &path(vec![(x, y), (x + LENGTH, y)], s));
+            marker(page, (x + LENGTH / 2, y), s);
+        };
+        symbols.push((&s.name, Box::new(symbol)));
     }
-    series.iter().for_each(|s| draw_series(canvas, s, &to_page));
+    for (style, (name, _)) in bars.iter().flat_map(|bars| &bars.segments).enumerate() {
+        let symbol = move |x, y| {
+            let [fill, outline] = bar([(x, y - 16), (x + LENGTH, y + 16)], style);
+            put(page, &fill);
+            put(page, &outline);
+        };
+        symbols.push((name, Box::new(symbol)));
+    }
+    for mark in marks {
+        let symbol = |x, y| {
+            let x = x + LENGTH / 2;
+            put(page, &PathElement::new(vec![(x, y - 18), (x, y + 18)], line(mark.style)));
+        };
+        symbols.push((&mark.name, Box::new(symbol)));
+    }
+    let [x, y] = figure.scales();
+    let names: Vec<&str> = symbols.iter().map(|(name, _)| *name).collect();
+    let (places, top) = legend([y.left(); 2], &names);
+    for ((name, symbol), (x, y)) in symbols.iter().zip(places) {
+        symbol(x as i32, y as i32);
+        let font = font().pos(Pos::new(HPos::Left, VPos::Center));
+        put(page, &Text::new(name.to_string(), ((x + SYMBOL) as i32, y as i32), font));
+    }
+    let (of_x, of_y) = (x.ends.clone(), y.ends.clone());
+    let (at_x, at_y) = (x.ticks.clone(), y.ticks.clone());
+    // The axis is not partial, but what plotters makes of a linear one with key points has no labels.
+    let linear = |ends: Range<f64>, at| ends.clone().with_key_points(at).partial_axis(ends);
+    let log = |ends: Range<f64>, at| ends.log_scale().with_key_points(at);
+    let place = (page, top, [x, y]);
+    match (figure.x.log, figure.y.log) {
+        (false, false) => chart(figure, place, linear(of_x, at_x), linear(of_y, at_y)),
+        (false, true) => chart(figure, place, linear(of_x, at_x), log(of_y, at_y)),
+        (true, false) => chart(figure, place, log(of_x, at_x), linear(of_y, at_y)),
+        (true, true) => chart(figure, place, log(of_x, at_x), log(of_y, at_y)),
+    }
 }
 
-fn draw_mark(canvas: &mut Canvas, mark: &Mark, ends: [At; 2]) {
-    canvas.line(&ends, Line { colour: &colour(mark.style), width: WIDE, dashes: "" });
-}
-
-fn draw_line(canvas: &mut Canvas, s: &Series, points: &[At]) {
-    let colour = colour(s.style);
-    let line = match s.provenance {
-        Provenance::Bound => Line { colour: INK, width: 3.0, dashes: "14 10" },
-        Provenance::Measured => Line { colour: &colour, width: WIDE, dashes: "" },
-        _ => Line { colour: &colour, width: WIDE, dashes: "22 15" },
+/// Draws the chart of a figure below the legend, and returns the notes.
+fn chart<X, Y>(
+    figure: &Figure,
+    (page, top, [mut x, y]): (&Page, f64, [Scale; 2]),
+    of_x: X,
+    of_y: Y,
+) -> Vec<String>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let [right, edge] = BESIDE;
+    let mut chart = ChartBuilder::on(page)
+        .margin_top(top)
+        .margin_right(right)
+        .margin_left(edge)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(y.left() - edge)
+        .build_cartesian_2d(of_x, of_y)
+        .expect("the chart is smaller than the page");
+    x.clear_labels(|tick| f64::from(chart.backend_coord(&(tick, y.ends.start)).0));
+    let label = |scale: &Scale, value: &f64| {
+        let index = scale.ticks.iter().position(|tick| tick == value);
+        index.map_or_else(String::new, |index| scale.labels[index].clone())
     };
-    if s.joined {
-        canvas.line(points, line);
+    let (label_x, label_y) = (|value: &f64| label(&x, value), |value: &f64| label(&y, value));
+    let mut mesh = chart.configure_mesh();
+    mesh.light_line_style(TRANSPARENT).bold_line_style(FAINT).axis_style(BLACK.stroke_width(2));
+    mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(TICK);
+    mesh.x_label_formatter(&label_x).y_label_formatter(&label_y);
+    mesh.x_desc(&figure.x.label).y_desc(&figure.y.label).draw().expect(DRAWN);
+    if let Some(bars) = &figure.bars {
+        chart.draw_series(stacked(bars)).expect(DRAWN);
+    }
+    let vertical = |x: f64, low: f64, high: f64, style: usize| {
+        PathElement::new(vec![(x, low), (x, high)], line(style))
+    };
+    let marks = figure.marks.iter().map(|m| vertical(m.x, y.ends.start, y.ends.end, m.style));
+    chart.draw_series(marks).expect(DRAWN);
+    let (least, most) = (y.ends.start.min(y.ends.end), y.ends.start.max(y.ends.end));
+    let mut notes = Vec::new();
+    for s in &figure.series {
+        let at = |p: &super::Point| (p.x, p.y.clamp(least, most));
+        let points: Vec<(f64, f64)> = s.points.iter().map(at).collect();
+        chart.draw_series([path(points.clone(), s)]).expect(DRAWN);
+        for p in s.points.iter().filter(|p| p.low < p.high) {
+            let [low, high] = [p.low, p.high].map(|value| value.clamp(least, most));
+            chart.draw_series([vertical(p.x, low, high, s.style)]).expect(DRAWN);
+            let cap = |y| {
+                EmptyElement::at((p.x, y))
+                    + PathElement::new(vec![(-10, 0), (10, 0)], line(s.style))
+            };
+            chart.draw_series([low, high].map(cap)).expect(DRAWN);
+        }
+        let places: Vec<_> = points.iter().map(|point| chart.backend_coord(point)).collect();
+        places.iter().for_each(|at| marker(page, *at, s));
+        for (note, (x, y)) in s.notes.iter().zip(places) {
+            let circle =
+                html! { circle cx=(x) cy=(y) r="16" fill-opacity="0" { title { (note) } } };
+            notes.push(circle.into_string());
+        }
+    }
+    notes
+}
+
+fn put<'a, E>(page: &Page<'a>, element: &E)
+where
+    E: Drawable<SVGBackend<'a>>,
+    for<'b> &'b E: PointCollection<'b, (i32, i32)>,
+{
+    page.draw(element).expect(DRAWN);
+}
+
+fn colour(style: usize) -> RGBColor {
+    let [r, g, b] = COLOURS[style % COLOURS.len()];
+    RGBColor(r, g, b)
+}
+
+fn line(style: usize) -> ShapeStyle {
+    colour(style).stroke_width(WIDE)
+}
+
+/// The font of all text.
+fn font() -> TextStyle<'static> {
+    // plotters divides the size by this factor in SVG.
+    (FONT, SIZE * 1.24).into_font().color(&BLACK)
+}
+
+/// The line of a series through points.
+fn path<'a, C: Clone + 'static>(
+    points: Vec<C>,
+    s: &Series,
+) -> DynElement<'static, SVGBackend<'a>, C> {
+    let (style, dashes) = match s.provenance {
+        Provenance::Bound => (BLACK.stroke_width(3), Some((14, 10))),
+        Provenance::Measured => (line(s.style), None),
+        _ => (line(s.style), Some((22, 15))),
+    };
+    match dashes {
+        _ if !s.joined => PathElement::new(Vec::new(), style).into_dyn(),
+        None => PathElement::new(points, style).into_dyn(),
+        Some((dash, gap)) => DashedPathElement::new(points, dash, gap, style).into_dyn(),
     }
 }
 
-fn draw_marker(canvas: &mut Canvas, s: &Series, at: At) {
-    if s.provenance != Provenance::Bound {
-        canvas.marker(at, s.style, s.provenance == Provenance::Measured);
+/// Draws the marker of a series, filled or hollow; bounds have none.
+fn marker(page: &Page, at: (i32, i32), s: &Series) {
+    let (ink, is_filled) = (colour(s.style), s.provenance == Provenance::Measured);
+    let corners = MARKERS[s.style % MARKERS.len()].iter().map(|c| (at.0 + c.0, at.1 + c.1));
+    let mut corners: Vec<(i32, i32)> = corners.collect();
+    if s.provenance == Provenance::Bound {
+        return;
     }
+    if corners.is_empty() {
+        let shape = if is_filled { ink.filled() } else { line(s.style) };
+        return put(page, &Circle::new(at, if is_filled { 14 } else { 12 }, shape));
+    }
+    if is_filled {
+        put(page, &Polygon::new(corners.clone(), ink.filled()));
+    }
+    // Twice the first edge, so that the corner where the line ends is like the others.
+    corners.extend_from_within(..2);
+    put(page, &PathElement::new(corners, line(s.style)));
 }
 
-fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
-    let at: Vec<At> = s.points.iter().map(|p| to_page(p.x, p.y)).collect();
-    if at.len() > 1 {
-        draw_line(canvas, s, &at);
-    }
-    let line = Line { colour: &colour(s.style), width: WIDE, dashes: "" };
-    for (i, p) in s.points.iter().enumerate() {
-        let [low, high] = [p.low, p.high].map(|y| to_page(p.x, y));
-        if low.1 - high.1 > 2.0 {
-            canvas.line(&[low, high], line);
-            for (x, y) in [low, high] {
-                canvas.line(&[(x - 10.0, y), (x + 10.0, y)], line);
-            }
+/// A bar, filled with its colour or with a tint of it: bars with odd styles are lighter, so that neighbours differ in grey too.
+fn bar<C: Clone>(corners: [C; 2], style: usize) -> [Rectangle<C>; 2] {
+    let fill = colour(style).mix(if style % 2 == 1 { 0.35 } else { 1.0 }).filled();
+    let outline = colour(style).stroke_width(2);
+    [Rectangle::new(corners.clone(), fill), Rectangle::new(corners, outline)]
+}
+
+fn stacked(bars: &Bars) -> Vec<Rectangle<(f64, f64)>> {
+    let mut begins = vec![0.0; bars.names.len()];
+    let mut drawn = Vec::new();
+    for (style, (_, values)) in bars.segments.iter().enumerate() {
+        for (i, value) in values.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+            let (begin, half) = (begins[i], (1.0 - GAP) / 2.0);
+            begins[i] += value;
+            let corners = [(begin, i as f64 - half), (begins[i], i as f64 + half)];
+            drawn.extend(bar(corners, style));
         }
-        draw_marker(canvas, s, at[i]);
-        if let Some(note) = s.notes.get(i) {
-            canvas.note(at[i], note);
-        }
     }
+    drawn
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{figure, series};
+    use super::super::samples::{bars, figure, series};
     use super::*;
 
     #[test]
@@ -137,5 +302,13 @@ mod tests {
         let svg = svg(&Figure { marks: vec![mark(1.5), mark(3.0)], ..shown });
         assert_eq!(svg.matches("increase").count(), 1);
         assert_eq!(svg.matches("stroke=\"#D55E00\"").count(), 3);
+    }
+
+    #[test]
+    fn segments_are_stacked_and_empty_ones_are_not_drawn() {
+        let svg = svg(&bars());
+        assert!(svg.contains(">grade<") && svg.contains(">mean, 3<"));
+        // Three segments and two entries of the legend, each with its outline.
+        assert_eq!(svg.matches("<rect").count(), 10, "{svg}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::format::Format;
 use super::format::rendered::tree;
-use super::samples::{figure, series};
+use super::samples::{bars, figure, series};
 use super::svg::svg;
 use super::{Axis, Figure, Point, Provenance};
 use resvg::tiny_skia::Rect;
@@ -38,7 +38,7 @@ pub(crate) fn assert_legible(svg: &str) {
                 || b.right() < a.left()
                 || a.bottom() <= b.top()
                 || b.bottom() <= a.top();
-            assert!(is_apart, "{name:?} lies on {other:?}");
+            assert!(is_apart, "{name:?} lies on {other:?}: {a:?} {b:?}");
         }
     }
 }
@@ -78,6 +78,14 @@ fn no_text_of_a_figure_is_cut_or_lies_on_another() {
     drawn.series.truncate(1);
     drawn.series[0].points.truncate(1);
     assert_legible(&svg(&drawn));
+    let mut stacked = bars();
+    for count in [2, 11, 64] {
+        let all = stacked.bars.as_mut().expect("bars");
+        all.names =
+            (0..count).map(|i| format!("morton rebalance W={}", 10_i32.pow(i % 5))).collect();
+        all.segments.iter_mut().for_each(|(_, values)| values.resize(count as usize, 98_765.4));
+        assert_legible(&svg(&stacked));
+    }
     let (x, y) = (Axis::linear("rank"), Axis::linear("a longer name of a quantity / s"));
     for factor in [1e-9f64, 0.37, 123_456.0, -98_765.4, 1e12] {
         drawn.series = vec![series(Provenance::Measured)];

@@ -5,8 +5,10 @@ use super::squares::Square;
 use super::view::Face;
 use super::{Body, Picture, Planar, plane_axes};
 use crate::figure::Axis;
-use crate::figure::axes;
-use crate::figure::canvas::{Anchor, At, Canvas, INK, Line, SYMBOL, WIDTH, document, hex, width};
+use crate::figure::axes::{self, Scale};
+use crate::figure::canvas::{
+    Anchor, At, Canvas, INK, Line, SIZE, SYMBOL, WIDTH, document, hex, legend, width,
+};
 use std::collections::BTreeSet;
 
 /// Least space for the ticks and the label of the vertical axis, and space at the right, which a view has on both sides.
@@ -17,6 +19,10 @@ const HEIGHT_MAX: f64 = 1650.0;
 const BELOW: f64 = 80.0;
 /// Width of the section line, and of the light line below it, which separates it from dark cells.
 const SECTION: (f64, f64) = (2.5, 5.0);
+/// Length of a tick.
+const TICK: f64 = 12.0;
+/// Distances of labels of ticks from the horizontal and from the vertical axis: those at the corner do not touch.
+const TO_LABEL: [f64; 2] = [30.0, 18.0];
 /// Shades of the surface.
 const SHADES: f64 = 24.0;
 
@@ -28,6 +34,11 @@ pub fn svg(picture: &Picture) -> String {
 /// Units of the page per unit of the user.
 pub fn scale(picture: &Picture) -> f64 {
     Page::of(picture).scale
+}
+
+/// The ticks of an axis.
+fn scale_of(low: f64, high: f64) -> Scale {
+    Scale::of(&Axis { range: Some((low, high)), ..Axis::linear("") }, [])
 }
 
 /// The place of the window on the page.
@@ -58,7 +69,7 @@ impl<'a> Page<'a> {
             |i: usize, of: fn(f64, f64) -> f64, from: f64| points().map(|p| p[i]).fold(from, of);
         let low = [0, 1].map(|i| end(i, f64::min, f64::INFINITY));
         let high = [0, 1].map(|i| end(i, f64::max, f64::NEG_INFINITY));
-        let ticks = axes::left(&Axis::linear(""), &(low[1]..high[1]));
+        let ticks = scale_of(low[1], high[1]).left();
         let left = if picture.is_view() { SIDES.1 } else { ticks.max(SIDES.0) };
         let [across, up] = [0, 1].map(|i| high[i] - low[i]);
         let scale = ((WIDTH - left - SIDES.1) / across).min(HEIGHT_MAX / up);
@@ -108,10 +119,7 @@ impl<'a> Page<'a> {
         }
         let mut bottom = to.1;
         if !self.picture.is_view() {
-            let names = plane_axes(self.picture.slice.axis).map(|axis| ["x", "y", "z"][axis]);
-            let [x, y] = names.map(Axis::linear);
-            let ends = [low[0]..high[0], low[1]..high[1]];
-            let _ = axes::axes(canvas, [&x, &y], ends, (from, to), false);
+            self.axes(canvas, from, to);
             bottom += axes::BELOW;
         }
         canvas.text(&self.picture.caption(), (self.left, bottom + BELOW / 2.0), Anchor::Start);
@@ -141,7 +149,8 @@ impl<'a> Page<'a> {
         let line = matches!(self.picture.body, Body::Section(_)).then_some("geometry");
         let names: Vec<&str> = entries.iter().map(|entry| entry.0).chain(line).collect();
         let start = self.left + width(&title) + 50.0;
-        canvas.legend([self.left, start], &names, |canvas, (x, y), i| {
+        let (places, bottom) = legend([self.left, start], &names);
+        for (i, (name, (x, y))) in names.into_iter().zip(places).enumerate() {
             let right = x + SYMBOL - 20.0;
             match entries.get(i) {
                 Some((_, fill)) => {
@@ -154,7 +163,33 @@ impl<'a> Page<'a> {
                     canvas.line(&[(x, y), (right, y)], line);
                 }
             }
-        })
+            canvas.text(name, (x + SYMBOL, y), Anchor::Start);
+        }
+        bottom
+    }
+
+    /// Draws the axes around the window, whose upper left and lower right corner are given.
+    fn axes(&self, canvas: &mut Canvas, from: At, to: At) {
+        let [low, high] = self.shown;
+        let [mut x, y] = [0, 1].map(|i| scale_of(low[i], high[i]));
+        x.clear_labels(|tick| self.at([tick, 0.0]).0);
+        let thin = Line { colour: INK, width: 2.0, dashes: "" };
+        for (tick, label) in x.ticks.iter().zip(&x.labels) {
+            let (place, _) = self.at([*tick, 0.0]);
+            canvas.line(&[(place, to.1), (place, to.1 + TICK)], thin);
+            canvas.text(label, (place, to.1 + TO_LABEL[0] + SIZE / 2.0), Anchor::Middle);
+        }
+        for (tick, label) in y.ticks.iter().zip(&y.labels) {
+            let (_, place) = self.at([0.0, *tick]);
+            canvas.line(&[(from.0, place), (from.0 - TICK, place)], thin);
+            canvas.text(label, (from.0 - TO_LABEL[1], place), Anchor::End);
+        }
+        let names = plane_axes(self.picture.slice.axis).map(|axis| ["x", "y", "z"][axis]);
+        let below = to.1 + axes::BELOW - SIZE / 2.0 - 6.0;
+        canvas.text(names[0], (from.0.midpoint(to.0), below), Anchor::Middle);
+        let beside = from.0 - y.left() + SIZE / 2.0 + 8.0;
+        canvas.text(names[1], (beside, from.1.midpoint(to.1)), Anchor::Upwards);
+        canvas.line(&[from, (to.0, from.1), to, (from.0, to.1), from], thin);
     }
 
     fn section(&self, canvas: &mut Canvas, segments: &[[Planar; 2]]) {

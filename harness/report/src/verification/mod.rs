@@ -24,8 +24,8 @@ pub fn markdown(report: &Report) -> String {
 }
 
 fn table_of(report: &Report) -> Table {
-    let columns =
-        vec!["case", "facets", "cells", "ranks", "hold", "fail", "left out", "time s", "M cells/s"];
+    let columns = "case,facets,base,cells,ranks,hold,fail,left out,time s,M cells/s,B/cell";
+    let columns = columns.split(',').collect();
     let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
     check_invariants(&rows, report);
     Table { columns, rows, ..Table::default() }
@@ -37,7 +37,9 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let counts = rank_counts(case);
     let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
     let of_case = case.checks.iter().filter(of_case).collect();
-    let mut first = vec![case.name.clone(), case.facets.to_string(), case.cells.to_string()];
+    let sizes = [case.facets, case.leaves_base, case.cells];
+    let mut first = vec![case.name.clone()];
+    first.extend(sizes.map(|size| size.to_string()));
     first.push("serial".to_owned());
     first.extend(results(of_case, serial));
     let mut rows = vec![first];
@@ -48,7 +50,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
         // All layouts give the same mesh; the table has the time of the fastest.
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
         let checks = case.checks.iter().filter(|check| check.ranks == Some(ranks)).collect();
-        let mut row = vec![String::new(); 3];
+        let mut row = vec![String::new(); 4];
         row.push(ranks.to_string());
         row.extend(results(checks, fastest));
         rows.push(row);
@@ -60,7 +62,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
 fn check_invariants(rows: &[Vec<String>], report: &Report) {
     let sum =
         |column: usize| rows.iter().map(|row| row[column].parse::<usize>().unwrap_or(0)).sum();
-    let shown = Tally { pass: sum(4), fail: sum(5), left_out: sum(6) };
+    let shown = Tally { pass: sum(5), fail: sum(6), left_out: sum(7) };
     assert_eq!(shown, report.tally(), "checks in the rows of the table, and in the report");
 }
 
@@ -75,9 +77,12 @@ fn rank_counts(case: &CaseReport) -> Vec<usize> {
 
 fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
     let Tally { pass, fail, left_out } = tally;
-    let shown = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    let speed = [run.map(|run| run.time_wall_s), run.map(|run| run.cells_per_s() / 1e6)];
-    [pass, fail, left_out].map(|n| n.to_string()).into_iter().chain(speed.map(shown)).collect()
+    let measured = |run: &Run| {
+        let (time_s, rate) = (run.time_wall_s, run.cells_per_s() / 1e6);
+        [format!("{time_s:.3}"), format!("{rate:.3}"), format!("{:.1}", run.bytes_per_cell())]
+    };
+    let measured = run.map_or_else(|| ["-"; 3].map(str::to_owned), measured);
+    [pass, fail, left_out].map(|n| n.to_string()).into_iter().chain(measured).collect()
 }
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.
@@ -140,9 +145,9 @@ mod tests {
             text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(
             lines[2],
-            ["cube_small", "12", "7600", "serial", "1", "0", "1", "0.100", "0.076"]
+            ["cube_small", "12", "5000", "7600", "serial", "1", "0", "1", "0.100", "0.076", "10.0"]
         );
-        assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.152"]);
+        assert_eq!(lines[3], ["4", "1", "1", "0", "0.050", "0.152", "10.0"]);
     }
 
     #[test]
@@ -164,7 +169,7 @@ mod tests {
         let text = markdown(&sample());
         let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
         assert_eq!(rows.len(), 4);
-        assert!(rows.iter().all(|row| row.matches(" |").count() == 9), "{text}");
+        assert!(rows.iter().all(|row| row.matches(" |").count() == 11), "{text}");
     }
 
     #[test]
