@@ -1,7 +1,7 @@
 //! The report of a gate as text, Markdown, JUnit XML and JSON.
 
 use crate::junit::{skipped, suite, test, to_text, unsuccessful};
-use crate::markdown::escaped;
+use crate::table::escaped;
 use bench::gate::measures::LayerName;
 use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
 use quick_junit::NonSuccessKind::{Error, Failure};

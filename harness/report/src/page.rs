@@ -1,6 +1,6 @@
 //! The HTML page that every report is put into: self-contained, without scripts, light and dark, narrow and wide.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 const STYLE: &str = include_str!("page.css");
 
@@ -23,7 +23,7 @@ pub fn page(title: &str, content: &Markup) -> String {
 }
 
 /// A table with numbers to the right.
-pub fn table(columns: &[&str], rows: &[Vec<Markup>]) -> Markup {
+pub fn table<T: Render>(columns: &[&str], rows: &[Vec<T>]) -> Markup {
     html! {
         div.scroll { table {
             thead { tr { @for column in columns { th { (column) } } } }

@@ -1,6 +1,5 @@
 //! A table in the forms that reports have: text, Markdown, HTML.
 
-use crate::markdown::escaped;
 use crate::page;
 use maud::{Markup, html};
 
@@ -81,14 +80,28 @@ impl Table {
 
     /// The table with its title and remarks as HTML.
     pub fn html(&self) -> Markup {
-        let row = |row: &Vec<String>| row.iter().map(|field| html! { (field) }).collect();
-        let rows: Vec<Vec<Markup>> = self.rows.iter().map(row).collect();
         html! {
             h3 { (self.title) }
-            (page::table(&self.columns, &rows))
+            (page::table(&self.columns, &self.rows))
             @for note in &self.notes { p { (note) } }
         }
     }
+}
+
+/// Text on one line in which Markdown and HTML find no markup.
+pub fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '&' => out.push_str("&amp;"),
+            '\n' => out.push_str("<br>"),
+            '|' | '*' | '_' | '`' | '[' | ']' | '\\' => out.extend(['\\', character]),
+            _ => out.push(character),
+        }
+    }
+    out
 }
 
 #[cfg(test)]

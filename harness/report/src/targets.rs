@@ -1,7 +1,6 @@
 //! The table of targets as text and as Markdown.
 
-use crate::markdown::escaped;
-use crate::table::Table;
+use crate::table::{Table, escaped};
 use bench::study::judge::{Judged, Verdict};
 
 fn table(rows: &[Judged]) -> Table {

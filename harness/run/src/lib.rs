@@ -16,7 +16,6 @@ pub mod proof;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 pub mod verify;
-pub mod view;
 
 use contract::failure::Failure;
 use engine::failure::{self, End};

@@ -1,4 +1,4 @@
-//! The commands, one file each with its arguments; `files`, `meshed`, `paper`, `programs`, `selection`, `values` and `view` are shared.
+//! The commands, one file each with its arguments; `files`, `meshed`, `paper`, `programs`, `selection` and `values` are shared.
 
 pub mod archive;
 pub mod audit;
@@ -23,5 +23,4 @@ pub mod shrink;
 pub mod track;
 mod values;
 pub mod verify;
-mod view;
 pub mod why;

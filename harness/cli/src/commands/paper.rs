@@ -1,18 +1,13 @@
 //! `harness picture --paper`: the pictures of the paper, made of one case.
 
-use super::meshed::{MeshArguments, Meshed};
-use super::view::{command, write_view};
-use contract::failure::EXIT_MISSING;
+use super::meshed::MeshArguments;
 use contract::failure::Failure;
 use contract::files::{Staging, named, nearest_directory};
 use contract::plain::{PlainCase, StlForm};
 use export::mesh::Mesh;
-use report::picture::format::{Format, put, write};
-use report::picture::scene::Scene;
-use report::picture::set::{Drawn, MEMBERS, Made, Member, Part, RANKS, page, request};
-use report::picture::{DETAIL, NO_LEAF, Picture, Request, svg};
+use report::picture::set::{MEMBERS, Made, RANKS, page, request};
+use report::picture::{NO_LEAF, Picture, svg, write};
 use run::engine::layout::{Layout, Ranks};
-use run::engine::paths::Paths;
 use run::engine::programs::Programs;
 use std::path::Path;
 use std::{fs, io};
@@ -42,19 +37,24 @@ pub fn draw(source: &MeshArguments, out: &Path) -> Result<(), Failure> {
         let place = tempfile::tempdir()?;
         let case = variant(&plain, made).write(place.path(), StlForm::Any)?;
         let meshed = source.engine.mesh(&engine, &case, &layout, made == Made::Base)?;
-        for member in members {
-            match draw_member(member, &meshed, staging.path(), &paths, source) {
-                Ok(drawn) => pictures.push((*member, drawn)),
+        let case = meshed.case.as_ref().expect("a case was meshed");
+        let mesh = Mesh::open(&meshed.dir)?;
+        for member @ (name, _, part, colour, _) in members {
+            match Picture::collect(&mesh, &request(*part, *colour, case)) {
+                Ok(picture) => {
+                    let svg = svg(&picture);
+                    write(&staging.path().join(format!("{name}.svg")), svg.as_bytes())?;
+                    pictures.push((*member, svg));
+                }
                 // In a close-up everything may be deleted.
                 Err(failure) if failure.why == NO_LEAF => {
-                    eprintln!("harness: {} is left out: no leaf is in its slice", member.0);
+                    eprintln!("harness: {name} is left out: no leaf is in its slice");
                 }
                 Err(failure) => return Err(failure),
             }
         }
     }
-    let text = page(&source.mesh, &command(), &pictures);
-    put(&staging.path().join(INDEX), text.as_bytes())?;
+    write(&staging.path().join(INDEX), page(&source.mesh, &pictures).as_bytes())?;
     staging.publish(|staged| publish(staged, out)).map_err(named)?;
     println!("{} pictures; the page is {}", pictures.len(), out.join(INDEX).display());
     Ok(())
@@ -79,39 +79,4 @@ fn variant(plain: &PlainCase, made: Made) -> PlainCase {
         Made::WithoutCrossing => case.table.insert("keep_crossing".into(), Value::Boolean(false)),
     };
     case
-}
-
-fn draw_member(
-    member: &Member,
-    meshed: &Meshed,
-    out: &Path,
-    paths: &Paths,
-    source: &MeshArguments,
-) -> Result<Drawn, Failure> {
-    let (name, _, part, colour, _) = *member;
-    let case = meshed.case.as_ref().expect("a case was meshed");
-    let mesh = Mesh::open(&meshed.dir)?;
-    let (selection, zoom, level_max) = request(part, case);
-    let body = Some(&case.facets[..]);
-    let request = Request { selection, body, colour, zoom, level_max, command: command() };
-    let file = |extension: &str| out.join(format!("{name}.{extension}"));
-    if matches!(part, Part::View | Part::ViewOfBody) {
-        let mut scene = Scene::collect(&mesh, &request)?;
-        if part == Part::ViewOfBody {
-            scene = scene.of_body();
-        }
-        write_view(&scene, &file("html"), paths, source)?;
-        return match write_view(&scene, &file("png"), paths, source) {
-            Ok(()) => Ok(Drawn::View(Some(fs::read(file("png"))?))),
-            // Without pyvista the page lacks this picture, and its HTML file remains.
-            Err(Failure { code: EXIT_MISSING, why }) => {
-                eprintln!("harness: {why}");
-                Ok(Drawn::View(None))
-            }
-            Err(other) => Err(other),
-        };
-    }
-    let picture = Picture::collect(&mesh, &request, &DETAIL)?;
-    write(&picture, Format::Svg, &file("svg"))?;
-    Ok(Drawn::Slice(svg(&picture)))
 }

@@ -1,37 +1,31 @@
 //! `harness picture`: draws a slice of a mesh, a view in three dimensions, or the pictures of the paper.
 
-use super::meshed::{MeshArguments, Meshed};
+use super::meshed::MeshArguments;
 use super::paper;
 use super::selection::SelectionArguments;
-use super::view::{command, write_view};
 use clap::Args;
 use contract::failure::EXIT_HOLDS;
 use contract::failure::Failure;
 use contract::octant::LEVEL_MAX;
 use export::mesh::Mesh;
 use report::picture::colour::Colour;
-use report::picture::format::{Format, write};
-use report::picture::scene::Scene;
-use report::picture::{DETAIL, Picture, Request};
+use report::picture::{Format, Picture, Request, svg, write};
 use run::engine::layout::{Layout, Ranks, SERIAL};
-use run::engine::paths::Paths;
+use std::io;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 A slice is drawn at page width with the section of the geometry, axes and a legend; cells too small to be seen \
-are merged, and their greatest value counts. A view shows the geometry and three \
-slices, which a mouse turns in any browser without network (.html), or the first slice (.png, with pyvista). An existing \
-file is replaced.
+are merged, and their greatest value counts. A view shows the slice and the surface of the geometry in three dimensions. An existing file is replaced.
 
 Examples:
   harness picture uav-small --out uav.svg                             mesh a case and draw its middle
   harness picture body.toml --out nose.png --slice y=0 --zoom 8       closer, in another plane
   harness picture mesh --case body.toml --out mesh.pdf --colour side  a mesh on disk; without --case, no geometry is drawn
-  harness picture uav-small --out ranks.html --ranks 16 --colour rank the partition in three dimensions
+  harness picture uav-small --out ranks.svg --ranks 16 --colour rank --view  the partition in three dimensions
   harness picture uav-medium --paper --out pictures                   every step of the algorithm, and a page of them
 
-Exit codes: 0 success; 2 invalid input or an unknown format; 3 the mesher, or pyvista for a .png view, is missing; \
-130 interrupted.";
+Exit codes: 0 success; 2 invalid input or an unknown format; 3 the mesher is missing; 130 interrupted.";
 
 /// `harness picture`.
 #[derive(Args, Debug)]
@@ -40,16 +34,16 @@ pub struct Arguments {
     /// The mesh.
     #[command(flatten)]
     source: MeshArguments,
-    /// The picture: .svg, .png or .pdf for a slice, .html or .png for a view; with --paper a directory
+    /// The picture: .svg, .png or .pdf; with --paper a directory
     #[arg(short, long, value_name = "FILE|DIR")]
     out: PathBuf,
     /// What colours show
     #[arg(long, value_enum, default_value = "level")]
     colour: Colour,
-    /// Magnification: edges of the root per edge of the picture, which is centred on the geometry
+    /// Magnification: edges of the root per edge of the picture, which is centred on the geometry. A view is close to it by itself
     #[arg(long, value_name = "X", default_value = "1", value_parser = zoom, conflicts_with = "clip")]
     zoom: f64,
-    /// Draw a view in three dimensions as .png
+    /// Draw a view in three dimensions
     #[arg(long)]
     view: bool,
     /// Simulated ranks that mesh a case
@@ -80,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 
 fn draw(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
-    let format = requested(arguments)?;
+    let format = requested(out)?;
     if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
         let why =
             "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
@@ -95,49 +89,31 @@ fn draw(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
         mesh.require_case(case)?;
     }
-    let request = request(arguments, &meshed, &mesh)?;
-    if arguments.view || format == Format::Html {
-        let scene = Scene::collect(&mesh, &request)?;
-        write_view(&scene, out, &Paths::find(), source)?;
-    } else {
-        let picture = Picture::collect(&mesh, &request, &DETAIL)?;
-        write(&picture, format, out)?;
-        println!("{}", picture.title());
-    }
-    println!("{}", out.display());
+    let request = Request {
+        selection: arguments.selection.of(&mesh)?,
+        body: meshed.case.as_ref().map(|case| &case.facets[..]),
+        colour: arguments.colour,
+        zoom: arguments.zoom,
+        level_max: LEVEL_MAX,
+        view: arguments.view,
+    };
+    let picture = Picture::collect(&mesh, &request)?;
+    write(out, &format.bytes(&svg(&picture)).map_err(io::Error::other)?)?;
+    println!("{}\n{}", picture.title(), out.display());
     if meshed.case.is_none() {
         println!("the geometry is not drawn: name its case with --case");
     }
     Ok(())
 }
 
-/// The format of the file, if that can be made of a slice or a view, whichever is requested.
-fn requested(arguments: &Arguments) -> Result<Format, String> {
-    let Arguments { out, view, .. } = arguments;
+/// The format of the file, if its directory exists.
+fn requested(out: &Path) -> Result<Format, String> {
     let format = Format::of(out)?;
-    if *view && !matches!(format, Format::Png | Format::Html) {
-        return Err(format!("{}: a view must be .html or .png", out.display()));
-    }
     let directory = out.parent().filter(|d| !d.as_os_str().is_empty());
     match directory.filter(|d| !d.is_dir()) {
         Some(missing) => Err(format!("{} is not a directory: create it", missing.display())),
         None => Ok(format),
     }
-}
-
-fn request<'a>(
-    arguments: &Arguments,
-    meshed: &'a Meshed,
-    mesh: &Mesh,
-) -> Result<Request<'a>, Failure> {
-    Ok(Request {
-        selection: arguments.selection.of(mesh)?,
-        body: meshed.case.as_ref().map(|case| &case.facets[..]),
-        colour: arguments.colour,
-        zoom: arguments.zoom,
-        level_max: LEVEL_MAX,
-        command: command(),
-    })
 }
 
 fn zoom(text: &str) -> Result<f64, String> {

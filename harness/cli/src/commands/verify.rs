@@ -5,9 +5,8 @@ use super::programs::ProgramArguments;
 use super::values::Output;
 use clap::Args;
 use contract::failure::Failure;
-use report::verification::markdown::markdown;
-use report::verification::table::table;
-use report::verification::{json, junit};
+use report::verification::machine::{json, junit};
+use report::verification::{markdown, table};
 use run::engine::programs::Programs;
 use run::verify::options::Options;
 use run::verify::verify;
@@ -46,15 +45,15 @@ pub fn run(arguments: Arguments) -> Result<u8, Failure> {
         for (name, text) in [
             ("table.txt", &table(&report)),
             ("report.md", &text),
-            ("junit.xml", &junit::junit(&report)),
-            ("report.json", &json::json(&report)),
+            ("junit.xml", &junit(&report)),
+            ("report.json", &json(&report)),
         ] {
             put(&out.join(name), text)?;
         }
     }
     put_forms(
         report.exit_code(),
-        &[(&junit_file, &|| junit::junit(&report)), (&json_file, &|| json::json(&report))],
+        &[(&junit_file, &|| junit(&report)), (&json_file, &|| json(&report))],
         Some(&text),
     )
 }

@@ -251,9 +251,14 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
             "picture mesh --case case.toml --out p.svg",
             &["p.svg", "p.csv"],
         ),
-        new("picture .html", Harness, "picture mesh --case case.toml --out p.html", &["p.html"]),
         new("export .vtp", Harness, "export mesh n.vtp --case case.toml", &["n.vtp"]),
         new("export .stl", Harness, "export mesh n.stl", &["n.stl"]),
+        new(
+            "picture --view",
+            Harness,
+            "picture mesh --case case.toml --view --out p.svg",
+            &["p.svg"],
+        ),
         Program {
             varying: &["a.json"],
             refusals: &[1, 2],

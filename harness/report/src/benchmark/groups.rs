@@ -8,6 +8,9 @@ use bench::order::{by_key, distinct};
 use statistics::Median;
 use std::fmt;
 
+/// The engine whose name is not in names of files.
+const OWN: &str = "mesher";
+
 /// How the times of a group were obtained.
 pub fn provenance(group: &Group) -> Provenance {
     match group.setup.comm {
@@ -19,32 +22,30 @@ pub fn provenance(group: &Group) -> Provenance {
 
 /// A median with its confidence interval as a point.
 pub fn point(x: f64, m: Median) -> Point {
-    Point { x, y: m.value, low: m.low, high: m.high, count: m.count, coverage: m.coverage }
+    Point { x, y: m.value, low: m.low, high: m.high }
 }
 
-/// The number of repetitions and the meaning of the error bars, as a sentence without its full stop.
+/// The number of repetitions and the meaning of the error bars, as a sentence.
 pub fn repetitions(groups: &[&Group]) -> String {
     let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
+    let projected = match groups.iter().any(|g| g.setup.comm == Comm::Sim) {
+        true => "; those of projections are of the projections of single runs",
+        false => "",
+    };
     format!(
-        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{}",
+        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{projected}.",
         counts(groups),
-        covered * 100.0,
-        if groups.iter().any(|g| g.by_rank && g.setup.comm == Comm::Sim) {
-            "; projections use medians per rank, and their bars are those of the projections of single runs"
-        } else {
-            ""
-        }
+        covered * 100.0
     )
 }
 
-/// The origin of the times of single ranks, as a sentence without its full stop.
+/// The origin of the times of single ranks, as a sentence.
 pub fn rank_times(groups: &[&Group]) -> String {
     let n = counts(groups);
-    match (groups.iter().all(|g| g.by_rank), groups.iter().any(|g| g.by_rank)) {
-        (true, _) => format!("Times of a rank in a phase are medians of {n} runs"),
-        (_, false) => format!("Runs of median time among {n}"),
-        _ => format!(
-            "Times of a rank in a phase are medians of {n} runs, or those of the one of median time"
+    match groups.iter().all(|g| g.by_rank) {
+        true => format!("Times of a rank in a phase are medians of {n} runs."),
+        false => format!(
+            "Times of a rank in a phase are those of the run of median time among {n}, or medians where all runs report them."
         ),
     }
 }
@@ -52,22 +53,18 @@ pub fn rank_times(groups: &[&Group]) -> String {
 /// The number of repetitions, or the range of numbers.
 fn counts(groups: &[&Group]) -> String {
     let counts = || groups.iter().map(|g| g.time_s.count);
-    distinct([counts().min(), counts().max()].into_iter().flatten().map(|n| n.to_string()))
-        .join(" to ")
+    range([counts().min(), counts().max()], |n| n.to_string())
 }
 
-/// The groups of an experiment by case, programs together, in the order of the record.
-pub fn by_case<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
-    by_key(of(groups, experiment), |group| Subject { engine: OWN, ..Subject::of(&group.setup) })
+/// Least and greatest as text, or one of them if both look alike.
+pub fn range<T>(ends: [Option<T>; 2], text: impl Fn(T) -> String) -> String {
+    distinct(ends.into_iter().flatten().map(text)).join(" to ")
 }
 
 /// The groups of an experiment by engine and case, in the order of the record.
 pub fn by_subject<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
-    by_key(of(groups, experiment), |group| Subject::of(&group.setup))
-}
-
-fn of<'a>(groups: &'a Groups, experiment: &str) -> impl Iterator<Item = &'a Group> {
-    groups.all.iter().filter(move |g| g.setup.experiment == experiment)
+    let of = groups.all.iter().filter(|g| g.setup.experiment == experiment);
+    by_key(of, |group| Subject::of(&group.setup))
 }
 
 /// The program and the case of a figure that shows only one of each.
@@ -87,6 +84,11 @@ impl<'a> Subject<'a> {
         Self { engine: &setup.engine, case: &setup.case, cells: setup.series_cells }
     }
 
+    /// The same for figures that show all programs.
+    pub fn of_all(setup: &'a Setup) -> Self {
+        Self { engine: OWN, ..Self::of(setup) }
+    }
+
     /// A name for files: the case, and before it the program unless that is the mesher of this repository.
     pub fn file(&self) -> String {
         let size = self.cells.map_or(String::new(), |n| format!("-{}", cells_label(n as u64)));
@@ -98,10 +100,8 @@ impl<'a> Subject<'a> {
 
     /// The case and the size of its series, as text.
     pub fn mesh(&self) -> String {
-        let size = self
-            .cells
-            .map_or(String::new(), |n| format!(" (series of {} cells)", grouped(n as u64)));
-        format!("{}{size}", self.case)
+        let size = |n: f64| format!(" (series of {} cells)", grouped(n as u64));
+        format!("{}{}", self.case, self.cells.map(size).unwrap_or_default())
     }
 }
 
@@ -109,14 +109,6 @@ impl fmt::Display for Subject<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} by {}", self.mesh(), self.engine)
     }
-}
-
-/// The engine whose name is not in names of files.
-const OWN: &str = "mesher";
-
-/// The programs of some groups without repetitions, as text.
-pub fn engines(groups: &[&Group]) -> String {
-    distinct(groups.iter().map(|group| group.setup.engine.as_str())).join(", ")
 }
 
 /// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.

@@ -1,27 +1,22 @@
 //! `harness report DIR`: figures, a page, a LaTeX fragment and macros of the numbers from records.
 
-mod balance;
+mod bars;
 mod figures;
 mod groups;
-mod html;
-mod latex;
 pub mod numbers;
-mod paper;
+mod page;
 pub mod prose;
 mod rules;
 mod scaling;
 pub mod tables;
 
-use crate::figure::check::check_invariants;
-#[cfg(feature = "figures")]
-use crate::figure::raster;
-use crate::figure::{Figure, csv, file_name, name_apart, svg, tex};
+use crate::figure::format::Format;
+use crate::figure::{Figure, check_invariants, file_name, latex, name_apart, svg};
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use contract::files::{named, write_atomically};
-use html::Drawn;
-pub use latex::machines;
 use numbers::{Number, numbers};
+pub use page::machines;
 use rules::Broken;
 use std::fs;
 use std::io;
@@ -53,28 +48,25 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     check_invariants(&figures);
     let place = directory.join("figures");
     fs::create_dir_all(&place)?;
-    let drawn: Vec<Drawn> =
+    let drawn: Vec<(&Figure, String)> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
     let broken = rules::broken(&groups, lines);
     let page = directory.join("index.html");
-    write(&page, html::page(&groups, &drawn, &broken, lines))?;
+    write(&page, page::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     let numbers = numbers(&groups);
     write(&directory.join("numbers.tex"), numbers::tex(&numbers))?;
     Ok(Written { page, figures: figures.len(), broken, numbers })
 }
 
-/// Writes a figure in all formats.
-fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<Drawn<'a>> {
-    let (svg, csv) = (svg::svg(figure), csv::csv(figure));
+/// Writes a figure in all formats; returns it with its SVG.
+fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<(&'a Figure, String)> {
+    let svg = svg::svg(figure);
     let path = |extension: &str| directory.join(format!("{}.{extension}", figure.id));
-    write(&path("svg"), &svg)?;
-    write(&path("csv"), &csv)?;
-    write(&path("tex"), tex::tex(figure))?;
-    #[cfg(feature = "figures")]
-    {
-        write(&path("png"), raster::png(&svg).map_err(io::Error::other)?)?;
-        write(&path("pdf"), raster::pdf(&svg).map_err(io::Error::other)?)?;
+    write(&path("csv"), latex::csv(figure))?;
+    write(&path("tex"), latex::tex(figure))?;
+    for (extension, format) in Format::ALL {
+        write(&path(extension), format.bytes(&svg).map_err(io::Error::other)?)?;
     }
     Ok((figure, svg))
 }

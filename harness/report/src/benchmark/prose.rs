@@ -17,40 +17,26 @@ pub struct Checked {
 
 /// Compares the numbers of a text with the results of a record.
 pub fn check(text: &str, numbers: &[Number]) -> Checked {
-    let mut checked = Checked::default();
-    for (line, content) in (1..).zip(text.lines()) {
-        let code = without_comment(content);
-        let mut find = |what: Option<String>| {
-            checked.compared += 1;
-            checked.findings.extend(what.map(|what| format!("line {line}: {what}")));
-        };
-        if let Some(arguments) = code.trim_start().strip_prefix("\\defresult") {
-            find(defines_otherwise(&groups(arguments), numbers));
-            continue;
+    let (mut code, mut found) = (String::new(), Vec::new());
+    for line in text.lines().map(without_comment) {
+        match line.trim_start().strip_prefix("\\defresult") {
+            Some(arguments) => found.push((code.len(), defines_otherwise(arguments, numbers))),
+            None => code += line,
         }
-        for literal in literals(code) {
-            let known = numbers.iter().any(|number| rounds_to(number, literal));
-            find(
-                (!known)
-                    .then(|| format!("{literal} is written by hand, and no result rounds to it")),
-            );
-        }
+        code.push('\n');
     }
-    let code: String = text.lines().map(|line| without_comment(line).to_owned() + "\n").collect();
-    for (at, option, key) in uses(&code) {
-        checked.compared += 1;
-        let line = 1 + code[..at].matches('\n').count();
-        let why = match numbers.iter().find(|number| number.key == key) {
-            None => format!("the record has no result {key}"),
-            Some(n) if option == "interval" && n.interval.is_empty() => {
-                format!("{key} has no interval")
-            }
-            Some(_) if ["value", "interval", "unit"].contains(&option) => continue,
-            Some(_) => format!("\\result has no option {option}: give value, interval or unit"),
-        };
-        checked.findings.push(format!("line {line}: {why}"));
-    }
-    checked
+    found.extend(uses(&code).map(|(at, option, key)| (at, misused(option, key, numbers))));
+    found.extend(literals(&code).map(|(at, literal)| {
+        let is_known = numbers.iter().any(|number| rounds_to(number, literal));
+        let why = || format!("{literal} is written by hand, and no result rounds to it");
+        (at, (!is_known).then(why))
+    }));
+    found.sort_by_key(|(at, _)| *at);
+    let line = |at: usize| 1 + code[..at].matches('\n').count();
+    let finding = |(at, why): &(usize, Option<String>)| {
+        why.as_ref().map(|why| format!("line {}: {why}", line(*at)))
+    };
+    Checked { compared: found.len(), findings: found.iter().filter_map(finding).collect() }
 }
 
 /// The line up to its comment.
@@ -59,14 +45,10 @@ fn without_comment(line: &str) -> &str {
     line.match_indices('%').find(is_start).map_or(line, |(at, _)| &line[..at])
 }
 
-/// The contents of the groups `{...}` at the beginning of a text.
-fn groups(text: &str) -> Vec<&str> {
-    text.split('{').skip(1).filter_map(|group| Some(group.split_once('}')?.0)).collect()
-}
-
 /// What a definition says that the record does not say.
-fn defines_otherwise(arguments: &[&str], numbers: &[Number]) -> Option<String> {
-    let [key, here @ ..] = arguments else {
+fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
+    let groups = arguments.split('{').skip(1).filter_map(|group| Some(group.split_once('}')?.0));
+    let [key, here @ ..] = &groups.collect::<Vec<_>>()[..] else {
         return Some("\\defresult needs four arguments".to_owned());
     };
     let Some(n) = numbers.iter().find(|number| number.key == *key) else {
@@ -74,6 +56,16 @@ fn defines_otherwise(arguments: &[&str], numbers: &[Number]) -> Option<String> {
     };
     let [here, there] = [here, &[&n.value, &n.interval, &unit_tex(n)]].map(|of| of.join(" "));
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
+}
+
+/// Why a use of `\result` has no text.
+fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
+    match (option, numbers.iter().find(|number| number.key == key)) {
+        (_, None) => Some(format!("the record has no result {key}")),
+        ("interval", Some(n)) if n.interval.is_empty() => Some(format!("{key} has no interval")),
+        ("value" | "interval" | "unit", _) => None,
+        _ => Some(format!("\\result has no option {option}: give value, interval or unit")),
+    }
 }
 
 /// Where `\result` is used, and with which option and key. White space may stand around its arguments, and ends of lines.
@@ -90,7 +82,7 @@ fn uses(code: &str) -> impl Iterator<Item = (usize, &str, &str)> {
 }
 
 /// Numbers with a decimal point and three or more significant digits, as they stand in the text. Zero before the point may be missing.
-fn literals(code: &str) -> impl Iterator<Item = &str> {
+fn literals(code: &str) -> impl Iterator<Item = (usize, &str)> {
     let not_part = |c: char| !c.is_ascii_digit() && c != '.';
     let is_start = move |&(at, c): &(usize, char)| {
         let before = code[..at].chars().next_back();
@@ -104,7 +96,9 @@ fn literals(code: &str) -> impl Iterator<Item = &str> {
         let literal = code[at..end].trim_end_matches('.');
         let digits = literal.trim_start_matches(['0', '.']).replace('.', "").len();
         let is_number = literal.matches('.').count() == 1 && digits >= 3;
-        (is_number && !is_length(&code[end..]) && !is_name(&code[..at])).then_some(literal)
+        let line = code[..at].rfind('\n').map_or(0, |end| end + 1);
+        (is_number && !is_length(&code[end..]) && !is_name(&code[line..at]))
+            .then_some((at, literal))
     })
 }
 
@@ -117,29 +111,26 @@ fn is_length(rest: &str) -> bool {
     units.iter().any(|unit| rest.starts_with(unit)) || ends.iter().any(|end| name.ends_with(end))
 }
 
-/// Whether the text ends within an option `[...]` of a command, or within the argument of a command that names a label, a file or a
+/// Whether the begin of a line ends within an option `[...]` of a command, or within the argument of a command that names a label, a file or a
 /// source.
 fn is_name(before: &str) -> bool {
-    let of_command = |text: &str| {
-        let name = text.trim_end().trim_end_matches(|c: char| c.is_ascii_alphabetic() || c == '*');
-        text.ends_with(['}', ']']) || name.len() < text.trim_end().len() && name.ends_with('\\')
+    const NAMING: &str = "label ref cite input result includegraphics url usepackage bibitem";
+    let opened = |open: char, close: char| {
+        let at = before.rfind(open).filter(|&at| !before[at..].contains(close));
+        at.map(|at| &before[..at])
     };
-    let option = before.rfind('[').filter(|&open| !before[open..].contains(']'));
-    if option.is_some_and(|open| of_command(&before[..open])) {
-        return true;
-    }
-    let Some(open) = before.rfind('{').filter(|&open| !before[open..].contains('}')) else {
-        return false;
+    let is_command = |text: &str| {
+        let name = text.trim_end_matches(|c: char| c.is_ascii_alphabetic() || c == '*');
+        text.ends_with(['}', ']']) || name.len() < text.len() && name.ends_with('\\')
     };
-    let command = &before[..open];
-    let command = if command.ends_with(']') {
-        command.rsplit_once('[').map_or("", |(c, _)| c)
-    } else {
-        command
+    let names = |command: &str| {
+        let command = command
+            .strip_suffix(']')
+            .and_then(|text| text.rsplit_once('['))
+            .map_or(command, |c| c.0);
+        NAMING.split(' ').any(|name| command.ends_with(name))
     };
-    ["label", "ref", "cite", "input", "result", "includegraphics", "url", "usepackage", "bibitem"]
-        .iter()
-        .any(|name| command.ends_with(name))
+    opened('[', ']').is_some_and(is_command) || opened('{', '}').is_some_and(names)
 }
 
 /// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
@@ -184,6 +175,7 @@ mod tests {
             ("\\defresult{a/time}{1.234}{1.10--1.30}{ms}", "1.10--1.30 ms here"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
+            ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
             ("a factor of .987", ".987 is written by hand"),
             ("\\result[intervall]{a/time}", "no option intervall"),
             ("\\result[interval]{a/speedup}", "a/speedup has no interval"),

@@ -2,10 +2,10 @@
 
 use super::groups::{Subject, is_summarised};
 use crate::table::Table;
-use bench::experiments::entry::{Comm, Phase};
+use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
-use bench::experiments::pop::{Efficiency, above_one, phase_efficiency, phase_s};
+use bench::experiments::pop::{Efficiency, above_one, phase_s};
 use bench::experiments::programs::Comparison;
 use bench::order::{by_key, distinct};
 
@@ -15,7 +15,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     let mut all: Vec<Table> =
         experiments.into_iter().map(|name| experiment(groups, name)).collect();
     all.extend(projections(groups));
-    all.extend(largest(groups).into_iter().map(|group| phases(groups, group)));
+    all.extend(largest(groups).into_iter().map(phases));
     all.extend(groups.comparisons().iter().map(programs));
     all
 }
@@ -33,13 +33,10 @@ pub fn text(groups: &Groups) -> String {
     lines.into_iter().map(|line| line + "\n").collect()
 }
 
-/// A group, or a phase, with its efficiencies.
-type With<'a, T> = (&'a T, Efficiency);
-
 /// Time, load imbalance λ = max/mean, POP efficiencies, rate and memory of every group.
 fn experiment(groups: &Groups, name: &str) -> Table {
     let of = groups.all.iter().filter(|g| g.setup.experiment == name);
-    let of: Vec<With<Group>> = of.map(|g| (g, groups.efficiency(g))).collect();
+    let of: Vec<(&Group, Efficiency)> = of.map(|g| (g, groups.efficiency(g))).collect();
     let lambda = |group: &Group| {
         let counted = group.typical.counters.get("leaves");
         counted.map_or("–".to_owned(), |of| format!("{:.3}", of.lambda(group.setup.ranks)))
@@ -74,11 +71,6 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],
     );
-    explained(table, &of)
-}
-
-/// The table with the reasons for efficiencies above 1.
-fn explained<T>(table: Table, of: &[With<T>]) -> Table {
     let efficiencies: Vec<Efficiency> = of.iter().map(|(_, e)| *e).collect();
     Table { notes: above_one(&efficiencies).into_iter().collect(), ..table }
 }
@@ -105,50 +97,36 @@ fn projections(groups: &Groups) -> Option<Table> {
     (!pairs.is_empty()).then_some(table)
 }
 
-/// The largest simulated run of every strong or weak scaling study.
+/// The first simulated run on the most ranks of every strong or weak scaling study.
 fn largest<'a>(groups: &'a Groups) -> Vec<&'a Group> {
     let study = |group: &'a Group| {
         let weak = group.setup.experiment == "weak";
         (weak, Subject::of(&group.setup).to_string(), (!weak).then(|| group.cells()))
     };
     let studies = by_key(groups.all.iter().filter(|g| is_summarised(g)), study);
-    // The first of those on the most ranks.
-    let largest =
-        |(_, groups): (_, Vec<&'a Group>)| groups.into_iter().rev().max_by_key(|g| g.setup.ranks);
-    studies.into_iter().filter_map(largest).collect()
+    let largest = |of: Vec<&'a Group>| of.into_iter().rev().max_by_key(|g| g.setup.ranks);
+    studies.into_iter().filter_map(|(_, of)| largest(of)).collect()
 }
 
-/// The phases of a group's typical run: useful time, efficiencies, messages.
-fn phases(groups: &Groups, group: &Group) -> Table {
+/// The phases of a group's typical run: useful time and messages.
+fn phases(group: &Group) -> Table {
     let (run, network) = (&group.typical, &group.network);
-    let reference = &groups.reference(group).typical;
-    let with = |p| (p, phase_efficiency(run, p, reference, network));
-    let of: Vec<With<Phase>> = run.phases.iter().map(with).collect();
     let total: f64 = run.phases.iter().map(|p| phase_s(run, p, network)).sum();
-    let s = &run.setup;
-    let cells = grouped(run.cells);
-    let table = Table::of(
-        format!(
-            "phases: {}, {} scaling, {cells} cells, {} simulated ranks",
-            Subject::of(s),
-            s.experiment,
-            s.ranks
-        ),
-        &of,
+    let (s, cells) = (&run.setup, grouped(run.cells));
+    let (subject, experiment, ranks) = (Subject::of(s), &s.experiment, s.ranks);
+    Table::of(
+        format!("phases: {subject}, {experiment} scaling, {cells} cells, {ranks} simulated ranks"),
+        &run.phases,
         &[
-            ("phase", &|(p, _)| p.name.clone()),
-            ("mean useful time / s", &|(p, _)| format!("{:.4}", p.useful_s.sum / s.ranks as f64)),
-            ("max useful time / s", &|(p, _)| format!("{:.4}", p.useful_s.max)),
-            ("λ", &|(_, e)| format!("{:.2}", 1.0 / e.load_balance)),
-            ("transfer", &|(_, e)| format!("{:.2}", e.transfer)),
-            ("parallel efficiency", &|(_, e)| format!("{:.2}", e.parallel())),
-            ("computation scaling", &|(_, e)| format!("{:.2}", e.computation_scaling)),
-            ("of run time", &|(_, e)| format!("{:.1} %", 100.0 * e.time_s / total)),
-            ("max messages / rank", &|(p, _)| format!("{:.0}", p.messages.max)),
-            ("max MB / rank", &|(p, _)| format!("{:.3}", p.message_bytes.max / 1e6)),
+            ("phase", &|p| p.name.clone()),
+            ("mean useful time / s", &|p| format!("{:.4}", p.useful_s.sum / ranks as f64)),
+            ("max useful time / s", &|p| format!("{:.4}", p.useful_s.max)),
+            ("λ", &|p| format!("{:.2}", p.useful_s.lambda(ranks))),
+            ("of run time", &|p| format!("{:.1} %", 100.0 * phase_s(run, p, network) / total)),
+            ("max messages / rank", &|p| format!("{:.0}", p.messages.max)),
+            ("max MB / rank", &|p| format!("{:.3}", p.message_bytes.max / 1e6)),
         ],
-    );
-    explained(table, &of)
+    )
 }
 
 /// Several programs on one core, the meshes that are missing, and what the programs do not provide.

@@ -1,100 +1,212 @@
-//! Axes around a rectangle of the page, by `plotters`.
+//! Ranges of axes, their ticks and labels.
 
 use super::Axis;
-use super::canvas::{At, Canvas, FAINT, WIDTH, font, width};
-use super::scale::{tick_labels, ticks};
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
+use super::canvas::{WIDTH, width};
+use bench::order::distinct;
 use std::ops::Range;
 
 /// Least space at the left of the data, for ticks and label.
 const LEFT: f64 = 190.0;
 /// Space at the left of ticks.
-const BESIDE_TICKS: f64 = 100.0;
+const BESIDE_TICKS: f64 = 110.0;
 /// Space below the data, for ticks and label.
-pub const BELOW: f64 = 130.0;
+pub const BELOW: f64 = 140.0;
 
-/// Space at the left of data on this axis.
-pub fn left(axis: &Axis, ends: &Range<f64>) -> f64 {
-    let labels = tick_labels(&ticks(axis, ends));
-    labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
+/// The digits as exponents.
+pub const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+
+/// An axis with its ends, and its ticks with their labels.
+pub struct Scale {
+    pub ends: Range<f64>,
+    pub ticks: Vec<f64>,
+    pub labels: Vec<String>,
 }
 
-/// A linear coordinate with these ticks.
-struct Scale(RangedCoordf64, Vec<f64>);
-
-impl Ranged for Scale {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.0.map(value, limit)
+impl Scale {
+    /// That of an axis which shows all `values`.
+    pub fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Self {
+        let ends = range(axis, values);
+        let ticks = ticks(axis, &ends);
+        Self { labels: tick_labels(&ticks), ends, ticks }
     }
 
-    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
-        self.1.clone()
+    /// That of categories, from top to bottom, as many of which have labels as there are lines.
+    pub fn of_names(names: &[String], lines: usize) -> Self {
+        let every = names.len().div_ceil(lines).max(1);
+        let (ticks, labels) =
+            (0..).zip(names).step_by(every).map(|(i, name)| (f64::from(i), name.clone())).unzip();
+        Self { ends: names.len() as f64 - 0.5..-0.5, ticks, labels }
     }
 
-    fn range(&self) -> Range<f64> {
-        self.0.range()
+    /// Space at the left of data, if this is the vertical axis.
+    pub fn left(&self) -> f64 {
+        self.labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
+    }
+
+    /// Clears the labels that have no room beside others, if this is the horizontal axis, whose values are at these places on the page.
+    pub fn clear_labels(&mut self, place: impl Fn(f64) -> f64) {
+        let mut taken = 0.0;
+        for (tick, label) in self.ticks.iter().zip(&mut self.labels) {
+            let (middle, half) = (place(*tick), width(label) / 2.0);
+            if middle - half < taken || middle + half > WIDTH {
+                label.clear();
+            } else {
+                taken = middle + half + 10.0;
+            }
+        }
     }
 }
 
-/// Where values are on the page.
-pub type ToPage = Box<dyn Fn(f64, f64) -> At>;
+/// The ends of an axis that shows all `values`. A logarithmic one ignores values that are not positive.
+fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
+    if let Some((low, high)) = axis.range {
+        return low..high;
+    }
+    let usable = values.into_iter().filter(|value| axis.shows(*value));
+    let (low, high) =
+        usable.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    match (axis.log, low <= high) {
+        (true, false) => 1.0..10.0,
+        (false, false) => 0.0..1.0,
+        // A margin keeps markers off the frame, and leaves room for ticks around a single value.
+        (true, true) => {
+            let margin = if high < 1.1 * low { 1.5 } else { (high / low).max(1.5).powf(0.05) };
+            low / margin..high * margin
+        }
+        (false, true) => low.min(0.0)..if high > 0.0 { high * 1.06 } else { 1.0 },
+    }
+}
 
-/// Draws the axes around a rectangle of the page, given by two opposite corners, with the ends of their values and perhaps a grid;
-/// returns where values are.
-pub fn axes(
-    canvas: &Canvas,
-    axes: [&Axis; 2],
-    ends: [Range<f64>; 2],
-    (from, to): (At, At),
-    grid: bool,
-) -> ToPage {
-    // What is linear on the page.
-    let place = |axis: &Axis, value: f64| if axis.log { value.log10() } else { value };
-    let scales = [0, 1].map(|i| {
-        let Range { start, end } = ends[i];
-        RangedCoordf64::from(place(axes[i], start)..place(axes[i], end))
-    });
-    let all = [0, 1].map(|i| ticks(axes[i], &ends[i]));
-    let labels = all.each_ref().map(|ticks| tick_labels(ticks));
-    let at = [0, 1].map(|i| all[i].iter().map(|v| place(axes[i], *v)).collect::<Vec<f64>>());
-    let label = |i: usize, value: &f64| {
-        let index = at[i].iter().position(|at| at == value);
-        index.map_or_else(String::new, |index| labels[i][index].clone())
+/// The positions of ticks: those that the axis has; else at most eight multiples of 1, 2 or 5 times a power of ten; on a logarithmic axis
+/// powers of ten and, where there are less than three of them, multiples.
+fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
+    let (low, high) = (range.start.min(range.end), range.start.max(range.end));
+    let slack = |v: f64| if axis.log { v.abs() * 1e-9 } else { (high - low) * 1e-9 };
+    let inside = |v: &f64| (low - slack(low)..=high + slack(high)).contains(v);
+    if !axis.ticks.is_empty() {
+        return axis.ticks.iter().copied().filter(inside).collect();
+    }
+    if !axis.log {
+        let power = 10f64.powf(((high - low) / 7.0).log10().floor());
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
+        let step = steps.into_iter().find(|step| (high - low) / step <= 7.0).unwrap_or(steps[3]);
+        let numbers = (low / step).ceil() as i64..=(high / step).floor() as i64;
+        return numbers.map(|number| number as f64 * step).collect();
+    }
+    let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let multiples = |factors: &[f64]| -> Vec<f64> {
+        let all = decades.clone().flat_map(|d| factors.iter().map(move |f| f * 10f64.powi(d)));
+        all.filter(inside).collect()
     };
-    let [x, y] = [0, 1].map(|i| Scale(scales[i].clone(), at[i].clone()));
-    let space = |i: usize, space: f64| if axes[i].label.is_empty() { 0.0 } else { space };
-    // The label of the vertical axis keeps clear of the edge of the page.
-    let [left, below] = [space(1, left(axes[1], &ends[1]) - 14.0), space(0, BELOW)];
-    let height = f64::from(canvas.area.dim_in_pixel().1);
-    let whole =
-        canvas.area.margin(from.1, height - to.1 - below, from.0 - left, f64::from(WIDTH) - to.0);
-    let mut chart = ChartBuilder::on(&whole)
-        .set_label_area_size(LabelAreaPosition::Left, left)
-        .set_label_area_size(LabelAreaPosition::Bottom, below)
-        .build_cartesian_2d(x, y)
-        .expect("the rectangle lies on the page");
-    let (of_x, of_y) = (|value: &f64| label(0, value), |value: &f64| label(1, value));
-    let mut mesh = chart.configure_mesh();
-    let grid = if grid { FAINT.to_rgba() } else { TRANSPARENT };
-    mesh.light_line_style(TRANSPARENT).bold_line_style(grid).axis_style(BLACK.stroke_width(2));
-    mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(12);
-    mesh.x_label_formatter(&of_x).y_label_formatter(&of_y);
-    mesh.x_desc(axes[0].label.as_str()).y_desc(axes[1].label.as_str());
-    mesh.draw().expect("a string accepts every element");
-    canvas.frame(from, to);
-    let limits = [(from.0 as i32, to.0 as i32), (to.1 as i32, from.1 as i32)];
-    let axes = axes.map(Axis::clone);
-    Box::new(move |x, y| {
-        let at = |i: usize, value: f64| {
-            let Range { start, end } = ends[i];
-            let within = value.clamp(start.min(end), start.max(end));
-            f64::from(scales[i].map(&place(&axes[i], within), limits[i]))
-        };
-        (at(0, x), at(1, y))
-    })
+    let some = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0];
+    let tenths: Vec<f64> = (10..100).map(|tenths| f64::from(tenths) / 10.0).collect();
+    // The coarsest choice with three ticks, and no more of them than have room.
+    let choices = [&[1.0][..], &[1.0, 2.0, 5.0], &some, &tenths].map(multiples);
+    let all = choices.into_iter().find(|c| c.len() > 2).unwrap_or_default();
+    let every = all.len().div_ceil(8).max(1);
+    all.into_iter().step_by(every).collect()
+}
+
+/// The labels of ticks, with as many digits as distinguish them.
+fn tick_labels(ticks: &[f64]) -> Vec<String> {
+    let short: Vec<String> = ticks.iter().map(|tick| tick_label(*tick)).collect();
+    if distinct(&short).len() == ticks.len() {
+        return short;
+    }
+    let step = ticks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    ticks.iter().map(|tick| format!("{tick:.decimals$}")).collect()
+}
+
+/// A number for a tick: a decimal where that is short, else with a power of ten.
+pub fn tick_label(value: f64) -> String {
+    let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    if (-3..5).contains(&exponent) {
+        let scale = 10f64.powi((3 - exponent).max(0));
+        // Adding zero turns -0 into 0.
+        return ((value * scale).round() / scale + 0.0).to_string();
+    }
+    // Rounding first: 9.999e8 is 10⁹.
+    let rounded = format!("{value:.2e}");
+    let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
+    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |d| SUPERSCRIPTS[d as usize]);
+    let power: String = exponent.chars().map(raised).collect();
+    if mantissa == "1" { format!("10{power}") } else { format!("{mantissa}·10{power}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(axis: &Axis, values: &[f64]) -> Vec<f64> {
+        ticks(axis, &range(axis, values.iter().copied()))
+    }
+
+    #[test]
+    fn decades_have_ticks_the_lowest_too_and_the_ends_have_margins() {
+        assert_eq!(of(&Axis::log(""), &[1.0, 1000.0, 0.0]), [1.0, 10.0, 100.0, 1000.0]);
+        let ends = range(&Axis::log(""), [1.0, 1000.0]);
+        assert!(ends.start < 1.0 && ends.end > 1000.0);
+    }
+
+    #[test]
+    fn axes_of_less_than_a_decade_have_three_ticks() {
+        assert_eq!(of(&Axis::log(""), &[10.0, 60.0]), [10.0, 20.0, 50.0]);
+        let narrow = of(&Axis::log(""), &[0.15, 0.42]);
+        assert_eq!(
+            narrow.iter().map(|t| tick_label(*t)).collect::<Vec<_>>(),
+            ["0.15", "0.2", "0.25", "0.3", "0.4"]
+        );
+        assert!((3..9).contains(&of(&Axis::log(""), &[9.0, 10.0]).len()));
+        assert!((3..9).contains(&of(&Axis::log(""), &[1e-6, 1e9]).len()));
+    }
+
+    #[test]
+    fn a_single_value_has_ticks_around_it() {
+        for value in [0.73, 1.0, 99_522.0, 1e9] {
+            assert!(of(&Axis::log(""), &[value]).len() > 2, "{value}");
+        }
+    }
+
+    #[test]
+    fn linear_axes_start_at_zero() {
+        assert_eq!(range(&Axis::linear(""), [3.0, 9.0]).start, 0.0);
+        assert_eq!(of(&Axis::linear(""), &[3.0, 9.0]), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert!(of(&Axis::linear(""), &[]).len() > 2);
+        assert!(ticks(&Axis::linear(""), &(-0.1..0.1)).contains(&0.0));
+        for exponent in -9..12 {
+            let high = 3.7 * 10f64.powi(exponent);
+            let count = ticks(&Axis::linear(""), &(-0.31 * high..high)).len();
+            assert!((3..9).contains(&count), "{count} ticks up to {high}");
+        }
+    }
+
+    #[test]
+    fn given_ticks_outside_the_range_are_dropped() {
+        let axis = Axis::log("").with_ticks(vec![1.0, 2.0, 4.0, 512.0]);
+        assert_eq!(of(&axis, &[1.0, 4.0]), [1.0, 2.0, 4.0]);
+    }
+
+    #[test]
+    fn tick_labels_are_short() {
+        let numbers =
+            [0.0, 1.0, 0.05, 2.5, 1024.0, 1e6, 5e7, 1e-6, 0.001, 1.15, 0.1 + 0.2, 9.999e8, -2.5e7];
+        let labels = [
+            "0",
+            "1",
+            "0.05",
+            "2.5",
+            "1024",
+            "10⁶",
+            "5·10⁷",
+            "10⁻⁶",
+            "0.001",
+            "1.15",
+            "0.3",
+            "10⁹",
+            "-2.5·10⁷",
+        ];
+        assert_eq!(numbers.map(tick_label), labels);
+    }
 }

@@ -1,21 +1,24 @@
-//! The model of a figure: axes, series, bars. SVG ([`svg`], by `plotters`) and CSV ([`csv`]) are produced from it, PNG and PDF
-//! from the SVG, and an axis of `pgfplots` that reads the CSV ([`tex`]).
+//! The model of a figure: axes, series of points or stacked bars, vertical lines. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
+//! ([`format`](mod@format)), and for LaTeX the values as CSV and an axis of `pgfplots` that reads them ([`latex`]).
 //!
-//! Invariants: every value states its provenance; points are joined only where interpolation between them is
-//! meaningful; captions state the confidence intervals.
+//! Points are joined only where interpolation between them is meaningful; captions state the confidence intervals. The rest of the invariants is asserted before
+//! figures are drawn ([`check_invariants`]):
+//!
+//! - Names of figures are those of files and differ; axes have labels.
+//! - Numbers are finite; a point is within its interval; on a logarithmic axis it is positive, because it would be missing there.
+//! - Bars have a value for each name and segment, and none is negative.
+//! - A point above the ideal line has a reason in the caption.
 
-pub(crate) mod axes;
+pub mod axes;
 pub mod canvas;
-pub mod check;
-pub mod csv;
-pub mod palette;
-#[cfg(feature = "figures")]
-pub mod raster;
-pub(crate) mod scale;
+pub mod format;
+pub mod latex;
 pub mod svg;
-pub mod tex;
+#[cfg(all(test, feature = "figures"))]
+pub(crate) mod tests;
 
-pub use scale::tick_label;
+use axes::Scale;
+pub use axes::tick_label;
 
 use std::collections::BTreeSet;
 
@@ -24,7 +27,6 @@ use std::collections::BTreeSet;
 pub struct Axis {
     /// Quantity and unit.
     pub label: String,
-    /// Whether the axis is logarithmic.
     pub log: bool,
     /// Positions of the ticks; chosen from the range if empty.
     pub ticks: Vec<f64>,
@@ -33,9 +35,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A logarithmic axis.
     pub fn log(label: &str) -> Self {
-        Self { label: label.to_owned(), log: true, ticks: Vec::new(), range: None }
+        Self { log: true, ..Self::linear(label) }
     }
 
     /// A linear axis that starts at zero.
@@ -43,24 +44,27 @@ impl Axis {
         Self { label: label.to_owned(), log: false, ticks: Vec::new(), range: None }
     }
 
-    /// The same axis with ticks at the given positions.
     pub fn with_ticks(self, ticks: Vec<f64>) -> Self {
         Self { ticks, ..self }
     }
+
+    fn shows(&self, value: f64) -> bool {
+        value.is_finite() && (!self.log || value > 0.0)
+    }
 }
 
-/// How a value was obtained.
+/// How a value was obtained. Markers of measured values are filled, all others hollow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Provenance {
-    /// Measured with at most one rank per core; markers are filled.
+    /// With at most one rank per core.
     Measured,
-    /// Measured with more ranks than cores; markers are hollow.
+    /// With more ranks than cores.
     Oversubscribed,
-    /// Projected from simulated ranks and a network model; markers are hollow.
+    /// From simulated ranks and a network model.
     Projected,
-    /// Quoted from a publication; markers are hollow.
+    /// Quoted from a publication.
     Cited,
-    /// A theoretical bound: a line without markers.
+    /// A theoretical bound, or a mean: a line without markers.
     Bound,
 }
 
@@ -75,17 +79,11 @@ impl Provenance {
             Self::Bound => "bound",
         }
     }
-
-    /// Whether markers are filled and lines solid.
-    pub fn is_solid(self) -> bool {
-        self == Self::Measured
-    }
 }
 
 /// A point with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Abscissa.
     pub x: f64,
     /// Median.
     pub y: f64,
@@ -93,25 +91,19 @@ pub struct Point {
     pub low: f64,
     /// Upper end of the confidence interval; `y` without one.
     pub high: f64,
-    /// Number of measured values that the median is taken of; 0 if nothing was measured.
-    pub count: usize,
-    /// Probability that the interval contains the true median.
-    pub coverage: f64,
 }
 
 impl Point {
     /// A point without an interval.
     pub fn exact(x: f64, y: f64) -> Self {
-        Self { x, y, low: y, high: y, count: 0, coverage: 0.0 }
+        Self { x, y, low: y, high: y }
     }
 }
 
 /// Points with one name in the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Name in the legend.
     pub name: String,
-    /// How the values were obtained.
     pub provenance: Provenance,
     /// Whether consecutive points are joined by a line.
     pub joined: bool,
@@ -119,7 +111,7 @@ pub struct Series {
     pub points: Vec<Point>,
     /// A description of each point, shown under the pointer; empty for none.
     pub notes: Vec<String>,
-    /// Index of colour and marker in the palette.
+    /// Index of colour and marker.
     pub style: usize,
 }
 
@@ -129,59 +121,32 @@ impl Series {
         Self { name: name.to_owned(), provenance, joined: true, points, notes: Vec::new(), style }
     }
 
-    /// The same series without lines between its points.
     pub fn not_joined(self) -> Self {
         Self { joined: false, ..self }
     }
 }
 
-/// A vertical line, such as a change point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
-    /// Name in the legend; marks of the same name have one entry.
-    pub name: String,
-    /// Abscissa.
-    pub x: f64,
-    /// Index of the colour in the palette.
-    pub style: usize,
-}
-
-/// Stacked bars.
+/// Stacked bars from left to right, one below the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bars {
-    /// Names of the bars.
-    pub categories: Vec<String>,
-    /// Segments from bottom to top: name, and one value per bar.
+    /// Names of the bars, from top to bottom.
+    pub names: Vec<String>,
+    /// Segments from left to right: name, and one value per bar.
     pub segments: Vec<(String, Vec<f64>)>,
-    /// Horizontal reference lines: name and level.
-    pub references: Vec<(String, f64)>,
-    /// How the values were obtained.
     pub provenance: Provenance,
 }
 
-/// The data of a figure.
+/// A vertical line, such as a change point. Those of the same name have one entry in the legend.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Body {
-    /// Points over a numerical axis.
-    Points {
-        /// The series.
-        series: Vec<Series>,
-        /// The vertical lines.
-        marks: Vec<Mark>,
-    },
-    /// Bars over categories.
-    Bars(Bars),
+pub struct Mark {
+    pub name: String,
+    pub x: f64,
+    /// Index of the colour.
+    pub style: usize,
 }
 
-impl Body {
-    /// Series without marks.
-    pub fn points(series: Vec<Series>) -> Self {
-        Self::Points { series, marks: Vec::new() }
-    }
-}
-
-/// Usual height of a figure.
-const HEIGHT: u32 = 1040;
+/// Greatest number of bars that have names.
+const LINES: usize = 12;
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -192,20 +157,53 @@ pub struct Figure {
     pub title: String,
     /// Quantities, sample sizes, intervals and the meaning of hollow markers.
     pub caption: String,
-    /// Horizontal axis.
     pub x: Axis,
-    /// Vertical axis.
     pub y: Axis,
-    /// The data.
-    pub body: Body,
+    pub series: Vec<Series>,
+    pub bars: Option<Bars>,
+    pub marks: Vec<Mark>,
     /// Height in units of which the width has [`canvas::WIDTH`].
     pub height: u32,
 }
 
 impl Figure {
-    /// A figure of the usual height.
-    pub fn new(id: String, title: String, caption: String, [x, y]: [Axis; 2], body: Body) -> Self {
-        Self { id, title, caption, x, y, body, height: HEIGHT }
+    /// A figure of the usual height without vertical lines.
+    pub fn new(
+        id: String,
+        title: String,
+        caption: String,
+        [x, y]: [Axis; 2],
+        series: Vec<Series>,
+    ) -> Self {
+        Self { id, title, caption, x, y, series, bars: None, marks: Vec::new(), height: 1040 }
+    }
+
+    /// The axes with their ends and ticks.
+    fn scales(&self) -> [Scale; 2] {
+        let marks = self.marks.iter().map(|mark| mark.x);
+        if let Some(bars) = &self.bars {
+            let total = |i: usize| bars.segments.iter().map(|(_, values)| values[i]).sum();
+            let ends = (0..bars.names.len()).map(total).chain(marks);
+            return [Scale::of(&self.x, ends), Scale::of_names(&bars.names, LINES)];
+        }
+        let all = || self.series.iter().flat_map(|s| &s.points);
+        let values = all().flat_map(|p| [p.y, p.low, p.high]);
+        [Scale::of(&self.x, all().map(|p| p.x).chain(marks)), Scale::of(&self.y, values)]
+    }
+
+    /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
+    /// how many there are.
+    pub fn without_zeros(mut self) -> Self {
+        let mut zeros = 0;
+        for series in &mut self.series {
+            let before = series.points.len();
+            series.points.retain(|p| !(self.x.log && p.x == 0.0 || self.y.log && p.y == 0.0));
+            zeros += before - series.points.len();
+        }
+        if zeros > 0 {
+            self.caption += &format!(" The axes cannot show {zeros} values of 0.");
+        }
+        self
     }
 }
 
@@ -216,62 +214,170 @@ pub fn file_name(text: &str) -> String {
     text.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()
 }
 
-impl Figure {
-    /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
-    /// how many there are.
-    pub fn without_zeros(mut self) -> Self {
-        let (x, y) = (self.x.log, self.y.log);
-        let Body::Points { series, .. } = &mut self.body else { return self };
-        let mut zeros = 0;
-        for Series { points, .. } in series {
-            let before = points.len();
-            points.retain(|p| (!x || p.x > 0.0) && (!y || p.y > 0.0));
-            zeros += before - points.len();
-        }
-        if zeros > 0 {
-            self.caption += &format!(" The axes cannot show {zeros} values of 0.");
-        }
-        self
-    }
-}
-
 /// Makes names different from each other: the second of a name ends in `-2`.
 pub fn name_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut taken = BTreeSet::new();
     for name in names {
         let plain = name.clone();
-        let numbered = (2..).map(|n| format!("{plain}-{n}"));
-        let mut free = std::iter::once(plain.clone()).chain(numbered);
-        *name =
-            free.find(|name| taken.insert(name.clone())).expect("there are always more numbers");
+        let mut number = 1;
+        while !taken.insert(name.clone()) {
+            number += 1;
+            *name = format!("{plain}-{number}");
+        }
+    }
+}
+
+/// Asserts the invariants of the figures of a report.
+///
+/// # Panics
+/// If one is violated.
+pub fn check_invariants(figures: &[Figure]) {
+    let names: BTreeSet<&str> = figures.iter().map(|f| f.id.as_str()).collect();
+    assert_eq!(names.len(), figures.len(), "two figures have one name: {names:?}");
+    for figure in figures {
+        let id = &figure.id;
+        assert!(!id.is_empty() && *id == file_name(id), "figure {id:?}: not a name of a file");
+        for axis in [&figure.x, &figure.y] {
+            assert!(!axis.label.is_empty(), "figure {id}: an axis has no label");
+        }
+        assert!(figure.marks.iter().all(|m| m.x.is_finite()), "figure {id}: a mark is nowhere");
+        figure.series.iter().for_each(|s| check_series(figure, s));
+        if let Some(bars) = &figure.bars {
+            let values = bars.segments.iter().flat_map(|(_, values)| values);
+            let is_length = |v: &f64| v.is_finite() && *v >= 0.0;
+            assert!({ values }.all(is_length), "figure {id}: a bar has no length");
+            let is_complete = |(_, values): &(String, Vec<f64>)| values.len() == bars.names.len();
+            assert!(bars.segments.iter().all(is_complete), "figure {id}: a bar lacks a segment");
+        }
+        check_ideal(figure);
+    }
+}
+
+fn check_series(figure: &Figure, s: &Series) {
+    let name = format!("figure {}, {}", figure.id, s.name);
+    for p in &s.points {
+        let is_shown = figure.x.shows(p.x) && figure.y.shows(p.y);
+        let is_finite = p.low.is_finite() && p.high.is_finite();
+        assert!(is_shown && is_finite, "{name}: the axes cannot show {p:?}");
+        assert!(p.low <= p.y && p.y <= p.high, "{name}: {p:?} is outside of its interval");
+    }
+}
+
+/// A line through the two ends of the ideal, straight on logarithmic axes.
+fn check_ideal(figure: &Figure) {
+    let all = &figure.series;
+    let ideal = all.iter().find(|s| s.provenance == Provenance::Bound && s.name == "ideal");
+    let Some([from, to]) = ideal.map(|s| &s.points[..]) else { return };
+    let slope = if to.x > from.x { (to.y / from.y).ln() / (to.x / from.x).ln() } else { 0.0 };
+    let is_above = |p: &Point| p.y > 1.0005 * from.y * (p.x / from.x).powf(slope);
+    let above = all.iter().flat_map(|s| &s.points).find(|p| is_above(p));
+    assert!(
+        above.is_none() || figure.caption.contains("above 1"),
+        "figure {}: {above:?} is above the ideal line, and the caption gives no reason",
+        figure.id
+    );
+}
+
+#[cfg(test)]
+pub mod samples {
+    use super::*;
+
+    pub(crate) fn figure(series: Vec<Series>) -> Figure {
+        Figure::new(
+            "speedup".into(),
+            "Speedup".into(),
+            "Speedup & <more>, n = 6.".into(),
+            [Axis::log("ranks").with_ticks(vec![1.0, 2.0, 4.0]), Axis::log("speedup")],
+            series,
+        )
+    }
+
+    pub(crate) fn bars() -> Figure {
+        let segments = vec![("read".into(), vec![1.0, 2.0]), ("grade".into(), vec![3.0, 0.0])];
+        let names = vec!["1".into(), "2".into()];
+        let bars = Bars { names, segments, provenance: Provenance::Projected };
+        let marks = vec![Mark { name: "mean, 3".into(), x: 3.0, style: 6 }];
+        let [x, y] = ["s", "ranks"].map(Axis::linear);
+        Figure { bars: Some(bars), marks, x, y, ..figure(Vec::new()) }
+    }
+
+    pub(crate) fn series(provenance: Provenance) -> Series {
+        let points =
+            [1.0, 2.0, 4.0].map(|x| Point { low: x * 0.9, high: x * 1.1, ..Point::exact(x, x) });
+        let name = format!("UAV, {}", provenance.word());
+        Series::new(&name, provenance, 0, points.to_vec())
     }
 }
 
 #[cfg(test)]
-pub(crate) mod samples {
+mod invariants {
+    use super::samples::{figure, series};
     use super::*;
+    use proptest::prelude::*;
 
-    pub(crate) fn figure(body: Body) -> Figure {
-        Figure {
-            id: "speedup".into(),
-            title: "Speedup".into(),
-            caption: "Speedup & <more>, n = 6.".into(),
-            x: Axis::log("ranks").with_ticks(vec![1.0, 2.0, 4.0]),
-            y: Axis::log("speedup"),
-            body,
-            height: HEIGHT,
+    fn points() -> Figure {
+        figure(vec![series(Provenance::Measured), series(Provenance::Projected)])
+    }
+
+    /// Asserts that a change of a figure is noticed, and for the stated reason.
+    fn assert_noticed(why: &str, change: impl Fn(&mut Figure)) {
+        check_invariants(&[points()]);
+        let mut changed = points();
+        change(&mut changed);
+        let caught = std::panic::catch_unwind(|| check_invariants(&[changed])).unwrap_err();
+        let message = caught.downcast_ref::<String>().expect("a message with values");
+        assert!(message.contains(why), "{message}");
+    }
+
+    #[test]
+    fn planted_wrong_figures_are_noticed() {
+        assert_noticed("not a name of a file", |f| f.id = "two words".into());
+        assert_noticed("no label", |f| f.y.label.clear());
+        assert_noticed("cannot show", |f| f.series[0].points[1].y = f64::NAN);
+        assert_noticed("cannot show", |f| f.series[1].points[0] = Point::exact(1.0, 0.0));
+        assert_noticed("outside of its interval", |f| f.series[0].points[1].y = 9.0);
+        assert_noticed("nowhere", |f| {
+            f.marks.push(Mark { name: "m".into(), x: f64::NAN, style: 0 })
+        });
+        let change = |of: fn(&mut Vec<f64>)| {
+            move |f: &mut Figure| {
+                let mut bars = samples::bars().bars;
+                bars.iter_mut().for_each(|bars| of(&mut bars.segments[0].1));
+                f.bars = bars;
+            }
+        };
+        check_invariants(&[samples::bars()]);
+        assert_noticed("no length", change(|values| values[1] = -1.0));
+        assert_noticed("lacks a segment", change(|values| values.truncate(1)));
+        assert_noticed("gives no reason", |f| {
+            let ends = [1.0, 4.0].map(|x| Point::exact(x, x / 2.0)).to_vec();
+            f.series.push(Series::new("ideal", Provenance::Bound, 0, ends));
+        });
+    }
+
+    proptest! {
+        /// Any names of cases, engines and series: file names and references within a drawing stay intact.
+        #[test]
+        fn names_are_plain_and_differ(names in proptest::collection::vec("[a ./\"é<&-]{0,3}", 1..12)) {
+            let mut all: Vec<Figure> =
+                names.iter().map(|name| Figure { id: file_name(&format!("rate-{name}")), ..points() }).collect();
+            name_apart(all.iter_mut().map(|figure| &mut figure.id));
+            check_invariants(&all);
         }
     }
 
-    pub(crate) fn series(provenance: Provenance) -> Series {
-        let points = [1.0, 2.0, 4.0].map(|x| Point {
-            low: x * 0.9,
-            high: x * 1.1,
-            count: 6,
-            coverage: 0.97,
-            ..Point::exact(x, x)
-        });
-        let name = format!("UAV, {}", provenance.word());
-        Series::new(&name, provenance, 0, points.to_vec())
+    #[test]
+    #[should_panic(expected = "two figures have one name")]
+    fn a_figure_that_would_overwrite_another_is_noticed() {
+        check_invariants(&[points(), points()]);
+    }
+
+    #[test]
+    fn values_that_a_logarithmic_axis_cannot_show_are_counted() {
+        let mut shown = points();
+        shown.series[0].points[0] = Point::exact(1.0, 0.0);
+        let shown = shown.without_zeros();
+        assert_eq!(shown.series[0].points.len(), 2);
+        assert!(shown.caption.ends_with("cannot show 1 values of 0."));
     }
 }

@@ -1,194 +1,276 @@
-//! A figure as SVG: frame, axes, legend, data.
+//! A figure as SVG, by `plotters`: a chart with its mesh and its series.
 //!
-//! The legend is above the data in as many columns as fit, because that of `plotters` is within the frame, where it hides data.
+//! The legend is ours, above the data in as many rows as it needs, because that of `plotters` is within the chart, where it hides data.
+//! Logarithmic axes are given their key points, because `plotters` drops the lowest tick.
 
-use super::axes::{BELOW, ToPage, axes, left};
-use super::canvas::*;
-use super::palette::colour;
-use super::scale::range;
-use super::{Axis, Bars, Body, Figure, Mark, Provenance, Series};
-use plotters::style::colors::BLACK;
+use super::axes::{BELOW, Scale};
+use super::canvas::{COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
+use super::{Bars, Figure, Mark, Provenance, Series};
+use maud::html;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::ops::Range;
+
+/// Corners of the markers around their centre. The first one is a circle.
+pub const MARKERS: [&[(i32, i32)]; 6] = [
+    &[],
+    &[(-11, -11), (11, -11), (11, 11), (-11, 11)],
+    &[(0, -15), (14, 11), (-14, 11)],
+    &[(0, -16), (16, 0), (0, 16), (-16, 0)],
+    &[(0, 15), (14, -11), (-14, -11)],
+    &[(-14, -5), (0, -15), (14, -5), (9, 12), (-9, 12)],
+];
+
+/// Length of a line in the legend.
+const LENGTH: i32 = SYMBOL as i32 - 18;
+/// Space at the right of the data, and between the label of the vertical axis and the edge of the page.
+const BESIDE: [f64; 2] = [40.0, 14.0];
+/// Length of a tick. Labels at the corner do not touch.
+const TICK: i32 = 16;
+/// Width of lines of data.
+const WIDE: u32 = 4;
+/// Colour of grid lines.
+const FAINT: RGBColor = RGBColor(170, 170, 170);
+/// Part of a bar's width that is between it and the next.
+const GAP: f64 = 0.2;
+/// Why drawing cannot fail.
+const DRAWN: &str = "a string accepts every element";
+
+type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A name in the legend, and what draws the symbol beside it at its left end.
+type Entry<'a> = (&'a str, Box<dyn Fn(i32, i32) + 'a>);
 
 /// The figure as an SVG document.
 pub fn svg(figure: &Figure) -> String {
+    let mut drawn = String::new();
+    let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, figure.height));
+    let notes = draw(figure, &backend.into_drawing_area());
+    let (_, elements) = drawn.split_once('\n').expect("an element begins the document");
+    let elements = elements.trim_end().strip_suffix("</svg>").expect("it ends the document");
+    let elements = elements.replace("\"#000000\"", &format!("\"{INK}\""));
+    // A text is on the line of its element.
+    let elements = elements.replace(" opacity=\"1\"", "").replace("\n</text>", "</text>");
+    let end = |line: &str| if line.starts_with("<text") { "" } else { "\n" };
+    let lines: String = elements.lines().flat_map(|line| [line, end(line)]).collect();
     document(&figure.title, |canvas| {
-        match &figure.body {
-            Body::Points { series, marks } => points(canvas, figure, series, marks),
-            Body::Bars(bars) => draw_bars(canvas, figure, bars),
-        }
-        figure.height
+        canvas.add(lines.trim_end());
+        notes.iter().for_each(|note| canvas.add(note));
+        f64::from(figure.height)
     })
 }
 
-/// A name in the legend, and what draws the symbol beside it at its left end.
-type Entry<'a> = (&'a str, Box<dyn Fn(&Canvas, At) + 'a>);
-
-/// Length of a line in the legend.
-const LENGTH: f64 = SYMBOL - 18.0;
-/// Up to this number of bars, each has a label.
-const STAGGERED_MAX: usize = 12;
-/// Space at the right of the data.
-const RIGHT: f64 = 40.0;
-
-/// Draws the legend, and returns its lower end.
-fn legend(canvas: &mut Canvas, left: f64, entries: &[Entry]) -> f64 {
-    let names: Vec<&str> = entries.iter().map(|entry| entry.0).collect();
-    canvas.legend([left; 2], &names, |canvas, at, i| entries[i].1(canvas, at))
-}
-
-fn of_series(s: &Series) -> Entry<'_> {
-    let symbol = |canvas: &Canvas, (x, y): At| {
-        let (ends, solid) = ([(x, y), (x + LENGTH, y)], s.provenance.is_solid());
-        if s.provenance == Provenance::Bound {
-            return canvas.line(&ends, BLACK, 3, DOTTED);
-        }
-        if s.joined {
-            canvas.line(&ends, colour(s.style), 4, if solid { None } else { DASHED });
-        }
-        canvas.marker((x + LENGTH / 2.0, y), s.style, solid);
-    };
-    (&s.name, Box::new(symbol))
-}
-
-fn of_mark(mark: &Mark) -> Entry<'_> {
-    let symbol = |canvas: &Canvas, (x, y): At| {
-        let ends = [y - 18.0, y + 18.0].map(|y| (x + LENGTH / 2.0, y));
-        canvas.line(&ends, colour(mark.style), 4, None);
-    };
-    (&mark.name, Box::new(symbol))
-}
-
-/// Dashes of a reference line, which differ from those of the next.
-fn reference_dashes(index: usize) -> Dashes {
-    [DOTTED, Some((40, 20)), Some((6, 6))][index % 3]
-}
-
-fn points(canvas: &mut Canvas, figure: &Figure, series: &[Series], marks: &[Mark]) {
-    let mut entries: Vec<Entry> = series.iter().map(of_series).collect();
-    for mark in marks {
-        if !entries.iter().any(|(name, _)| *name == mark.name) {
-            entries.push(of_mark(mark));
+/// Draws a figure, and returns the notes that are shown while the pointer is near a point.
+fn draw(figure: &Figure, page: &Page) -> Vec<String> {
+    let Figure { series, bars, .. } = figure;
+    let mut marks: Vec<&Mark> = Vec::new();
+    for mark in &figure.marks {
+        if !marks.iter().any(|other| other.name == mark.name) {
+            marks.push(mark);
         }
     }
-    let all = || series.iter().flat_map(|s| s.points.iter());
-    let x = range(&figure.x, all().map(|p| p.x));
-    let y = range(&figure.y, all().flat_map(|p| [p.y, p.low, p.high]));
-    let left = left(&figure.y, &y);
-    let (top, bottom) = (legend(canvas, left, &entries), f64::from(figure.height) - BELOW);
-    let to_page = axes(
-        canvas,
-        [&figure.x, &figure.y],
-        [x, y.clone()],
-        ((left, top), (f64::from(WIDTH) - RIGHT, bottom)),
-        true,
-    );
-    for mark in marks {
-        let ends = [y.start, y.end].map(|y| to_page(mark.x, y));
-        canvas.line(&ends, colour(mark.style), 4, None);
+    let mut symbols: Vec<Entry> = Vec::new();
+    for s in series {
+        let symbol = |x, y| {
+            put(page, &path(vec![(x, y), (x + LENGTH, y)], s));
+            marker(page, (x + LENGTH / 2, y), s);
+        };
+        symbols.push((&s.name, Box::new(symbol)));
     }
-    series.iter().for_each(|s| draw_series(canvas, s, &to_page));
+    for (style, (name, _)) in bars.iter().flat_map(|bars| &bars.segments).enumerate() {
+        let symbol = move |x, y| {
+            let [fill, outline] = bar([(x, y - 16), (x + LENGTH, y + 16)], style);
+            put(page, &fill);
+            put(page, &outline);
+        };
+        symbols.push((name, Box::new(symbol)));
+    }
+    for mark in marks {
+        let symbol = |x, y| {
+            let x = x + LENGTH / 2;
+            put(page, &PathElement::new(vec![(x, y - 18), (x, y + 18)], line(mark.style)));
+        };
+        symbols.push((&mark.name, Box::new(symbol)));
+    }
+    let [x, y] = figure.scales();
+    let names: Vec<&str> = symbols.iter().map(|(name, _)| *name).collect();
+    let (places, top) = legend([y.left(); 2], &names);
+    for ((name, symbol), (x, y)) in symbols.iter().zip(places) {
+        symbol(x as i32, y as i32);
+        let font = font().pos(Pos::new(HPos::Left, VPos::Center));
+        put(page, &Text::new(name.to_string(), ((x + SYMBOL) as i32, y as i32), font));
+    }
+    let (of_x, of_y) = (x.ends.clone(), y.ends.clone());
+    let (at_x, at_y) = (x.ticks.clone(), y.ticks.clone());
+    // The axis is not partial, but what plotters makes of a linear one with key points has no labels.
+    let linear = |ends: Range<f64>, at| ends.clone().with_key_points(at).partial_axis(ends);
+    let log = |ends: Range<f64>, at| ends.log_scale().with_key_points(at);
+    let place = (page, top, [x, y]);
+    match (figure.x.log, figure.y.log) {
+        (false, false) => chart(figure, place, linear(of_x, at_x), linear(of_y, at_y)),
+        (false, true) => chart(figure, place, linear(of_x, at_x), log(of_y, at_y)),
+        (true, false) => chart(figure, place, log(of_x, at_x), linear(of_y, at_y)),
+        (true, true) => chart(figure, place, log(of_x, at_x), log(of_y, at_y)),
+    }
 }
 
-fn draw_series(canvas: &mut Canvas, s: &Series, to_page: &ToPage) {
-    let at: Vec<At> = s.points.iter().map(|p| to_page(p.x, p.y)).collect();
+/// Draws the chart of a figure below the legend, and returns the notes.
+fn chart<X, Y>(
+    figure: &Figure,
+    (page, top, [mut x, y]): (&Page, f64, [Scale; 2]),
+    of_x: X,
+    of_y: Y,
+) -> Vec<String>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let [right, edge] = BESIDE;
+    let mut chart = ChartBuilder::on(page)
+        .margin_top(top)
+        .margin_right(right)
+        .margin_left(edge)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(y.left() - edge)
+        .build_cartesian_2d(of_x, of_y)
+        .expect("the chart is smaller than the page");
+    x.clear_labels(|tick| f64::from(chart.backend_coord(&(tick, y.ends.start)).0));
+    let label = |scale: &Scale, value: &f64| {
+        let index = scale.ticks.iter().position(|tick| tick == value);
+        index.map_or_else(String::new, |index| scale.labels[index].clone())
+    };
+    let (label_x, label_y) = (|value: &f64| label(&x, value), |value: &f64| label(&y, value));
+    let mut mesh = chart.configure_mesh();
+    mesh.light_line_style(TRANSPARENT).bold_line_style(FAINT).axis_style(BLACK.stroke_width(2));
+    mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(TICK);
+    mesh.x_label_formatter(&label_x).y_label_formatter(&label_y);
+    mesh.x_desc(&figure.x.label).y_desc(&figure.y.label).draw().expect(DRAWN);
+    if let Some(bars) = &figure.bars {
+        chart.draw_series(stacked(bars)).expect(DRAWN);
+    }
+    let vertical = |x: f64, low: f64, high: f64, style: usize| {
+        PathElement::new(vec![(x, low), (x, high)], line(style))
+    };
+    let marks = figure.marks.iter().map(|m| vertical(m.x, y.ends.start, y.ends.end, m.style));
+    chart.draw_series(marks).expect(DRAWN);
+    let (least, most) = (y.ends.start.min(y.ends.end), y.ends.start.max(y.ends.end));
+    let mut notes = Vec::new();
+    for s in &figure.series {
+        let at = |p: &super::Point| (p.x, p.y.clamp(least, most));
+        let points: Vec<(f64, f64)> = s.points.iter().map(at).collect();
+        chart.draw_series([path(points.clone(), s)]).expect(DRAWN);
+        for p in s.points.iter().filter(|p| p.low < p.high) {
+            let [low, high] = [p.low, p.high].map(|value| value.clamp(least, most));
+            chart.draw_series([vertical(p.x, low, high, s.style)]).expect(DRAWN);
+            let cap = |y| {
+                EmptyElement::at((p.x, y))
+                    + PathElement::new(vec![(-10, 0), (10, 0)], line(s.style))
+            };
+            chart.draw_series([low, high].map(cap)).expect(DRAWN);
+        }
+        let places: Vec<_> = points.iter().map(|point| chart.backend_coord(point)).collect();
+        places.iter().for_each(|at| marker(page, *at, s));
+        for (note, (x, y)) in s.notes.iter().zip(places) {
+            let circle =
+                html! { circle cx=(x) cy=(y) r="16" fill-opacity="0" { title { (note) } } };
+            notes.push(circle.into_string());
+        }
+    }
+    notes
+}
+
+fn put<'a, E>(page: &Page<'a>, element: &E)
+where
+    E: Drawable<SVGBackend<'a>>,
+    for<'b> &'b E: PointCollection<'b, (i32, i32)>,
+{
+    page.draw(element).expect(DRAWN);
+}
+
+fn colour(style: usize) -> RGBColor {
+    let [r, g, b] = COLOURS[style % COLOURS.len()];
+    RGBColor(r, g, b)
+}
+
+fn line(style: usize) -> ShapeStyle {
+    colour(style).stroke_width(WIDE)
+}
+
+/// The font of all text.
+fn font() -> TextStyle<'static> {
+    // plotters divides the size by this factor in SVG.
+    (FONT, SIZE * 1.24).into_font().color(&BLACK)
+}
+
+/// The line of a series through points.
+fn path<'a, C: Clone + 'static>(
+    points: Vec<C>,
+    s: &Series,
+) -> DynElement<'static, SVGBackend<'a>, C> {
+    let (style, dashes) = match s.provenance {
+        Provenance::Bound => (BLACK.stroke_width(3), Some((14, 10))),
+        Provenance::Measured => (line(s.style), None),
+        _ => (line(s.style), Some((22, 15))),
+    };
+    match dashes {
+        _ if !s.joined => PathElement::new(Vec::new(), style).into_dyn(),
+        None => PathElement::new(points, style).into_dyn(),
+        Some((dash, gap)) => DashedPathElement::new(points, dash, gap, style).into_dyn(),
+    }
+}
+
+/// Draws the marker of a series, filled or hollow; bounds have none.
+fn marker(page: &Page, at: (i32, i32), s: &Series) {
+    let (ink, is_filled) = (colour(s.style), s.provenance == Provenance::Measured);
+    let corners = MARKERS[s.style % MARKERS.len()].iter().map(|c| (at.0 + c.0, at.1 + c.1));
+    let mut corners: Vec<(i32, i32)> = corners.collect();
     if s.provenance == Provenance::Bound {
-        return canvas.line(&at, BLACK, 3, DOTTED);
+        return;
     }
-    let (ink, solid) = (colour(s.style), s.provenance.is_solid());
-    if s.joined && at.len() > 1 {
-        canvas.line(&at, ink, 4, if solid { None } else { DASHED });
+    if corners.is_empty() {
+        let shape = if is_filled { ink.filled() } else { line(s.style) };
+        return put(page, &Circle::new(at, if is_filled { 14 } else { 12 }, shape));
     }
-    for (i, p) in s.points.iter().enumerate() {
-        let [low, high] = [p.low, p.high].map(|y| to_page(p.x, y));
-        if low.1 - high.1 > 2.0 {
-            canvas.line(&[low, high], ink, 4, None);
-            for end in [low, high] {
-                canvas.line(&[(end.0 - 10.0, end.1), (end.0 + 10.0, end.1)], ink, 4, None);
-            }
-        }
-        canvas.marker(at[i], s.style, solid);
-        if let Some(note) = s.notes.get(i) {
-            canvas.note(at[i], note);
-        }
+    if is_filled {
+        put(page, &Polygon::new(corners.clone(), ink.filled()));
     }
+    // Twice the first edge, so that the corner where the line ends is like the others.
+    corners.extend_from_within(..2);
+    put(page, &PathElement::new(corners, line(s.style)));
 }
 
-fn draw_bars(canvas: &mut Canvas, figure: &Figure, bars: &Bars) {
-    let mut entries: Vec<Entry> = Vec::new();
-    for (style, (name, _)) in bars.segments.iter().enumerate() {
-        let bar = move |canvas: &Canvas, (x, y): At| {
-            canvas.bar((x + 12.0, y - 16.0), (x + SYMBOL - 22.0, y + 16.0), style)
-        };
-        entries.push((name, Box::new(bar)));
-    }
-    for (i, (name, _)) in bars.references.iter().enumerate() {
-        let line = move |canvas: &Canvas, (x, y): At| {
-            canvas.line(&[(x, y), (x + LENGTH, y)], BLACK, 3, reference_dashes(i))
-        };
-        entries.push((name, Box::new(line)));
-    }
-    let total = |i: usize| bars.segments.iter().map(|s| s.1[i]).sum::<f64>();
-    let (count, right) = (bars.categories.len(), f64::from(WIDTH) - RIGHT);
-    let y = range(&figure.y, (0..count).map(total).chain(bars.references.iter().map(|r| r.1)));
-    let left = left(&figure.y, &y);
-    let top = legend(canvas, left, &entries);
-    let labels = labels(&bars.categories, (right - left) / count.max(1) as f64);
-    let lines = labels.iter().map(Vec::len).max().unwrap_or(1).saturating_sub(1) as f64;
-    let bottom = f64::from(figure.height) - BELOW - lines * LINE;
-    // The names of the bars are below the axis in place of ticks, and its label is below them.
-    let unnamed = Axis { label: " ".to_owned(), ticks: vec![f64::NAN], ..Axis::linear("") };
-    let ends = [0.0..count.max(1) as f64, y.clone()];
-    let to_page = axes(canvas, [&unnamed, &figure.y], ends, ((left, top), (right, bottom)), true);
-    let gap = if count > 20 { 0.1 } else { 0.2 };
-    for (i, names) in labels.iter().enumerate() {
-        let (begin, end, mut sum) = (i as f64 + gap, (i + 1) as f64 - gap, 0.0);
-        for (style, (_, values)) in bars.segments.iter().enumerate() {
-            if values[i] > 0.0 {
-                canvas.bar(to_page(begin, sum + values[i]), to_page(end, sum), style);
-            }
-            sum += values[i];
-        }
-        let (x, _) = to_page(i as f64 + 0.5, 0.0);
-        for (line, name) in names.iter().enumerate() {
-            canvas.text_below(name, (x, bottom + 22.0 + LINE * line as f64));
-        }
-    }
-    for (i, (_, level)) in bars.references.iter().enumerate() {
-        let ends = [0.0, count as f64].map(|x| to_page(x, *level));
-        canvas.line(&ends, BLACK, 3, reference_dashes(i));
-    }
-    let below = (left.midpoint(right), bottom + 82.0 + lines * LINE);
-    canvas.text_below(&figure.x.label, below);
+/// A bar, filled with its colour or with a tint of it: bars with odd styles are lighter, so that neighbours differ in grey too.
+fn bar<C: Clone>(corners: [C; 2], style: usize) -> [Rectangle<C>; 2] {
+    let fill = colour(style).mix(if style % 2 == 1 { 0.35 } else { 1.0 }).filled();
+    let outline = colour(style).stroke_width(2);
+    [Rectangle::new(corners.clone(), fill), Rectangle::new(corners, outline)]
 }
 
-/// The lines of the label below every bar. Labels too long for their bars are broken at spaces; where that does not suffice, those of
-/// neighbouring bars are on different lines. Only every second, third ... of many bars has one.
-fn labels(names: &[String], step: f64) -> Vec<Vec<String>> {
-    let widest = |all: &[Vec<String>]| all.iter().flatten().map(|w| width(w)).fold(0.0, f64::max);
-    let whole: Vec<Vec<String>> = names.iter().map(|n| vec![n.clone()]).collect();
-    let broken: Vec<Vec<String>> =
-        names.iter().map(|n| n.split(' ').map(str::to_owned).collect()).collect();
-    let mut chosen = if widest(&whole) + 16.0 <= step { whole } else { broken };
-    let every = ((widest(&chosen) + 4.0) / step).ceil().max(1.0) as usize;
-    let lines = chosen.iter().map(Vec::len).max().unwrap_or(0);
-    for (i, label) in chosen.iter_mut().enumerate() {
-        match names.len() <= STAGGERED_MAX {
-            true => drop(label.splice(0..0, vec![String::new(); i % every * lines])),
-            false if i % every != 0 => label.clear(),
-            false => {}
+fn stacked(bars: &Bars) -> Vec<Rectangle<(f64, f64)>> {
+    let mut begins = vec![0.0; bars.names.len()];
+    let mut drawn = Vec::new();
+    for (style, (_, values)) in bars.segments.iter().enumerate() {
+        for (i, value) in values.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+            let (begin, half) = (begins[i], (1.0 - GAP) / 2.0);
+            begins[i] += value;
+            let corners = [(begin, i as f64 - half), (begins[i], i as f64 + half)];
+            drawn.extend(bar(corners, style));
         }
     }
-    chosen
+    drawn
 }
+
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{figure, series};
+    use super::super::samples::{bars, figure, series};
     use super::*;
 
     #[test]
     fn measured_points_are_filled_and_projected_ones_hollow() {
         let circles = |provenance, kind: &str| {
-            let svg = svg(&figure(Body::points(vec![series(provenance)])));
+            let svg = svg(&figure(vec![series(provenance)]));
             svg.lines().filter(|l| l.starts_with("<circle") && l.contains(kind)).count()
         };
         // Three points and the legend.
@@ -196,6 +278,7 @@ mod tests {
             |provenance| (circles(provenance, "fill=\"#"), circles(provenance, "fill=\"none\""));
         assert_eq!(counts(Provenance::Measured), (4, 0));
         assert_eq!(counts(Provenance::Projected), (0, 4));
+        assert_eq!(counts(Provenance::Bound), (0, 0));
     }
 
     #[test]
@@ -203,7 +286,7 @@ mod tests {
         let mut noted = series(Provenance::Measured);
         noted.name = "a < b".into();
         noted.notes = vec!["first & <best>".into()];
-        let svg = svg(&figure(Body::points(vec![noted])));
+        let svg = svg(&figure(vec![noted]));
         assert!(
             svg.contains("a &lt; b") && svg.contains("<title>first &amp; &lt;best&gt;</title>")
         );
@@ -215,37 +298,17 @@ mod tests {
     #[test]
     fn marks_of_one_name_share_an_entry_of_the_legend() {
         let mark = |x| Mark { name: "increase".into(), x, style: 1 };
-        let body = Body::Points {
-            series: vec![series(Provenance::Measured)],
-            marks: vec![mark(1.5), mark(3.0)],
-        };
-        let svg = svg(&figure(body));
+        let shown = figure(vec![series(Provenance::Measured)]);
+        let svg = svg(&Figure { marks: vec![mark(1.5), mark(3.0)], ..shown });
         assert_eq!(svg.matches("increase").count(), 1);
         assert_eq!(svg.matches("stroke=\"#D55E00\"").count(), 3);
     }
 
     #[test]
-    fn labels_are_wrapped_before_they_are_omitted() {
-        let names: Vec<String> = ["metis unit", "morton area"].map(str::to_owned).to_vec();
-        assert_eq!(labels(&names, 500.0), [vec!["metis unit"], vec!["morton area"]]);
-        let broken = [vec!["metis", "unit"], vec!["morton", "area"]];
-        assert_eq!(labels(&names, 228.0), broken);
-        assert_eq!(labels(&names, 120.0), [vec!["metis", "unit"], vec!["", "", "morton", "area"]]);
-        let ranks: Vec<String> = (100..164).map(|rank| rank.to_string()).collect();
-        assert_eq!(labels(&ranks, 30.0)[..2], [vec!["100"], vec![]]);
-    }
-
-    #[test]
     fn segments_are_stacked_and_empty_ones_are_not_drawn() {
-        let bars = Bars {
-            categories: vec!["1".into(), "2".into()],
-            segments: vec![("read".into(), vec![1.0, 2.0]), ("grade".into(), vec![3.0, 0.0])],
-            references: vec![("mean".into(), 3.0)],
-            provenance: Provenance::Projected,
-        };
-        let svg = svg(&Figure { y: Axis::linear("s"), ..figure(Body::Bars(bars)) });
-        assert!(svg.contains(">grade<") && svg.contains(">mean<"));
-        // Three segments and two entries of the legend.
-        assert_eq!(svg.matches("<rect").count(), 5, "{svg}");
+        let svg = svg(&bars());
+        assert!(svg.contains(">grade<") && svg.contains(">mean, 3<"));
+        // Three segments and two entries of the legend, each with its outline.
+        assert_eq!(svg.matches("<rect").count(), 10, "{svg}");
     }
 }

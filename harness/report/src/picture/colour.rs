@@ -3,8 +3,7 @@
 //! Invariants: every colour is distinguishable with every kind of colour vision from those it stands beside; finer cells
 //! are darker, so that levels can be read in grey too.
 
-use crate::figure::palette::{COLOURS, SHADES, shade};
-use contract::lattice::Root;
+use crate::figure::canvas::COLOURS;
 use contract::word::Side;
 use export::leaf::Leaf;
 use std::collections::BTreeSet;
@@ -19,13 +18,11 @@ pub enum Colour {
     Rank,
     /// Outside, inside or crossing
     Side,
-    /// Edge of a cell
-    Spacing,
 }
 
 impl fmt::Display for Colour {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(["level", "rank", "side", "spacing"][*self as usize])
+        f.write_str(["level", "rank", "side"][*self as usize])
     }
 }
 
@@ -42,8 +39,16 @@ pub struct Entry {
 
 /// Ranks that the legend names one by one.
 const RANKS_NAMED: usize = 16;
-/// Part of the colour map that is used: lines are not visible on its dark end.
-const SHADES_USED: f64 = 0.8;
+/// Cividis from its light end on: it looks alike with and without deficiencies of colour vision, and larger values are darker in grey
+/// too. Its dark end, on which lines are not visible, is not used.
+const CIVIDIS: [[u8; 3]; 6] = [
+    [255, 234, 70],
+    [211, 193, 100],
+    [166, 157, 117],
+    [124, 123, 120],
+    [87, 92, 109],
+    [45, 68, 108],
+];
 /// Part of white in the lightest shade, which covers most of a picture.
 const LIGHTEST: f64 = 0.5;
 /// Tints of a colour, as [`tint`] takes them; ranks have as many colours as there are tints of all colours. The second is dark:
@@ -54,23 +59,20 @@ impl Colour {
     /// The value of a leaf: its level, rank or code of the side.
     pub fn value(self, leaf: &Leaf) -> u32 {
         match self {
-            Self::Level | Self::Spacing => u32::from(leaf.octant.level),
+            Self::Level => u32::from(leaf.octant.level),
             Self::Rank => leaf.rank,
             Self::Side => leaf.side as u32,
         }
     }
 
     /// The colours of the values that occur, in ascending order of the values.
-    pub fn key(self, values: &BTreeSet<u32>, root: &Root) -> Vec<Entry> {
+    pub fn key(self, values: &BTreeSet<u32>) -> Vec<Entry> {
         let count = values.len();
         let entry = |(i, &value): (usize, &u32)| match self {
-            Self::Level | Self::Spacing => Entry {
+            Self::Level => Entry {
                 value,
                 fill: of_level(i as f64 / (count - 1).max(1) as f64),
-                name: match self {
-                    Self::Level => value.to_string(),
-                    _ => short(root.edge / f64::from(1u32 << value)),
-                },
+                name: value.to_string(),
             },
             Self::Rank => Entry { value, fill: of_rank(value), name: value.to_string() },
             Self::Side => {
@@ -97,8 +99,13 @@ impl Colour {
 
 /// The colour of a level, 0 for the coarsest and 1 for the finest.
 fn of_level(position: f64) -> [u8; 3] {
-    let index = position * SHADES_USED * (SHADES - 1) as f64;
-    tint(shade(index as usize), LIGHTEST * (1.0 - position))
+    let place = position * (CIVIDIS.len() - 1) as f64;
+    let lower = (place as usize).min(CIVIDIS.len() - 2);
+    let mixed = std::array::from_fn(|i| {
+        let (a, b) = (f64::from(CIVIDIS[lower][i]), f64::from(CIVIDIS[lower + 1][i]));
+        (a + (b - a) * (place - lower as f64)).round() as u8
+    });
+    tint(mixed, LIGHTEST * (1.0 - position))
 }
 
 /// The colour of a rank. Consecutive ranks, which are often neighbours, differ in hue.
@@ -113,23 +120,18 @@ fn tint(colour: [u8; 3], part: f64) -> [u8; 3] {
     colour.map(|c| (f64::from(c) + (end - f64::from(c)) * part.abs()).round() as u8)
 }
 
-/// A length with four significant digits.
-pub fn short(length: f64) -> String {
-    crate::figure::tick_label(length)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const ROOT: Root = Root { origin: [0.0; 3], edge: 8.0 };
-
     #[test]
-    fn finer_cells_are_darker() {
-        let key = Colour::Spacing.key(&(2..9).collect(), &ROOT);
-        assert_eq!(key[0].name, "2");
-        let grey = |e: &Entry| e.fill.iter().map(|&c| u32::from(c)).sum::<u32>();
-        assert!(key.windows(2).all(|w| grey(&w[0]) > grey(&w[1])), "{key:?}");
+    fn finer_cells_are_darker_in_grey_too() {
+        let key = Colour::Level.key(&(0..20).collect());
+        let grey = |e: &Entry| {
+            let [r, g, b] = e.fill.map(f64::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        assert!(key.windows(2).all(|w| grey(&w[0]) > grey(&w[1]) + 2.0), "{key:?}");
     }
 
     /// A colour in CIE Lab, as seen with a matrix of colour vision on linear RGB.
@@ -179,7 +181,7 @@ mod tests {
 
     #[test]
     fn twenty_one_ranks_have_different_colours_and_many_ranks_have_no_names() {
-        let key = Colour::Rank.key(&(0..21).collect(), &ROOT);
+        let key = Colour::Rank.key(&(0..21).collect());
         let fills: BTreeSet<[u8; 3]> = key.iter().map(|e| e.fill).collect();
         assert_eq!(fills.len(), 21);
         assert_eq!(Colour::Rank.legend(&key).1, "21 ranks, coloured in turn");

@@ -1,33 +1,37 @@
-//! Pictures of meshes: slices as SVG, PNG and PDF, and views in three dimensions as HTML and PNG.
+//! Pictures of meshes: a slice, or a view of it in three dimensions with the surface of the body.
 //!
-//! [`Picture`] is the data of a slice: the squares in which a plane cuts leaves, the segments in which it cuts facets, and the
-//! window. Reading takes time in proportion to the slice, and no picture has more squares than can be shown.
+//! [`Picture`] is the data of a picture: the squares in which a plane cuts leaves, the body, and the window. Reading takes time in
+//! proportion to the slice, and no picture has more squares than can be shown.
 
 pub mod colour;
 mod draw;
-pub mod format;
-pub mod scene;
 pub mod set;
-pub mod squares;
-mod surface;
+mod squares;
 #[cfg(test)]
 mod tests;
+mod view;
 
-use colour::{Colour, Entry, short};
+use colour::{Colour, Entry};
 use contract::case::Facet;
 use contract::failure::Failure;
+use contract::files::{named, write_atomically};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
-use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
+use contract::octant::UNITS_PER_CELL;
 use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
 use geometry::tree::{Aabb, Point};
-use squares::{Detail, Squares, plane_axes};
+use run::engine::interrupt;
+use squares::{SQUARES_MAX, Square, Squares};
+use std::io::{self, Write};
+use std::path::Path;
+use view::{Face, Projection, surface};
 
+pub use crate::figure::format::Format;
 pub use draw::svg;
 
-/// A point in a plane.
-pub type Planar = [f64; 2];
+/// A point in a plane: to the right, and upwards.
+type Planar = [f64; 2];
 
 /// What a picture shows.
 #[derive(Clone, Debug)]
@@ -38,12 +42,13 @@ pub struct Request<'a> {
     pub body: Option<&'a [Facet]>,
     /// The quantity that colours show.
     pub colour: Colour,
-    /// Edge of the root in edges of the window, which is centred on the body. Without effect on a clip box.
+    /// Edge of the root in edges of the window, which is centred on the body; a view without magnification is close to the body. Without
+    /// effect on a clip box.
     pub zoom: f64,
     /// Leaves deeper than this are merged into their ancestors: the base mesh of a partition, for example.
     pub level_max: u8,
-    /// Command that makes the picture, which a view names.
-    pub command: String,
+    /// Whether it is a view in three dimensions.
+    pub view: bool,
 }
 
 impl Request<'_> {
@@ -58,72 +63,49 @@ impl Request<'_> {
             false => Ok(()),
         }
     }
-
-    /// The squares in which a plane cuts the leaves in a window, at this many units of the page per unit of the user. The window may end
-    /// within the root, but the plane need not be in the box.
-    fn squares(
-        &self,
-        mesh: &Mesh,
-        slice: Slice,
-        mut window: [[i64; 3]; 2],
-        scale: f64,
-        detail: &Detail,
-    ) -> Result<Squares, Failure> {
-        (window[0][slice.axis], window[1][slice.axis]) = (0, UNITS_PER_EDGE);
-        let (slice, clip) = (Some(slice), Some(window));
-        let selection = Selection { slice, clip, ..self.selection.clone() };
-        let (edge, detail) = (mesh.manifest.root.edge * scale, detail.to_level(self.level_max));
-        Squares::collect(mesh, &selection, self.colour, edge, &detail)
-    }
 }
 
-/// The data of a picture of a slice.
+/// The data of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// The root of the mesh.
-    pub root: Root,
-    /// The plane.
-    pub slice: Slice,
-    /// The quantity that colours show.
-    pub colour: Colour,
-    /// Lower left and upper right corner in the plane, in the user's units.
-    pub window: [Planar; 2],
-    /// The squares.
-    pub squares: Squares,
+    root: Root,
+    slice: Slice,
+    colour: Colour,
+    /// Minimum and maximum corner of what is shown, in the user's units.
+    window: [[f64; 3]; 2],
+    squares: Squares,
     /// The colours of their values.
-    pub key: Vec<Entry>,
-    /// The segments in which the plane cuts the body, in the user's units; `None` if the body is not known.
-    pub section: Option<Vec<[Planar; 2]>>,
+    key: Vec<Entry>,
+    body: Body,
+    projection: Projection,
+}
+
+/// What is drawn of the body, in the plane of the picture and in the user's units.
+#[derive(Clone, Debug, PartialEq)]
+enum Body {
+    Unknown,
+    /// The segments in which the plane cuts it.
+    Section(Vec<[Planar; 2]>),
+    /// Its surface in a view, from the farthest triangle to the nearest.
+    Surface(Vec<Face>),
 }
 
 /// Why a picture would be empty.
 pub const NO_LEAF: &str =
     "no leaf of the selection is in a slice: give another --slice or a larger --clip";
 
-/// Squares of a slice: about two megabytes of SVG.
-pub const DETAIL: Detail =
-    Detail { squares_max: 60_000, outlined_max: 30_000, level_max: LEVEL_MAX };
-
-/// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, through the
-/// root's centre and normal to z.
-pub fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
-    let extent = extent(root, body);
-    let length = |a: usize| extent[1][a] - extent[0][a];
+/// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, normal to z through the root's
+/// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
+fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
+    let [low, high] = extent(root, body);
+    let length = |a: usize| high[a] - low[a];
     // Of equal extents the last one, so that a cube is seen from above. A plane within a flat body has no section.
     let axes = (0..3).rev().filter(|&a| length(a) > 0.0);
-    let axis = axes.min_by(|&a, &b| length(a).total_cmp(&length(b)));
-    halfway(root, body, axis.unwrap_or(2))
-}
-
-/// The plane normal to an axis that halves the area of the body, or passes through the root's centre.
-///
-/// A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
-pub fn halfway(root: &Root, body: Option<&[Facet]>, axis: usize) -> Slice {
-    let [low, high] = extent(root, body);
+    let axis = axes.min_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(2);
     let middle = body.and_then(|facets| median(facets, axis));
     let middle = middle.unwrap_or((low[axis] + high[axis]) / 2.0);
     // A thousandth of the extent is not visible, and a short coordinate can be entered again.
-    let step = 10f64.powf((high[axis] - low[axis]).log10().floor() - 3.0);
+    let step = 10f64.powf(length(axis).log10().floor() - 3.0);
     let middle = if step > 0.0 { (middle / step).round() * step } else { middle };
     let within = middle.clamp(root.origin[axis], root.origin[axis] + root.edge);
     Slice::new(root, axis, within).expect("a coordinate in the root")
@@ -151,7 +133,7 @@ fn median(facets: &[Facet], axis: usize) -> Option<f64> {
 }
 
 /// The bounding box of the body, or the root.
-pub fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
+fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
     let Some(facets) = body.filter(|facets| !facets.is_empty()) else {
         return [root.origin, root.origin.map(|c| c + root.edge)];
     };
@@ -162,8 +144,15 @@ pub fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
     })
 }
 
+/// The magnification at which the window has as many longest extents of the body, or the root.
+fn zoom_to(root: &Root, body: Option<&[Facet]>, extents: f64) -> f64 {
+    let [low, high] = extent(root, body);
+    let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::MIN_POSITIVE, f64::max);
+    (root.edge / (extents * longest)).max(1.0)
+}
+
 /// The cube of the window, moved into the root, on the lattice.
-pub fn zoomed(root: &Root, body: Option<&[Facet]>, zoom: f64) -> [[i64; 3]; 2] {
+fn zoomed(root: &Root, body: Option<&[Facet]>, zoom: f64) -> [[i64; 3]; 2] {
     let [low, high] = extent(root, body);
     let edge = ((UNITS_PER_EDGE as f64 / zoom) as i64).clamp(UNITS_PER_CELL, UNITS_PER_EDGE);
     let centre = std::array::from_fn(|a| (low[a] + high[a]) / 2.0);
@@ -177,100 +166,125 @@ impl Picture {
     ///
     /// # Errors
     /// If the mesh cannot be read, or the picture would be empty.
-    pub fn collect(mesh: &Mesh, request: &Request, detail: &Detail) -> Result<Self, Failure> {
+    pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, Failure> {
+        Self::with_squares(mesh, request, SQUARES_MAX)
+    }
+
+    fn with_squares(mesh: &Mesh, request: &Request, squares_max: usize) -> Result<Self, Failure> {
         let root = mesh.manifest.root;
         request.check(mesh)?;
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let axes = plane_axes(slice.axis);
-        let clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
-        let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
-        if (0..2).any(|i| window[0][i] >= window[1][i]) {
+        let zoom = match request.view && request.zoom == 1.0 {
+            true => zoom_to(&root, request.body, 1.5),
+            false => request.zoom,
+        };
+        let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, zoom));
+        let window = clip.map(|corner| root.to_user(corner));
+        if axes.iter().any(|&a| window[0][a] >= window[1][a]) {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
             return Err(Failure::input(why.to_owned()));
         }
-        let squares = request.squares(mesh, slice, clip, draw::scale(&window), detail)?;
-        if squares.squares.is_empty() {
+        let projection = if request.view { Projection::OBLIQUE } else { Projection::along(axes) };
+        let body = match request.body {
+            None => Body::Unknown,
+            Some(facets) if request.view => {
+                let plane = (slice.axis, root.to_user([slice.at; 3])[slice.axis]);
+                Body::Surface(surface(facets, &window, plane, &projection))
+            }
+            Some(facets) => {
+                let corners = window.map(|corner| axes.map(|a| corner[a]));
+                Body::Section(section(&root, slice, &corners, facets))
+            }
+        };
+        let (colour, key) = (request.colour, Vec::new());
+        let squares = Squares::default();
+        let mut picture = Self { root, slice, colour, window, squares, key, body, projection };
+        // The window may end within the root, but the plane need not be in the box.
+        (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
+        let (slice, clip) = (Some(slice), Some(clip));
+        let selection = Selection { slice, clip, ..request.selection.clone() };
+        let edge = root.edge * draw::scale(&picture);
+        let levels = squares::deepest(edge).map(|level| level.min(request.level_max));
+        picture.squares = Squares::collect(mesh, &selection, request, levels, squares_max)?;
+        if picture.squares.squares.is_empty() {
             let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
             return Err(Failure::input(why.to_owned()));
         }
-        let values = squares.squares.iter().map(|s| s.value).collect();
-        let key = request.colour.key(&values, &root);
-        let section = request.body.map(|facets| section(&root, slice, &window, facets));
-        let picture = Self { root, slice, colour: request.colour, window, squares, key, section };
+        let values = picture.squares.squares.iter().map(|s| s.value).collect();
+        picture.key = colour.key(&values);
         picture.check_invariants();
         Ok(picture)
     }
 
     /// Asserts that the window is in the root, that every square is in it and has a colour, and that the section lies in the window.
-    ///
-    /// # Panics
-    /// If that is not so.
-    pub fn check_invariants(&self) {
+    fn check_invariants(&self) {
         let (root, [low, high]) = (&self.root, self.window);
         let (slack, axes) = (root.edge * 1e-6, plane_axes(self.slice.axis));
-        for (i, from) in axes.map(|axis| root.origin[axis] - slack).into_iter().enumerate() {
-            let until = from + root.edge + 2.0 * slack;
-            let is_inside = from <= low[i] && low[i] < high[i] && high[i] <= until;
+        for a in axes {
+            let (from, until) = (root.origin[a] - slack, root.origin[a] + root.edge + slack);
+            let is_inside = from <= low[a] && low[a] < high[a] && high[a] <= until;
             assert!(is_inside, "the window {:?} is not within the root", self.window);
         }
         for square in &self.squares.squares {
-            let [from, to] = self.corners(square);
-            let is_shown = (0..2).all(|i| from[i] < high[i] + slack && to[i] > low[i] - slack);
-            assert!(is_shown, "{square:?} is outside of the window {:?}", self.window);
+            let [from, _, to, _] = self.corners(square);
+            let is_shown = |a: usize| from[a] < high[a] + slack && to[a] > low[a] - slack;
+            assert!(axes.into_iter().all(is_shown), "{square:?} is outside of {:?}", self.window);
             assert!(self.key.iter().any(|e| e.value == square.value), "{square:?} has no colour");
         }
-        let is_within =
-            |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
-        let beyond = self.section.iter().flatten().flatten().find(|p| !is_within(p));
-        assert!(beyond.is_none(), "the section leaves the window {:?} at {beyond:?}", self.window);
+        if let Body::Section(segments) = &self.body {
+            let within = |p: &Planar, i: usize| {
+                (low[axes[i]] - slack..=high[axes[i]] + slack).contains(&p[i])
+            };
+            let beyond = segments.iter().flatten().find(|p| !(within(p, 0) && within(p, 1)));
+            assert!(beyond.is_none(), "the section leaves {:?} at {beyond:?}", self.window);
+        }
+    }
+
+    fn is_view(&self) -> bool {
+        self.projection == Projection::OBLIQUE
     }
 
     /// One sentence on what the picture shows.
     pub fn title(&self) -> String {
-        let Self { root, slice, squares, colour, .. } = self;
-        format!(
-            "Slice {} of a mesh, {} cells by {colour}",
-            plane_name(root, *slice),
-            squares.leaves
-        )
+        let (plane, cells) = (self.plane_name(), self.squares.leaves);
+        format!("Slice {plane} of a mesh, {cells} cells by {}", self.colour)
     }
 
-    /// The names of the axes of the plane: first to the right, then upwards.
-    fn axes(&self) -> [&'static str; 2] {
-        plane_axes(self.slice.axis).map(|axis| ["x", "y", "z"][axis])
+    /// The plane and the number of cells.
+    fn caption(&self) -> String {
+        let (plane, Squares { leaves, is_merged, .. }) = (self.plane_name(), &self.squares);
+        let merged = if *is_merged { ", the smallest merged" } else { "" };
+        format!("{plane}; cells in the plane: {leaves}{merged}")
     }
 
-    /// The number of cells, as text.
-    fn count(&self) -> String {
-        let Squares { leaves, is_merged, .. } = self.squares;
-        let noun = if leaves == 1 { "cell" } else { "cells" };
-        let merged = if is_merged { ", the smallest merged" } else { "" };
-        format!("{leaves} {noun} in the plane{merged}")
+    /// The corners of a square, in the user's units and in turn.
+    fn corners(&self, square: &Square) -> [[f64; 3]; 4] {
+        let [across, up] = plane_axes(self.slice.axis);
+        [[0, 0], [1, 0], [1, 1], [0, 1]].map(|side| {
+            let mut at = [self.slice.at; 3];
+            for (axis, i) in [(across, 0), (up, 1)] {
+                let cells = square.corner[i] + side[i] * square.edge();
+                at[axis] = i64::from(cells) * UNITS_PER_CELL;
+            }
+            self.root.to_user(at)
+        })
     }
 
-    /// The corners of a square in the plane, in the user's units.
-    fn corners(&self, square: &squares::Square) -> [Planar; 2] {
-        let axes = plane_axes(self.slice.axis);
-        let at = |cells: u32, axis: usize| {
-            self.root.to_user([i64::from(cells) * UNITS_PER_CELL; 3])[axis]
-        };
-        let low = [0, 1].map(|i| at(square.corner[i], axes[i]));
-        [low, [0, 1].map(|i| at(square.corner[i] + square.edge(), axes[i]))]
+    /// The plane as in `z = 0.5`, to the digits that the lattice resolves.
+    fn plane_name(&self) -> String {
+        let at = self.root.to_user([self.slice.at; 3])[self.slice.axis];
+        let resolved = (self.root.edge / UNITS_PER_EDGE as f64).log10().ceil() as i32;
+        let decimals = usize::try_from(-resolved).unwrap_or(0);
+        // Parsing removes the zeros at the end, and adding zero turns -0 into 0.
+        let shown = format!("{at:.decimals$}").parse().unwrap_or(at) + 0.0;
+        format!("{} = {shown}", ["x", "y", "z"][self.slice.axis])
     }
 }
 
-/// A plane as in `z = 0.5`, to the digits that the lattice resolves.
-fn plane_name(root: &Root, slice: Slice) -> String {
-    let at = root.to_user([slice.at; 3])[slice.axis];
-    let resolved = 10f64.powf((root.edge / UNITS_PER_EDGE as f64).log10().ceil());
-    // Adding zero turns -0 into 0.
-    let at = (at / resolved).round() * resolved + 0.0;
-    let is_short = at == 0.0 || (1e-6..1e9).contains(&at.abs());
-    let decimals = (-resolved.log10()).round().max(0.0) as usize;
-    // Parsing removes the zeros at the end.
-    let shown = format!("{at:.decimals$}").parse().ok().filter(|_: &f64| is_short);
-    let shown = shown.map_or_else(|| short(at), |at| at.to_string());
-    format!("{} = {shown}", ["x", "y", "z"][slice.axis])
+/// The two axes of a plane normal to `axis`: first to the right, then upwards.
+fn plane_axes(axis: usize) -> [usize; 2] {
+    [[1, 2], [0, 2], [0, 1]][axis]
 }
 
 /// The segments in which the plane cuts the facets. The plane is moved into the layer of leaves that it cuts, so that
@@ -299,4 +313,16 @@ fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) ->
         (ends[0] <= ends[1]).then(|| ends.map(|t| axes.map(|a| from[a] + (to - from)[a] * t)))
     };
     facets.iter().filter_map(cut).collect()
+}
+
+/// Writes a file, which is either complete or absent. It is absent if the user has interrupted the drawing.
+///
+/// # Errors
+/// If it cannot be written; the message names it.
+pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let fill = |out: &mut dyn Write| {
+        out.write_all(bytes)?;
+        if interrupt::requested() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
+    };
+    write_atomically(path, fill).map_err(|error| named(path, &error))
 }

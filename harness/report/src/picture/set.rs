@@ -1,18 +1,17 @@
-//! The pictures of the paper, made of any case: the algorithm from the geometry to the final mesh.
+//! The pictures of the paper, made of any case: the algorithm from the base mesh to the final mesh.
 //!
 //! The paper's Figures 1 to 16 are pictures of its method and of its meshes; Figures 17 to 23 are diagrams, which
 //! [`crate::benchmark`] makes. The pictures are numbered in the order of the algorithm, and the page names their counterparts.
 
 use self::Made::{Base, Final, Layers, WithoutCrossing};
-use self::Part::{BaseMesh, Body, CloseUp, Root, View, ViewOfBody};
-use super::colour::Colour::{self, Level, Rank, Side, Spacing};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use self::Part::{Around, BaseMesh, CloseUp, Root, View};
+use super::Request;
+use super::colour::Colour::{self, Level, Rank, Side};
 use contract::case::Case;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::{LEVEL_MAX, UNITS_PER_CELL};
 use export::selection::{Selection, Slice};
-use maud::{Markup, PreEscaped, html};
+use maud::html;
 
 /// Ranks that make the meshes.
 pub const RANKS: usize = 16;
@@ -20,10 +19,6 @@ pub const RANKS: usize = 16;
 const LEVELS_ABOVE_SURFACE: u8 = 5;
 /// Edge of a close-up, in cells at the surface.
 const CLOSE_UP_CELLS: i64 = 48;
-/// Edge of the window around the body, in its longest extents.
-const AROUND: f64 = 1.5;
-/// Edge of the window around the base mesh, in longest extents of the body.
-const AROUND_BASE_MESH: f64 = 4.0;
 
 /// A mesh of the case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,56 +41,56 @@ pub enum Part {
     /// The wider surroundings of the body, with leaves merged to the level of the base mesh.
     BaseMesh,
     /// The surroundings of the body.
-    Body,
+    Around,
     /// A few cells around the foremost vertex of the body.
     CloseUp,
-    /// A view in three dimensions.
+    /// The surroundings of the body in three dimensions.
     View,
-    /// A view of the body alone.
-    ViewOfBody,
 }
 
-/// A picture of the set: the name of its files, the mesh, the part of it, the colours, and one sentence on what it shows.
+/// A picture of the set: the name of its file, the mesh, the part of it, the colours, and one sentence on what it shows.
 pub type Member = (&'static str, Made, Part, Colour, &'static str);
 
 /// The pictures, in the order of the algorithm.
-pub const MEMBERS: [Member; 16] = [
-    ("01-geometry", Base, ViewOfBody, Level, "The geometry."),
-    ("02-base-mesh", Base, BaseMesh, Level, "The base mesh, whose leaves are assigned to ranks."),
-    ("03-base-partition", Base, BaseMesh, Rank, "Its partition: intervals of the Morton curve."),
-    ("04-surface-partition", Base, View, Rank, "The partition on the surface and in a slice."),
-    ("05-refinement", Base, Body, Level, "The base tree after refinement, not yet balanced."),
-    ("06-sides", Base, Body, Side, "Crossing leaves, and components outside and inside."),
-    ("07-sides-close-up", Base, CloseUp, Side, "The same at the foremost vertex."),
-    ("08-balance", Layers(1), Body, Level, "n = 1: 2:1 balance alone (the paper's 4:1 rule)."),
-    ("09-layers-2", Layers(2), Body, Level, "Layers of at least n = 2 cells."),
-    ("10-layers-4", Layers(4), Body, Level, "Layers of at least n = 4 cells."),
-    ("11-layers-10", Layers(10), Body, Level, "Layers of at least n = 10 cells."),
-    ("12-mesh", Final, Root, Level, "The final mesh, up to the far field."),
-    ("13-mesh-close-up", Final, CloseUp, Spacing, "The final mesh at the foremost vertex."),
+pub const MEMBERS: [Member; 12] = [
+    ("01-base-mesh", Base, BaseMesh, Level, "The base mesh, whose leaves are assigned to ranks."),
+    ("02-base-partition", Base, BaseMesh, Rank, "Its partition: intervals of the Morton curve."),
+    ("03-refinement", Base, Around, Level, "The base tree after refinement, not yet balanced."),
+    ("04-sides", Base, Around, Side, "Crossing leaves, and components outside and inside."),
+    ("05-balance", Layers(1), Around, Level, "n = 1: 2:1 balance alone (the paper's 4:1 rule)."),
+    ("06-layers-4", Layers(4), Around, Level, "Layers of at least n = 4 cells."),
+    ("07-layers-10", Layers(10), Around, Level, "Layers of at least n = 10 cells."),
+    ("08-mesh", Final, Root, Level, "The final mesh, up to the far field."),
+    ("09-partition", Final, Around, Rank, "The partition of the final mesh."),
+    ("10-view", Final, View, Level, "The final mesh in a slice through the geometry."),
+    ("11-close-up", Final, CloseUp, Level, "The final mesh at the foremost vertex."),
     (
-        "14-without-crossing",
+        "12-without-crossing",
         WithoutCrossing,
         CloseUp,
-        Spacing,
+        Level,
         "The gap that a near-body mesh fills.",
     ),
-    ("15-partition", Final, Body, Rank, "The partition of the final mesh."),
-    ("16-mesh-view", Final, View, Level, "The final mesh in a slice through the geometry."),
 ];
 
-/// Leaves, window and deepest level of a slice: selection, zoom and level, as a request has them.
-pub fn request(part: Part, case: &Case) -> (Selection, f64, u8) {
-    let [low, high] = super::extent(&case.root, Some(&case.facets));
-    let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::MIN_POSITIVE, f64::max);
-    let window = |extents: f64| (case.root.edge / (extents * longest)).max(1.0);
+/// What a picture of a case shows.
+pub fn request(part: Part, colour: Colour, case: &Case) -> Request<'_> {
+    let zoom = |extents: f64| super::zoom_to(&case.root, Some(&case.facets), extents);
     let level_base = case.level_surface.saturating_sub(LEVELS_ABOVE_SURFACE).max(2);
+    let whole = Request {
+        selection: Selection::default(),
+        body: Some(&case.facets),
+        colour,
+        zoom: 1.0,
+        level_max: LEVEL_MAX,
+        view: false,
+    };
     match part {
-        Root | View => (Selection::default(), 1.0, LEVEL_MAX),
-        BaseMesh => (Selection::default(), window(AROUND_BASE_MESH), level_base),
-        Body => (Selection::default(), window(AROUND), LEVEL_MAX),
-        ViewOfBody => (Selection::default(), window(1.1), LEVEL_MAX),
-        CloseUp => (close_up(case), 1.0, LEVEL_MAX),
+        Root => whole,
+        BaseMesh => Request { zoom: zoom(4.0), level_max: level_base, ..whole },
+        Around => Request { zoom: zoom(1.5), ..whole },
+        View => Request { view: true, ..whole },
+        CloseUp => Request { selection: close_up(case), ..whole },
     }
 }
 
@@ -115,43 +110,17 @@ fn close_up(case: &Case) -> Selection {
     }
 }
 
-/// A picture as part of the page.
-pub enum Drawn {
-    /// A slice as SVG.
-    Slice(String),
-    /// A view as PNG, if it could be drawn.
-    View(Option<Vec<u8>>),
-}
-
-/// The page with all pictures, which needs no other file; `case` is the name of the case.
-pub fn page(case: &str, command: &str, pictures: &[(Member, Drawn)]) -> String {
+/// The page with all pictures and their SVG documents, which needs no other file; `case` is the name of the case.
+pub fn page(case: &str, pictures: &[(Member, String)]) -> String {
     let content = html! {
         p {
-            "The method and its meshes in pictures, from the geometry to the final mesh, for the case " code { (case) }
+            "The method and its meshes in pictures, from the base mesh to the final mesh, for the case " code { (case) }
             " on " (RANKS) " simulated ranks, in the order of the algorithm. Counterparts in the paper are Figures 3 (base mesh), 4 (balance), 5, 9 and 10 "
-            "(layers), 11 and 12 (partition), and 13 (gap). The files beside this page have the "
-            "pictures as SVG, and the views as HTML, which a mouse turns."
+            "(layers), 11 and 12 (partition), and 13 (gap)."
         }
-        p { "Made by " code { (command) } "." }
-        @for ((name, .., caption), drawn) in pictures { (figure(name, caption, drawn)) }
+        @for ((name, .., caption), svg) in pictures {
+            (crate::page::figure(name, name, svg, &html! { (caption) " " a href={ (name) ".svg" } { "SVG" } "." }))
+        }
     };
     crate::page::page(&format!("Pictures of {case}"), &content)
-}
-
-fn figure(name: &str, caption: &str, drawn: &Drawn) -> Markup {
-    let link = |extension: &str, text: &str| html! { a href={ (name) "." (extension) } { (text) } };
-    let (drawing, links) = match drawn {
-        Drawn::Slice(svg) => (PreEscaped(svg.clone()), link("svg", "SVG")),
-        Drawn::View(png) => {
-            let drawing = html! {
-                @if let Some(png) = png {
-                    img src={ "data:image/png;base64," (BASE64_STANDARD.encode(png)) } alt=(caption) style="width: 100%";
-                } @else {
-                    p { "pyvista, which draws views, is missing; the HTML file needs no other program." }
-                }
-            };
-            (drawing, link("html", "Turn it in a browser"))
-        }
-    };
-    crate::page::figure(name, name, &drawing.0, &html! { (caption) " " (links) "." })
 }

@@ -1,10 +1,7 @@
 //! Pictures of small meshes whose squares are known, and of random ones.
 
-use super::format::{Format, write};
-use super::scene::{Scene, html};
-use super::squares::Detail;
 use super::*;
-use contract::octant::Octant;
+use contract::octant::{LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_of};
 use contract::word::{self, Leaf, Side, encode};
 use export::selection::Selection;
@@ -31,7 +28,7 @@ fn request(colour: Colour) -> Request<'static> {
         colour,
         zoom: 1.0,
         level_max: LEVEL_MAX,
-        command: "harness picture mesh --out a.svg".to_owned(),
+        view: false,
     }
 }
 
@@ -59,22 +56,21 @@ fn cube() -> Vec<Facet> {
 fn squares_are_where_the_leaves_are() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let shown = Request { selection: at(2, 1.0), ..request(Colour::Level) };
-    let svg = svg(&Picture::collect(&mesh, &shown, &DETAIL).unwrap());
+    let svg = svg(&Picture::collect(&mesh, &shown).unwrap());
     // The window is 1360 wide, from 200 to 1560, so a unit of the user is 170; the legend ends at 72.
     for path in [
-        "M200 752h340v340h-340z",
-        "M540 1092h340v340h-340z",
-        "M880 752h680v680h-680z",
-        "M200 72h680v680h-680z",
+        "M200 1092L540 1092L540 752L200 752z",
+        "M540 1432L880 1432L880 1092L540 1092z",
+        "M880 1432L1560 1432L1560 752L880 752z",
+        "M200 752L880 752L880 72L200 72z",
     ] {
         assert!(svg.contains(path), "{path} is missing in {svg}");
     }
-    assert_eq!((svg.matches("h340v340").count(), svg.matches("h680v680").count()), (4, 3));
-    assert!(svg.contains(">z = 1; 7 cells in the plane<"), "{svg}");
+    assert!(svg.contains(">z = 1; cells in the plane: 7<"), "{svg}");
     assert!(svg.contains(">level<") && !svg.contains("geometry"), "{svg}");
     // Above the small leaves.
     let shown = Request { selection: at(2, 4.0), ..shown };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
+    let picture = Picture::collect(&mesh, &shown).unwrap();
     assert_eq!((picture.squares.leaves, picture.key.len()), (4, 1));
 }
 
@@ -85,7 +81,10 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     let section = |axis: usize, coordinate: f64| {
         let selection = at(axis, coordinate);
         let shown = Request { selection, body: Some(&cube), ..request(Colour::Level) };
-        Picture::collect(&mesh, &shown, &DETAIL).unwrap().section.unwrap()
+        let Body::Section(segments) = Picture::collect(&mesh, &shown).unwrap().body else {
+            panic!("a slice has a section")
+        };
+        segments
     };
     for (axis, coordinate) in [(0, 4.0), (1, 3.3), (2, 4.0), (2, 2.0)] {
         let segments = section(axis, coordinate);
@@ -99,7 +98,7 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     assert!(section(2, 6.0).is_empty());
     // Without a slice, the plane halves the cube.
     let shown = Request { body: Some(&cube), ..request(Colour::Side) };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
+    let picture = Picture::collect(&mesh, &shown).unwrap();
     assert_eq!((picture.slice.axis, picture.slice.at), (2, UNITS_PER_EDGE / 2));
     assert!(svg(&picture).contains(">geometry<"));
 }
@@ -114,7 +113,7 @@ proptest! {
         let slice = selection.slice.unwrap();
         let cut: Vec<Octant> = leaves.iter().map(|&w| word::octant(w)).filter(|o| slice.cuts(o)).collect();
         let shown = Request { selection, ..request(Colour::Level) };
-        let picture = match Picture::collect(&mesh, &shown, &DETAIL) {
+        let picture = match Picture::collect(&mesh, &shown) {
             Ok(picture) => picture,
             Err(error) => {
                 prop_assert!(cut.is_empty(), "{}", error);
@@ -127,13 +126,10 @@ proptest! {
         prop_assert_eq!(squares.iter().map(|s| area(s.edge())).sum::<f64>(), expected);
         prop_assert_eq!(picture.squares.leaves, cut.len() as u64);
         // As many as a small page holds; each leaf is in one of them.
-        let detail = Detail { squares_max: 20, outlined_max: 5, level_max: LEVEL_MAX };
-        let merged = Picture::collect(&mesh, &shown, &detail).unwrap().squares;
+        let merged = Picture::with_squares(&mesh, &shown, 20).unwrap().squares;
         prop_assert!(merged.squares.len() <= 20);
         prop_assert_eq!(merged.squares.iter().map(|s| s.leaves).sum::<u64>(), cut.len() as u64);
         prop_assert_eq!(merged.leaves, cut.len() as u64);
-        let outlined = merged.squares.iter().filter(|s| s.level <= merged.level_outlined);
-        prop_assert!(outlined.count() <= 5 || merged.level_outlined == 0);
     }
 }
 
@@ -148,15 +144,15 @@ fn small_leaves_are_merged_and_the_greatest_value_counts() {
     words.sort_unstable();
     let (_place, mesh) = on_disk(vec![words]);
     let shown = Request { selection: at(2, 0.0), ..request(Colour::Side) };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
+    let picture = Picture::collect(&mesh, &shown).unwrap();
     let [square] = picture.squares.squares[..] else { panic!("{picture:?}") };
     assert_eq!((square.level, square.value, square.leaves), (10, Side::Crossing as u32, 3));
-    assert!(svg(&picture).contains("3 cells in the plane, the smallest merged"));
+    assert!(svg(&picture).contains("cells in the plane: 3, the smallest merged"));
     // The base mesh shows its own levels.
     let shown = Request { level_max: 6, colour: Colour::Level, ..shown };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
+    let picture = Picture::collect(&mesh, &shown).unwrap();
     assert_eq!((picture.squares.squares.len(), picture.key[0].value), (1, 6));
-    assert!(svg(&picture).contains("; 1 cell in the plane<"));
+    assert!(svg(&picture).contains("; cells in the plane: 1<"));
 }
 
 #[test]
@@ -164,9 +160,9 @@ fn a_clip_box_is_the_window() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let clip = [[0.0, 0.0, 7.0], [4.0, 2.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
     let selection = Selection { clip: Some(clip), ..at(2, 1.0) };
-    let shown = Request { selection, ..request(Colour::Spacing) };
-    let picture = Picture::collect(&mesh, &shown, &DETAIL).unwrap();
-    assert_eq!(picture.window, [[0.0, 0.0], [4.0, 2.0]]);
+    let shown = Request { selection, ..request(Colour::Level) };
+    let picture = Picture::collect(&mesh, &shown).unwrap();
+    assert_eq!(picture.window, [[0.0, 0.0, 7.0], [4.0, 2.0, 8.0]]);
     assert_eq!((picture.squares.leaves, picture.key[0].name.as_str()), (2, "2"));
 }
 
@@ -179,17 +175,16 @@ proptest! {
         let (_place, mesh) = on_disk(vec![eight_and_seven()]);
         let clip = [[1.0, 2.0, 0.0], [3.0, 3.0, 8.0]].map(|c| mesh.manifest.root.quantise_clamped(c));
         let selection = Selection { clip: Some(clip), ..at(2, 4.0) };
-        let shown = Request { selection, body: Some(&facets), ..request(Colour::Spacing) };
-        Picture::collect(&mesh, &shown, &DETAIL).unwrap().check_invariants();
+        let shown = Request { selection, body: Some(&facets), ..request(Colour::Level) };
+        Picture::collect(&mesh, &shown).unwrap().check_invariants();
     }
 }
 
 #[test]
 fn a_picture_without_cells_and_unknown_sides_are_errors() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
-    let sentence = |mesh: &Mesh, shown: &Request| {
-        Picture::collect(mesh, shown, &DETAIL).unwrap_err().to_string()
-    };
+    let sentence =
+        |mesh: &Mesh, shown: &Request| Picture::collect(mesh, shown).unwrap_err().to_string();
     let selection = Selection { level_max: Some(0), ..Selection::default() };
     let empty = Request { selection, ..request(Colour::Level) };
     assert!(sentence(&mesh, &empty).contains("no leaf of the selection"));
@@ -202,55 +197,108 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 #[test]
 fn a_picture_is_written_in_the_format_of_its_name() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
-    let picture = Picture::collect(&mesh, &request(Colour::Level), &DETAIL).unwrap();
+    let svg = svg(&Picture::collect(&mesh, &request(Colour::Level)).unwrap());
     let path = place.path().join("a.svg");
-    write(&picture, Format::of(&path).unwrap(), &path).unwrap();
-    assert!(path.is_file());
-    let error = write(&picture, Format::Svg, &place.path().join("no/a.svg")).unwrap_err();
+    write(&path, &Format::of(&path).unwrap().bytes(&svg).unwrap()).unwrap();
+    assert_eq!(std::fs::read_to_string(path).unwrap(), svg);
+    let error = write(&place.path().join("no/a.svg"), b"").unwrap_err();
     assert!(error.to_string().contains("no/a.svg"), "{error}");
-    for (name, why) in
-        [("a.vtk", "must end in .svg"), ("a", "must end in"), (".svg", "must end in")]
-    {
-        assert!(Format::of(name.as_ref()).unwrap_err().contains(why), "{name}");
+    for name in ["a.vtk", "a", ".svg", "a.html"] {
+        assert!(Format::of(name.as_ref()).unwrap_err().contains(".svg"), "{name}");
     }
-    assert!(Format::Html.draw(&picture).is_err());
     if cfg!(feature = "figures") {
-        assert_eq!(&Format::Png.draw(&picture).unwrap()[1..4], b"PNG");
-        assert!(Format::Pdf.draw(&picture).unwrap().starts_with(b"%PDF"));
+        let bytes = |name: &str| Format::of(name.as_ref()).unwrap().bytes(&svg).unwrap();
+        assert_eq!(&bytes("a.PNG")[1..4], b"PNG");
+        assert!(bytes("a.pdf").starts_with(b"%PDF"));
     }
 }
 
 #[test]
-fn a_view_has_three_slices_and_the_ranks_of_the_surface_and_needs_no_network() {
-    let words = eight_and_seven();
-    let (_place, mesh) = on_disk(vec![words[..10].to_vec(), words[10..].to_vec()]);
+fn a_view_has_the_slice_and_the_visible_surface_from_the_farthest_to_the_nearest() {
+    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let cube = cube();
-    let shown = Request { body: Some(&cube), ..request(Colour::Rank) };
-    let scene = Scene::collect(&mesh, &shown).unwrap();
-    let names: Vec<&str> = scene.slices.iter().map(|s| s.name.as_str()).collect();
-    assert_eq!(names, ["z = 4", "x = 4", "y = 4"]);
-    // Six bytes per square are eight characters; the planes cut the four leaves above 4.
-    assert!(scene.slices.iter().all(|s| s.squares.len() == 4 * 8));
-    assert_eq!(scene.legend.len(), 2);
-    let body = scene.body.as_ref().unwrap();
-    assert_eq!(body.points.len(), (8 * 12usize).div_ceil(3) * 4);
-    let page = html(&scene);
-    assert!(page.contains("\"title\": \"15 cells by rank\"") && !page.contains("{}</script>"));
-    for outside in ["http", "src=", "import ", "@import", "url(", "fetch("] {
-        assert!(!page.contains(outside), "{outside}");
-    }
-    let alone = scene.of_body();
-    assert!(alone.slices.is_empty() && alone.legend.is_empty() && alone.body.is_some());
+    let shown = Request { body: Some(&cube), view: true, ..request(Colour::Level) };
+    let picture = Picture::collect(&mesh, &shown).unwrap();
+    let Body::Surface(faces) = &picture.body else { panic!("a view has a surface") };
+    // The cube of edge 4 in a window of 1.5 edges, seen from a direction of which all components are alike.
+    let area = |[a, b, c]: [Planar; 3]| {
+        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2.0
+    };
+    let toward = [0.5f64, 0.69, 0.52];
+    let expected = 2.0 * 16.0 * toward.iter().sum::<f64>();
+    let sum: f64 = faces.iter().map(|f| area(f.corners)).sum();
+    assert!((sum / expected - 1.0).abs() < 0.02, "{sum} of {expected}");
+    assert!(faces.iter().all(|f| area(f.corners) > 0.0));
+    let before: f64 = faces.iter().filter(|f| f.is_before).map(|f| area(f.corners)).sum();
+    assert!((before / sum - 0.5).abs() < 0.02, "half of the surface is above z = 4: {before}");
+    // Light falls on the three sides that are seen in different ways, on the others too: facets need no orientation.
+    let lights: std::collections::BTreeSet<i64> =
+        faces.iter().map(|f| (f.light * 100.0) as i64).collect();
+    assert_eq!(lights.len(), 3, "{lights:?}");
+    // The last triangle is at the corner that is nearest.
+    let nearest = picture.projection.planar([2.0, 2.0, 6.0]);
+    let last = faces.last().unwrap().corners;
+    assert!(last.iter().any(|p| (p[0] - nearest[0]).hypot(p[1] - nearest[1]) < 0.01), "{last:?}");
+    let svg = svg(&picture);
+    assert!(svg.contains(">z = 4; cells in the plane: 4<") && !svg.contains(">x<"), "{svg:.900}");
+}
+
+#[test]
+fn facets_far_beyond_the_window_and_many_small_ones_are_drawn_fast() {
+    let window = [[0.0; 3], [1.0; 3]];
+    let large = [[[-1e6, -1e6, 0.5], [1e6, -1e6, 0.5], [0.0, 1e6, 0.5f32]]];
+    let faces = surface(&large, &window, (2, 0.2), &Projection::OBLIQUE);
+    assert!((1000..20_000).contains(&faces.len()), "{}", faces.len());
+    assert!(faces.iter().all(|f| f.is_before));
+    let small = |i: u32| {
+        let (x, y) = ((i % 250) as f32 / 250.0, (i / 250) as f32 / 250.0);
+        [[x, y, 0.1], [x + 0.004, y, 0.1], [x, y + 0.004, 0.1]]
+    };
+    let many: Vec<Facet> = (0..62_500).map(small).collect();
+    assert!(surface(&many, &window, (2, 0.2), &Projection::OBLIQUE).len() <= 40_000);
+    let again = || surface(&many, &window, (2, 0.05), &Projection::OBLIQUE);
+    assert_eq!(again(), again(), "the order does not depend on chance");
+    assert_eq!(surface(&[], &window, (2, 0.2), &Projection::OBLIQUE), []);
 }
 
 #[test]
 fn labels_of_the_vertical_axis_have_room_and_planes_far_from_the_origin_their_digits() {
-    let at = |v: f64| [[0.0, v], [100.0, v + 100.0]];
+    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
+    let picture = Picture::collect(&mesh, &request(Colour::Level)).unwrap();
+    let at = |v: f64, root: Root| Picture {
+        window: [[0.0, v, 0.0], [100.0, v + 100.0, 0.0]],
+        root,
+        ..picture.clone()
+    };
     // Five digits and a sign are wider than the usual margin.
-    assert!(draw::scale(&at(-12_050.0)) < 0.97 * draw::scale(&at(0.0)));
+    let root = picture.root;
+    assert!(draw::scale(&at(-12_050.0, root)) < 0.97 * draw::scale(&at(0.0, root)));
     let root = Root { origin: [22_191.242, -14_722.031, 689.93], edge: 5553.0 };
     for (z, name) in [(3410.4, "z = 3410.4"), (3410.0, "z = 3410"), (689.93, "z = 689.93")] {
-        assert_eq!(plane_name(&root, Slice::new(&root, 2, z).unwrap()), name);
+        let slice = Slice::new(&root, 2, z).unwrap();
+        assert_eq!(Picture { slice, ..at(0.0, root) }.plane_name(), name);
+    }
+}
+
+/// Slices and views in every colour, of a root far from the origin too.
+#[cfg(feature = "figures")]
+#[test]
+fn no_text_of_a_picture_is_cut_or_lies_on_another() {
+    use crate::figure::tests::assert_legible;
+    let words = eight_and_seven();
+    let (_place, mesh) = on_disk(words.chunks(1).map(<[u64]>::to_vec).collect());
+    let cube = cube();
+    for (view, colour) in [false, true]
+        .into_iter()
+        .flat_map(|view| [Colour::Level, Colour::Rank, Colour::Side].map(|colour| (view, colour)))
+    {
+        let shown = Request { body: Some(&cube), view, ..request(colour) };
+        let picture = Picture::collect(&mesh, &shown).unwrap();
+        assert_legible(&svg(&picture));
+        let far = |at: f64| at - 12_345_678.0;
+        let window = picture.window.map(|corner| corner.map(far));
+        let root = Root { origin: picture.root.origin.map(far), ..picture.root };
+        assert_legible(&svg(&Picture { window, root, body: Body::Unknown, ..picture }));
     }
 }
 
@@ -259,11 +307,11 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
     let (_dir, mesh) = on_disk(vec![eight_and_seven()]);
     let facet = [[1.0f32, 1.0, -1.0], [7.0, 1.0, 9.0], [1.0, 7.0, 9.0]];
     let request = Request { body: Some(&[facet]), selection: at(2, 1.0), ..request(Colour::Level) };
-    let mut picture = Picture::collect(&mesh, &request, &DETAIL).unwrap();
+    let mut picture = Picture::collect(&mesh, &request).unwrap();
     change(&mut picture);
     let check = std::panic::AssertUnwindSafe(|| {
         picture.check_invariants();
-        picture.squares.check_invariants(&DETAIL);
+        picture.squares.check_invariants(SQUARES_MAX);
     });
     let caught = std::panic::catch_unwind(check).unwrap_err();
     let message = caught.downcast_ref::<String>().cloned();
@@ -274,9 +322,12 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
 #[test]
 fn planted_wrong_pictures_are_noticed() {
     assert_noticed("not within the root", |p| p.window[1][0] = 9.0);
-    assert_noticed("outside of the window", |p| p.window = [[6.0; 2], [8.0; 2]]);
+    assert_noticed("is outside of", |p| p.window = [[6.0; 3], [8.0; 3]]);
     assert_noticed("has no colour", |p| p.key.truncate(1));
-    assert_noticed("leaves the window", |p| p.section.as_mut().unwrap()[0][0][1] = -5.0);
+    assert_noticed("leaves [", |p| {
+        let Body::Section(segments) = &mut p.body else { panic!("a slice has a section") };
+        segments[0][0][1] = -5.0;
+    });
     assert_noticed("not the square of an octant", |p| p.squares.squares[0].corner[0] += 1);
     assert_noticed("leaves of all squares", |p| p.squares.leaves += 1);
     assert_noticed("overlap", |p| p.squares.squares.swap(0, 5));

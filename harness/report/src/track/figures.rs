@@ -2,7 +2,7 @@
 //!
 //! Points are not joined: there are no values between two commits.
 
-use crate::figure::{Axis, Body, Figure, Mark, Point, Provenance, Series as Plotted, file_name};
+use crate::figure::{Axis, Figure, Mark, Point, Provenance, Series as Plotted, file_name};
 use bench::track::history::Record;
 use bench::track::{Change, Series};
 
@@ -47,15 +47,15 @@ pub fn of_metric(records: &[Record], series: &Series) -> Figure {
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
     }
     let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
-    let marks = series.changes.iter().map(mark).collect();
     Figure {
         height: HEIGHT,
+        marks: series.changes.iter().map(mark).collect(),
         ..Figure::new(
             file_name(&format!("metric-{}", series.name)),
             series.name.clone(),
             String::new(),
             [commits(records.len()), y],
-            Body::Points { series: lines, marks },
+            lines,
         )
     }
 }
@@ -111,7 +111,7 @@ mod tests {
         let figure = of_metric(&records, words);
         let (low, high) = figure.y.range.unwrap();
         assert!((500.0..1000.0).contains(&low) && (1110.0..1500.0).contains(&high), "{low} {high}");
-        let Body::Points { series, .. } = figure.body else { panic!() };
+        let series = figure.series;
         assert_eq!((series[0].points.len(), series[1].points.len()), (29, 1));
         assert_eq!(series[1].points[0].y, high);
         assert!(series[1].notes[0].contains("1000000000"), "{:?}", series[1].notes);
@@ -122,7 +122,7 @@ mod tests {
         let records = bench::testing::history();
         let all = analyse(&records, &Rules::default());
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
-        let Body::Points { series, marks } = of_metric(&records, words).body else { panic!() };
+        let Figure { series, marks, .. } = of_metric(&records, words);
         assert_eq!(marks, [Mark { name: "worse".into(), x: 19.5, style: 1 }]);
         assert!(series[0].notes[20].ends_with("\n<b>"), "{:?}", series[0].notes[20]);
     }

@@ -1,0 +1,87 @@
+//! The formats of a drawing. PNG and PDF are made from the SVG, with the typeface in `font/` only, so that they look the same on every machine.
+
+use std::path::Path;
+
+/// A format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Scalable vector graphics.
+    Svg,
+    /// On white, with one pixel per unit of the SVG's coordinates.
+    Png,
+    /// Text remains text.
+    Pdf,
+}
+
+impl Format {
+    /// The formats that were compiled, with the ends of their files' names.
+    pub const ALL: &[(&str, Self)] = &[
+        ("svg", Self::Svg),
+        #[cfg(feature = "figures")]
+        ("png", Self::Png),
+        #[cfg(feature = "figures")]
+        ("pdf", Self::Pdf),
+    ];
+
+    /// The format that a file name states.
+    ///
+    /// # Errors
+    /// One sentence, if it states none that was compiled.
+    pub fn of(path: &Path) -> Result<Self, String> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        let extension = extension.to_ascii_lowercase();
+        let known = Self::ALL.iter().find(|(name, _)| *name == extension);
+        let why = match cfg!(feature = "figures") {
+            true => "the file name of a picture must end in .svg, .png or .pdf",
+            false => "a harness without the feature figures draws .svg only",
+        };
+        known.map(|(_, format)| *format).ok_or_else(|| format!("{}: {why}", path.display()))
+    }
+
+    /// The drawing in this format.
+    ///
+    /// # Errors
+    /// If `svg` is not an SVG document.
+    pub fn bytes(self, svg: &str) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Svg => Ok(svg.as_bytes().to_vec()),
+            #[cfg(feature = "figures")]
+            Self::Png => rendered::png(svg),
+            #[cfg(feature = "figures")]
+            Self::Pdf => rendered::pdf(svg),
+            #[cfg(not(feature = "figures"))]
+            Self::Png | Self::Pdf => unreachable!("a format that was not compiled"),
+        }
+    }
+}
+
+#[cfg(feature = "figures")]
+pub(super) mod rendered {
+    use crate::figure::canvas::FONT;
+    use resvg::{tiny_skia, usvg};
+    use std::sync::Arc;
+
+    /// DejaVu Sans, Latin part; its licence is in the same directory.
+    const FONT_FILE: &[u8] = include_bytes!("font/DejaVuSans-latin.ttf");
+
+    pub fn tree(svg: &str) -> Result<usvg::Tree, String> {
+        let mut options = usvg::Options { font_family: FONT.into(), ..usvg::Options::default() };
+        Arc::make_mut(&mut options.fontdb).load_font_data(FONT_FILE.to_vec());
+        usvg::Tree::from_str(svg, &options).map_err(|error| error.to_string())
+    }
+
+    pub fn png(svg: &str) -> Result<Vec<u8>, String> {
+        let tree = tree(svg)?;
+        let size = tree.size().to_int_size();
+        let pixels = tiny_skia::Pixmap::new(size.width(), size.height());
+        let mut pixels = pixels.ok_or("the size is 0")?;
+        pixels.fill(tiny_skia::Color::WHITE);
+        resvg::render(&tree, tiny_skia::Transform::identity(), &mut pixels.as_mut());
+        pixels.encode_png().map_err(|error| error.to_string())
+    }
+
+    pub fn pdf(svg: &str) -> Result<Vec<u8>, String> {
+        let (conversion, page) = Default::default();
+        svg2pdf::to_pdf(&tree(svg)?, conversion, page).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,261 @@
+//! Figures for LaTeX, set in the fonts of the document: the values as CSV, and an axis of `pgfplots` that reads them.
+
+use super::axes::{SUPERSCRIPTS, Scale};
+use super::canvas::COLOURS;
+use super::svg::MARKERS;
+use super::{Axis, Bars, Figure, Point, Provenance, Series};
+use std::fmt::Write;
+
+/// What a document needs before it can include figures.
+const PREAMBLE: &str = "\\usepackage{pgfplots} \\pgfplotsset{compat=1.16}";
+
+/// Filled and hollow marker of every style.
+const MARKS: [(&str, &str); MARKERS.len()] = [
+    ("*", "o"),
+    ("square*", "square"),
+    ("triangle*", "triangle"),
+    ("diamond*", "diamond"),
+    ("triangle*, mark options={rotate=180}", "triangle, mark options={rotate=180}"),
+    ("pentagon*", "pentagon"),
+];
+
+/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes. Rows of one series have the same
+/// number `plot`, and so have those of one segment of bars. Numbers come first and text has no commas, so that `pgfplots` can read it.
+pub fn csv(figure: &Figure) -> String {
+    let head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
+    if let Some(bars) = &figure.bars {
+        return head + &bars_csv(figure, bars);
+    }
+    let columns = ["plot", "x", "y", "low", "high", "series", "how"];
+    let point = |plot: usize, s: &Series, p: &Point| {
+        let numbers = [plot as f64, p.x, p.y, p.low, p.high];
+        let numbers = numbers.iter().map(f64::to_string);
+        numbers.chain([plain(&s.name), s.provenance.word().to_owned()]).collect()
+    };
+    let series = figure.series.iter().enumerate();
+    let rows = series.flat_map(|(plot, s)| s.points.iter().map(move |p| point(plot, s, p)));
+    head + &table(&columns, rows)
+}
+
+/// The segments of every bar, and the vertical lines between them.
+fn bars_csv(figure: &Figure, bars: &Bars) -> String {
+    let row = |plot: usize, at: [f64; 2], text: [&str; 3]| {
+        let numbers = [plot as f64, at[0], at[1]].map(|number| number.to_string());
+        numbers.into_iter().chain(text.map(plain)).collect()
+    };
+    let mut rows = Vec::new();
+    for (plot, (part, values)) in bars.segments.iter().enumerate() {
+        for (i, name) in bars.names.iter().enumerate() {
+            let text = [name, part, bars.provenance.word()];
+            rows.push(row(plot, [values[i], i as f64], text));
+        }
+    }
+    for (plot, mark) in (bars.segments.len()..).zip(&figure.marks) {
+        let ends = [-0.5, bars.names.len() as f64 - 0.5];
+        rows.extend(ends.map(|y| row(plot, [mark.x, y], ["", &mark.name, "bound"])));
+    }
+    table(&["plot", "x", "y", "bar", "part", "how"], rows)
+}
+
+/// A name without what ends a field or means something to TeX.
+fn plain(text: &str) -> String {
+    text.replace(", ", "; ")
+        .replace([',', '"', '%', '#', '\\', '{', '}', '$', '&', '~', '^', '\n', '\r'], " ")
+}
+
+/// A CSV table with its head.
+///
+/// # Panics
+/// If a row and the head have different numbers of fields.
+pub fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = ::csv::Writer::from_writer(Vec::new());
+    let write = || -> Result<(), ::csv::Error> {
+        writer.write_record(columns)?;
+        rows.into_iter().try_for_each(|row| writer.write_record(row))
+    };
+    write().expect("memory accepts rows of equal length");
+    let bytes = writer.into_inner().expect("memory accepts every write");
+    String::from_utf8(bytes).expect("the fields are UTF-8")
+}
+
+/// The figure as a `tikzpicture`. `\figures` is the directory of its other files.
+pub fn tex(figure: &Figure) -> String {
+    let mut out = format!(
+        "% Requires {PREAMBLE}\n\\providecommand{{\\figures}}{{figures}}\n\\begin{{tikzpicture}}\n"
+    );
+    for (i, [r, g, b]) in COLOURS.iter().enumerate() {
+        // Writing into a string cannot fail, here and below.
+        let _ = writeln!(out, "\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}");
+    }
+    let [x, y] = figure.scales();
+    let kind = match figure.bars {
+        Some(_) => "xbar stacked, bar width=8pt, ",
+        None => "",
+    };
+    let _ = writeln!(
+        out,
+        "\\begin{{axis}}[\n  width=\\linewidth, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
+         legend style={{at={{(0.5,1.03)}},anchor=south,legend columns=2,draw=none,font=\\footnotesize}},\n  {},\n  {}\n]",
+        axis_options("x", &figure.x, &x),
+        axis_options("y", &figure.y, &y)
+    );
+    for (plot, (name, _)) in figure.bars.iter().flat_map(|bars| &bars.segments).enumerate() {
+        let style = plot % COLOURS.len();
+        let tint = if plot % 2 == 1 { "!35" } else { "" };
+        let _ = writeln!(
+            out,
+            "\\addplot+[fill=style{style}{tint}, draw=style{style}] table[{}, x=x, y=y] {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
+            rows(plot),
+            figure.id,
+            escape(name)
+        );
+    }
+    for mark in &figure.marks {
+        let (style, x) = (mark.style % COLOURS.len(), mark.x);
+        let _ = writeln!(
+            out,
+            "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
+             \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{}}}",
+            escape(&mark.name)
+        );
+    }
+    for (plot, s) in figure.series.iter().enumerate() {
+        let (style, (filled, hollow)) = (s.style % COLOURS.len(), MARKS[s.style % MARKS.len()]);
+        let (line, mark) = match s.provenance {
+            Provenance::Measured => ("solid", filled),
+            _ => ("dashed", hollow),
+        };
+        let line = if s.joined { line } else { "only marks" };
+        let options = match s.provenance {
+            Provenance::Bound => "black, densely dotted, no marks".to_owned(),
+            _ => format!(
+                "style{style}, {line}, mark={mark}, error bars/.cd, y dir=both, y explicit, error bar style={{solid}}"
+            ),
+        };
+        let _ = writeln!(
+            out,
+            "\\addplot[{options}] table[{}, x=x, y=y, \
+             y error plus expr=\\thisrow{{high}}-\\thisrow{{y}}, y error minus expr=\\thisrow{{y}}-\\thisrow{{low}}] \
+             {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
+            rows(plot),
+            figure.id,
+            escape(&s.name)
+        );
+    }
+    out + "\\end{axis}\n\\end{tikzpicture}\n"
+}
+
+/// The rows of a plot in the CSV file.
+fn rows(plot: usize) -> String {
+    format!(
+        "col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}"
+    )
+}
+
+/// Label, kind, ends and ticks of an axis. Names of bars are from top to bottom.
+fn axis_options(name: &str, axis: &Axis, scale: &Scale) -> String {
+    let at: Vec<String> = scale.ticks.iter().map(f64::to_string).collect();
+    let labels: Vec<String> = scale.labels.iter().map(|label| escape(label)).collect();
+    let (start, end) = (scale.ends.start, scale.ends.end);
+    format!(
+        "{name}label={{{}}}, {name}mode={}, {name}min={}, {name}max={}, {}{name}tick={{{}}}, {name}ticklabels={{{}}}",
+        escape(&axis.label),
+        if axis.log { "log" } else { "linear" },
+        start.min(end),
+        start.max(end),
+        if start > end { format!("{name} dir=reverse, ") } else { String::new() },
+        at.join(","),
+        labels.join(",")
+    )
+}
+
+/// The figures with captions and labels, for `\input` in a document.
+pub fn fragment(figures: &[Figure]) -> String {
+    let mut out = format!(
+        "% Made by `harness report`. Requires {PREAMBLE}.\n\
+         % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
+         \\providecommand{{\\figures}}{{figures}}\n"
+    );
+    for Figure { id, caption, .. } in figures {
+        let _ = write!(
+            out,
+            "\n\\begin{{figure}}\n  \\centering\n  \\input{{\\figures/{id}.tex}}\n  \\caption{{{}}}\n  \\label{{fig:{id}}}\n\\end{{figure}}\n",
+            escape(caption)
+        );
+    }
+    out
+}
+
+/// The text with what is special to LaTeX escaped.
+fn escape(text: &str) -> String {
+    let escaped = |c: char| match c {
+        '\\' => "\\textbackslash{}".to_owned(),
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '<' => "\\textless{}".to_owned(),
+        '>' => "\\textgreater{}".to_owned(),
+        '`' => "'".to_owned(),
+        '·' => "$\\cdot$".to_owned(),
+        'λ' => "$\\lambda$".to_owned(),
+        '–' => "--".to_owned(),
+        'µ' => "$\\mu$".to_owned(),
+        '×' => "$\\times$".to_owned(),
+        '⁻' => "$^-$".to_owned(),
+        _ => match SUPERSCRIPTS.iter().position(|s| *s == c) {
+            Some(digit) => format!("$^{digit}$"),
+            None => c.to_string(),
+        },
+    };
+    text.chars().map(escaped).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{bars, figure, series};
+    use super::*;
+
+    #[test]
+    fn every_point_is_a_line_and_text_is_plain() {
+        let text = csv(&figure(vec![series(Provenance::Measured), series(Provenance::Projected)]));
+        assert_eq!(text.lines().count(), 3 + 6);
+        assert!(text.contains("\n1,4,4,3.6,4.4,UAV; projected,projected\n"), "{text}");
+        assert_eq!(plain("5 % of \"a\", b_1"), "5   of  a ; b_1");
+    }
+
+    #[test]
+    fn measured_points_are_filled_and_oversubscribed_ones_hollow() {
+        let both = vec![series(Provenance::Measured), series(Provenance::Oversubscribed)];
+        let text = tex(&figure(both));
+        assert!(text.contains("mark=*") && text.contains("mark=o"));
+        assert!(text.contains("xmode=log") && text.contains("xtick={1,2,4}, xticklabels={1,2,4}"));
+        assert!(
+            text.contains("{\\thisrow{plot}}{1:1}") && text.contains("{\\figures/speedup.csv}")
+        );
+        assert_eq!(text.matches('{').count(), text.matches('}').count(), "{text}");
+        assert_eq!(text.matches("\\begin").count(), text.matches("\\end").count(), "{text}");
+    }
+
+    #[test]
+    fn segments_of_bars_are_plots_and_the_fragment_has_captions_and_labels() {
+        let figure = bars();
+        let text = csv(&figure);
+        assert!(text.contains("\n1,3,0,1,grade,projected\n"), "{text}");
+        assert!(text.contains("\n2,3,1.5,,mean; 3,bound\n"), "{text}");
+        let text = tex(&figure);
+        assert!(text.contains("xbar stacked") && text.contains("y dir=reverse"), "{text}");
+        assert!(text.contains("ytick={0,1}, yticklabels={1,2}"), "{text}");
+        assert!(text.contains("({axis cs:3,0}|-{rel axis cs:0,0})"), "{text}");
+        assert_eq!(text.matches('{').count(), text.matches('}').count(), "{text}");
+        let text = fragment(&[figure]);
+        assert!(text.contains("\\input{\\figures/speedup.tex}"), "{text}");
+        assert!(text.contains("\\label{fig:speedup}"), "{text}");
+        assert!(text.contains("Speedup \\& \\textless{}more\\textgreater{}"), "{text}");
+    }
+
+    #[test]
+    fn special_characters_are_escaped() {
+        assert_eq!(escape("5·10⁻⁷"), "5$\\cdot$10$^-$$^7$");
+        assert_eq!(escape("50 % of A_1 & {B}"), "50 \\% of A\\_1 \\& \\{B\\}");
+    }
+}
