@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Least space at the left of the data, for ticks and label.
 const LEFT: f64 = 190.0;
 /// Space at the left of ticks.
-const BESIDE_TICKS: f64 = 110.0;
+const BESIDE_TICKS: f64 = 100.0;
 /// Space below the data, for ticks and label.
 pub const BELOW: f64 = 140.0;
 

@@ -27,7 +27,7 @@ pub const MARKERS: [&[(i32, i32)]; 6] = [
 /// Length of a line in the legend.
 const LENGTH: i32 = SYMBOL as i32 - 18;
 /// Space at the right of the data, and between the label of the vertical axis and the edge of the page.
-const BESIDE: [f64; 2] = [40.0, 14.0];
+const BESIDE: [f64; 2] = [40.0, 10.0];
 /// Length of a tick. Labels at the corner do not touch.
 const TICK: i32 = 16;
 /// Width of lines of data.
