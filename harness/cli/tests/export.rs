@@ -169,7 +169,7 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     let import = ["import", "mesh.vtkhdf", "--sides", "side", "--out", "again"];
     let (code, output, error) = harness(&import);
     assert_eq!((code, error.as_str()), (0, ""));
-    assert!(output.contains("148 cells, sides Known"), "{output}");
+    assert!(output.contains("148 cells, sides known"), "{output}");
     assert_eq!(harness(&["diff", "mesh", "again"]).0, 0);
 
     // A directory with the tree alone is compared like one with leaf words.
