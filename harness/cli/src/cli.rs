@@ -42,7 +42,7 @@ pub enum Command {
     Audit(commands::audit::Arguments),
     /// Diagnose a geometry before meshing: its defects, and what each means for the mesh
     Geometry(commands::geometry::Arguments),
-    /// Search for an opening through which two places are joined, and the spacing at which it closes or opens
+    /// Search for an opening through which two places are joined, and the spacing that closes it
     Leak(Box<commands::leak::Arguments>),
     /// Write a mesh, or part of it, for ParaView and other programs
     Export(commands::export::Arguments),

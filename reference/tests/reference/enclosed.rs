@@ -15,7 +15,7 @@ fn blocks(corners: &[[i64; 2]]) -> Case {
     Case { keep: Keep::Outside, ..case(&facets.collect::<Vec<_>>().concat(), 4) }
 }
 
-/// The shell of `tests/seeds.rs`: 8 leaves in the cavity, 1,352 around the shell, 784 in it.
+/// The shell of `seeds.rs`: 8 leaves in the cavity, 1,352 around the shell, 784 in it.
 #[test]
 fn a_sealed_cavity_is_deleted_unless_the_case_keeps_it() {
     let shell = blocks(&[[1, 7], [3, 5]]);

@@ -2,7 +2,7 @@
 //!
 //! One pass over the part files, which are merged while they are read, or over the tree if there are none, computes the tally, checks the order and
 //! builds the tree. Leaves are not stored. The tree stores equal subtrees once, so memory grows with the
-//! variety of a mesh and not with its size; an option limits it. Without a case, the checks use the requirements in the
+//! variety of a mesh and not with its size, up to [`NODES_MAX`]. Without a case, the checks use the requirements in the
 //! manifest, and the head of each names what it cannot detect. With a case, they are a whole check: a mesh that passes is the
 //! mesh of the definition. With promises of less than the definition, exactly those are checked.
 //!
