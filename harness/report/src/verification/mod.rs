@@ -78,8 +78,9 @@ fn rank_counts(case: &CaseReport) -> Vec<usize> {
 fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
     let Tally { pass, fail, left_out } = tally;
     let measured = |run: &Run| {
-        let (time_s, rate) = (run.time_wall_s, run.cells_per_s() / 1e6);
-        [format!("{time_s:.3}"), format!("{rate:.3}"), format!("{:.1}", run.bytes_per_cell())]
+        let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
+        let rate = format!("{:.3}", run.cells_per_s() / 1e6);
+        [time_s.unwrap_or("-".to_owned()), rate, format!("{:.1}", run.bytes_per_cell())]
     };
     let measured = run.map_or_else(|| ["-"; 3].map(str::to_owned), measured);
     [pass, fail, left_out].map(|n| n.to_string()).into_iter().chain(measured).collect()
