@@ -1,14 +1,18 @@
-//! The formats of an export. The name of the file decides.
+//! The formats of an export. The name of the file decides. Scripts make CGNS of a polyMesh, and MFEM's format of a forest of p4est.
 
+use std::fs::File;
+use std::io;
 use std::path::Path;
 
 use crate::foam;
 use crate::front;
 use crate::htg;
-use crate::options::Write;
-use crate::scripted;
+use crate::mesh::Mesh;
+use crate::options::{Options, Summary, Write};
+use crate::selection::Selection;
 use crate::{p8est, vtu};
 use contract::failure::Failure;
+use contract::files::{Staging, fill_atomically};
 
 /// A format of mesh files.
 #[derive(Debug)]
@@ -54,13 +58,19 @@ pub const FORMATS: &[Format] = &[
         ending: ".cgns",
         purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
         options: &["--case", "--regions"],
-        write: scripted::cgns,
+        write: |mesh, selection, path, options| {
+            let source = ("polyMesh", foam::write as Write);
+            made("cgns", source, (mesh, selection, path, options))
+        },
     },
     Format {
         ending: ".mfem",
         purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
         options: &[],
-        write: scripted::mfem,
+        write: |mesh, selection, path, options| {
+            let source = ("mesh.p8est", p8est::write as Write);
+            made("mfem", source, (mesh, selection, path, options))
+        },
     },
     Format {
         ending: ".vtkhdf",
@@ -81,6 +91,26 @@ pub const FORMATS: &[Format] = &[
         write: front::stl,
     },
 ];
+
+/// Writes the selected leaves of a mesh in another format, whose file has this name, and has the script make this format of it.
+///
+/// # Errors
+/// As the other format, and if the script fails.
+fn made(
+    format: &str,
+    (name, write): (&str, Write),
+    (mesh, selection, path, options): (&Mesh, &Selection, &Path, &Options<'_>),
+) -> Result<Summary, Failure> {
+    let failed = |error: io::Error| Failure::at(path, error);
+    let place = Staging::beside(path).map_err(failed)?;
+    let (source, file) = (place.path().join(name), place.path().join("made"));
+    let written = write(mesh, selection, &source, options)?;
+    (options.script)(format, &source, &file)?;
+    let mut made = File::open(&file).map_err(failed)?;
+    let copy = |draft: &mut File| io::copy(&mut made, draft).map_err(failed);
+    let bytes = fill_atomically(path, failed, copy)?;
+    Ok(Summary { files: 1, bytes, ..written })
+}
 
 /// The format of a file with this name.
 ///

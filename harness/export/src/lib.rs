@@ -4,7 +4,7 @@
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
 //! - [`vtu`]: cells for VTK; [`front`]: the surface towards a near-body mesh;
-//! - [`foam`]: meshes for OpenFOAM; [`scripted`]: CGNS and MFEM, made of other formats by scripts;
+//! - [`foam`]: meshes for OpenFOAM; CGNS and MFEM are made of other formats by scripts;
 
 #![deny(missing_docs)]
 
@@ -18,7 +18,6 @@ pub mod mesh;
 pub mod options;
 pub mod p8est;
 pub mod polydata;
-pub mod scripted;
 pub mod selection;
 mod squares;
 #[cfg(test)]

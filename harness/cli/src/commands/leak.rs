@@ -15,13 +15,10 @@ use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
 use report::json::pretty;
-
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
-use run::engine::runner::Engine;
 use run::progress::Progress;
-use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::Duration;
 
@@ -43,7 +40,7 @@ Examples:
   harness leak car.toml --from 0,0,1 --vtk leak.vtp      its path for ParaView
 
 Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found; 2 invalid input, or nothing to \
-examine; 3 mesher and reference are missing, or one that was given; 130 interrupted.")]
+examine; 3 the mesher is missing; 130 interrupted.")]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
@@ -75,9 +72,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let programs = Programs::find(arguments.programs.given())?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
-    let engine = engine(&programs, &arguments.programs)?;
     let limit = Duration::from_secs(arguments.timeout);
-    let mut trees = BaseTrees::new(engine, &path, &case, limit)?;
+    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, limit)?;
     let progress = Progress::new();
     let (mut first, leaked) = match (arguments.from, arguments.to) {
         (None, None) => {
@@ -142,37 +138,12 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
     Ok(leaks)
 }
 
-/// The program that makes the base trees: the mesher, or the reference if the mesher is missing and was not given.
-fn engine<'a>(programs: &'a Programs, given: &ProgramArguments) -> Result<&'a Engine, Failure> {
-    let all = [
-        (&programs.mesher, given.mesher.is_some(), "mesher"),
-        (&programs.reference, given.reference.is_some(), "reference"),
-    ];
-    let exists = |engine: &Engine| engine.program().is_file();
-    let found = all.iter().find(|(engine, ..)| exists(engine)).map(|(engine, ..)| *engine);
-    let wrong = all.iter().find(|(engine, is_given, _)| *is_given && !exists(engine));
-    match (found, wrong) {
-        (Some(engine), None) => Ok(engine),
-        (_, wrong) => {
-            let (engine, _, name) = wrong.unwrap_or(&all[0]);
-            let path = engine.program().display();
-            Err(Failure::missing(format!(
-                "the {name} is missing: build {path}, or give another path with --{name}"
-            )))
-        }
-    }
-}
-
-/// Writes the requested files, unless the user interrupts before they are complete.
+/// Writes the requested files, unless the user has interrupted.
 fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     let passages: Vec<&Passage> =
         answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
-    let complete = |written: io::Result<()>| match interrupt::requested() {
-        true => Err(ErrorKind::Interrupted.into()),
-        false => written,
-    };
-    let json: Content<'_> = &|out| complete(out.write_all(pretty(answers).as_bytes()));
-    let vtk: Content<'_> = &|out| complete(polydata::paths(&passages, out));
+    let json: Content<'_> = &|out| out.write_all(pretty(answers).as_bytes());
+    let vtk: Content<'_> = &|out| polydata::paths(&passages, out);
     if passages.is_empty() && arguments.vtk.is_some() {
         eprintln!(
             "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"
@@ -181,8 +152,10 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
     let all = [(arguments.json.as_deref(), json), (of_path, vtk)];
     let files: Vec<_> = all.into_iter().filter_map(|(file, fill)| Some((file?, fill))).collect();
-    write_together(&files, |path, error| Failure::from(named(path, &error)))?;
-    if files.is_empty() && interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) }
+    if interrupt::requested() {
+        return Err(Failure::interrupted());
+    }
+    write_together(&files, |path, error| Failure::from(named(path, &error)))
 }
 
 fn target(text: &str) -> Result<Target, String> {

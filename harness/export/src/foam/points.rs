@@ -14,8 +14,6 @@ use contract::failure::Failure;
 
 /// Number of points that can be distinguished.
 const POINTS_MAX: usize = u32::MAX as usize;
-/// Cells whose points are sorted at once.
-const CHUNK: u32 = 1 << 12;
 
 /// The points, as Morton codes with 20 bits per axis, and the number of each.
 #[derive(Debug, Default)]
@@ -37,32 +35,25 @@ impl Points {
     /// # Errors
     /// If there are too many, or if the user interrupts.
     pub fn new(leaves: &Leaves, options: &Options) -> Result<Self, Failure> {
-        let (mut keys, mut begin, mut of_cell) = (Vec::new(), 0, Vec::new());
-        leaves.walk(options, &mut |number, around| {
+        let (mut numbers, mut of_cell) = (FxHashMap::default(), Vec::new());
+        leaves.walk(options, &mut |_, around| {
             squares(leaves, around, &mut of_cell);
             let edge = around.octant.edge();
-            let corner = |d: u32| {
-                key(std::array::from_fn(|a| around.octant.corner[a] + edge * (d >> a & 1)))
-            };
-            keys.extend((0..8).map(corner));
+            let corner =
+                |d: u32| std::array::from_fn(|a| around.octant.corner[a] + edge * (d >> a & 1));
             let of_boundary = of_cell.iter().filter(|square| square.across.as_cell().is_none());
-            keys.extend(of_boundary.flat_map(|square| square.corners().map(key)));
-            // Most points are those of cells that follow each other.
-            if number % CHUNK == CHUNK - 1 {
-                begin = sort_from(&mut keys, begin);
-            }
+            let points = (0..8).map(corner).chain(of_boundary.flat_map(Square::corners));
+            numbers.extend(points.map(|point| (key(point), 0)));
             Ok(())
         })?;
-        sort_from(&mut keys, begin);
-        // Sorted runs are merged.
-        keys.sort();
-        keys.dedup();
+        let mut keys: Vec<u64> = numbers.keys().copied().collect();
+        keys.sort_unstable();
         if keys.len() > POINTS_MAX {
             return Err(Failure::input(format!(
                 "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
             )));
         }
-        let numbers = keys.iter().copied().zip(0..).collect();
+        numbers.extend(keys.iter().copied().zip(0..));
         Ok(Self { keys, numbers })
     }
 
@@ -94,13 +85,4 @@ impl Points {
             hanging(corner, corners[(i + 1) % 4], &|point| self.number(point), polygon);
         }
     }
-}
-
-/// Sorts the keys from an index on, without repetitions; returns their new number.
-fn sort_from(keys: &mut Vec<u64>, begin: usize) -> usize {
-    let mut last = keys.split_off(begin);
-    last.sort_unstable();
-    last.dedup();
-    keys.append(&mut last);
-    keys.len()
 }

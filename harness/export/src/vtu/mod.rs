@@ -62,7 +62,7 @@ pub fn write(
         let header = content.header(&places, digest, header_bytes);
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
-        file.write_all(header.as_bytes()).map_err(named)?;
+        file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
         options.check()?;
         Ok(header_bytes as u64 + data_bytes + END.len() as u64)
     })?;

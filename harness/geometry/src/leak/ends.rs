@@ -6,7 +6,6 @@ use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word::{self, Side};
 
 use super::Leaks;
-use super::space::Space;
 use crate::tree::Point;
 use contract::failure::Failure;
 use serde::Serialize;
@@ -123,12 +122,14 @@ impl<F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'_, F> {
         places: &[[f64; 3]],
     ) -> Result<Option<[f64; 3]>, Failure> {
         let root = self.case.root;
-        let on_lattice = |at| -> Result<Point, String> { on_lattice("--to", at, &root) };
-        let end = on_lattice(end)?;
+        let end = on_lattice("--to", end, &root)?;
         self.make_tree(level)?;
-        let space = Space::new(&self.trees[&level], &self.facets)?;
-        let reached = space.reached(space.locate(end));
-        let is_reached = |place: Point| reached[space.locate(place) as usize];
-        Ok(places.iter().copied().find(|&place| on_lattice(place).is_ok_and(is_reached)))
+        for &place in places {
+            let Ok(at) = on_lattice("--from", place, &root) else { continue };
+            if self.search(level, (end, Some(at)))? == Some(true) {
+                return Ok(Some(place));
+            }
+        }
+        Ok(None)
     }
 }

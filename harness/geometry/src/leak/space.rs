@@ -222,19 +222,6 @@ impl<'a> Space<'a> {
         3f64.sqrt() / 2.0 * self.edge(cell)
     }
 
-    /// For each cell, whether a path through open cells leads to it from another one.
-    pub fn reached(&self, from: u32) -> Vec<bool> {
-        let mut reached = vec![false; self.cells.len()];
-        let mut next = vec![from];
-        while let Some(cell) = next.pop() {
-            if self.is_open(cell) && !reached[cell as usize] {
-                reached[cell as usize] = true;
-                self.neighbours(cell, &mut |neighbour| next.push(neighbour));
-            }
-        }
-        reached
-    }
-
     /// The path between open cells whose least width is greatest, widths above `cap` being equal, and this width. Of paths that are
     /// wider than `cap` throughout, it is a short one that keeps away from facets. `None` if no path exists.
     ///

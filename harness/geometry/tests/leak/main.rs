@@ -170,10 +170,10 @@ fn the_answer_is_the_expected_text() {
     let all = [
         ("hole", turned(hole), 6),
         ("missing-facet", turned(missing), 7),
-        ("pipe", turned(pipe(1.0, 0.13)), 6),
+        ("pipe", turned(pipe(1.0, 0.13)), 7),
         ("slit-open", slit.facets.clone(), 7),
         ("slit-closed", slit.facets, 4),
-        ("torn-sphere", torn_sphere(), 5),
+        ("torn-sphere", torn_sphere(), 7),
     ];
     for (name, facets, level) in all {
         assert_text(

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_verdict_comes_last() {
-        let verdict = "1 case: 2 checks hold, 1 fail, 1 left out, in 2.0 s: FAILED\n";
+        let verdict = "cases: 1; checks: 2 hold, 1 fail, 1 left out; 2.0 s: FAILED\n";
         assert!(table(&sample()).ends_with(verdict));
     }
 
