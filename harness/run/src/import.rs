@@ -1,7 +1,7 @@
 //! Meshes in the formats of other programs. Those that the crate `contract` does not read are read in Python;
 //! `harness/oracles/imports.py` describes how.
 
-use crate::engine::failure::{End, Failure as Ended};
+use crate::engine::failure::End;
 use crate::engine::paths::Paths;
 use crate::engine::python;
 use contract::case::Case;
@@ -94,13 +94,10 @@ pub fn import(
             return Ok(Imported::Tree(Box::new(tree)));
         }
     }
-    let cells = read(
-        path,
-        format,
-        &Request { root, is_root_of_case: request.root.is_none(), ..request.clone() },
-        paths,
-        limit,
-    )?;
+    let is_root_of_case = request.root.is_none();
+    let request = Request { root, is_root_of_case, ..request.clone() };
+    let cells = read(path, format, &request, paths, limit);
+    let cells = cells.map_err(|failure| failure.of_file(path))?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
 }
@@ -121,36 +118,6 @@ fn parts(path: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).chain(named.map(|name| beside.join(name))).collect()
 }
 
-/// Reads the cells of a file.
-fn read(
-    path: &Path,
-    format: Format,
-    request: &Request,
-    paths: &Paths,
-    limit: Duration,
-) -> Result<Cells, Failure> {
-    let cells = match format {
-        Format::LeafWords | Format::P4est => {
-            import::read(path, format, request).map_err(Failure::from)
-        }
-        Format::Vtk => {
-            read_in_python(("vtk", "import_vtk.py"), path, format, request, paths, limit)
-        }
-        Format::Openfoam => {
-            let why = "has no polyMesh: give a case, its directory constant, or polyMesh, and reconstruct a decomposed mesh";
-            let mesh = import::poly_mesh(path).ok_or_else(|| Failure::input(why));
-            mesh.and_then(|mesh| read_in_python(CELLS, &mesh, format, request, paths, limit))
-        }
-        Format::Table | Format::Discretize => {
-            read_in_python(CELLS, path, format, request, paths, limit)
-        }
-    };
-    cells.map_err(|failure| failure.of_file(path))
-}
-
-/// The reader of all formats but VTK's: its name in messages, and the script.
-const CELLS: (&str, &str) = ("numpy", "import_cells.py");
-
 /// What a script is asked for.
 #[derive(Serialize)]
 struct Asked<'a> {
@@ -168,26 +135,43 @@ struct Stated {
     digest: Option<Digest>,
 }
 
-fn read_in_python(
-    (name, script): (&str, &str),
+/// Reads the cells of a file.
+fn read(
     path: &Path,
     format: Format,
     request: &Request,
     paths: &Paths,
     limit: Duration,
 ) -> Result<Cells, Failure> {
-    let place = tempfile::tempdir().map_err(|error| Failure::from(Unusable::from(error)))?;
+    let (name, script) = match format {
+        Format::LeafWords | Format::P4est => return Ok(import::read(path, format, request)?),
+        Format::Vtk => ("vtk", "import_vtk.py"),
+        Format::Openfoam | Format::Table | Format::Discretize => ("numpy", "import_cells.py"),
+    };
+    let mesh = match format {
+        Format::Openfoam => import::poly_mesh(path).ok_or_else(|| {
+            Failure::input("has no polyMesh: give a case, its directory constant, or polyMesh, and reconstruct a decomposed mesh")
+        })?,
+        _ => path.to_owned(),
+    };
+    let place = tempfile::tempdir().map_err(Unusable::from)?;
     let table = place.path().join("cells");
     let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
-    let arguments = [path.as_os_str(), table.as_os_str(), asked.as_ref()];
-    let finished = python::run(name, script, arguments, paths, limit, place.path())
-        .map_err(|failure| refusal(name, &failure))?;
+    let arguments = [mesh.as_os_str(), table.as_os_str(), asked.as_ref()];
+    let finished = python::run(name, script, arguments, paths, limit, place.path());
+    let finished = finished.map_err(|failure| match &failure.end {
+        End::Interrupted => Failure::interrupted(),
+        End::Missing(why) => {
+            Failure::missing(format!("this format is read with {name} in Python, which {why}"))
+        }
+        End::Exited { code: CODE_INPUT, error } => Failure::input(error),
+        _ => Failure::input(format!("cannot be read: {failure}")),
+    })?;
     let stated = fs::read(&finished.stdout).ok();
     let stated: Stated = stated
         .and_then(|text| serde_json::from_slice(&text).ok())
         .ok_or_else(|| Failure::input("was read, but the script reported no root"))?;
-    let bytes = fs::read(&table).map_err(|error| Failure::from(Unusable::from(error)))?;
-    Ok(cells(&bytes, stated)?)
+    Ok(cells(&fs::read(&table).map_err(Unusable::from)?, stated)?)
 }
 
 /// The cells of rows of numbers: corner, edge, and level and side if they are known.
@@ -205,17 +189,6 @@ fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Unusable> {
     Ok(cells)
 }
 
-fn refusal(name: &str, failure: &Ended) -> Failure {
-    match &failure.end {
-        End::Interrupted => Failure::interrupted(),
-        End::Missing(why) => {
-            Failure::missing(format!("this format is read with {name} in Python, which {why}"))
-        }
-        End::Exited { code: CODE_INPUT, error } => Failure::input(error),
-        _ => Failure::input(format!("cannot be read: {failure}")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -230,7 +203,8 @@ mod tests {
         fs::set_permissions(&python, fs::Permissions::from_mode(0o755)).unwrap();
         let paths = Paths { python, ..Paths::find() };
         let request = Request { sides: sides.map(str::to_owned), ..Request::default() };
-        read(Path::new("mesh.vtu"), Format::Vtk, &request, &paths, Duration::from_millis(2000))
+        let limit = Duration::from_millis(2000);
+        read(Path::new("mesh.vtu"), Format::Vtk, &request, &paths, limit)
     }
 
     /// A script that writes one cell, and this line.
@@ -261,9 +235,7 @@ mod tests {
     #[test]
     fn each_failure_of_the_script_has_its_own_sentence() {
         let sentence = |script: &str| match read_with(script, None).unwrap_err() {
-            Failure { code: EXIT_INPUT, why } => {
-                why.strip_prefix("mesh.vtu: ").expect("the file's name").to_owned()
-            }
+            Failure { code: EXIT_INPUT, why } => why,
             other => panic!("{other:?}"),
         };
         assert_eq!(sentence("echo has no cells >&2; exit 2"), "has no cells");

@@ -36,30 +36,27 @@ impl Paths {
         let directory = harness.parent().unwrap_or(Path::new(".")).to_owned();
         let root = repository(&directory);
         let from_env = |name| env::var_os(name).map(PathBuf::from);
+        let or_else = |first: PathBuf, second: PathBuf| match !first.is_file() && second.is_file() {
+            true => second,
+            false => first,
+        };
+        // In the target directory of the harness or, for a harness that was copied elsewhere, in that of the repository.
         let target = directory.parent().unwrap_or(Path::new("..")).to_owned();
+        let built = |name| or_else(target.join(name), root.join("target").join(name));
         Self {
             mpirun: on_path("mpirun").unwrap_or_else(|| PathBuf::from("mpirun")),
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| {
-                let [own, beside] = [root.join(".venv/bin/python"), directory.join("python")];
-                if !own.is_file() && beside.is_file() { beside } else { own }
+                or_else(root.join(".venv/bin/python"), directory.join("python"))
             }),
             oracles: root.join("harness/oracles"),
-            p4est: from_env("HARNESS_P4EST")
-                .unwrap_or_else(|| built(&target, &root, "engines/p4est-balance")),
-            proven_checker: from_env("HARNESS_PROVEN")
-                .unwrap_or_else(|| built(&target, &root, "proof/check")),
+            p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| built("engines/p4est-balance")),
+            proven_checker: from_env("HARNESS_PROVEN").unwrap_or_else(|| built("proof/check")),
             catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
             engines: root.join("harness/engines"),
             root,
             harness,
         }
     }
-}
-
-/// A program in the target directory of the harness or, for a harness that was copied elsewhere, in that of the repository.
-fn built(target: &Path, root: &Path, name: &str) -> PathBuf {
-    let [first, second] = [target.to_owned(), root.join("target")].map(|place| place.join(name));
-    if !first.is_file() && second.is_file() { second } else { first }
 }
 
 /// The root of the repository: the nearest directory above the harness, or above the current directory, that contains

@@ -128,6 +128,9 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     let time_wall_s = start.elapsed().as_secs_f64();
     if ended.is_err() {
         session.end();
+        // Of a flood, the beginning suffices.
+        let floods = outputs.iter().filter(|output| length(output) > OUTPUT_MAX);
+        floods.for_each(|output| _ = output.set_len(ERROR_MAX));
     }
     let (status, time_cpu_s) = ended?;
     // Ctrl-C in a terminal also reaches the child directly; its exit code is then not a result.
@@ -282,8 +285,11 @@ mod tests {
 
     #[test]
     fn a_flood_of_output_ends_the_child() {
-        let End::Unusable(why) = end_of("yes", 60_000) else { panic!() };
+        let logs = tempfile::tempdir().unwrap();
+        let watch = Watch::new("child", Duration::from_secs(60), logs.path());
+        let End::Unusable(why) = shell("yes", &watch).unwrap_err().end else { panic!() };
         assert!(why.contains("64 MiB"), "{why}");
+        assert_eq!(fs::metadata(watch.log("stdout")).unwrap().len(), ERROR_MAX);
     }
 
     #[test]

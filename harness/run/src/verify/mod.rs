@@ -81,19 +81,18 @@ fn require_programs(programs: &Programs) -> Result<(), Failure> {
     let engine = &programs.engine;
     let used = [("mesher", engine), ("reference", &programs.reference)];
     let used = &used[..1 + usize::from(engine.description().promises.definition)];
-    for (program, engine) in used.iter().filter(|(_, engine)| !engine.program().is_file()) {
-        let path = engine.program().display();
-        let fix = match description::is_own(engine.name()) {
-            true => format!("build {path}, or give another path with --{program}"),
-            false => format!(
-                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {}: correct it, as \
-                 in program = \"{{here}}/my-mesher\", or give --{program} PATH",
-                engine.name()
-            ),
-        };
-        return Err(Failure::missing(format!("the {program} is missing: {fix}")));
-    }
-    Ok(())
+    let mut absent = used.iter().filter(|(_, engine)| !engine.program().is_file());
+    let Some((program, engine)) = absent.next() else { return Ok(()) };
+    let path = engine.program().display();
+    let fix = match description::is_own(engine.name()) {
+        true => format!("build {path}, or give another path with --{program}"),
+        false => format!(
+            "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {}: correct it, as in \
+             program = \"{{here}}/my-mesher\", or give --{program} PATH",
+            engine.name()
+        ),
+    };
+    Err(Failure::missing(format!("the {program} is missing: {fix}")))
 }
 
 /// What the verifications of all cases share.
