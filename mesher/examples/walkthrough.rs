@@ -17,6 +17,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use words::words;
 
+// The test of this example has the file, too.
+#[allow(clippy::duplicate_mod)]
 #[path = "../tests/support/words.rs"]
 mod words;
 

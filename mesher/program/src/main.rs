@@ -360,7 +360,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         interrupt::stop_at(format_args!("report:{}", comm.rank()));
         agree(comm, on_json(advice, &|path| write_atomically(path, json))).map(|()| done)
     };
-    let advice = "free disk space";
+    let advice = "choose another --json or free disk space";
     if args.plan {
         let plan = planner::plan(&case, &options, comm, record)?;
         let refusal = (!plan.fits && !args.force).then(|| plan.refusal());
@@ -369,7 +369,9 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     }
     let report = planner::mesh(&case, &options, args.force, comm, record)?;
     let advice = match options.out {
-        Some(_) => "the mesh is complete, only its report is missing; free disk space",
+        Some(_) => {
+            "the mesh is complete, only its report is missing; choose another --json or free disk space"
+        }
         None => advice,
     };
     let done = Done { text: report.to_string(), warnings: report.warnings.clone(), refusal: None };

@@ -76,12 +76,18 @@ impl Launcher {
         if !is_mpirun || self.words[1..] != ["-n", RANKS] || nodes != "1" {
             return None;
         }
-        let made = tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok()?;
-        interrupt::note_directory(made.path());
-        command.env("OMPI_MCA_btl_vader_backing_directory", made.path());
-        command.env("OMPI_MCA_orte_tmpdir_base", made.path());
-        Some(made)
+        own_directory(command)
     }
+}
+
+/// Makes a directory for the files of OpenMPI, which leaves them if its ranks or daemon are killed. `None` if this machine has no
+/// `/dev/shm`.
+pub fn own_directory(command: &mut Command) -> Option<TempDir> {
+    let made = tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok()?;
+    interrupt::note_directory(made.path());
+    command.env("OMPI_MCA_btl_vader_backing_directory", made.path());
+    command.env("OMPI_MCA_orte_tmpdir_base", made.path());
+    Some(made)
 }
 
 /// Sets the environment that OpenMPI needs to run as root and with more ranks than cores, also for a program that

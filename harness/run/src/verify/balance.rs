@@ -72,6 +72,7 @@ impl CaseRun<'_> {
         let mut command = Command::new(&self.all.programs.paths.p4est);
         command.arg(base).arg(&out);
         launcher::set_environment(&mut command);
+        let _files = launcher::own_directory(&mut command);
         process::run(&mut command, &Watch::new("p4est", self.all.options.limit(), &out))?;
         let part = PartFile::open(&out.join("leaves-00000.npy"));
         let part = part.map_err(|error| unusable(format!("wrote no leaves: {error}")))?;
