@@ -133,7 +133,12 @@ impl Split {
             let near = match rule {
                 Rule::Layer => {
                     let edges = octant.distance(leaf) / i64::from(leaf.edge());
-                    format!("section 6, step 2 (layer): {edges} of its edges away is the leaf")
+                    match edges {
+                        0 => "section 6, step 2 (layer): it touches the leaf".to_owned(),
+                        _ => format!(
+                            "section 6, step 2 (layer): {edges} of its edges away is the leaf"
+                        ),
+                    }
                 }
                 Rule::Balance => {
                     let levels = leaf.level - octant.level;

@@ -57,10 +57,7 @@ fn a_split_that_facets_layers_or_balance_require_is_right() {
                 1,
                 "by section 6, step 3 (balance): it touches, 2 levels finer, the leaf octant 0.7.1 (level 3)",
             ),
-            (
-                2,
-                "by section 6, step 2 (layer): 0 of its edges away is the leaf octant 0.7.1 (level 3)",
-            ),
+            (2, "by section 6, step 2 (layer): it touches the leaf octant 0.7.1 (level 3)"),
         ] {
             let case = case(&format!("keep = 'all'\nlayer_cells_min = {n}"), &[FACET]);
             let text = rule(&case, given, &split(&case, &[]), &split(&case, &[&[1]]));
