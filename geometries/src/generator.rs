@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::Deserialize;
 
-use crate::{Facet, Mesh, shapes};
+use crate::{Facet, shapes};
 
 /// The shapes that can be generated. Case files use their names in snake case.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Hash)]
@@ -143,8 +143,13 @@ pub enum GeneratorError {
         most: usize,
     },
     /// The vertices of a facet coincide or are not finite in f32.
-    #[error("[generator] {0}; request fewer facets or a shape closer to the origin")]
-    Unrepresentable(String),
+    #[error(
+        "[generator] facet {facet} has no area in f32; request fewer facets or a shape closer to the origin"
+    )]
+    Unrepresentable {
+        /// Index of the facet.
+        facet: usize,
+    },
 }
 
 /// Maximum number of facets, so that a mistyped number is an error instead of the end of all memory.
@@ -170,19 +175,11 @@ impl Generator {
         }
     }
 
-    /// The shape as facet soup, wound outward.
+    /// The shape as facet soup, wound outward: exactly `facets` facets, one less if that number is odd.
     ///
     /// # Errors
     /// The table is invalid for the shape.
     pub fn facets(&self) -> Result<Vec<Facet>, GeneratorError> {
-        Ok(self.mesh()?.facets())
-    }
-
-    /// The shape as an indexed mesh of exactly `facets` facets, one less if that number is odd.
-    ///
-    /// # Errors
-    /// The table is invalid for the shape.
-    pub fn mesh(&self) -> Result<Mesh, GeneratorError> {
         self.check_keys()?;
         let least = shapes::facets_least(self.shape);
         if self.facets < least || self.facets > FACETS_MOST {
@@ -192,9 +189,9 @@ impl Generator {
         let mut mesh = shapes::draw(self)?;
         mesh.translate(self.centre.unwrap_or([0.0; 3]));
         mesh.split_edges_until(self.facets);
-        match mesh.fault_of_area() {
-            None => Ok(mesh),
-            Some(fault) => Err(GeneratorError::Unrepresentable(fault.to_string())),
+        match mesh.flat_facet() {
+            None => Ok(mesh.facets()),
+            Some(facet) => Err(GeneratorError::Unrepresentable { facet }),
         }
     }
 

@@ -16,8 +16,8 @@ mod shapes;
 mod stl;
 
 pub use generator::{Generator, GeneratorError, Shape};
-pub use mesh::{Mesh, MeshFault};
-pub use stl::write_stl_binary;
+use mesh::Mesh;
+pub use stl::{StlFile, stl_files, write_stl_binary};
 
 /// The three vertices of a facet, in the precision of STL.
 pub type Facet = [[f32; 3]; 3];

@@ -1,15 +1,15 @@
 //! A closed triangulated surface with indexed vertices.
 //!
-//! Invariants of a finished mesh, executed by [`Mesh::fault`]:
+//! Invariants of a finished mesh:
 //! - every edge belongs to exactly two facets, which traverse it in opposite directions (the surface
-//!   is watertight and consistently wound);
-//! - every facet has a positive area after its vertices are rounded to f32.
+//!   is watertight and consistently wound), as tests require of every shape;
+//! - every facet has a positive area after its vertices are rounded to f32, which [`Mesh::flat_facet`]
+//!   finds out.
 //!
 //! Positions are f64 until [`Mesh::facets`] rounds each vertex to f32, so all facets at a vertex
 //! get the same bits.
 
 use std::collections::HashMap;
-use std::fmt;
 
 use crate::Facet;
 pub(crate) use edges::EdgeHasher;
@@ -19,35 +19,9 @@ mod edges;
 
 /// A surface of triangles over indexed vertices, wound so that its normals point outward.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
+pub(crate) struct Mesh {
     pub(crate) vertices: Vec<[f64; 3]>,
     pub(crate) triangles: Vec<[u32; 3]>,
-}
-
-/// A violated invariant of a mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum MeshFault {
-    /// The facet has no area after rounding to f32, or is not finite.
-    FacetWithoutArea {
-        /// Index of the facet.
-        facet: usize,
-    },
-    /// The number of directed edges in the opposite direction is not one.
-    EdgeUnmatched {
-        /// Vertex indices, from and to.
-        edge: [u32; 2],
-    },
-}
-
-impl fmt::Display for MeshFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::FacetWithoutArea { facet } => write!(f, "facet {facet} has no area in f32"),
-            Self::EdgeUnmatched { edge: [a, b] } => {
-                write!(f, "the edge from vertex {a} to {b} does not have exactly one opposite edge")
-            }
-        }
-    }
 }
 
 impl Mesh {
@@ -90,27 +64,12 @@ impl Mesh {
     }
 
     /// The surface as facet soup.
-    pub fn facets(&self) -> Vec<Facet> {
+    pub(crate) fn facets(&self) -> Vec<Facet> {
         self.triangles.iter().map(|&t| self.facet(t)).collect()
     }
 
     fn facet(&self, triangle: [u32; 3]) -> Facet {
         triangle.map(|v| self.vertices[v as usize].map(|x| x as f32))
-    }
-
-    /// The enclosed volume, negative if the surface is wound inward.
-    pub fn volume(&self) -> f64 {
-        let six_fold: f64 = self
-            .triangles
-            .iter()
-            .map(|t| {
-                let [p, q, r] = t.map(|v| self.vertices[v as usize]);
-                p[0] * (q[1] * r[2] - q[2] * r[1])
-                    + p[1] * (q[2] * r[0] - q[0] * r[2])
-                    + p[2] * (q[0] * r[1] - q[1] * r[0])
-            })
-            .sum();
-        six_fold / 6.0
     }
 
     /// Splits the longest edges at their midpoints until the mesh has `facets` facets, one less if
@@ -163,7 +122,7 @@ impl Mesh {
     }
 
     /// The first facet that has no area after rounding to f32, or whose edges are not finite.
-    pub(crate) fn fault_of_area(&self) -> Option<MeshFault> {
+    pub(crate) fn flat_facet(&self) -> Option<usize> {
         let has_area = |t: &[u32; 3]| {
             let [p, q, r] = self.facet(*t).map(|p| p.map(f64::from));
             let u: [f64; 3] = std::array::from_fn(|a| q[a] - p[a]);
@@ -171,13 +130,34 @@ impl Mesh {
             let is_finite = u.into_iter().chain(v).all(f64::is_finite);
             is_finite && (0..3).any(|a| u[a] * v[(a + 1) % 3] != u[(a + 1) % 3] * v[a])
         };
-        let facet = self.triangles.iter().position(|t| !has_area(t))?;
-        Some(MeshFault::FacetWithoutArea { facet })
+        self.triangles.iter().position(|t| !has_area(t))
+    }
+}
+
+#[cfg(test)]
+impl Mesh {
+    /// Whether every edge belongs to exactly two facets, which traverse it in opposite directions.
+    pub(crate) fn is_closed(&self) -> bool {
+        let mut times: HashMap<[u32; 2], usize> = HashMap::new();
+        for t in &self.triangles {
+            (0..3).for_each(|i| *times.entry([t[i], t[(i + 1) % 3]]).or_default() += 1);
+        }
+        times.iter().all(|(&[a, b], &count)| count == 1 && times.get(&[b, a]) == Some(&1))
     }
 
-    /// The first violated invariant; `None` if all hold.
-    pub fn fault(&self) -> Option<MeshFault> {
-        self.fault_of_area().or_else(|| edges::fault(&self.triangles))
+    /// The enclosed volume, negative if the surface is wound inward.
+    pub(crate) fn volume(&self) -> f64 {
+        let six_fold: f64 = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let [p, q, r] = t.map(|v| self.vertices[v as usize]);
+                p[0] * (q[1] * r[2] - q[2] * r[1])
+                    + p[1] * (q[2] * r[0] - q[0] * r[2])
+                    + p[2] * (q[0] * r[1] - q[1] * r[0])
+            })
+            .sum();
+        six_fold / 6.0
     }
 }
 
@@ -198,7 +178,7 @@ mod tests {
             let mut mesh = tetrahedron();
             mesh.split_edges_until(facets);
             assert_eq!(mesh.triangles.len(), facets & !1);
-            assert_eq!(mesh.fault(), None);
+            assert!(mesh.is_closed() && mesh.flat_facet().is_none());
             assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         }
     }
@@ -207,19 +187,20 @@ mod tests {
     fn open_flipped_doubled_and_flat_meshes_are_faulty() {
         let mut open = tetrahedron();
         open.triangles.pop();
-        assert!(matches!(open.fault(), Some(MeshFault::EdgeUnmatched { .. })));
+        assert!(!open.is_closed());
 
         let mut flipped = tetrahedron();
         flipped.triangles[2].swap(0, 1);
-        assert!(matches!(flipped.fault(), Some(MeshFault::EdgeUnmatched { .. })));
+        assert!(!flipped.is_closed());
 
         let mut doubled = tetrahedron();
         doubled.triangles.extend(doubled.triangles.clone());
-        assert!(matches!(doubled.fault(), Some(MeshFault::EdgeUnmatched { .. })));
+        assert!(!doubled.is_closed());
 
         let mut flat = tetrahedron();
         flat.vertices[3] = [1e-60, 1e-60, 1e-60];
-        assert_eq!(flat.fault(), Some(MeshFault::FacetWithoutArea { facet: 1 }));
+        assert!(flat.is_closed());
+        assert_eq!(flat.flat_facet(), Some(1));
     }
 
     #[test]
@@ -227,6 +208,6 @@ mod tests {
         let mut mesh = tetrahedron();
         mesh.flip();
         assert!(mesh.volume() < 0.0);
-        assert_eq!(mesh.fault(), None);
+        assert!(mesh.is_closed());
     }
 }

@@ -2,15 +2,13 @@
 
 use crate::{Generator, GeneratorError, Mesh, Shape};
 
+mod aircraft;
 mod assembly;
-mod fighter;
 mod implicit;
 mod pipe;
+mod round;
 mod slab;
 mod solids;
-mod sphere;
-mod torus;
-mod uav;
 
 /// The keys of the dimensions of a shape.
 pub(crate) fn dimensions(shape: Shape) -> &'static [&'static str] {
@@ -51,12 +49,12 @@ pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     match of.shape {
         Shape::Cube => slab::cube(of),
         Shape::Plate => slab::plate(of),
-        Shape::Sphere => sphere::sphere(of),
-        Shape::NestedSpheres => sphere::nested_spheres(of),
-        Shape::Torus => torus::torus(of),
+        Shape::Sphere => round::sphere(of),
+        Shape::NestedSpheres => round::nested_spheres(of),
+        Shape::Torus => round::torus(of),
         Shape::Pipe => pipe::pipe(of),
-        Shape::Uav => implicit::draw::<uav::Uav>(of),
-        Shape::Fighter => implicit::draw::<fighter::Fighter>(of),
+        Shape::Uav => implicit::draw::<aircraft::Uav>(of),
+        Shape::Fighter => implicit::draw::<aircraft::Fighter>(of),
         Shape::BoxesOverlapping => assembly::boxes_overlapping(of),
         Shape::BoxInBox => assembly::box_in_box(of),
         Shape::ThreeSpheres => assembly::three_spheres(of),

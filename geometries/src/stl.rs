@@ -1,4 +1,5 @@
-//! Writer of binary STL: a header of 80 bytes, the number of facets, 50 bytes per facet.
+//! Writer of binary STL (a header of 80 bytes, the number of facets, 50 bytes per facet), and the files of `stl-files.txt`, for tests
+//! of readers. The head of that file describes its format.
 
 use std::io::{self, Write};
 
@@ -40,6 +41,67 @@ fn normal(facet: &Facet) -> [f32; 3] {
     });
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
     if length > 0.0 { n.map(|x| (x / length) as f32) } else { [0.0; 3] }
+}
+
+/// An STL file that every reader must read, or must refuse.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StlFile {
+    /// Its name, which ends in `.stl`.
+    pub name: String,
+    /// Whether it must be read.
+    pub is_valid: bool,
+    /// Its contents.
+    pub bytes: Vec<u8>,
+}
+
+/// All files.
+///
+/// # Panics
+/// If the format of `stl-files.txt` is violated.
+pub fn stl_files() -> Vec<StlFile> {
+    let text = include_str!("../stl-files.txt");
+    let (_, files) = text.split_once("\n== ").expect("a first file");
+    files.split("\n== ").map(file).collect()
+}
+
+fn file(text: &str) -> StlFile {
+    let (head, body) = text.split_once('\n').unwrap_or((text, ""));
+    let (title, _) = head.split_once(": ").expect("a property or an error");
+    let words: Vec<&str> = title.split(' ').collect();
+    // Its last line end is before the head of the next file.
+    let body =
+        if body.is_empty() || body.ends_with('\n') { body.into() } else { format!("{body}\n") };
+    StlFile {
+        name: words[1].into(),
+        is_valid: words[0] == "valid",
+        bytes: if words.contains(&"hex") {
+            body.split_whitespace().map(byte).collect()
+        } else {
+            unescaped(&body)
+        },
+    }
+}
+
+fn byte(hex: &str) -> u8 {
+    u8::from_str_radix(hex, 16).expect("two hexadecimal digits")
+}
+
+fn unescaped(text: &str) -> Vec<u8> {
+    let mut parts = text.split('\\');
+    let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();
+    while let Some(part) = parts.next() {
+        let (escaped, rest) = match part.chars().next() {
+            Some('\n') => (None, &part[1..]),
+            Some('r') => (Some(b'\r'), &part[1..]),
+            Some('t') => (Some(b'\t'), &part[1..]),
+            Some('x') => (Some(byte(&part[1..3])), &part[3..]),
+            None => (Some(b'\\'), parts.next().unwrap_or_default()),
+            Some(other) => panic!("\\{other} is no escape"),
+        };
+        bytes.extend(escaped);
+        bytes.extend_from_slice(rest.as_bytes());
+    }
+    bytes
 }
 
 #[cfg(test)]

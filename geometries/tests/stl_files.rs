@@ -1,22 +1,9 @@
-//! The STL files in `bad/` and `tricky/` match the descriptions in their READMEs.
+//! The files of `stl-files.txt` are what its head says of them.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use geometries::{StlFile, stl_files};
 
-fn here(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
-}
-
-fn files(directory: &str) -> BTreeSet<String> {
-    std::fs::read_dir(here(directory))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .filter(|name| name.ends_with(".stl"))
-        .collect()
-}
-
-fn bytes(directory: &str, name: &str) -> Vec<u8> {
-    std::fs::read(here(directory).join(name)).unwrap()
+fn file(name: &str) -> StlFile {
+    stl_files().into_iter().find(|file| file.name == name).unwrap()
 }
 
 /// Whether a file has the length of a binary STL file with its facet count.
@@ -40,41 +27,38 @@ fn coordinates_text(data: &[u8]) -> Vec<f32> {
 }
 
 #[test]
-fn readmes_list_exactly_the_files() {
-    for directory in ["bad", "tricky"] {
-        let readme = String::from_utf8(bytes(directory, "README.md")).unwrap();
-        let listed: BTreeSet<String> = readme
-            .lines()
-            .filter_map(|line| line.strip_prefix("| `"))
-            .map(|line| line.split('`').next().unwrap().to_owned())
-            .collect();
-        assert_eq!(listed, files(directory), "{directory}");
-        assert!(listed.len() >= 20, "{directory}");
-    }
-}
-
-#[test]
-fn all_tricky_files_contain_the_same_facets() {
-    let expected = coordinates_binary(&bytes("tricky", "binary.stl"));
+fn all_valid_files_contain_the_same_facets() {
+    let expected = coordinates_binary(&file("binary.stl").bytes);
     assert_eq!(expected.len(), 8 * 9);
-    for name in files("tricky") {
-        let data = bytes("tricky", &name);
-        assert_eq!(is_binary(&data), name.starts_with("binary"), "{name}");
+    let valid: Vec<_> = stl_files().into_iter().filter(|file| file.is_valid).collect();
+    assert_eq!(valid.len(), 20);
+    for StlFile { name, bytes, .. } in valid {
+        assert_eq!(is_binary(&bytes), name.starts_with("binary"), "{name}");
         let found =
-            if is_binary(&data) { coordinates_binary(&data) } else { coordinates_text(&data) };
+            if is_binary(&bytes) { coordinates_binary(&bytes) } else { coordinates_text(&bytes) };
         assert_eq!(found, expected, "{name}");
     }
 }
 
 #[test]
-fn bad_files_have_the_wrong_length_for_binary_stl_or_one_number_that_is_not_finite() {
-    let good = bytes("tricky", "binary.stl");
-    for name in files("bad") {
-        let data = bytes("bad", &name);
+fn invalid_files_have_the_wrong_length_for_binary_stl_or_one_number_that_is_not_finite() {
+    let good = file("binary.stl").bytes;
+    let invalid: Vec<_> = stl_files().into_iter().filter(|file| !file.is_valid).collect();
+    assert_eq!(invalid.len(), 23);
+    for StlFile { name, bytes, .. } in invalid {
         let one_is_not_finite =
-            || coordinates_binary(&data).iter().filter(|x| !x.is_finite()).count() == 1;
-        assert!(!is_binary(&data) || one_is_not_finite(), "{name}");
-        assert_ne!(data, good);
+            || coordinates_binary(&bytes).iter().filter(|x| !x.is_finite()).count() == 1;
+        assert!(!is_binary(&bytes) || one_is_not_finite(), "{name}");
+        assert_ne!(bytes, good);
     }
-    assert!(is_binary(&bytes("bad", "nan.stl")) && is_binary(&bytes("bad", "infinite.stl")));
+    assert!(is_binary(&file("nan.stl").bytes) && is_binary(&file("infinite.stl").bytes));
+}
+
+#[test]
+fn escapes_are_bytes() {
+    assert_eq!(file("header_cut.stl").bytes.len(), 40);
+    assert!(file("empty.stl").bytes.is_empty());
+    assert!(!file("ascii_cr.stl").bytes.contains(&b'\n'));
+    assert!(file("ascii_crlf.stl").bytes.ends_with(b"\r\n"));
+    assert!(String::from_utf8(file("ascii_name_latin1.stl").bytes).is_err());
 }

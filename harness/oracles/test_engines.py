@@ -14,7 +14,7 @@ import unittest
 import numpy as np
 import pyvista
 
-from test_import import ROOT, run
+from built import ROOT, run
 
 ENGINES = ROOT / "harness/engines"
 # The case of the tutorial, as it stands there.

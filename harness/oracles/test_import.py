@@ -16,18 +16,9 @@ import numpy as np
 import pyvista
 import vtk
 
-from built import PROGRAMS, ROOT, needs
-
-SAMPLES = ROOT / "harness/contract/tests/samples"
+from built import PROGRAMS, ROOT, needs, run, samples
 
 ORIGIN, EDGE, DEPTH = np.array([-1.0, 2.0, 0.5]), 4.0, 4
-
-
-def run(program, *arguments):
-    """Exit code, standard output and standard error of one of the programs."""
-    environment = os.environ | {"HARNESS_PYTHON": sys.executable}
-    run = subprocess.run([PROGRAMS / program, *arguments], capture_output=True, text=True, env=environment)
-    return run.returncode, run.stdout, run.stderr
 
 
 def leaves():
@@ -219,19 +210,18 @@ class ImportTest(unittest.TestCase):
         self.assertEqual(manifest["root"], json.loads((mesh / "mesh.json").read_text())["root"])
 
     def test_meshes_of_other_programs(self):
-        samples = ROOT / "harness/contract/tests/samples"
         for name, table in (("cube.json", "cube.csv"), ("flat.msh", "flat.csv"), ("foam-ascii", "foam.csv"), ("foam-binary", "foam.csv")):
-            words, manifest = self.imported(samples / name)
+            words, manifest = self.imported(samples() / name)
             root = manifest["root"]
-            expected, _ = self.imported(samples / table, "--root", ",".join(map(repr, [*root["origin"], root["edge"]])))
+            expected, _ = self.imported(samples() / table, "--root", ",".join(map(repr, [*root["origin"], root["edge"]])))
             np.testing.assert_array_equal(words, expected, name)
-        code, output, error = run("harness", "import", samples / "foam-binary", "--out", self.at / "foam")
+        code, output, error = run("harness", "import", samples() / "foam-binary", "--out", self.at / "foam")
         self.assertEqual((code, error.count("\n")), (0, 1))
         self.assertIn("the root -1,-1,-1,4 is the least that holds the cells", error)
         self.assertIn("256 cells", output)
-        self.assertIn("cube.csv: cell 0 (corner", self.refused(samples / "cube.csv", "--root", "0,0,0,1"))
+        self.assertIn("cube.csv: cell 0 (corner", self.refused(samples() / "cube.csv", "--root", "0,0,0,1"))
         level = self.at / "level"
-        shutil.copytree(samples / "foam-ascii", level)
+        shutil.copytree(samples() / "foam-ascii", level)
         text = (level / "cellLevel").read_text()
         (level / "cellLevel").write_text(text.replace("(\n0\n0\n0\n", "(\n0\n0\n1\n", 1))
         self.assertIn("cell 2 has level 1 and edge 1, but cell 0 has level 0 and edge 1", self.refused(level))
@@ -290,7 +280,7 @@ class ImportTest(unittest.TestCase):
         grid.GetYCoordinates().SetTuple1(1, np.nan)
         write(grid, "vtkHDFWriter", self.at / "nan.vtkhdf")
         self.assertIn("has trees that are not equal cubes", self.refused(self.at / "nan.vtkhdf"))
-        text = (SAMPLES / "cube.json").read_text()
+        text = (samples() / "cube.json").read_text()
         (self.at / "nan.json").write_text(re.sub(r'"(x0|origin)": \[[^,]*', r'"\1": [NaN', text))
         self.assertIn("has the corner [nan, ", self.refused(self.at / "nan.json"))
 

@@ -12,9 +12,9 @@ import unittest
 import numpy as np
 
 import import_cells
+from built import samples
 from imports import Refused
 
-SAMPLES = pathlib.Path(__file__).parent.parent / "contract/tests/samples"
 FOAM = ("points", "faces", "owner", "neighbour", "cellLevel")
 # Every sample, the table of its cells, and the root that it states.
 KNOWN = {
@@ -52,10 +52,10 @@ class CellsTest(unittest.TestCase):
         """A copy of a sample in which the content of one file was changed."""
         copy = self.at / name
         shutil.rmtree(copy, ignore_errors=True)
-        if (SAMPLES / name).is_dir():
-            shutil.copytree(SAMPLES / name, copy)
+        if (samples() / name).is_dir():
+            shutil.copytree(samples() / name, copy)
         else:
-            shutil.copy(SAMPLES / name, copy)
+            shutil.copy(samples() / name, copy)
         path = copy / file if file else copy
         path.write_bytes(change(path.read_bytes()))
         return copy
@@ -82,8 +82,8 @@ class CellsTest(unittest.TestCase):
     def test_every_sample_has_the_cells_that_its_program_states(self):
         for name, (table, root) in KNOWN.items():
             with self.subTest(name):
-                corners, edges, more = read(SAMPLES / name)
-                expected, sizes, _ = read(SAMPLES / table)
+                corners, edges, more = read(samples() / name)
+                expected, sizes, _ = read(samples() / table)
                 order, same = np.lexsort(corners.round(9).T), np.lexsort(expected.round(9).T)
                 np.testing.assert_allclose(corners[order], expected[same], atol=1e-9)
                 np.testing.assert_allclose(edges[order], sizes[same], atol=1e-9)
@@ -114,14 +114,14 @@ class CellsTest(unittest.TestCase):
 
     def test_a_given_root_replaces_one_that_the_file_rounded(self):
         exact = root_of([0.0, 0.0, 0.0, 0.25])
-        corners, edges, more = read(SAMPLES / "rounded.msh", root=exact)
+        corners, edges, more = read(samples() / "rounded.msh", root=exact)
         self.assertIs(more["root"], exact)
-        expected, sizes, _ = read(SAMPLES / "rounded.csv")
+        expected, sizes, _ = read(samples() / "rounded.csv")
         order, same = np.lexsort(corners.round(9).T), np.lexsort(expected.round(9).T)
         np.testing.assert_allclose(corners[order], expected[same], atol=1e-9)
         np.testing.assert_allclose(edges[order], sizes[same], atol=1e-9)
         # This root is not the file's: cells stay where they are.
-        _, _, more = read(SAMPLES / "rounded.msh", root=root_of([0.0, 0.0, 0.0, 0.3]))
+        _, _, more = read(samples() / "rounded.msh", root=root_of([0.0, 0.0, 0.0, 0.3]))
         self.assertNotEqual(more["root"]["edge"], 0.3)
 
     def test_columns_are_found_by_name_or_by_place(self):
@@ -198,7 +198,7 @@ class CellsTest(unittest.TestCase):
         self.assertEqual(set(more["sides"].tolist()), {0, 1})
         self.assertIn("absent", self.refused(copy, sides="absent"))
         for name in ("cube.json", "cube.msh"):
-            self.assertIn("omit --sides", self.refused(SAMPLES / name, sides="body"))
+            self.assertIn("omit --sides", self.refused(samples() / name, sides="body"))
 
     def test_a_compressed_or_missing_file_is_named(self):
         copy = self.edited("foam-binary", "points", lambda content: content)
@@ -271,7 +271,7 @@ class CellsTest(unittest.TestCase):
 
     def test_cells_of_discretize_have_whole_numbers_within_the_mesh(self):
         def changed(change):
-            mesh = json.loads((SAMPLES / "cube.json").read_text())
+            mesh = json.loads((samples() / "cube.json").read_text())
             change(mesh)
             path = self.at / "changed.json"
             path.write_text(json.dumps(mesh))

@@ -15,8 +15,7 @@ import xml.etree.ElementTree
 import numpy as np
 import pyvista
 
-from built import PROGRAMS, ROOT, InDirectory, needs
-from test_vtu import EDGE_BITS, decode
+from built import EDGE_BITS, InDirectory, PROGRAMS, ROOT, decode, needs
 
 EDGE, FINEST = 4.0, 5
 CASE = f"""geometry = "body.stl"

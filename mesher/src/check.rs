@@ -10,15 +10,14 @@ pub mod base;
 pub mod graded;
 pub mod sides;
 
-use crate::grow::Mesh;
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
 use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
-use crate::job::Options;
-use crate::output::manifest::{MeshEntry, PartWords};
+use crate::mesh::Mesh;
 use crate::output::stream::Counts;
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
+use crate::record::Options;
 use crate::sides::Sides;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
@@ -125,7 +124,6 @@ pub fn base_tree(
 ) {
     tree.check_structure();
     replicas(&[&tree.split, &tree.crossing], ownership, comm);
-    is_complete(&tree.split, ownership, comm);
     base::tree(tree, facets, rules, ownership);
 }
 
@@ -137,7 +135,7 @@ pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, c
     sides::seeds(sides, tree, rules, ownership);
 }
 
-/// The tree is linear and complete, replicas agree, and no deleted leaf is split.
+/// The tree is linear, replicas agree, and no deleted leaf is split.
 pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     check_split(split);
@@ -151,7 +149,6 @@ pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
         }
     }
     replicas(&[split, crossing, &sides.stored], ownership, comm);
-    is_complete(split, ownership, comm);
 }
 
 /// A number that any change of the mesh changes, whatever the partition. Collective.
@@ -171,12 +168,6 @@ fn bricks_of(sets: &PerLevel) -> impl Iterator<Item = (Level, Brick)> {
     (0..).zip(sets).flat_map(|(l, set)| set.bricks().map(move |b| (l, b)))
 }
 
-/// The volume, in octants of level 19, of some octants in bricks that this rank owns.
-fn volume_owned(octants: impl Iterator<Item = (Level, Brick)>, ownership: &Ownership) -> u64 {
-    let owned = octants.filter(|(l, b)| ownership.owns(*l, b.key));
-    owned.map(|(l, b)| volume_of(l, b.bits)).sum()
-}
-
 fn hash(value: &impl Hash) -> u64 {
     let mut hasher = DefaultHasher::new();
     value.hash(&mut hasher);
@@ -187,25 +178,29 @@ fn hash(value: &impl Hash) -> u64 {
 /// alone.
 fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     let boundaries: Vec<_> = ownership.boundaries().collect();
-    // The ranks whose intervals meet a brick, in their order: all of them hold it, the first one owns it.
-    let owners_of = |l: Level, key: u64| -> Vec<usize> {
+    // The owner of a brick, and all ranks that hold it.
+    let holders = |l: Level, key: u64| -> (usize, BTreeSet<usize>) {
         let up = 3 * (LEVEL_MAX + 2 - l);
         let (start, end) = if l < 2 { (0, u64::MAX) } else { (key << up, (key + 1) << up) };
         let first = boundaries.partition_point(|b| b.0 <= start) - 1;
-        boundaries[first..].iter().take_while(|b| b.0 < end).map(|b| b.1).collect()
+        let within = boundaries[first..].iter().take_while(|b| b.0 < end);
+        let owners: Vec<usize> = within.map(|b| b.1).collect();
+        let is_full = l < 2 || owners.len() >= OWNERS_MANY;
+        let all =
+            if is_full { (0..comm.size()).collect() } else { owners.iter().copied().collect() };
+        (owners[0], all)
     };
     let mut out = Vec::new();
     for (number, set) in sets.iter().enumerate() {
         for (l, b) in bricks_of(set) {
-            let owners = owners_of(l, b.key);
-            let is_full = l < 2 || owners.len() >= OWNERS_MANY;
-            let is_held = is_full || owners.contains(&comm.rank());
+            let (owner, holders) = holders(l, b.key);
+            let is_held = holders.contains(&comm.rank());
             assert!(is_held, "level {l}: a rank must hold the bricks that it has");
-            let is_owned = owners[0] == comm.rank();
+            let is_owned = owner == comm.rank();
             assert_eq!(ownership.owns(l, b.key), is_owned, "level {l}: the owner of a brick");
-            if is_full || owners.len() > 1 {
+            if holders.len() > 1 {
                 let id = (number as u64) << 5 | u64::from(l);
-                out.push((owners[0], [id, b.key, b.bits]));
+                out.push((owner, [id, b.key, b.bits]));
             }
         }
     }
@@ -216,11 +211,8 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
     }
     for ([id, key], bits) in all {
         let l = (id & 31) as Level;
-        let owners: BTreeSet<usize> = match owners_of(l, key) {
-            owners if l < 2 || owners.len() >= OWNERS_MANY => (0..comm.size()).collect(),
-            owners => owners.into_iter().collect(),
-        };
-        let equal = bits.len() == owners.len() && bits.iter().all(|b| *b == bits[0]);
+        let is_everywhere = bits.len() == holders(l, key).1.len();
+        let equal = is_everywhere && bits.iter().all(|b| *b == bits[0]);
         assert!(equal, "level {l}: replicas of a brick must be equal on all ranks that hold it");
     }
 }
@@ -255,17 +247,6 @@ fn is_in_leaf(leaves: &PerLevel, l: Level, code: u64) -> bool {
     (0..=l).any(|m| leaves[m as usize].contains(code >> (3 * (l - m))))
 }
 
-/// The leaves of all ranks tile the root: as no octant is split without its parent, their volumes must add up.
-fn is_complete(split: &PerLevel, ownership: &Ownership, comm: &dyn Comm) {
-    let leaves = (0..=LEVEL_MAX).flat_map(|l| {
-        let mut cursor = split[l as usize].cursor();
-        let leaves = move |b: Brick| Brick { bits: b.bits & !cursor.get(b.key), ..b };
-        Tree::exists(split, l).map(leaves).map(move |b| (l, b))
-    });
-    let volume = comm.sum(volume_owned(leaves, ownership));
-    assert_eq!(volume, volume_of(0, 1), "leaves must tile the root");
-}
-
 /// The volume of some octants of a level, in octants of level 19.
 fn volume_of(l: Level, octants: u64) -> u64 {
     u64::from(octants.count_ones()) << (3 * (LEVEL_MAX - l))
@@ -281,7 +262,10 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!(counts.total(), number, "counts must add up");
-    let mut add = |sets| volume += volume_owned(bricks_of(sets), &mesh.ownership);
+    let mut add = |sets| {
+        let owned = bricks_of(sets).filter(|(l, b)| mesh.ownership.owns(*l, b.key));
+        volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
+    };
     if !mesh.is_base {
         add(mesh.sides.deleted());
         if !mesh.rules.keep_crossing {
@@ -302,13 +286,6 @@ fn is_linear(end: u64, words: &[u64]) -> u64 {
 
 fn level_of(word: u64) -> Level {
     (word >> 2 & 31) as Level
-}
-
-/// The numbers of leaves by level, by rank and of this rank add up.
-pub fn totals(entry: &MeshEntry, parts: &[PartWords], leaves: u64, comm: &dyn Comm) {
-    let by_rank: u64 = parts.iter().map(|p| p[0]).sum();
-    assert_eq!(entry.leaves, by_rank, "leaves by level and by rank must add up");
-    assert_eq!(parts[comm.rank()][0], leaves, "parts must be in the order of ranks");
 }
 
 #[cfg(test)]

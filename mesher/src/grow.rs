@@ -3,75 +3,32 @@
 use crate::check;
 use crate::error::Error;
 use crate::grade;
-use crate::input::lattice::{Bounds, Keep, Rules};
+use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
-use crate::job::{Job, Options};
-use crate::output::stream::Leaves;
+use crate::mesh::Mesh;
 use crate::output::warnings;
 use crate::partition::initial::{self, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner};
-use crate::record::Recorder;
+use crate::record::{Job, Options, Recorder};
 use crate::refine;
 use crate::refine::voxelise::{self, BinnedFacets};
-use crate::sides::leaks::{self, Leaks};
-use crate::sides::{self, Decided, Sides, openness};
+use crate::sides::{self, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
-use bricks::tree::{PerLevel, Tree};
+use bricks::tree::Tree;
 use ranks::{Comm, Solo, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
-
-/// A mesh as one rank holds it.
-pub struct Mesh {
-    /// The facets of all ranks, in numbers.
-    pub facets: FacetCounts,
-    /// The rules on the lattice.
-    pub rules: Rules,
-    /// The ranks that own and hold bricks.
-    pub ownership: Ownership,
-    /// Level of the base leaves, or of the octants between which partition boundaries lie.
-    pub level_base: Level,
-    /// The partitioner that was used; none for a single rank.
-    pub partitioner: Option<Partitioner>,
-    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
-    pub split: PerLevel,
-    /// Crossing leaves of T0.
-    pub crossing: PerLevel,
-    /// Sides of the leaves of T0.
-    pub sides: Sides,
-    /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Leaks,
-    /// Whether the facets are an open body, and bound nothing although the outside is kept.
-    pub bounds_nothing: bool,
-    /// Name of the case in advice to the user.
-    pub case_name: String,
-    /// Whether the tree is T0, of which all leaves are in the mesh.
-    pub is_base: bool,
-}
-
-impl Mesh {
-    /// The leaves that this rank owns.
-    pub fn leaves(&self) -> Leaves<'_> {
-        Leaves {
-            split: &self.split,
-            crossing: &self.crossing,
-            sides: &self.sides,
-            ownership: &self.ownership,
-            drops_crossing: !self.is_base && !self.rules.keep_crossing,
-        }
-    }
-}
 
 /// Phases 3 to 8: from the facets and the rules on the lattice to the tree. `count` sees the base tree. Collective.
 ///
 /// # Errors
 /// The same on all ranks.
 pub fn grow<F: Borrow<[Facet]>>(
-    Quantised { rules, facets, counts, .. }: Quantised<F>,
+    Quantised { rules, facets, counts }: Quantised<F>,
     job: &mut Job,
     count: impl FnOnce(&Tree, &Ownership),
 ) -> Result<Mesh, Error> {
@@ -169,7 +126,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     if options.strict
         && let Some(warning) = warnings::of_leaks(&mesh)
     {
-        return Err(Error::Leak(warning));
+        return Err(Error::leak(warning));
     }
     if options.ungraded {
         return Ok(mesh);
@@ -223,8 +180,8 @@ fn of_base_mesh(
     base.boxes.iter_mut().for_each(|b| b.level = b.level.min(depth));
     let facets = check::base::all_facets(facets, comm);
     let options = Options { ungraded: true, ..Options::default() };
-    let (bounds, mut record) = (Bounds::EMPTY, Recorder::default());
-    let quantised = Quantised { rules: base, bounds, facets, counts };
+    let mut record = Recorder::default();
+    let quantised = Quantised { rules: base, facets, counts };
     let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record), |_, _| {});
     let gone = match rules.keep {
         Keep::Outside => Some(Side::Inside as u64),

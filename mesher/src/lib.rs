@@ -12,9 +12,25 @@ pub mod check;
 pub mod error;
 pub mod grade;
 mod grow;
-pub mod input;
-mod job;
-pub mod output;
+/// Phases 1 and 2: the case, its geometry, and both on the lattice.
+pub mod input {
+    pub mod case;
+    pub mod ingest;
+    pub mod lattice;
+    pub mod quantise;
+    pub mod stl;
+}
+mod mesh;
+/// Phases 9 and 10: the leaves in order, files, manifest and report.
+pub mod output {
+    pub mod htg;
+    pub mod leaves;
+    pub mod manifest;
+    pub mod report;
+    pub mod stream;
+    pub(crate) mod warnings;
+    pub mod write;
+}
 pub mod partition;
 pub mod record;
 pub mod refine;
@@ -23,8 +39,9 @@ pub mod sides;
 #[path = "../bricks/src/values.rs"]
 mod values;
 
-pub use grow::{Mesh, grow};
-pub use job::{Job, Options};
+pub use grow::grow;
+pub use mesh::Mesh;
+pub use record::{Job, Options};
 
 use error::Error;
 use files::interrupt::stop_at;
@@ -101,15 +118,13 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
     }
 
     // 10. Finish: sums over the ranks, and the manifest.
-    let (entry, parts) =
-        job.phase("finish", |comm| leaves::finish(mesh, &counts, &digests, out, comm))?;
+    let entry = job.phase("finish", |comm| leaves::finish(mesh, &counts, &digests, out, comm))?;
     job.counters.leaves = counts.total();
     job.counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };
     let traffic = job.comm.traffic();
     (job.counters.messages, job.counters.message_bytes) = (traffic.messages, traffic.bytes);
-    job.check(|comm| check::totals(&entry, &parts, counts.total(), comm));
     Ok(Report::new(mesh, entry, job))
 }
 

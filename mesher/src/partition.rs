@@ -14,7 +14,6 @@ pub mod area;
 pub mod cost;
 pub mod curve;
 pub mod initial;
-#[cfg(feature = "metis")]
 mod metis;
 pub mod ownership;
 pub mod repartition;

@@ -157,7 +157,7 @@ def across(k):
             yield k("across", w, usize(axis), up).x == union(w, lambda i: [j for j, beyond in [beside(i, axis, not up)] if beyond])
 
 
-@fact(BRICK, ("along(w, Z, 4, 28)", "along(w, Z, 4, 27)"), ("(w >> gap & m[1])", "(w >> gap & m[3])"))
+@fact(BRICK, ("moved(w, 2, false)", "moved(w, 1, false)"), ("w | x | y | z", "x | y | z"))
 def spread_faces(k):
     """`spread_faces` is the union of the octants and their face neighbours in the brick: a step of the flood."""
     w = k.bits("u64")

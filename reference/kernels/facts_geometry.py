@@ -228,7 +228,7 @@ def nearness(k):
     """A rounded coordinate is accepted by `off_centre` and its limit if and only if it lies in [-2^27, 2^28], for every f64, infinities and
     NaN included: so the conversion to i32 is exact."""
     x = k.float()
-    q = k("nearest", x, Number("f64", 0.0), Number("f64", 1.0), file=LATTICE)
+    q = k("rounded", x, Number("f64", 0.0), Number("f64", 1.0), file=LATTICE)
     limit = k.sources.fragment("let limit = ", LATTICE)
     near = z3.fpLEQ(k("off_centre", q, file=LATTICE).x, z3.FPVal(limit.x, z3.Float64()))
     yield near == z3.And(z3.fpGEQ(q.x, z3.FPVal(VERTEX[0], z3.Float64())), z3.fpLEQ(q.x, z3.FPVal(VERTEX[1], z3.Float64())))

@@ -7,9 +7,11 @@ import time
 from multiprocessing import Pool
 from pathlib import Path
 
-import facts
+import facts_bricks  # noqa: F401  (its facts are entered in FACTS)
+import facts_geometry  # noqa: F401
 import values
 import z3
+from kernels import FACTS, FILES, Kernels
 from rust import MESHER, Sources
 
 VALUES = Path(__file__).with_name("values.txt")
@@ -41,7 +43,7 @@ def verdict(given, goal):
 
 def proven(fact, sources):
     """Whether a fact holds, or the verdict on the first part that does not; and the number of parts."""
-    k, parts = facts.Kernels(sources), 0
+    k, parts = Kernels(sources), 0
     given = []
     def holds(goals):
         nonlocal parts
@@ -65,8 +67,8 @@ def proven(fact, sources):
 
 def row(name):
     """The line of a fact, and whether it is proven."""
-    fact, start = next(f for f in facts.FACTS if f.__name__ == name), time.process_time()
-    answer, parts = proven(fact, Sources(facts.FILES))
+    fact, start = next(f for f in FACTS if f.__name__ == name), time.process_time()
+    answer, parts = proven(fact, Sources(FILES))
     return f"{name:20} {time.process_time() - start:5.1f} s  {parts:3}  {answer:8} {' '.join(fact.__doc__.split())} [{fact.file}]", answer == "unsat"
 
 
@@ -74,7 +76,7 @@ def planted(mutant):
     """The line of a fault, and whether the proof fails. A fault may also make an index, a shift or a sum of known numbers impossible."""
     name, change = mutant
     impossible = OverflowError, IndexError
-    fact, start, sources = next(f for f in facts.FACTS if f.__name__ == name), time.process_time(), Sources(facts.FILES, change)
+    fact, start, sources = next(f for f in FACTS if f.__name__ == name), time.process_time(), Sources(FILES, change)
     try:
         answer = proven(fact, sources)[0]
     except impossible as e:
@@ -100,7 +102,7 @@ def table(rows, tasks):
 
 def compared():
     """Whether values.txt has the values of these sources, and a test compares those of every file."""
-    sources = Sources(facts.FILES)
+    sources = Sources(FILES)
     if VALUES.read_text().splitlines() != list(values.lines(sources)):
         print("values.txt is not of these sources: ci/kernels --values writes it")
         return 1
@@ -112,12 +114,12 @@ def compared():
 
 def main(options):
     names = [o for o in options if not o.startswith("--")]
-    chosen = [f for f in facts.FACTS if not names or f.__name__ in names]
+    chosen = [f for f in FACTS if not names or f.__name__ in names]
     if names and len(chosen) != len(names) or not set(options) - set(names) <= {"--mutants", "--values"}:
-        print(f"prove.py: the facts are {', '.join(f.__name__ for f in facts.FACTS)}", file=sys.stderr)
+        print(f"prove.py: the facts are {', '.join(f.__name__ for f in FACTS)}", file=sys.stderr)
         return 2
     if "--values" in options:
-        VALUES.write_text("".join(f"{line}\n" for line in values.lines(Sources(facts.FILES))))
+        VALUES.write_text("".join(f"{line}\n" for line in values.lines(Sources(FILES))))
         return 0
     began = time.time()
     if "--mutants" in options:

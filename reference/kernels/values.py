@@ -117,7 +117,7 @@ INPUTS = {
     (DIGEST, "digest_lanes"): lambda r: [[u64(r) for _ in range(r.randrange(4))]],
     (LATTICE, "meets"): lambda r: [b := box(r), r.choice([b["min"], b["max"], point(r)]), i64(1 << r.randrange(28))],
     (LATTICE, "box_mask"): box_and_brick,
-    (LATTICE, "nearest"): lambda r: [Number("f64", coordinate(r) / 4), Number("f64", float(r.randint(-8, 8))), Number("f64", 2.0)],
+    (LATTICE, "rounded"): lambda r: [Number("f64", coordinate(r) / 4), Number("f64", float(r.randint(-8, 8))), Number("f64", 2.0)],
     (LATTICE, "off_centre"): lambda r: [Number("f64", float(coordinate(r)))],
     (VOXELISE, "of"): lambda r: [facet(r, *r.choice([VERTEX, (0, ROOT), (0, ROOT)]))],
     (RAYS, "meets"): ray,

@@ -1,7 +1,6 @@
 //! Reader of case files: TOML in which an unknown key is an error.
 use crate::case::{BoxSpec, Case, Enclosed, Keep, Root};
-use crate::error::Error;
-use crate::input_file;
+use crate::error::{Error, read_file};
 use crate::stl;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -46,7 +45,7 @@ const ROOT_SCALE: f64 = 10.0;
 pub fn read(path: &Path) -> Result<Case, Error> {
     let invalid =
         |problem: String| Error::Invalid(format!("case file {}: {problem}", path.display()));
-    let text = String::from_utf8(input_file::read(path)?)
+    let text = String::from_utf8(read_file(path)?)
         .map_err(|error| invalid(format!("{error}; save it as UTF-8")))?;
     let file: CaseFile = toml::from_str(&text).map_err(|error| invalid(explain(&error, &text)))?;
     let facets: Vec<stl::Facet> = match (&file.geometry, &file.generator) {

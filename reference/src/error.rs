@@ -1,7 +1,7 @@
 //! Errors of the user's input and output. Each message is one sentence: the problem, its location
 //! and a remedy.
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// An error that the user can correct. Bugs panic instead.
@@ -85,4 +85,12 @@ impl Error {
             _ => 2,
         }
     }
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// It is not a regular file, is an output of this run, or cannot be read.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, Error> {
+    files::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })
 }

@@ -15,7 +15,6 @@ pub mod case_file;
 pub mod crossing;
 pub mod error;
 pub mod gradation;
-mod input_file;
 pub mod kept;
 pub mod lattice;
 pub mod leaks;

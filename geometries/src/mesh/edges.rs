@@ -2,7 +2,7 @@
 
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::{Mesh, MeshFault};
+use super::Mesh;
 
 /// A directed edge of one facet.
 #[derive(Clone, Copy)]
@@ -64,26 +64,6 @@ pub(super) fn longest(mesh: &Mesh, number: usize) -> Vec<Edge> {
     }
     edges.sort_unstable_by(order);
     edges
-}
-
-/// The first directed edge for which the number of directed edges in the opposite direction is not
-/// one.
-pub(super) fn fault(triangles: &[[u32; 3]]) -> Option<MeshFault> {
-    // Sorted by key and then by direction, a valid edge is a pair (up, down).
-    let mut directed: Vec<(u64, bool)> =
-        halves(triangles).map(|(_, half)| (half.key(), half.is_down())).collect();
-    directed.sort_unstable();
-    let is_valid = |pair: &[(u64, bool)]| matches!(pair, [(k, false), (l, true)] if k == l);
-    let mut pairs = directed.chunks(2);
-    let mut previous_key = None;
-    let wrong = pairs.find(|pair| {
-        let repeats = previous_key == Some(pair[0].0);
-        previous_key = pair.last().map(|&(key, _)| key);
-        repeats || !is_valid(pair)
-    })?;
-    let (key, is_down) = wrong[0];
-    let [low, high] = [(key >> 32) as u32, key as u32];
-    Some(MeshFault::EdgeUnmatched { edge: if is_down { [high, low] } else { [low, high] } })
 }
 
 /// Hashes one u64 by a multiplication, which is faster than the default for millions of edges.

@@ -92,7 +92,7 @@ mod tests {
     fn a_ball_is_closed_and_has_the_volume_and_euler_number_of_a_ball() {
         let mesh = fit::<Ball>(30_000);
         assert!((27_000..=30_000).contains(&mesh.triangles.len()));
-        assert_eq!(mesh.fault(), None);
+        assert!(mesh.is_closed() && mesh.flat_facet().is_none());
         assert!((mesh.volume() - 4.18879).abs() < 0.01);
         let euler = mesh.vertices.len() as i64 - mesh.triangles.len() as i64 / 2;
         assert_eq!(euler, 2);

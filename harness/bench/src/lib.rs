@@ -29,12 +29,15 @@ fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
     reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
 }
 
-/// Returns what git prints in a directory, without the end of the last line; `None` if it fails.
+/// Returns what a command prints; `None` if it fails.
+fn printed(command: &mut Command) -> Option<String> {
+    let output = command.output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+}
+
+/// Returns what git prints in a directory; `None` if it fails.
 fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
-    let mut git = Command::new("git");
-    let output = git.arg("-C").arg(directory).args(arguments).output().ok()?;
-    let text = String::from_utf8_lossy(&output.stdout).trim_end().to_owned();
-    output.status.success().then_some(text)
+    printed(Command::new("git").arg("-C").arg(directory).args(arguments))
 }
 
 /// Prints what a long command does on standard error. If that cannot be written, the command goes on.

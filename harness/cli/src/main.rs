@@ -3,12 +3,12 @@
 #[macro_use]
 mod output;
 
-mod cli;
 mod commands;
+mod options;
 
+use clap::Parser;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
-use cli::{Arguments, Command};
+use commands::Arguments;
 use contract::failure::Failure;
 use contract::failure::{EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_OUTPUT};
 use files::{BUG, Heap};
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
         Err(error) => return refuse(&error),
     };
     report_a_panic_once();
-    let Ok(ended) = catch_unwind(|| dispatch(arguments)) else {
+    let Ok(ended) = catch_unwind(|| arguments.command.run()) else {
         interrupt::clean();
         exit(BUG);
     };
@@ -86,33 +86,4 @@ fn print_failure(Failure { code, why }: Failure) -> u8 {
         _ => eprintln!("harness: {why}"),
     }
     code
-}
-
-fn dispatch(arguments: Arguments) -> Result<u8, Failure> {
-    match arguments.command {
-        Command::Verify(arguments) => commands::verify::run(*arguments),
-        Command::Selftest(arguments) => commands::selftest::run(&arguments),
-        Command::Gate(arguments) => commands::gate::run(&arguments),
-        Command::Bench(arguments) => commands::bench::run(&arguments),
-        Command::Report(arguments) => commands::report::run(&arguments),
-        Command::Archive(arguments) => commands::archive::run(&arguments),
-        Command::Replay(arguments) => commands::replay::run(&arguments),
-        Command::Track(arguments) => commands::track::run(&arguments),
-        Command::Shrink(arguments) => commands::shrink::run(&arguments),
-        Command::Audit(arguments) => commands::audit::run(&arguments),
-        Command::Geometry(arguments) => commands::geometry::run(&arguments),
-        Command::Leak(arguments) => commands::leak::run(&arguments),
-        Command::Export(arguments) => commands::export::run(&arguments),
-        Command::Picture(arguments) => commands::picture::run(&arguments),
-        Command::Import(arguments) => commands::import::run(&arguments),
-        Command::Diff(arguments) => commands::diff::run(&arguments),
-        Command::Why(arguments) => commands::why::run(&arguments),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "harness", &mut script);
-            print!("{}", String::from_utf8_lossy(&script));
-            Ok(EXIT_HOLDS)
-        }
-        Command::Planted(arguments) => Ok(commands::planted::run(&arguments)),
-    }
 }

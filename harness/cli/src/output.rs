@@ -1,11 +1,16 @@
-//! Printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
+//! Outputs: files, and printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
-use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT};
+use crate::options::Output;
+use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT, Failure, exit_first};
+use contract::files::write_atomically;
 use files::{message, plain};
 use run::engine::interrupt;
+use std::env;
 use std::fmt::Arguments;
+use std::fs::{OpenOptions, create_dir_all};
 use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::path::Path;
 use std::sync::OnceLock;
 
 /// The first error of standard output, except that of a closed pipe.
@@ -57,4 +62,47 @@ pub fn finish(code: u8) -> u8 {
         }
         None => code,
     }
+}
+
+/// Writes a file and creates its missing parent directories.
+///
+/// # Errors
+/// The file's name and the reason.
+pub fn put(path: &Path, text: &str) -> Result<(), Failure> {
+    let make = || {
+        path.parent().map_or(Ok(()), create_dir_all)?;
+        write_atomically(path, |out| out.write_all(text.as_bytes()))
+    };
+    make().map_err(|error| Failure::at(path, error))
+}
+
+/// The failure to write a report of a command that would return `code`: its code is the first of both.
+pub fn unwritten(code: u8) -> impl Fn(Failure) -> Failure {
+    move |Failure { code: other, why }| Failure {
+        code: exit_first(code, other),
+        why: format!("a report could not be written: {why}"),
+    }
+}
+
+/// A file for a form of a report, if it was asked for, and the form.
+pub type Form<'a> = (&'a Option<Output>, &'a dyn Fn() -> String);
+
+/// Writes the forms that were asked for, and appends Markdown to the summary page of a GitHub action; returns the exit code of the
+/// report.
+///
+/// # Errors
+/// If a file cannot be written, with the exit code that comes first.
+pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8, Failure> {
+    let write = || -> Result<(), Failure> {
+        for (file, form) in forms {
+            file.as_ref().map_or(Ok(()), |file| put(file, &form()))?;
+        }
+        let page = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty());
+        if let (Some(page), Some(text)) = (page, summary) {
+            let mut file = OpenOptions::new().create(true).append(true).open(page)?;
+            file.write_all(text.as_bytes())?;
+        }
+        Ok(())
+    };
+    write().map(|()| code).map_err(unwritten(code))
 }

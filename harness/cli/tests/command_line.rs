@@ -147,9 +147,8 @@ fn what_cannot_be_meant_is_invalid_input() {
     let file = file.to_str().unwrap();
     for (arguments, why) in [
         (&["track", "missing.jsonl"][..], "missing.jsonl is missing"),
-        (&["track", file, "--alpha", "7"], "greater than 0 and at most 1"),
-        (&["track", file, "--alpha", "nan"], "greater than 0 and at most 1"),
-        (&["track", file, "--effect-min", "1e9"], "percentage"),
+        (&["track", file, "--alpha", "7"], "a number from 0.000001 to 1"),
+        (&["track", file, "--alpha", "nan"], "a number from 0.000001 to 1"),
         (&["gate", "--baseline", file], "neither a program that can be executed nor"),
         (&["gate", "--candidate", file], "neither a program that can be executed nor"),
         (&["gate", "--budget", "nan"], "a whole number of seconds"),

@@ -1,4 +1,4 @@
-//! `harness export` as a command. `harness/oracles/test_vtu.py` reads its files back.
+//! `harness export` as a command. `harness/oracles/test_vtk.py` reads its files back.
 
 use contract::testing::{leaf_set, words_of, words_with_sides};
 use contract::word::Side;
@@ -175,7 +175,7 @@ fn a_tree_is_read_back_without_python_and_damage_is_found() {
     // A directory with the tree alone is compared like one with leaf words.
     fs::create_dir(place.path().join("tree")).unwrap();
     fs::copy(place.path().join("mesh.vtkhdf"), place.path().join("tree/mesh.vtkhdf")).unwrap();
-    let mut manifest = contract::leafset::read_manifest(&place.path().join("mesh")).unwrap();
+    let mut manifest = contract::manifest::Manifest::read(&place.path().join("mesh")).unwrap();
     (manifest.parts, manifest.hyper_tree_grid) = (Vec::new(), Some("mesh.vtkhdf".to_owned()));
     let write = |manifest: &contract::manifest::Manifest| {
         fs::write(place.path().join("tree/mesh.json"), serde_json::to_vec(manifest).unwrap())

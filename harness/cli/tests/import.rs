@@ -125,7 +125,7 @@ fn unusable_input_is_one_sentence_with_the_file() {
     assert!(refused(&[empty.to_str().unwrap()]).contains("--format"));
     assert!(refused(&[bare.to_str().unwrap()]).contains("--format leaf-words"));
     assert!(refused(&[&sample("unitcube.p8est"), "--root", "0,0,0,-1"]).contains("is not a cube"));
-    assert!(refused(&[&sample("cube.json"), "--format", "p4est"]).contains("p8est"));
+    assert!(refused(&[&sample("brick.csv"), "--format", "p4est"]).contains("p8est"));
 }
 
 #[test]
@@ -133,7 +133,15 @@ fn formats_that_are_read_in_python_need_it() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("mesh.vtu");
     fs::write(&file, "<VTKFile type=\"UnstructuredGrid\">").unwrap();
-    for mesh in [file.to_str().unwrap(), &sample("cube.json"), &sample("foam-binary")] {
+    let discretize = place.path().join("tree.json");
+    fs::write(&discretize, "{}").unwrap();
+    let foam = place.path().join("constant/polyMesh");
+    fs::create_dir_all(&foam).unwrap();
+    for list in ["points", "faces", "owner", "neighbour"] {
+        fs::write(foam.join(list), "FoamFile {}").unwrap();
+    }
+    let foam = place.path().to_str().unwrap();
+    for mesh in [file.to_str().unwrap(), discretize.to_str().unwrap(), foam] {
         let (code, _, error) = result(&["audit", mesh]);
         assert!(code == 3 && error.contains("/nowhere/python"), "{error}");
     }

@@ -3,8 +3,9 @@
 #[cfg(test)]
 mod tests;
 
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::files;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -26,24 +27,18 @@ pub struct Case {
     pub facets: Vec<Facet>,
     /// The body on the lattice.
     pub facets_lattice: Vec<FacetLattice>,
-    /// The root cube.
-    pub root: Root,
-    /// D: the level of crossing leaves.
-    pub level_surface: u8,
-    /// n: minimum thickness of a layer, in cells.
-    pub layer_cells_min: u32,
-    /// The side that is kept.
-    pub keep: Keep,
-    /// Whether crossing leaves are kept.
-    pub keep_crossing: bool,
-    /// Extent boxes on the lattice.
-    pub boxes: Vec<ExtentBox>,
     /// Points that lie in the flow, in the user's units. If there are any, they and not rays determine all sides.
     pub seeds: Vec<[f64; 3]>,
-    /// The seeds on the lattice. Each lies in the root's half-open cube.
-    pub seeds_lattice: Vec<[i64; 3]>,
-    /// The treatment of outside components that the far field does not reach.
-    pub enclosed: Enclosed,
+    /// The root and the rules, on the lattice: the manifest of a mesh without leaves.
+    pub rules: Manifest,
+}
+
+impl Deref for Case {
+    type Target = Manifest;
+
+    fn deref(&self) -> &Manifest {
+        &self.rules
+    }
 }
 
 /// The case file, key by key.
@@ -92,9 +87,9 @@ impl Case {
     ///
     /// # Errors
     /// If a file cannot be read, or if the case is invalid.
-    pub fn read(path: &Path) -> Result<Self, Unusable> {
-        let text = files::read_text(path).map_err(|error| Unusable::at(path, error))?;
-        let wrong = |why: String| Unusable::at(path, why);
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let text = files::read_text(path).map_err(|error| Failure::about(path, error))?;
+        let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
         let facets = facets(path, &file)?;
@@ -135,30 +130,26 @@ impl Case {
             let (min, max) = (root.quantise_clamped(b.min), root.quantise_clamped(b.max));
             boxes.push(ExtentBox { min, max, level: level("box spacing", b.spacing)? });
         }
-        let case = Self {
-            name,
-            geometry: None,
-            facets_lattice: on_lattice(&root, &facets)?,
-            facets,
-            root,
+        let rules = Manifest {
             level_surface,
             layer_cells_min: file.layer_cells_min,
             keep: file.keep,
             keep_crossing: file.keep_crossing,
             boxes,
-            seeds_lattice: seeds_on_lattice(&root, &file.seeds)?,
-            seeds: file.seeds.clone(),
+            seeds: seeds_on_lattice(&root, &file.seeds)?,
             enclosed: file.enclosed,
+            ..Manifest::without_leaves(Tree::Final, root, String::new())
         };
+        let (facets_lattice, seeds) = (on_lattice(&root, &facets)?, file.seeds.clone());
+        let case = Self { name, geometry: None, facets, facets_lattice, seeds, rules };
         case.refuse_crossing_seeds()?;
         Ok(case)
     }
 
     /// Refuses a seed in a crossing leaf of T0.
     fn refuse_crossing_seeds(&self) -> Result<(), String> {
-        let inputs = self.inputs();
-        for (i, (&seed, at)) in self.seeds_lattice.iter().zip(&self.seeds).enumerate() {
-            if let (leaf, Some(facet)) = inputs.base_leaf_at(seed, &self.facets_lattice) {
+        for (i, (&seed, at)) in self.rules.seeds.iter().zip(&self.seeds).enumerate() {
+            if let (leaf, Some(facet)) = self.base_leaf_at(seed, &self.facets_lattice) {
                 let leaf = self.root.describe(&leaf);
                 return Err(format!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
@@ -172,21 +163,12 @@ impl Case {
 
     /// The inputs, as the manifest of a final mesh has them.
     pub fn inputs(&self) -> Manifest {
-        self.manifest(Tree::Final, String::new())
+        self.rules.clone()
     }
 
     /// The manifest of a mesh of this case, without leaves.
     pub fn manifest(&self, tree: Tree, program: String) -> Manifest {
-        Manifest {
-            level_surface: self.level_surface,
-            layer_cells_min: self.layer_cells_min,
-            keep: self.keep,
-            keep_crossing: self.keep_crossing,
-            boxes: self.boxes.clone(),
-            seeds: self.seeds_lattice.clone(),
-            enclosed: self.enclosed,
-            ..Manifest::without_leaves(tree, self.root, program)
-        }
+        Manifest { tree, program, ..self.rules.clone() }
     }
 }
 
@@ -196,16 +178,16 @@ fn beside(case: &Path, path: &Path) -> PathBuf {
 }
 
 /// The body, read from a file or generated.
-fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, Unusable> {
+fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, Failure> {
     match (&file.geometry, &file.generator) {
         (Some(stl), None) => {
             let path = beside(case, stl);
             let body = stl::read(&path)
-                .map_err(|why| Unusable::because(format!("{} {why}", path.display())))?;
+                .map_err(|why| Failure::input(format!("{} {why}", path.display())))?;
             Ok(body.facets)
         }
-        (None, Some(generator)) => generator.facets().map_err(|error| Unusable::at(case, error)),
-        _ => Err(Unusable::at(case, "give exactly one of `geometry` and `[generator]`")),
+        (None, Some(generator)) => generator.facets().map_err(|error| Failure::about(case, error)),
+        _ => Err(Failure::about(case, "give exactly one of `geometry` and `[generator]`")),
     }
 }
 
@@ -288,12 +270,8 @@ fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, St
 }
 
 fn positive(what: &str, value: f64) -> Result<(), String> {
-    let good = value.is_finite() && value > 0.0;
-    if good {
-        Ok(())
-    } else {
-        Err(format!("{what} = {value} must be finite and greater than zero"))
-    }
+    let why = || format!("{what} = {value} must be finite and greater than zero");
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(why()) }
 }
 
 /// Examples of keys of a case file.

@@ -22,17 +22,20 @@ pub enum Size {
 }
 
 /// A case that was selected.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct Selected {
     /// Its name, which is also the name of its directory.
     pub name: String,
     /// The command-line argument that selects it again.
+    #[serde(skip)]
     pub argument: String,
     /// The case file.
+    #[serde(rename = "file")]
     pub path: PathBuf,
     /// Its size, if it is in the catalogue.
     pub size: Option<Size>,
     /// Set if its geometry file does not exist: which file, and how to get it.
+    #[serde(skip)]
     pub absent: Option<String>,
 }
 
@@ -46,15 +49,7 @@ pub struct Catalogue {
 
 #[derive(Debug, Deserialize)]
 struct CatalogueFile {
-    #[serde(rename = "case")]
-    entries: Vec<Entry>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Entry {
-    name: String,
-    file: PathBuf,
-    size: Size,
+    case: Vec<Selected>,
 }
 
 /// The one key of a case file that the catalogue reads.
@@ -163,26 +158,21 @@ fn from_path(argument: &str) -> Result<Selected, String> {
 
 fn read(path: &Path) -> Result<Vec<Selected>, String> {
     let wrong = |why: String| format!("{}: {why}", path.display());
+    let missing = "the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository";
     let text = files::read_text(path).map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => {
-            wrong("the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository".to_owned())
-        }
+        io::ErrorKind::NotFound => wrong(missing.to_owned()),
         _ => wrong(error.to_string()),
     })?;
     let file: CatalogueFile = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let directory = path.parent().unwrap_or(Path::new("."));
-    let selected = |entry: Entry| {
-        let path = directory.join(entry.file);
-        let absent = missing_geometry(&path);
-        Selected {
-            argument: entry.name.clone(),
-            name: entry.name,
-            path,
-            size: Some(entry.size),
-            absent,
-        }
-    };
-    Ok(file.entries.into_iter().map(selected).collect())
+    let mut cases = file.case;
+    for case in &mut cases {
+        case.argument.clone_from(&case.name);
+        case.path = directory.join(&case.path);
+        case.absent = missing_geometry(&case.path);
+        case.size.ok_or_else(|| wrong(format!("the case {} has no size", case.name)))?;
+    }
+    Ok(cases)
 }
 
 /// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported

@@ -24,12 +24,13 @@ pub fn exit_first(a: u8, b: u8) -> u8 {
     order.into_iter().find(|code| [a, b].contains(code)).unwrap_or(EXIT_HOLDS)
 }
 
-/// Why a command has no result.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a command has no result, or why a file cannot be used: one sentence, or the predicate of one whose subject is the file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{why}")]
 pub struct Failure {
     /// The exit code.
     pub code: u8,
-    /// The reason, in one sentence.
+    /// The reason.
     pub why: String,
 }
 
@@ -42,6 +43,16 @@ impl Failure {
     /// A required program or file is missing, or nothing was checked.
     pub fn missing(why: impl Display) -> Self {
         Self { code: EXIT_MISSING, why: why.to_string() }
+    }
+
+    /// An input that cannot be used for a reason, with its path before that.
+    pub fn about(path: &Path, why: impl Display) -> Self {
+        Self::input(format!("{}: {why}", path.display()))
+    }
+
+    /// An input that cannot be read.
+    pub fn unreadable(error: io::Error) -> Self {
+        Self::input(format!("cannot be read: {error}"))
     }
 
     /// The user interrupted the command.
@@ -63,59 +74,17 @@ impl Failure {
     #[must_use]
     pub fn of_file(self, path: &Path) -> Self {
         match self.code {
-            EXIT_INPUT => Self::input(format!("{}: {}", path.display(), self.why)),
+            EXIT_INPUT => Self::about(path, self.why),
             _ => self,
         }
     }
 }
 
-impl Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.why)
+impl From<String> for Failure {
+    fn from(why: String) -> Self {
+        Self::input(why)
     }
 }
-
-/// Why a file or directory cannot be used: one sentence, or the predicate of one whose subject is the file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Unusable(String);
-
-impl Unusable {
-    /// For a reason.
-    pub fn because(why: impl Into<String>) -> Self {
-        Self(why.into())
-    }
-
-    /// For a reason, with the path before it.
-    pub fn at(path: &Path, why: impl Display) -> Self {
-        Self(format!("{}: {why}", path.display()))
-    }
-
-    /// The error with the path of the file before it.
-    #[must_use]
-    pub fn of_file(self, path: &Path) -> Self {
-        Self::at(path, self)
-    }
-}
-
-impl From<io::Error> for Unusable {
-    fn from(error: io::Error) -> Self {
-        Self(format!("cannot be read: {error}"))
-    }
-}
-
-/// Errors that are always those of the input.
-macro_rules! inputs {
-    ($($error:ty),*) => {$(
-        impl From<$error> for Failure {
-            fn from(error: $error) -> Self {
-                Self::input(error)
-            }
-        }
-    )*};
-}
-
-inputs!(String, Unusable);
 
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {

@@ -8,16 +8,14 @@
 //! Opening a file verifies the whole structure: every node but the root has a parent, and masked nodes are leaves. Sides are verified as they are
 //! read. Damage to the file itself shows in its checksums.
 
-mod bits;
 #[cfg(test)]
 mod tests;
 
 use crate::lattice::Root;
 use crate::word;
-use bits::Bits;
-
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use vtkhdf::format::Chunked;
 pub use vtkhdf::format::ReadError as TreeError;
 use vtkhdf::read::TreeReader;
 use vtkhdf::tree::Shape;
@@ -47,14 +45,6 @@ pub struct TreeFile {
 
 type Result<T> = std::result::Result<T, TreeError>;
 
-fn layout<T>(why: impl Into<String>) -> Result<T> {
-    Err(TreeError::Unknown(why.into()))
-}
-
-fn nodes<T>(why: impl Into<String>) -> Result<T> {
-    Err(TreeError::Damaged(why.into()))
-}
-
 impl TreeFile {
     /// Opens a file. With `sides`, its leaves have sides; otherwise all are outside.
     ///
@@ -65,7 +55,8 @@ impl TreeFile {
         let Shape { origin, edge, .. } = file.shape;
         let is_cube = edge > 0.0 && edge.is_finite() && origin.iter().all(|c| c.is_finite());
         if !is_cube {
-            return layout(format!("its root is no cube: corner {origin:?}, edge {edge}"));
+            let why = format!("its root is no cube: corner {origin:?}, edge {edge}");
+            return Err(TreeError::Unknown(why));
         }
         let (mut levels, mut end) = (Vec::new(), 0);
         for count in &file.shape.nodes {
@@ -77,16 +68,17 @@ impl TreeFile {
         let masked = file.masked.as_ref().map(|array| Bits::read(&file, array, end)).transpose()?;
         let masked = masked.unwrap_or_default();
         if !split.are_disjoint(&masked) {
-            return nodes("a node is masked and split");
+            return Err(TreeError::Damaged("a node is masked and split".to_owned()));
         }
         let mut leaves = end - masked.ones(0..end);
         for (level, pair) in levels.windows(2).enumerate() {
             let (parents, children) = (split.ones(pair[0].clone()), pair[1].end - pair[1].start);
             leaves -= parents;
             if 8 * parents != children {
-                return nodes(format!(
+                let why = format!(
                     "{parents} nodes of level {level} are split, and {children} are on the next"
-                ));
+                );
+                return Err(TreeError::Damaged(why));
             }
         }
         let (path, root) = (path.to_owned(), Root { origin, edge });
@@ -176,7 +168,66 @@ impl Walk<'_> {
         }
         match sides[at] {
             side @ 0..=2 => Ok(side),
-            side => nodes(format!("node {node} has the side {side}")),
+            side => Err(TreeError::Damaged(format!("node {node} has the side {side}"))),
         }
+    }
+}
+
+/// The bits of an array, all in memory: an eighth of a byte for each node in a chunk that is stored. The first bit of a byte is the most
+/// significant one.
+#[derive(Debug, Default)]
+struct Bits {
+    /// The chunks; empty without set bits.
+    chunks: Vec<Vec<u8>>,
+    /// Bytes of a chunk.
+    chunk_bytes: u64,
+}
+
+impl Bits {
+    /// The first `count` bits of an array. Those after them have no meaning, and are zero here.
+    fn read(file: &TreeReader, array: &Chunked, count: u64) -> Result<Self> {
+        let mut bits = Self { chunks: Vec::new(), chunk_bytes: u64::from(array.chunk_len) };
+        for (index, begin) in (0..array.chunks.len()).zip((0..).step_by(array.chunk_len as usize)) {
+            let mut chunk = Vec::new();
+            if array.chunks[index].is_some() {
+                file.read_chunk(array, index, &mut chunk)?;
+            }
+            let left = count.saturating_sub(8 * begin);
+            if left < 8 * chunk.len() as u64 {
+                chunk.truncate(left.div_ceil(8) as usize);
+                if let Some(last) = chunk.last_mut().filter(|_| !left.is_multiple_of(8)) {
+                    *last &= !(0xff >> (left % 8));
+                }
+            }
+            bits.chunks.push(chunk);
+        }
+        Ok(bits)
+    }
+
+    /// Up to eight bits from a position on; the first becomes the lowest.
+    fn get(&self, first: u64, count: u32) -> u8 {
+        let pair = u16::from_be_bytes([self.byte(first / 8), self.byte(first / 8 + 1)]);
+        let bits = ((pair << (first % 8) >> 8) as u8).reverse_bits();
+        bits & ((1u16 << count) - 1) as u8
+    }
+
+    fn byte(&self, at: u64) -> u8 {
+        let Some(chunk) = at.checked_div(self.chunk_bytes) else { return 0 };
+        let chunk = self.chunks.get(chunk as usize);
+        let byte = chunk.and_then(|chunk| chunk.get((at % self.chunk_bytes) as usize));
+        byte.copied().unwrap_or(0)
+    }
+
+    /// Number of bits that are set in a range.
+    fn ones(&self, Range { start, end }: Range<u64>) -> u64 {
+        let bits = |first: u64| self.get(first, (end - first).min(8) as u32).count_ones();
+        (start..end).step_by(8).map(|first| u64::from(bits(first))).sum()
+    }
+
+    /// Whether no bit is set in both.
+    fn are_disjoint(&self, other: &Self) -> bool {
+        let of_chunk = |(a, b): (&Vec<u8>, &Vec<u8>)| a.iter().zip(b).all(|(a, b)| a & b == 0);
+        // Of two arrays of which one has a shorter chunk, that is the only one.
+        self.chunks.iter().zip(&other.chunks).all(of_chunk)
     }
 }

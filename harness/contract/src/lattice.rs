@@ -10,6 +10,29 @@ pub const UNITS_PER_EDGE: i64 = 1 << 27;
 /// A facet on the lattice.
 pub type FacetLattice = [[i64; 3]; 3];
 
+/// The vector from `b` to `a`.
+pub fn difference(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// The vector product.
+pub fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
+    std::array::from_fn(|a| {
+        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+        u[b] * v[c] - u[c] * v[b]
+    })
+}
+
+/// The scalar product.
+pub fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
+    (0..3).map(|i| i128::from(a[i]) * i128::from(b[i])).sum()
+}
+
+/// The facet's normal, with twice the area as its length; components are at most 2^59 in magnitude. Zero if the facet is degenerate.
+pub fn normal(&[a, b, c]: &FacetLattice) -> [i64; 3] {
+    cross(difference(b, a), difference(c, a))
+}
+
 /// The root cube, in the user's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,15 +1,11 @@
-//! Leaf-set directories: the manifest `mesh.json` and the part files that it names, or the tree in one file, or both.
-//!
-//! Reading fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an
-//! array of words, or a part file that the manifest does not name. The checks establish whether the contents
-//! are correct.
+//! Leaf sets in memory, and the writing of leaf-set directories: the manifest `mesh.json` and the part files that it names. [`crate::mesh`] reads
+//! directories of any size.
 
 use crate::digest::Digest;
-use crate::failure::Unusable;
-use crate::files::{self, named};
-use crate::htg::{TreeError, TreeFile};
-use crate::manifest::{self, Manifest, Part, Sides, Tally};
-use crate::mesh::Mesh;
+use crate::failure::Failure;
+use crate::files::named;
+use crate::manifest::{self, Manifest, Part, Tally};
+use crate::mesh::{Mesh, part_names};
 use crate::npy::{self, PartFile};
 use ::files::Claim;
 use std::fs;
@@ -31,12 +27,10 @@ pub struct LeafSet {
 ///
 /// # Errors
 /// If the directory is not a leaf set.
-pub fn read(dir: &Path) -> Result<LeafSet, Unusable> {
+pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
     let mesh = Mesh::open(dir)?;
-    let mut parts = Vec::new();
-    for part in &mesh.parts {
-        parts.push(part.read_all().map_err(|error| of_part(part, error))?);
-    }
+    let mut parts: Vec<Vec<u64>> =
+        mesh.parts.iter().map(PartFile::read_all).collect::<Result<_, _>>()?;
     if mesh.tree_file.is_some() {
         let mut words = Vec::new();
         mesh.visit(&mut |run| words.extend_from_slice(run))?;
@@ -49,20 +43,15 @@ pub fn read(dir: &Path) -> Result<LeafSet, Unusable> {
 ///
 /// # Errors
 /// If the directory or an array cannot be read, or if there is none.
-pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, Unusable> {
-    let io = |error| Unusable::at(dir, error);
-    let mut names = Vec::new();
-    for entry in fs::read_dir(dir).map_err(io)? {
-        let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
-        names.extend(Path::new(&name).extension().is_some_and(|e| e == "npy").then_some(name));
-    }
+pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, Failure> {
+    let names = part_names(dir)?;
     if names.is_empty() {
-        return Err(io(std::io::Error::other("it has neither mesh.json nor an array of leaves")));
+        return Err(Failure::about(dir, "it has neither mesh.json nor an array of leaves"));
     }
-    names.sort_unstable();
     let read = |name: String| {
-        let part = open_part(&dir.join(&name))?;
-        part.read_all().map(|words| (name, words)).map_err(|error| of_part(&part, error))
+        let path = dir.join(&name);
+        let part = PartFile::open(&path).map_err(|why| why.of_file(&path))?;
+        Ok((name, part.read_all()?))
     };
     names.into_iter().map(read).collect()
 }
@@ -131,87 +120,6 @@ impl LeafSet {
     }
 }
 
-/// Maximum number of distinct nodes of a tree in memory. A node needs up to 120 bytes while the tables grow.
-pub const NODES_MAX: usize = 32_000_000;
-
-/// Opens a part.
-pub(crate) fn open_part(path: &Path) -> Result<PartFile, Unusable> {
-    PartFile::open(path).map_err(|why| Unusable::at(path, format!("the part {why}")))
-}
-
-/// A part that was opened, but cannot be read.
-pub(crate) fn of_part(part: &PartFile, error: std::io::Error) -> Unusable {
-    Unusable::at(part.path(), format!("the part {}", Unusable::from(error)))
-}
-
-/// A tree that was opened, but cannot be read.
-pub fn of_tree(tree: &TreeFile, why: &TreeError) -> Unusable {
-    Unusable::at(tree.path(), format!("the tree {why}"))
-}
-
-/// Opens the tree of a leaf-set directory without reading leaves; `None` if there is none.
-///
-/// # Errors
-/// If the file is not the tree of a mesh with this root.
-pub fn open_tree(dir: &Path, manifest: &Manifest) -> Result<Option<TreeFile>, Unusable> {
-    let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
-    let path = dir.join(name);
-    let sides = manifest.sides == Sides::Known;
-    let tree = TreeFile::open(&path, sides).and_then(|tree| match tree.root == manifest.root {
-        true => Ok(tree),
-        false => Err(TreeError::Unknown(format!(
-            "its root is {}, but that of the manifest {}",
-            tree.root, manifest.root
-        ))),
-    });
-    tree.map(Some).map_err(|why| Unusable::at(&path, format!("the tree {why}")))
-}
-
-/// Reads only the manifest.
-///
-/// # Errors
-/// If it cannot be read, or does not follow its schema.
-pub fn read_manifest(dir: &Path) -> Result<Manifest, Unusable> {
-    if dir.is_file() {
-        let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
-        return Err(Unusable::because(format!("{} {why}", dir.display())));
-    }
-    let path = dir.join(manifest::FILE);
-    let text = files::read_text(&path).map_err(|error| Unusable::at(&path, error))?;
-    let not_one = |why: String| Unusable::at(&path, format!("not a leaf-set manifest: {why}"));
-    let wrong = |why| Err(not_one(why));
-    let manifest: Manifest =
-        serde_json::from_str(&text).map_err(|error| not_one(error.to_string()))?;
-    if manifest.schema != manifest::SCHEMA {
-        return wrong(format!("its schema is {:?}, not {:?}", manifest.schema, manifest::SCHEMA));
-    }
-    if let Some(fault) = manifest.fault() {
-        return wrong(fault.to_owned());
-    }
-    // A path instead of a file name could refer to the leaves of another mesh.
-    let mut names = manifest.parts.iter().map(|p| &p.file).chain(&manifest.hyper_tree_grid);
-    if let Some(name) = names.find(|name| Path::new(name).components().count() != 1) {
-        return wrong(format!("{name:?} is not a plain file name"));
-    }
-    Ok(manifest)
-}
-
-/// A part file that the manifest does not name shows that manifest and directory do not belong together.
-pub(crate) fn refuse_extra_parts(dir: &Path, manifest: &Manifest) -> Result<(), Unusable> {
-    let io = |error| Unusable::at(dir, error);
-    for entry in fs::read_dir(dir).map_err(io)? {
-        let name = entry.map_err(io)?.file_name();
-        let is_part = Path::new(&name).extension().is_some_and(|e| e == "npy");
-        if is_part && !manifest.parts.iter().any(|p| *p.file == *name) {
-            return Err(Unusable::at(
-                &dir.join(name),
-                "a part file that the manifest does not name",
-            ));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -242,7 +150,6 @@ mod tests {
             (&found.manifest, &found.parts, &found.words),
             (&set.manifest, &set.parts, &set.words)
         );
-        assert!(matches!(open_tree(dir.path(), &set.manifest), Ok(None)));
         let why = |change: &dyn Fn(&mut Manifest)| {
             let mut manifest = set.manifest.clone();
             change(&mut manifest);
@@ -270,7 +177,7 @@ mod tests {
                 .contains("absent.npy: the part cannot be read")
         );
         fs::write(dir.path().join("mesh.json"), "{}").unwrap();
-        let why = |path: &Path| read_manifest(path).unwrap_err().to_string();
+        let why = |path: &Path| Manifest::read(path).unwrap_err().to_string();
         assert!(why(dir.path()).contains("mesh.json: not a leaf-set manifest: missing field"));
         let file = dir.path().join("mesh.json");
         assert!(why(&file).contains("mesh.json is a file: give the directory of a mesh"));

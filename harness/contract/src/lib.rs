@@ -5,7 +5,7 @@
 //! - [`failure`]: why a command has no result, with its exit code; [`watch`]: what it reports meanwhile;
 //! - [`paper`]: the numbers that we cite;
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
-//! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`parity`] (rays),
+//! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`neighbourhood`], [`parity`] (rays),
 //!   [`triangle`] (exact facet-octant test), [`sets`] (disjoint sets).
 
 pub mod case;
@@ -19,6 +19,7 @@ pub mod lattice;
 pub mod leafset;
 pub mod manifest;
 pub mod mesh;
+pub mod neighbourhood;
 pub mod npy;
 pub mod number;
 pub mod octant;

@@ -10,6 +10,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
+use crate::failure::Failure;
+use crate::files;
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::octant::{LEVEL_MAX, Octant};
 
@@ -257,8 +259,17 @@ impl Manifest {
         }
     }
 
-    /// The entry that no mesh has, because a number is out of range; `None` if there is none. Checks compute with all these numbers.
-    pub fn fault(&self) -> Option<&'static str> {
+    /// The entry that no mesh has, because the schema is another, a number is out of range, or a name is a path; `None` if there is none. Checks
+    /// compute with all these numbers.
+    pub fn fault(&self) -> Option<String> {
+        if self.schema != SCHEMA {
+            return Some(format!("its schema is {:?}, not {SCHEMA:?}", self.schema));
+        }
+        // A path instead of a file name could refer to the leaves of another mesh.
+        let mut names = self.parts.iter().map(|p| &p.file).chain(&self.hyper_tree_grid);
+        if let Some(name) = names.find(|name| Path::new(name).components().count() != 1) {
+            return Some(format!("{name:?} is not a plain file name"));
+        }
         let lattice = 0..=UNITS_PER_EDGE;
         let is_box = |b: &ExtentBox| {
             b.level <= LEVEL_MAX
@@ -282,7 +293,7 @@ impl Manifest {
                 "root: give a cube with an edge from 1e-100 to 1e100",
             ),
         ];
-        faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault)
+        faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault.to_owned())
     }
 
     /// Replaces all entries that depend on the leaves.
@@ -292,6 +303,24 @@ impl Manifest {
         self.leaves_by_side = tally.by_side;
         self.digest = tally.digest;
         self.octant_digests = tally.octants;
+    }
+
+    /// Reads the manifest of a directory.
+    ///
+    /// # Errors
+    /// If it cannot be read, or does not follow its schema.
+    pub fn read(dir: &Path) -> Result<Self, Failure> {
+        if dir.is_file() {
+            let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
+            return Err(Failure::input(format!("{} {why}", dir.display())));
+        }
+        let path = dir.join(FILE);
+        let text = files::read_text(&path).map_err(|error| Failure::about(&path, error))?;
+        let wrong = |why| Failure::about(&path, format!("not a leaf-set manifest: {why}"));
+        let manifest: Self =
+            serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        manifest.fault().map_or(Ok(()), |fault| Err(wrong(fault)))?;
+        Ok(manifest)
     }
 
     /// Writes the manifest into an existing directory.
@@ -351,20 +380,20 @@ impl Tally {
 
     /// Adds one word. Call [`Tally::finish`] after the last.
     pub fn add(&mut self, word: u64) {
-        self.count(word);
+        self.count(word, 1);
         self.octants[octant_index(word)].add(word);
     }
 
-    /// Counts a word by level and side, and leaves the digests unchanged.
-    pub fn count(&mut self, word: u64) {
-        self.leaves += 1;
+    /// Counts this many words of the level and side of one, and leaves the digests unchanged.
+    pub fn count(&mut self, word: u64, leaves: u64) {
+        self.leaves += leaves;
         if let Some(count) = self.by_level.get_mut(usize::from(crate::word::level(word))) {
-            *count += 1;
+            *count += leaves;
         }
         match word & 3 {
-            0 => self.by_side.outside += 1,
-            1 => self.by_side.inside += 1,
-            2 => self.by_side.crossing += 1,
+            0 => self.by_side.outside += leaves,
+            1 => self.by_side.inside += leaves,
+            2 => self.by_side.crossing += leaves,
             _ => {}
         }
     }

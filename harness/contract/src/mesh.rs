@@ -1,21 +1,31 @@
 //! Meshes on disk, of any size: the part files of a leaf-set directory or, if it has none, its tree.
 //!
-//! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`] and [`Mesh::tree`] refuse words that are
+//! [`Mesh::stream`] passes on all words as they are, for the checks. [`Mesh::visit`], [`Mesh::leaves`] and [`Mesh::tree`] refuse words that are
 //! not a linear oct-tree, for all who rely on one.
+//!
+//! Opening fails only if the directory cannot be interpreted: no manifest, a part that is missing or is not an array of words, or a part file
+//! that the manifest does not name. The checks establish whether the contents are correct.
 
-use crate::failure::Unusable;
-use crate::htg::TreeFile;
-pub use crate::leafset::NODES_MAX;
-
-use crate::leafset::{self, of_part, of_tree};
-use crate::manifest::Manifest;
+use crate::case::Case;
+use crate::digest::Digest;
+use crate::failure::Failure;
+use crate::htg::{TreeError, TreeFile};
+use crate::lattice::Root;
+use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::tree::{Builder, Tree};
-use crate::word;
+use crate::word::{self, Side};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::fs;
 use std::path::{Path, PathBuf};
+
+/// Maximum number of distinct nodes of a tree in memory. A node needs up to 120 bytes while the tables grow.
+pub const NODES_MAX: usize = 32_000_000;
+
+/// Leaves between two checks whether to continue.
+const CHECKED: u64 = 1 << 16;
 
 /// A leaf-set directory whose manifest and files were opened. No leaf has been read.
 #[derive(Debug)]
@@ -29,26 +39,64 @@ pub struct Mesh {
     pub tree_file: Option<TreeFile>,
 }
 
+/// A leaf of a mesh on disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Its octant.
+    pub octant: Octant,
+    /// Its side.
+    pub side: Side,
+    /// The rank that owns it: the index of its part; 0 in a tree.
+    pub rank: u32,
+    /// Index among all leaves of the mesh, in Morton order.
+    pub index: u64,
+}
+
+/// Asks whether to continue; its error ends a visit.
+pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
+
 impl Mesh {
     /// Opens a leaf-set directory.
     ///
     /// # Errors
     /// If the directory is not a leaf set.
-    pub fn open(dir: &Path) -> Result<Self, Unusable> {
-        let manifest = leafset::read_manifest(dir)?;
-        let tree_file = match manifest.parts.is_empty() {
-            true => leafset::open_tree(dir, &manifest)?,
-            false => None,
-        };
-        let mut parts = Vec::new();
-        for part in &manifest.parts {
+    pub fn open(dir: &Path) -> Result<Self, Failure> {
+        let manifest = Manifest::read(dir)?;
+        if manifest.parts.is_empty()
+            && let Some(mesh) = Self::of_tree(dir, &manifest)?
+        {
+            return Ok(mesh);
+        }
+        let open = |part: &Part| {
             let path = dir.join(&part.file);
-            parts.push(leafset::open_part(&path)?);
+            PartFile::open(&path).map_err(|why| why.of_file(&path))
+        };
+        let parts = manifest.parts.iter().map(open).collect::<Result<_, _>>()?;
+        // A part file that the manifest does not name shows that manifest and directory do not belong together.
+        let is_extra = |name: &String| !manifest.parts.iter().any(|part| part.file == *name);
+        if let Some(name) = part_names(dir)?.into_iter().find(is_extra) {
+            let why = "a part file that the manifest does not name";
+            return Err(Failure::about(&dir.join(name), why));
         }
-        if tree_file.is_none() {
-            leafset::refuse_extra_parts(dir, &manifest)?;
+        Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file: None })
+    }
+
+    /// Opens the tree of a directory with this manifest, whether or not it has parts; `None` if there is none.
+    ///
+    /// # Errors
+    /// If the file is not the tree of a mesh with this root.
+    pub fn of_tree(dir: &Path, manifest: &Manifest) -> Result<Option<Self>, Failure> {
+        let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
+        let path = dir.join(name);
+        let tree = TreeFile::open(&path, manifest.sides == Sides::Known);
+        let tree = tree.map_err(|why| damaged_tree(&path, &why))?;
+        if tree.root != manifest.root {
+            let (found, stated) = (tree.root, manifest.root);
+            let why = format!("the tree has the root {found}, but the manifest states {stated}");
+            return Err(Failure::about(&path, why));
         }
-        Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file })
+        let (dir, manifest) = (dir.to_owned(), manifest.clone());
+        Ok(Some(Self { dir, manifest, parts: Vec::new(), tree_file: Some(tree) }))
     }
 
     /// Number of leaves in the files, whatever the manifest states.
@@ -69,9 +117,12 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the tree is damaged.
-    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Unusable> {
+    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Failure> {
         match &self.tree_file {
-            Some(tree) => tree.words(&mut |words| run(0, words)).map_err(|why| of_tree(tree, &why)),
+            Some(tree) => {
+                let read = tree.words(&mut |words| run(0, words));
+                read.map_err(|why| damaged_tree(tree.path(), &why))
+            }
             None => merge(&self.parts, run),
         }
     }
@@ -80,38 +131,72 @@ impl Mesh {
     ///
     /// # Errors
     /// If a file cannot be read, or if the words are not those of a linear oct-tree.
-    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), Unusable> {
-        let mut order = Order::default();
-        let mut fault = None;
-        self.stream(&mut |_, words| {
-            fault = words.iter().find_map(|&word| order.fault(word));
-            if fault.is_none() {
-                visit(words);
-            }
-            fault.is_none()
+    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), Failure> {
+        self.visit_parts(|_, words| {
+            visit(words);
+            Ok(())
+        })
+    }
+
+    /// The same with the index of the part, until an error of `visit`.
+    fn visit_parts(
+        &self,
+        mut visit: impl FnMut(usize, &[u64]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let (mut order, mut visited) = (Order::default(), Ok(()));
+        self.stream(&mut |part, words| {
+            visited = match words.iter().find_map(|&word| order.fault(word)) {
+                Some(why) => Err(self.not_linear(&why)),
+                None => visit(part, words),
+            };
+            visited.is_ok()
         })?;
-        fault.map_or(Ok(()), |why| Err(self.not_linear(why)))
+        visited
+    }
+
+    /// Visits all leaves in Morton order. `check` is called from time to time.
+    ///
+    /// # Errors
+    /// As [`Mesh::visit`], or if the leaves do not have the digest in the manifest; or the first error of `check` or `visit`, which ends
+    /// the traversal.
+    pub fn leaves(
+        &self,
+        check: Check<'_>,
+        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let (mut index, mut digest) = (0u64, Digest::default());
+        let mut one = |word: u64, rank: u32| {
+            if index.is_multiple_of(CHECKED) {
+                check()?;
+            }
+            let leaf = Leaf { octant: word::octant(word), side: word::side(word), rank, index };
+            index += 1;
+            digest.add(word);
+            visit(leaf)
+        };
+        self.visit_parts(|part, words| words.iter().try_for_each(|&word| one(word, part as u32)))?;
+        let stated = self.manifest.digest;
+        let why = format!(
+            "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
+        );
+        if digest == stated { Ok(()) } else { Err(Failure::input(why)) }
     }
 
     /// All leaves as a tree.
     ///
     /// # Errors
     /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
-    pub fn tree(&self) -> Result<Tree, Unusable> {
+    pub fn tree(&self) -> Result<Tree, Failure> {
         let mut builder = Builder::default();
         self.visit(&mut |words| {
             if builder.nodes() <= NODES_MAX {
                 words.iter().for_each(|&w| builder.push(w).expect("a visit is linear"));
             }
         })?;
+        let why = "distinct octants, which is the limit: use a part of the mesh";
         match builder.nodes() <= NODES_MAX {
             true => Ok(builder.finish()),
-            false => Err(Unusable::at(
-                &self.dir,
-                format!(
-                    "more than {NODES_MAX} distinct octants, which is the limit: use a part of the mesh"
-                ),
-            )),
+            false => Err(Failure::about(&self.dir, format!("more than {NODES_MAX} {why}"))),
         }
     }
 
@@ -119,7 +204,7 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::visit`].
-    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, Unusable> {
+    pub fn octant(&self, octant: &Octant) -> Result<Vec<u64>, Failure> {
         let start = word::key_of(octant.corner);
         let keys = start..start + word::span(octant.level);
         let mut found = Vec::new();
@@ -129,19 +214,85 @@ impl Mesh {
     }
 
     /// The error of words that are not a linear oct-tree.
-    pub fn not_linear(&self, why: String) -> Unusable {
+    fn not_linear(&self, why: &str) -> Failure {
         let why = format!("not a linear oct-tree, because {why}: run harness audit on it");
-        Unusable::at(&self.dir, why)
+        Failure::about(&self.dir, why)
     }
+
+    /// Refuses a case that was not meshed here, by its root, its surface level and its facets.
+    ///
+    /// # Errors
+    /// If the mesh cannot be one of the case.
+    pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
+        let stated = |root: Root, level: u8, geometry: Option<Geometry>| {
+            let Root { origin: [x, y, z], edge } = root;
+            let facets = geometry.map_or(String::new(), |Geometry { facets, digest }| {
+                format!(", with {facets} facets of the digest {digest}")
+            });
+            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
+        };
+        let geometry = self.manifest.geometry;
+        let of_mesh = stated(self.manifest.root, self.manifest.level_surface, geometry);
+        let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
+        let of_case = stated(case.root, case.level_surface, geometry);
+        if of_mesh == of_case {
+            return Ok(());
+        }
+        Err(Failure::input(format!(
+            "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
+            case.name
+        )))
+    }
+
+    /// Makes sure that the sides of the leaves are known.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn require_sides(&self) -> Result<(), Failure> {
+        let why = "the sides of this mesh are unknown, and this needs them: only .vtu and polyMesh can be written without";
+        match self.manifest.sides {
+            Sides::Known => Ok(()),
+            Sides::Unknown => Err(Failure::input(why)),
+        }
+    }
+
+    /// Whether the rank of each leaf is known: words have a file for each rank, and a tree has none.
+    pub fn has_ranks(&self) -> bool {
+        self.tree_file.is_none()
+    }
+
+    /// The error of a request that needs them.
+    pub fn ranks_unknown(&self) -> Failure {
+        Failure::input(
+            "the ranks of a mesh that has only a tree are unknown: mesh with --write words",
+        )
+    }
+}
+
+/// A tree that cannot be opened or read.
+fn damaged_tree(path: &Path, why: &TreeError) -> Failure {
+    Failure::about(path, format!("the tree {why}"))
+}
+
+/// The names of the arrays of leaves in a directory, in alphabetical order.
+pub(crate) fn part_names(dir: &Path) -> Result<Vec<String>, Failure> {
+    let io = |error| Failure::about(dir, error);
+    let mut names = Vec::new();
+    for entry in fs::read_dir(dir).map_err(io)? {
+        let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
+        names.extend(Path::new(&name).extension().is_some_and(|e| e == "npy").then_some(name));
+    }
+    names.sort_unstable();
+    Ok(names)
 }
 
 /// The end of the leaves so far, as a Morton code.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Order(u64);
+struct Order(u64);
 
 impl Order {
     /// Why a word does not follow the words before it in a linear oct-tree.
-    pub fn fault(&mut self, word: u64) -> Option<String> {
+    fn fault(&mut self, word: u64) -> Option<String> {
         if let Some(why) = word::fault(word) {
             return Some(format!("the word {word:#018x} is not a leaf: {why}"));
         }
@@ -169,12 +320,11 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Refills an exhausted buffer; false at the end of the part.
-    fn fill(&mut self) -> Result<bool, Unusable> {
+    fn fill(&mut self) -> Result<bool, Failure> {
         if self.position == self.words.len() {
             let left = self.file.len() - self.next;
             self.words.resize(usize::try_from(left).unwrap_or(usize::MAX).min(CHUNK), 0);
-            let read = self.file.read_at(self.next, &mut self.words);
-            read.map_err(|error| of_part(self.file, error))?;
+            self.file.read_at(self.next, &mut self.words)?;
             (self.next, self.position) = (self.next + self.words.len() as u64, 0);
         }
         Ok(!self.words.is_empty())
@@ -187,7 +337,7 @@ impl Reader<'_> {
 ///
 /// # Errors
 /// If a part cannot be read.
-fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Unusable> {
+fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Failure> {
     let reader = |file| Reader { file, next: 0, words: Vec::new(), position: 0 };
     let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
     let mut heads = BinaryHeap::new();

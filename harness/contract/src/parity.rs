@@ -5,7 +5,7 @@
 //! the projection. An edge is crossed iff its half-open range contains the point's second coordinate, which is
 //! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
-use crate::lattice::FacetLattice;
+use crate::lattice::{FacetLattice, difference, dot, normal};
 use rustc_hash::FxHashMap;
 
 /// Facets, binned into one grid per axis.
@@ -80,22 +80,11 @@ fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
 /// contains the point.
 fn is_positive(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     let normal = normal(facet);
-    let from = |a: usize| i128::from(point[a] - facet[0][a]);
-    let height: i128 = (0..3).map(|a| i128::from(normal[a]) * from(a)).sum();
+    let height = dot(normal, difference(point, facet[0]));
     let perturbed = [height, normal[(axis + 1) % 3].into(), normal[(axis + 2) % 3].into()];
     let sign = perturbed.into_iter().map(i128::signum).find(|&s| s != 0)?;
     // The plane lies in the positive direction iff the height decreases in that direction.
     Some(sign != i128::from(normal[axis].signum()))
-}
-
-/// The facet's normal, with twice the area as its length; at most 2^59 in size on the lattice.
-pub fn normal(facet: &FacetLattice) -> [i64; 3] {
-    let edge = |v: usize| -> [i64; 3] { std::array::from_fn(|a| facet[v][a] - facet[0][a]) };
-    let (u, v) = (edge(1), edge(2));
-    std::array::from_fn(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        u[b] * v[c] - u[c] * v[b]
-    })
 }
 
 impl Grid {

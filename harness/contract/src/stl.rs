@@ -6,7 +6,7 @@ use std::path::Path;
 use geometries::Facet;
 use serde::Serialize;
 
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::files;
 
 /// A solid of an STL file.
@@ -33,15 +33,15 @@ pub struct Body {
 ///
 /// # Errors
 /// If the file cannot be read, or is not an STL file.
-pub fn read(path: &Path) -> Result<Body, Unusable> {
-    parse(&files::read(path)?)
+pub fn read(path: &Path) -> Result<Body, Failure> {
+    parse(&files::read(path).map_err(Failure::unreadable)?)
 }
 
 /// Parses the bytes of an STL file.
 ///
 /// # Errors
 /// If they are not an STL file.
-pub fn parse(bytes: &[u8]) -> Result<Body, Unusable> {
+pub fn parse(bytes: &[u8]) -> Result<Body, Failure> {
     if bytes.is_empty() {
         return Err(wrong("it is empty"));
     }
@@ -83,20 +83,12 @@ fn length(facets: u32) -> u64 {
 }
 
 /// Bytes that are neither text nor a binary file: probably a binary file that is truncated.
-fn damaged(bytes: &[u8]) -> Unusable {
+fn damaged(bytes: &[u8]) -> Failure {
     let found = bytes.len();
-    let how = |count| if (found as u64) < length(count) { "truncated" } else { "longer" };
-    match facet_count(bytes) {
-        Some(count) => wrong(&format!(
-            "its header promises {count} facets, which take {} bytes, but the file has {found}: it is {}, or not an STL file; \
-             export it again",
-            length(count),
-            how(count)
-        )),
-        None => wrong(&format!(
-            "it is not text, and its {found} bytes are fewer than the header of a binary file: it is truncated; export it again"
-        )),
-    }
+    let promised = facet_count(bytes).map_or("a header of 84 bytes".to_owned(), |count| {
+        format!("the {} bytes of the {count} facets that its header promises", length(count))
+    });
+    wrong(&format!("it is not text, and has {found} bytes in place of {promised}: export it again"))
 }
 
 /// A word, and the number of line ends before it.
@@ -113,7 +105,7 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
 }
 
 /// The solids of an ASCII file (reference/DEFINITION.md, section 10).
-fn ascii(bytes: &[u8]) -> Result<Body, Unusable> {
+fn ascii(bytes: &[u8]) -> Result<Body, Failure> {
     if bytes.contains(&0) {
         return Err(damaged(bytes));
     }
@@ -130,7 +122,7 @@ fn ascii(bytes: &[u8]) -> Result<Body, Unusable> {
             match words.next() {
                 Some((word, _)) if is(word, "facet") => {
                     let before = body.facets.len();
-                    let located = |why| Unusable::because(format!("{why}, after {before} facets"));
+                    let located = |why| Failure::input(format!("{why}, after {before} facets"));
                     body.facets.push(facet(&mut words).map_err(located)?);
                 }
                 Some((word, line)) if is(word, "endsolid") => break line,
@@ -174,7 +166,7 @@ fn starts_facet<'a>(words: &(impl Iterator<Item = Word<'a>> + Clone), line: usiz
 }
 
 /// A facet after its first word. Its normal is ignored.
-fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Unusable> {
+fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Failure> {
     expect(words, "normal")?;
     if words.take(3).count() < 3 {
         return Err(unexpected("a normal", None));
@@ -197,7 +189,7 @@ fn facet<'a>(words: &mut impl Iterator<Item = Word<'a>>) -> Result<Facet, Unusab
 }
 
 /// Takes this word; returns its line.
-fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, Unusable> {
+fn expect<'a>(words: &mut impl Iterator<Item = Word<'a>>, wanted: &str) -> Result<usize, Failure> {
     match words.next() {
         Some((word, line)) if is(word, wanted) => Ok(line),
         other => Err(unexpected(wanted, other)),
@@ -208,7 +200,7 @@ fn is(word: &[u8], wanted: &str) -> bool {
     word.eq_ignore_ascii_case(wanted.as_bytes())
 }
 
-fn unexpected(wanted: &str, found: Option<Word>) -> Unusable {
+fn unexpected(wanted: &str, found: Option<Word>) -> Failure {
     match found {
         Some((word, _)) => {
             let shown = String::from_utf8_lossy(&word[..word.len().min(40)]);
@@ -218,8 +210,8 @@ fn unexpected(wanted: &str, found: Option<Word>) -> Unusable {
     }
 }
 
-fn wrong(why: &str) -> Unusable {
-    Unusable::because(format!("is not an STL file: {why}"))
+fn wrong(why: &str) -> Failure {
+    Failure::input(format!("is not an STL file: {why}"))
 }
 
 #[cfg(test)]
@@ -230,7 +222,7 @@ mod tests {
                          vertex 0 1 -2.5e-1\nendloop\nendfacet\n";
     const EXPECTED: Facet = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, -0.25]];
 
-    fn of(bytes: &[u8]) -> Result<Vec<Facet>, Unusable> {
+    fn of(bytes: &[u8]) -> Result<Vec<Facet>, Failure> {
         parse(bytes).map(|body| body.facets)
     }
 
@@ -266,11 +258,9 @@ mod tests {
         bytes.extend(3u32.to_le_bytes());
         bytes.extend([0; 120]);
         let why = of(&bytes).unwrap_err().to_string();
-        assert!(
-            why.contains("promises 3 facets, which take 234 bytes, but the file has 204"),
-            "{why}"
-        );
-        assert!(of(&bytes[..60]).unwrap_err().to_string().contains("60 bytes are fewer"));
+        assert!(why.contains("204 bytes in place of the 234 bytes of the 3 facets"), "{why}");
+        let why = of(&bytes[..60]).unwrap_err().to_string();
+        assert!(why.contains("60 bytes in place of a header"), "{why}");
         assert_eq!(of(b"").unwrap_err().to_string(), "is not an STL file: it is empty");
     }
 

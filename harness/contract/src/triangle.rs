@@ -5,7 +5,7 @@
 //! of its plane with the box, so any point of that intersection decides. The test takes the point on the box
 //! diagonal that is most nearly parallel to the normal.
 
-use crate::lattice::FacetLattice;
+use crate::lattice::{FacetLattice, cross, difference, dot, normal};
 
 /// A facet with precomputed bounds, normal and height.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ impl Triangle {
         let pick = |f: fn(i64, i64) -> i64| -> [i64; 3] {
             std::array::from_fn(|a| f(f(corners[0][a], corners[1][a]), corners[2][a]))
         };
-        let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+        let normal = normal(corners);
         let height = dot(normal, corners[0]);
         Self { corners: *corners, low: pick(i64::min), high: pick(i64::max), normal, height }
     }
@@ -41,15 +41,12 @@ impl Triangle {
         }
         // If both ends of the diagonal are on one side of the plane, so is the box.
         let (near, far) = self.diagonal(low, high);
-        let (below, above) =
-            (dot(self.normal, near) - self.height, dot(self.normal, far) - self.height);
-        if below > 0 || above < 0 {
+        let above = |point| dot(self.normal, point) - self.height;
+        if above(near) > 0 || above(far) < 0 {
             return false;
         }
         let [a, b, c] = self.corners;
-        segment_meets(a, b, low, high)
-            || segment_meets(b, c, low, high)
-            || segment_meets(c, a, low, high)
+        [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| segment_meets(from, to, low, high))
             || self.pierced(near, far)
     }
 
@@ -67,8 +64,8 @@ impl Triangle {
         if self.normal == [0; 3] {
             return false;
         }
-        let along = sub(far, near);
-        let spokes = self.corners.map(|v| sub(v, near));
+        let along = difference(far, near);
+        let spokes = self.corners.map(|v| difference(v, near));
         let turn = |i: usize, j: usize| dot(cross(spokes[i], spokes[j]), along).signum();
         let turns = [turn(0, 1), turn(1, 2), turn(2, 0)];
         !(turns.contains(&1) && turns.contains(&-1))
@@ -99,21 +96,6 @@ fn segment_meets(from: [i64; 3], to: [i64; 3], low: [i64; 3], high: [i64; 3]) ->
 /// Compares fractions with positive denominators. On the lattice both products are less than 2^60.
 fn less(a: (i64, i64), b: (i64, i64)) -> bool {
     a.0 * b.1 < b.0 * a.1
-}
-
-fn sub(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
-    std::array::from_fn(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        u[b] * v[c] - u[c] * v[b]
-    })
-}
-
-fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
-    (0..3).map(|i| i128::from(a[i]) * i128::from(b[i])).sum()
 }
 
 #[cfg(test)]
@@ -174,7 +156,7 @@ mod tests {
     /// Whether no plane separates the triangle from the box: normal to an axis, to the triangle, or to an axis and an edge.
     fn is_not_separated(t: &FacetLattice, low: [i64; 3], high: [i64; 3]) -> bool {
         let unit = |axis: usize| -> [i64; 3] { std::array::from_fn(|a| i64::from(a == axis)) };
-        let edges = [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])];
+        let edges = [difference(t[1], t[0]), difference(t[2], t[1]), difference(t[0], t[2])];
         let mixed = (0..9).map(|i| cross(unit(i / 3), edges[i % 3]));
         let mut normals = (0..3).map(unit).chain([cross(edges[0], edges[1])]).chain(mixed);
         normals.all(|n| {

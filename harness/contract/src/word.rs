@@ -46,11 +46,7 @@ impl Side {
 
 impl fmt::Display for Side {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Outside => "outside",
-            Self::Inside => "inside",
-            Self::Crossing => "crossing",
-        })
+        f.write_str(["outside", "inside", "crossing"][*self as usize])
     }
 }
 
@@ -133,10 +129,7 @@ pub fn encode(leaf: &Leaf) -> u64 {
 /// # Errors
 /// If the word is not a leaf.
 pub fn decode(word: u64) -> Result<Leaf, String> {
-    match fault(word) {
-        Some(why) => Err(why),
-        None => Ok(Leaf { octant: octant(word), side: side(word) }),
-    }
+    fault(word).map_or_else(|| Ok(Leaf { octant: octant(word), side: side(word) }), Err)
 }
 
 /// The octant of a valid word.

@@ -21,7 +21,7 @@
 #include <p8est_bits.h>
 #include <p8est_extended.h>
 
-#include "search.h"
+#include "facets.h"
 
 const char *const program_name = "p4est-mesher";
 

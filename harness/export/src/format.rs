@@ -7,12 +7,12 @@ use std::path::Path;
 use crate::foam;
 use crate::front;
 use crate::htg;
-use crate::mesh::Mesh;
 use crate::options::{Options, Summary, Write};
 use crate::selection::Selection;
 use crate::{p8est, vtu};
 use contract::failure::Failure;
 use contract::files::{Staging, fill_atomically};
+use contract::mesh::Mesh;
 
 /// A format of mesh files.
 #[derive(Debug)]

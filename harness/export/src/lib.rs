@@ -1,5 +1,4 @@
-//! Meshes as files of other programs. A [`mesh::Mesh`] on disk is read leaf by leaf, so memory does not grow with the mesh,
-//! also of one of which a [`selection::Selection`] needs a part.
+//! Meshes as files of other programs. A mesh on disk is read leaf by leaf, and a [`selection::Selection`] is a part of it.
 //!
 //! - [`format`](mod@format): the table of formats by file name;
 //! - [`htg`]: the tree for VTK, in one file;
@@ -12,15 +11,12 @@ pub mod foam;
 pub mod format;
 pub mod front;
 pub mod htg;
-pub mod leaf;
 mod leaves;
-pub mod mesh;
 pub mod options;
 pub mod p8est;
+mod points;
 pub mod polydata;
 pub mod selection;
-mod squares;
 #[cfg(test)]
 mod testing;
 pub mod vtu;
-mod written;

@@ -1,14 +1,22 @@
-//! What every export is given besides mesh and selection, and what it returns.
+//! What every export is given besides mesh and selection, what it returns, and what it has written: counted as it is written, and compared with
+//! what was to be written before a file gets its name.
+//!
+//! Invariants of what was written:
+//! - octants ascend along the Morton curve without overlap and end in the root;
+//! - cells are as many as were selected, which another pass over the mesh has counted, and all leaves of the mesh if there is no selection;
+//! - in a format without holes, octants and fillers tile the root.
 
 use std::num::NonZero;
 use std::path::Path;
 
 use contract::case::Case;
-
-use crate::mesh::Mesh;
-use crate::selection::Selection;
 use contract::failure::Failure;
+use contract::mesh::Mesh;
+use contract::octant::Octant;
 use contract::watch::Watch;
+use contract::word::{self, KEY_END};
+
+use crate::selection::Selection;
 
 /// Options of every export.
 #[derive(Clone, Copy)]
@@ -65,6 +73,13 @@ impl Options<'_> {
     pub fn check_at(&self, count: u64) -> Result<(), Failure> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
+
+    /// Reports from time to time that `done` of `total` leaves are written.
+    pub fn progress(&self, done: u64, total: u64) {
+        if done.is_multiple_of(1 << 16) {
+            self.watch.progress(done, total);
+        }
+    }
 }
 
 /// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
@@ -81,4 +96,98 @@ pub struct Summary {
     pub bytes: u64,
     /// What else the user should know, one line each.
     pub notes: Vec<String>,
+}
+
+/// Octants that were written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Written {
+    /// Number of cells.
+    pub cells: u64,
+    /// Volume of all octants in level-19 cells.
+    pub volume: u64,
+    /// Morton codes of the first octant and after the last one.
+    ends: Option<(u64, u64)>,
+}
+
+impl Written {
+    /// Adds an octant, which is a cell or a filler.
+    ///
+    /// # Panics
+    /// If it does not follow the last one, or is not in the root.
+    pub(crate) fn add(&mut self, octant: &Octant, is_cell: bool) {
+        let begin = word::key_of(octant.corner);
+        let end = begin + word::span(octant.level);
+        let one = Self { cells: u64::from(is_cell), volume: end - begin, ends: Some((begin, end)) };
+        self.append(&one);
+    }
+
+    /// Adds octants that follow the last one.
+    ///
+    /// # Panics
+    /// If they do not follow it, or are not in the root.
+    pub(crate) fn append(&mut self, next: &Self) {
+        let Some((begin, end)) = next.ends else { return };
+        let (first, last) = self.ends.unwrap_or((begin, 0));
+        assert!(last <= begin, "an octant at {begin} is written after one that ends at {last}");
+        assert!(end <= KEY_END, "an octant that ends at {end} is outside of the root");
+        self.cells += next.cells;
+        self.volume += next.volume;
+        self.ends = Some((first, end));
+    }
+
+    /// Asserts that these are the selected leaves of a mesh, which are this many.
+    ///
+    /// # Panics
+    /// If they are not.
+    pub(crate) fn check_invariants(&self, mesh: &Mesh, selection: &Selection, selected: u64) {
+        let Self { cells, volume, .. } = *self;
+        assert_eq!(cells, selected, "cells written and leaves selected");
+        assert!(volume <= KEY_END, "{cells} cells of volume {volume} are more than the root");
+        if *selection == Selection::default() {
+            assert_eq!(cells, mesh.len(), "cells written and leaves of the mesh");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::on_disk;
+    use contract::testing::random_words;
+    use proptest::prelude::*;
+
+    fn written(words: &[u64]) -> Written {
+        let mut written = Written::default();
+        words.iter().for_each(|&w| written.add(&word::octant(w), true));
+        written
+    }
+
+    proptest! {
+        #[test]
+        fn leaves_in_order_are_accepted_and_any_other_order_or_number_is_noticed(
+            words in random_words(3), at in any::<prop::sample::Index>(), by in 1usize..9
+        ) {
+            prop_assume!(words.len() > 1);
+            let (_dir, mesh) = on_disk(&words, 2, |i| i / 7);
+            let all = Selection::default();
+            written(&words).check_invariants(&mesh, &all, words.len() as u64);
+            let noticed = |words: Vec<u64>| {
+                let check = || written(&words).check_invariants(&mesh, &all, mesh.len());
+                std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
+            };
+            let i = at.index(words.len());
+            let (mut fewer, mut swapped, mut twice) = (words.clone(), words.clone(), words.clone());
+            fewer.remove(i);
+            swapped.swap(i, (i + by % (words.len() - 1) + 1) % words.len());
+            twice.insert(i, words[i]);
+            prop_assert!(noticed(fewer) && noticed(twice));
+            prop_assert!(swapped == words || noticed(swapped));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "outside of the root")]
+    fn an_octant_outside_of_the_root_is_noticed() {
+        Written::default().append(&Written { ends: Some((0, KEY_END + 1)), ..Written::default() });
+    }
 }

@@ -11,20 +11,18 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+use contract::failure::Failure;
 use contract::files;
 use contract::import::forest::{ALIGNMENT, FORMAT};
 use contract::import::p4est::FILLER;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
+use contract::mesh::{Leaf, Mesh};
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
-use crate::leaf::Leaf;
-use crate::mesh::Mesh;
-use crate::options::{Options, Summary};
-use crate::selection::Selection;
-use crate::written::Written;
-use contract::failure::Failure;
+use crate::options::{Options, Summary, Written};
+use crate::selection::{Selection, nothing_selected};
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
@@ -36,9 +34,6 @@ const RECORD_BYTES: usize = 17;
 const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
 const VERSION: &[u8] = b"2.2";
-
-/// Number of quadrants between two reports of progress.
-const STEP: u64 = 1 << 16;
 
 /// Writes the selected leaves and the fillers as a forest. The mesh is read twice, because the numbers of quadrants precede them.
 ///
@@ -53,7 +48,7 @@ pub fn write(
 ) -> Result<Summary, Failure> {
     let (leaves, ends) = counted(mesh, selection, options)?;
     if leaves == 0 {
-        return Err(mesh.nothing_selected());
+        return Err(nothing_selected(mesh));
     }
     let total = ends[ends.len() - 1];
     let named = |error| Failure::at(path, error);
@@ -65,9 +60,7 @@ pub fn write(
         out.write_all(&start).map_err(named)?;
         let (mut done, mut written) = (0, Written::default());
         quadrants(mesh, selection, options, &mut |quadrant| {
-            if done % STEP == 0 {
-                options.watch.progress(done, total);
-            }
+            options.progress(done, total);
             done += 1;
             written.add(&quadrant.octant, quadrant.data != FILLER);
             out.write_all(&quadrant.record()).map_err(named)
@@ -108,7 +101,7 @@ fn quadrants(
 ) -> Result<(), Failure> {
     let has_sides = mesh.manifest.sides == Sides::Known;
     let (mut next, mut part_last) = (0, 0);
-    mesh.visit(selection, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
+    selection.visit(mesh, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(Failure::input(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"

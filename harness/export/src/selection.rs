@@ -1,10 +1,10 @@
 //! Parts of a mesh: which leaves an export contains.
 
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::mesh::{Check, Leaf, Mesh};
 use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word::Side;
-
-use crate::leaf::Leaf;
 
 /// The leaves that satisfy every condition; without conditions, all leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,6 +61,35 @@ impl Selection {
             && self.rank.is_none_or(|rank| leaf.rank == rank)
     }
 
+    /// Visits the selected leaves of a mesh in Morton order. All leaves are read once.
+    ///
+    /// # Errors
+    /// As [`Mesh::leaves`].
+    pub fn visit(
+        &self,
+        mesh: &Mesh,
+        check: Check<'_>,
+        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        mesh.leaves(check, &mut |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) })
+    }
+
+    /// Number of selected leaves of a mesh, which is not 0.
+    ///
+    /// # Errors
+    /// As [`Mesh::leaves`], and if no leaf is selected.
+    pub(crate) fn count(&self, mesh: &Mesh, check: Check<'_>) -> Result<u64, Failure> {
+        let mut leaves = 0;
+        match *self == Self::default() {
+            true => leaves = mesh.len(),
+            false => self.visit(mesh, check, &mut |_| {
+                leaves += 1;
+                Ok(())
+            })?,
+        }
+        if leaves == 0 { Err(nothing_selected(mesh)) } else { Ok(leaves) }
+    }
+
     /// Whether an octant may contain selected leaves, by its position.
     fn meets(&self, octant: &Octant) -> bool {
         let (low, high) = octant.bounds();
@@ -71,9 +100,80 @@ impl Selection {
     }
 }
 
+/// The error of an export without leaves.
+pub(crate) fn nothing_selected(mesh: &Mesh) -> Failure {
+    Failure::input(match mesh.is_empty() {
+        true => "the mesh has no leaves",
+        false => "no leaf satisfies all conditions of the selection: remove one of them",
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::on_disk;
+    use contract::testing::random_words;
+    use contract::word;
+    use proptest::prelude::*;
+
+    fn words(mesh: &Mesh, selection: &Selection) -> Result<Vec<u64>, Failure> {
+        let mut words = Vec::new();
+        selection.visit(mesh, &|| Ok(()), &mut |leaf| {
+            words.push(word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side }));
+            Ok(())
+        })?;
+        Ok(words)
+    }
+
+    proptest! {
+        #[test]
+        fn all_leaves_of_interleaved_parts_are_visited_in_order(
+            leaves in random_words(5), parts in 1usize..4, run in 1usize..40
+        ) {
+            let (_dir, mesh) = on_disk(&leaves, parts, |i| i / run);
+            prop_assert_eq!(&words(&mesh, &Selection::default()).unwrap(), &leaves);
+        }
+
+        #[test]
+        fn a_selection_has_the_leaves_that_satisfy_it(
+            leaves in random_words(5), axis in 0usize..3, at in 0.0f64..=1.0, level in 0u8..6
+        ) {
+            let (_dir, mesh) = on_disk(&leaves, 2, |i| i / 9);
+            let slice = Slice::new(&mesh.manifest.root, axis, at);
+            let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
+            let mut expected = Vec::new();
+            let mut index = 0;
+            mesh.leaves(&|| Ok(()), &mut |leaf| {
+                assert_eq!(leaf.index, index);
+                index += 1;
+                expected.extend(selection.has(&leaf).then(|| {
+                    word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side })
+                }));
+                Ok(())
+            }).unwrap();
+            prop_assert_eq!(words(&mesh, &selection).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn leaves_out_of_order_and_invalid_words_are_errors_that_name_the_leaf() {
+        let leaves: Vec<u64> = contract::testing::words_of(|o| o.level < 1);
+        let mut swapped = leaves.clone();
+        swapped.swap(2, 3);
+        let mut overlapping = leaves.clone();
+        overlapping
+            .insert(0, word::encode(&word::Leaf { octant: Octant::ROOT, side: Side::Inside }));
+        let invalid: Vec<u64> = leaves.iter().map(|w| w | 3).collect();
+        for (leaves, expected) in [
+            (swapped, "precedes the leaf before"),
+            (overlapping, "overlaps or precedes"),
+            (invalid, "is not a leaf"),
+        ] {
+            let (_dir, mesh) = on_disk(&leaves, 1, |_| 0);
+            let error = words(&mesh, &Selection::default()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
 
     #[test]
     fn a_plane_cuts_exactly_one_of_the_two_leaves_that_share_a_face() {

@@ -1,11 +1,11 @@
 //! Meshes on disk, for tests.
 
-use crate::mesh::Mesh;
 use crate::options::{Label, Options, Regions};
 use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
+use contract::mesh::Mesh;
 use contract::watch::Watch;
 use std::num::NonZero;
 use std::path::Path;

@@ -7,11 +7,11 @@ use contract::htg::{TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
+use contract::mesh::Leaf;
+use contract::mesh::Mesh;
 use contract::testing::random_words;
 use contract::watch::Watch;
 use contract::word::{self, Leaf as WordLeaf};
-use export::leaf::Leaf;
-use export::mesh::Mesh;
 use export::options::{Label, Options, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
@@ -67,11 +67,12 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
 /// Words and indices of the selected leaves.
 fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
     let mut leaves = Vec::new();
-    mesh.visit(selection, &|| Ok(()), &mut |Leaf { octant, side, index, .. }| {
-        leaves.push((word::encode(&WordLeaf { octant, side }), index));
-        Ok(())
-    })
-    .unwrap();
+    selection
+        .visit(mesh, &|| Ok(()), &mut |Leaf { octant, side, index, .. }| {
+            leaves.push((word::encode(&WordLeaf { octant, side }), index));
+            Ok(())
+        })
+        .unwrap();
     leaves
 }
 

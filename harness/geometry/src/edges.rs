@@ -42,8 +42,8 @@ pub struct EdgeCounts {
 pub struct Edges {
     /// Vertex numbers of every facet, in ascending order of coordinate bits.
     pub corners: Vec<[u32; 3]>,
-    /// Number of distinct vertices.
-    pub vertices: u32,
+    /// Coordinates of the vertices, in the user's units.
+    pub points: Vec<[f64; 3]>,
     /// Packed (lower vertex, higher vertex, facet, direction), sorted.
     packed: Vec<u128>,
 }
@@ -51,9 +51,7 @@ pub struct Edges {
 impl Edges {
     /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets.
     pub fn new(facets: &[Facet]) -> Self {
-        // Adding zero turns -0 into 0.
-        let corners = facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits()));
-        let (corners, vertices) = number(corners);
+        let (corners, points) = number(facets);
         let mut packed = Vec::with_capacity(3 * corners.len());
         for (facet, &[a, b, c]) in corners.iter().enumerate() {
             if a == b || b == c || c == a {
@@ -66,7 +64,7 @@ impl Edges {
             }
         }
         packed.sort_unstable();
-        Self { corners, vertices, packed }
+        Self { corners, points, packed }
     }
 
     /// Every edge: its vertices, lower first, and its facets.
@@ -98,29 +96,26 @@ impl Edges {
         }
         counts
     }
-
-    /// The coordinates of a vertex of a facet, in the user's units.
-    pub fn position(&self, input: &Input, facet: u32, vertex: u32) -> [f64; 3] {
-        let corner = self.corners[facet as usize].iter().position(|&v| v == vertex);
-        input.facets[facet as usize][corner.expect("the facet has the vertex")].map(f64::from)
-    }
 }
 
-/// Numbers the distinct vertices, in their order. Returns the numbers of every facet's corners, and the number of vertices.
-fn number(corners: impl Iterator<Item = [u32; 3]>) -> (Vec<[u32; 3]>, u32) {
-    let mut sorted: Vec<([u32; 3], u32)> = corners.zip(0..).collect();
+/// Numbers the distinct vertices, in their order. Returns the numbers of every facet's corners, and the vertices.
+fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    // Adding zero turns -0 into 0.
+    let bits = facets.as_flattened().iter().map(|v| v.map(|x| (x + 0.0).to_bits()));
+    let mut sorted: Vec<([u32; 3], u32)> = bits.zip(0..).collect();
     sorted.sort_unstable();
-    let mut numbers = vec![[0; 3]; sorted.len() / 3];
-    let mut vertices = 0;
+    let mut numbers = vec![[0; 3]; facets.len()];
+    let mut points = Vec::new();
     for same in sorted.chunk_by(|a, b| a.0 == b.0) {
-        same.iter().for_each(|&(_, corner)| numbers.as_flattened_mut()[corner as usize] = vertices);
-        vertices += 1;
+        let number = points.len() as u32;
+        same.iter().for_each(|&(_, corner)| numbers.as_flattened_mut()[corner as usize] = number);
+        points.push(same[0].0.map(|bits| f32::from_bits(bits).into()));
     }
-    (numbers, vertices)
+    (numbers, points)
 }
 
 /// Edges with an odd number of facets, more than one, and pairs of neighbours with inconsistent winding.
-pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
+pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
     let mut findings = [Kind::NonManifoldOdd, Kind::Winding].map(Finding::new);
     for (ends, uses) in edges.iter() {
         let uses: Vec<Use> = uses.collect();
@@ -130,7 +125,7 @@ pub fn findings(input: &Input, edges: &Edges, first: usize) -> [Finding; 2] {
             _ => continue,
         };
         findings[at].add(first, || {
-            let [p, q] = ends.map(|v| edges.position(input, uses[0].facet, v));
+            let [p, q] = ends.map(|v| edges.points[v as usize]);
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
             Place::new(uses.iter().map(|u| u.facet).take(Place::FACETS_MAX).collect(), middle)
         });
@@ -184,7 +179,7 @@ mod tests {
     #[test]
     fn the_two_zeros_are_one_vertex() {
         let edges = Edges::new(&[[A, B, C], [[-0.0, 0.0, -0.0], C, D]]);
-        assert_eq!((edges.vertices, edges.corners[0][0] == edges.corners[1][0]), (4, true));
+        assert_eq!((edges.points.len(), edges.corners[0][0] == edges.corners[1][0]), (4, true));
     }
 
     #[test]

@@ -1,6 +1,11 @@
-//! The findings of a diagnosis: kinds, counts and places.
+//! The findings of a diagnosis: kinds, counts and places, and what each kind means for the mesh.
 
+use contract::manifest::Keep;
+use contract::number::number;
+use contract::octant::CELLS_PER_EDGE;
 use serde::Serialize;
+
+use super::input::Input;
 
 /// Kinds of findings, in the order of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -82,5 +87,203 @@ impl Finding {
         if self.places.len() < first {
             self.places.push(place());
         }
+    }
+}
+
+impl Kind {
+    /// The heading of the kind's row.
+    pub fn title(self) -> &'static str {
+        self.row().0
+    }
+
+    /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
+    pub fn changes_region(self, keep: Keep) -> bool {
+        match self {
+            Self::NonManifoldOdd | Self::Duplicates | Self::OutsideRoot => true,
+            Self::ThinWalls => keep != Keep::Outside,
+            Self::ThinGaps => keep != Keep::Inside,
+            _ => false,
+        }
+    }
+
+    /// Heading and effect on the mesh.
+    #[rustfmt::skip]
+    fn row(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Openings => ("openings",
+                "Inside and outside become one component where a cell fits through."),
+            Self::NonManifoldOdd => ("edges with 3, 5, ... facets",
+                "Rays on either side of such an edge disagree about the inside, so a component's side may be wrong or ambiguous."),
+            Self::Winding => ("neighbours, opposite winding",
+                "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
+            Self::InsideOut => ("closed shells inside out",
+                "No effect, but normals point inward: thin walls and thin gaps are confused, and other programs may exchange inside and outside."),
+            Self::Nested => ("closed shells in closed shells",
+                "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
+            Self::Duplicates => ("duplicate facets",
+                "A ray counts every copy: an even number is passed as if the surface were open, so a component's side may be wrong. Remove the copies."),
+            Self::Intersections => ("intersecting pairs of facets",
+                "Where two closed shells overlap by more than a cell, the overlap is outside, and deleted like a cavity. Unite the shells if that is not meant."),
+            Self::ThinWalls => ("facets of thin walls",
+                "No cell fits into the wall: it consists of crossing leaves, without an inside."),
+            Self::ThinGaps => ("facets at thin gaps",
+                "No cell fits into the gap, so no flow passes. The wedge along the line where two shells intersect is a gap, too."),
+            Self::OutsideRoot => ("facets beyond the root",
+                "The root cuts the body, whose facets beyond it rays still count. Enlarge the root if the body is to be meshed whole."),
+            Self::TouchingRoot => ("facets on the root's boundary",
+                "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there."),
+        }
+    }
+}
+
+/// The effect of a finding that occurs at least once.
+pub fn meaning(finding: &Finding, input: &Input) -> String {
+    let (_, meaning) = finding.kind.row();
+    let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
+    let finest = input.root.edge / f64::from(CELLS_PER_EDGE);
+    match finding.kind {
+        Kind::Openings => openings(finding, input, (width, finest)),
+        Kind::Intersections if finding.count_changing == 0 => {
+            "No effect: the facets overlap within one plane or by the rounding of their \
+                                                               vertices, so no volumes overlap."
+                .into()
+        }
+        // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice.
+        Kind::ThinWalls | Kind::ThinGaps if width / 2.0 < finest => {
+            format!("{meaning} A twentieth is too narrow for the finest cell of the root.")
+        }
+        Kind::ThinWalls | Kind::ThinGaps => format!(
+            "{meaning} A spacing below {} would resolve all but the narrowest twentieth.",
+            number(width / 2.0)
+        ),
+        _ => meaning.into(),
+    }
+}
+
+/// The effect of openings, of which the widest is given.
+fn openings(finding: &Finding, input: &Input, (widest, finest): (f64, f64)) -> String {
+    let (_, meaning) = finding.kind.row();
+    if widest < finest {
+        return "All are narrower than the finest cell of the root, so crossing leaves close them at every spacing.".into();
+    }
+    let widest = number(widest);
+    if input.cell.is_none() || finding.count_changing == 0 {
+        return format!(
+            "Crossing leaves close an opening that is narrower than a cell; at a spacing of {widest} or less the widest may leak. \
+             {meaning}"
+        );
+    }
+    // A straight chain of cells, each connected to the next by a face, fits into a round opening wider than 2 sqrt(3) cells.
+    format!(
+        "At least one cell wide: {} of {}, the widest {widest}. {meaning} Below 3.5 cells that depends on the position in the \
+         lattice. Close it or mesh with a greater spacing. The rim of a sheet counts, too; a sheet has no inside.",
+        finding.count_changing, finding.count
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Requested;
+    use contract::lattice::Root;
+
+    /// The root's finest cell is 1 wide, and with a spacing the cells at the surface are 4.
+    fn input(with_cell: bool) -> Input {
+        let edge = f64::from(CELLS_PER_EDGE);
+        let root = Some(Root { origin: [0.0; 3], edge });
+        let requested = Requested { spacing_min: with_cell.then_some(4.0), root, root_scale: None };
+        Input::new(vec![[[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]]], &requested).unwrap()
+    }
+
+    /// The meaning of places of which the first is this wide.
+    fn of_width(kind: Kind, width: f64, changing: u64, with_cell: bool) -> String {
+        let place = Place { width: Some(width), ..Place::new(vec![0], [0.0; 3]) };
+        let finding = Finding {
+            count: 3,
+            count_changing: changing,
+            places: vec![place],
+            ..Finding::new(kind)
+        };
+        meaning(&finding, &input(with_cell))
+    }
+
+    #[test]
+    fn an_opening_is_judged_by_its_width_in_cells() {
+        for (width, changing, with_cell, beginning) in [
+            (0.0, 0, true, "All are narrower than the finest cell"),
+            (0.99, 0, true, "All are narrower than the finest cell"),
+            (
+                1.0,
+                0,
+                true,
+                "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
+            ),
+            (
+                1.0,
+                3,
+                false,
+                "Crossing leaves close an opening that is narrower than a cell; at a spacing of 1.00 or less",
+            ),
+            (14.0, 2, true, "At least one cell wide: 2 of 3, the widest 14.0"),
+        ] {
+            let text = of_width(Kind::Openings, width, changing, with_cell);
+            assert!(text.starts_with(beginning), "{width}, {changing}, {with_cell}: {text}");
+        }
+    }
+
+    #[test]
+    fn a_sheet_is_resolved_by_half_its_width_unless_that_is_below_the_finest_cell() {
+        for kind in [Kind::ThinWalls, Kind::ThinGaps] {
+            let narrow = of_width(kind, 1.99, 3, true);
+            assert!(narrow.ends_with("too narrow for the finest cell of the root."), "{narrow}");
+            let wide = of_width(kind, 2.0, 3, true);
+            assert!(
+                wide.ends_with(
+                    " A spacing below 1.00 would resolve all but the narrowest twentieth."
+                ),
+                "{wide}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_kind_has_a_meaning_of_its_own() {
+        let kinds = [
+            Kind::Openings,
+            Kind::NonManifoldOdd,
+            Kind::Winding,
+            Kind::InsideOut,
+            Kind::Nested,
+            Kind::Duplicates,
+            Kind::Intersections,
+            Kind::ThinWalls,
+            Kind::ThinGaps,
+            Kind::OutsideRoot,
+            Kind::TouchingRoot,
+        ];
+        let text = |kind, changing| of_width(kind, 3.0, changing, true);
+        let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
+        meanings.push(text(Kind::Intersections, 0));
+        assert!(meanings[11].starts_with("No effect: the facets overlap within one plane"));
+        assert!(meanings[6].starts_with("Where two closed shells overlap"));
+        meanings.sort();
+        meanings.dedup();
+        assert_eq!(meanings.len(), kinds.len() + 1);
+        let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.title()).collect();
+        assert_eq!(titles.len(), kinds.len());
+        let changing = |keep| {
+            kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()
+        };
+        let always = [Kind::NonManifoldOdd, Kind::Duplicates];
+        let all = [always[0], always[1], Kind::ThinWalls, Kind::ThinGaps, Kind::OutsideRoot];
+        assert_eq!(changing(Keep::All), all);
+        assert_eq!(
+            changing(Keep::Outside),
+            [always[0], always[1], Kind::ThinGaps, Kind::OutsideRoot]
+        );
+        assert_eq!(
+            changing(Keep::Inside),
+            [always[0], always[1], Kind::ThinWalls, Kind::OutsideRoot]
+        );
     }
 }

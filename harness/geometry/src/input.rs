@@ -63,7 +63,7 @@ impl Input {
         };
         let input = Self::new(case.facets, &requested)
             .map_err(|error| format!("{}: {error}", path.display()))?;
-        Ok(Self { keep: case.keep, ..input })
+        Ok(Self { keep: case.rules.keep, ..input })
     }
 
     /// A geometry in memory.
@@ -93,9 +93,9 @@ impl Input {
             facets: case.facets,
             lattice: case.facets_lattice,
             solids: Vec::new(),
-            root: case.root,
+            root: case.rules.root,
             cell: requested.spacing_min.map(|_| cell),
-            keep: case.keep,
+            keep: case.rules.keep,
         })
     }
 

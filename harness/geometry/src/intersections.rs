@@ -4,8 +4,7 @@
 //! of finitely many planes does: with the normal of a triangle, or normal to an edge of each; in a common plane,
 //! normal to an edge of either.
 
-use contract::lattice::FacetLattice;
-use contract::parity::normal;
+use contract::lattice::{FacetLattice, normal};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;

@@ -1,10 +1,10 @@
 //! Geometries: their diagnosis before they are meshed, and [`leak`]s through their openings.
 //!
 //! - [`input`]: the file, its root and the cell's edge length;
-//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`], [`junctions`] and [`width`] build on it;
+//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`] and [`width`] build on it;
 //! - [`extent`]: the body's position in the root;
 //! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
-//! - [`finding`] and [`report`]: the result as data; [`meaning`](mod@meaning): a table of their kinds; [`text`]: the result for a terminal.
+//! - [`finding`] and [`report`]: the result as data; [`text`]: the result for a terminal.
 //!
 //! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that
 //! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
@@ -14,9 +14,7 @@ mod extent;
 pub mod finding;
 pub mod input;
 mod intersections;
-mod junctions;
 pub mod leak;
-mod meaning;
 mod openings;
 pub mod report;
 mod sheets;
@@ -38,7 +36,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let shells = Shells::new(&edges, &input.lattice);
     let mut findings: Vec<Finding> = Vec::new();
     findings.push(openings::openings(input, &edges, first));
-    findings.extend(edges::findings(input, &edges, first));
+    findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     findings.push(edges::duplicates(input, &edges, first));
     let tree = FacetTree::new(&input.lattice);

@@ -1,4 +1,8 @@
 //! Openings: connected sets of open edges, that is, of edges with one facet, apart from T-junctions.
+//!
+//! At a T-junction a vertex of one facet lies on an edge of another. Both facets have open edges there, but the surface has no
+//! hole. Two open edges that leave a vertex in the same direction cancel along the shorter one, until no such
+//! pair is left; what remains bounds openings.
 
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::CELLS_PER_EDGE;
@@ -7,28 +11,26 @@ use contract::sets::Sets;
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
-use super::junctions::{Segment, uncancelled};
+use super::tree::Point;
 use super::width;
 
 /// A vertex this near to an edge lies on it, in lattice units. The finest cells are 256 units wide.
 const TOLERANCE: f64 = 2.0;
 
-/// The boundary of all openings.
-struct Rims {
-    segments: Vec<Segment>,
-    /// Coordinates by vertex index, in the user's units.
-    points: Vec<[f64; 3]>,
-}
-
 /// All openings, widest first: a hole, the rim of a sheet, or several that share a vertex.
 pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let open = rims(input, edges);
+    let open = edges.iter().filter_map(|(ends, mut uses)| {
+        let is_open = uses.len() == 1;
+        uses.next().filter(|_| is_open).map(|u| Segment { ends, facet: u.facet })
+    });
     let tolerance = TOLERANCE * input.root.edge / UNITS_PER_EDGE as f64;
-    let segments = uncancelled(open.segments, &open.points, tolerance);
-    let rims = Rims { segments, points: open.points };
-    let mut places: Vec<Place> =
-        components(&rims).iter().map(|component| place(&rims, component)).collect();
-    places.sort_by(|a, b| order(b.width, a.width).then(a.facets.cmp(&b.facets)));
+    let rims = uncancelled(open.collect(), &edges.points, tolerance);
+    let mut places: Vec<Place> = components(&rims, edges.points.len())
+        .iter()
+        .map(|component| place(&edges.points, component))
+        .collect();
+    let width = |place: &Place| place.width.unwrap_or(0.0);
+    places.sort_by(|a, b| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
     let mut finding = Finding::new(Kind::Openings);
     finding.count = places.len() as u64;
     finding.count_changing = places.iter().filter(|p| is_leak(input, p)).count() as u64;
@@ -44,38 +46,21 @@ fn is_leak(input: &Input, place: &Place) -> bool {
     place.width.is_some_and(|width| width >= cell)
 }
 
-/// All open edges.
-fn rims(input: &Input, edges: &Edges) -> Rims {
-    let open = edges.iter().filter_map(|(ends, mut uses)| {
-        let is_open = uses.len() == 1;
-        uses.next().filter(|_| is_open).map(|u| Segment { ends, facet: u.facet })
-    });
-    let mut segments: Vec<Segment> = open.collect();
-    let with_facet = |s: &Segment| s.ends.map(|v| (v, s.facet));
-    let mut vertices: Vec<(u32, u32)> = segments.iter().flat_map(with_facet).collect();
-    vertices.sort_unstable();
-    vertices.dedup_by_key(|(v, _)| *v);
-    let points = vertices.iter().map(|&(v, facet)| edges.position(input, facet, v)).collect();
-    let index = |v: u32| vertices.binary_search_by_key(&v, |(v, _)| *v).expect("listed") as u32;
-    segments.iter_mut().for_each(|s| s.ends = s.ends.map(index));
-    Rims { segments, points }
-}
-
 /// The segments by component.
-fn components(rims: &Rims) -> Vec<Vec<Segment>> {
-    let mut sets = Sets::new(rims.points.len());
-    for segment in &rims.segments {
+fn components(rims: &[Segment], vertices: usize) -> Vec<Vec<Segment>> {
+    let mut sets = Sets::new(vertices);
+    for segment in rims {
         sets.union(segment.ends[0], segment.ends[1]);
     }
     let mut labelled: Vec<(u32, Segment)> =
-        rims.segments.iter().map(|s| (sets.root(s.ends[0]), *s)).collect();
+        rims.iter().map(|segment| (sets.root(segment.ends[0]), *segment)).collect();
     labelled.sort_by_key(|(label, segment)| (*label, segment.ends));
     let component = |same: &[(u32, Segment)]| same.iter().map(|(_, segment)| *segment).collect();
     labelled.chunk_by(|a, b| a.0 == b.0).map(component).collect()
 }
 
-fn place(rims: &Rims, component: &[Segment]) -> Place {
-    let ends = |s: &Segment| s.ends.map(|v| rims.points[v as usize]);
+fn place(points: &[[f64; 3]], component: &[Segment]) -> Place {
+    let ends = |segment: &Segment| segment.ends.map(|v| points[v as usize]);
     let points: Vec<[f64; 3]> = component.iter().flat_map(ends).collect();
     let centre =
         std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / points.len() as f64);
@@ -86,6 +71,108 @@ fn place(rims: &Rims, component: &[Segment]) -> Place {
     Place { width: Some(width::width(&points)), ..Place::new(facets, centre) }
 }
 
-fn order(a: Option<f64>, b: Option<f64>) -> std::cmp::Ordering {
-    a.unwrap_or(0.0).total_cmp(&b.unwrap_or(0.0))
+/// A segment between two vertices at the boundary of a facet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Both ends.
+    pub ends: [u32; 2],
+    /// The facet.
+    pub facet: u32,
+}
+
+/// A vertex with more segments is left unchanged.
+const SEGMENTS_MAX: usize = 256;
+
+/// The segments that remain after cancellation. A vertex lies on a segment if it is within `tolerance` of it.
+pub fn uncancelled(segments: Vec<Segment>, points: &[[f64; 3]], tolerance: f64) -> Vec<Segment> {
+    let mut at: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
+    for (i, segment) in segments.iter().enumerate() {
+        segment.ends.iter().for_each(|&v| at[v as usize].push(i as u32));
+    }
+    let mut segments: Vec<Option<Segment>> = segments.into_iter().map(Some).collect();
+    let mut waiting: Vec<u32> = (0..points.len() as u32).rev().collect();
+    while let Some(v) = waiting.pop() {
+        at[v as usize].retain(|&i| segments[i as usize].is_some_and(|s| s.ends.contains(&v)));
+        let Some((long, short)) = overlap(v, &at[v as usize], &segments, points, tolerance) else {
+            continue;
+        };
+        let end = |i: u32| segments[i as usize].map(|s| other(s, v)).expect("retained");
+        let (far, near) = (end(long), end(short));
+        segments[short as usize] = None;
+        let rest = segments[long as usize].filter(|_| far != near);
+        segments[long as usize] = rest.map(|s| Segment { ends: [near, far], ..s });
+        at[near as usize].push(long);
+        waiting.extend([v, near, far]);
+    }
+    segments.into_iter().flatten().collect()
+}
+
+/// Two segments that leave a vertex in the same direction, the longer first.
+fn overlap(
+    v: u32,
+    at: &[u32],
+    segments: &[Option<Segment>],
+    points: &[[f64; 3]],
+    tolerance: f64,
+) -> Option<(u32, u32)> {
+    if at.len() > SEGMENTS_MAX {
+        return None;
+    }
+    let point = |v: u32| Point::from(points[v as usize]);
+    let along = |i: u32| point(other(segments[i as usize].expect("retained"), v)) - point(v);
+    for (n, &i) in at.iter().enumerate() {
+        for &j in &at[n + 1..] {
+            let (p, q) = (along(i), along(j));
+            let is_longer = p.length_squared() >= q.length_squared();
+            let (long, short) = if is_longer { (p, q) } else { (q, p) };
+            let t = short.dot(long) / long.length_squared();
+            if t > 0.0 && (short - t * long).length() <= tolerance {
+                return Some(if is_longer { (i, j) } else { (j, i) });
+            }
+        }
+    }
+    None
+}
+
+fn other(segment: Segment, v: u32) -> u32 {
+    segment.ends[usize::from(segment.ends[0] == v)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on the x axis but the last.
+    const POINTS: [[f64; 3]; 6] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [3.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+    ];
+
+    fn rest(ends: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        let sorted = |s: &Segment| [s.ends[0].min(s.ends[1]), s.ends[0].max(s.ends[1])];
+        let segments = ends.iter().map(|&ends| Segment { ends, facet: 0 }).collect();
+        uncancelled(segments, &POINTS, 1e-9).iter().map(sorted).collect()
+    }
+
+    #[test]
+    fn a_long_edge_cancels_with_its_parts() {
+        assert_eq!(rest(&[[0, 4], [1, 0], [1, 3], [4, 3]]), [] as [[u32; 2]; 0]);
+        // Both sides are divided, at different vertices.
+        assert_eq!(rest(&[[0, 2], [2, 4], [0, 1], [1, 3], [3, 4]]), [] as [[u32; 2]; 0]);
+    }
+
+    #[test]
+    fn a_missing_part_and_a_triangle_remain() {
+        assert_eq!(rest(&[[0, 4], [0, 1], [3, 4]]), [[1, 3]]);
+        assert_eq!(rest(&[[0, 4], [4, 5], [5, 0]]).len(), 3);
+        // Opposite directions at vertex 2.
+        assert_eq!(rest(&[[0, 2], [2, 4]]).len(), 2);
+        // An edge across another one is no part of it, however short it is.
+        let across = [[0, 1], [0, 5]].map(|ends| Segment { ends, facet: 0 });
+        assert_eq!(uncancelled(across.to_vec(), &POINTS, 1.5).len(), 2);
+    }
 }

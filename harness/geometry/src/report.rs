@@ -14,9 +14,8 @@ use serde::Serialize;
 
 use super::edges::{EdgeCounts, Edges};
 use super::extent::{self, Extent};
-use super::finding::{Finding, Kind};
+use super::finding::{self, Finding, Kind};
 use super::input::Input;
-use super::meaning;
 use super::shells::Shell;
 
 /// Name and version of the JSON form.
@@ -71,14 +70,14 @@ impl Diagnosis {
             if finding.kind.changes_region(input.keep) {
                 finding.count_changing = finding.count;
             }
-            finding.meaning = meaning::meaning(finding, input);
+            finding.meaning = finding::meaning(finding, input);
         }
         let closed = shells.iter().filter(|shell| shell.is_closed).count() as u64;
         let of_shells = shells.iter().map(|shell| u64::from(shell.facets)).sum();
         let diagnosis = Self {
             schema: SCHEMA,
             facets: input.facets.len() as u64,
-            vertices: edges.vertices.into(),
+            vertices: edges.points.len() as u64,
             edges: edges.counts(),
             solids: input.solids.clone(),
             shells: Shells { count: shells.len() as u64, closed, facets: of_shells },

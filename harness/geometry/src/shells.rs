@@ -8,10 +8,11 @@ use contract::sets::Sets;
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use super::tree::{Aabb, Point};
 use std::collections::HashMap;
 
 /// A shell.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Shell {
     /// Index of the first facet.
     pub facet_first: u32,
@@ -23,25 +24,16 @@ pub struct Shell {
     is_oriented: bool,
     /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
     volume_sixfold: i128,
-    /// Least coordinates on the lattice.
-    low: [i64; 3],
-    /// Greatest coordinates on the lattice.
-    high: [i64; 3],
+    /// On the lattice, whose coordinates are exact in f64.
+    bounds: Aabb,
 }
 
 impl Shell {
     /// A shell without facets yet.
-    pub(super) fn new(facet_first: u32) -> Self {
-        let (low, high) = ([i64::MAX; 3], [i64::MIN; 3]);
-        Self {
-            facet_first,
-            facets: 0,
-            is_closed: true,
-            is_oriented: true,
-            volume_sixfold: 0,
-            low,
-            high,
-        }
+    fn new(facet_first: u32) -> Self {
+        let bounds = Aabb::new_invalid();
+        let (is_closed, is_oriented) = (true, true);
+        Self { facet_first, facets: 0, is_closed, is_oriented, volume_sixfold: 0, bounds }
     }
 
     fn add(&mut self, facet: &FacetLattice) {
@@ -51,10 +43,7 @@ impl Shell {
         let along = |a: usize, b: usize, c: usize| p[a] * (q[b] * r[c] - q[c] * r[b]);
         self.volume_sixfold += along(0, 1, 2) + along(1, 2, 0) + along(2, 0, 1);
         for vertex in facet {
-            for (a, &c) in vertex.iter().enumerate() {
-                self.low[a] = self.low[a].min(c);
-                self.high[a] = self.high[a].max(c);
-            }
+            self.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
         }
     }
 
@@ -64,7 +53,8 @@ impl Shell {
 
     /// Whether the bounding box lies in the interior of that of the other shell.
     fn may_be_in(&self, other: &Self) -> bool {
-        (0..3).all(|a| other.low[a] < self.low[a] && self.high[a] < other.high[a])
+        let (inner, outer) = (self.bounds, other.bounds);
+        outer.mins.cmplt(inner.mins).all() && inner.maxs.cmplt(outer.maxs).all()
     }
 }
 

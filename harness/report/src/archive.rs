@@ -2,6 +2,7 @@
 
 use crate::benchmark::machines;
 use bench::experiments::entry::{Entry, Line};
+use bench::experiments::record::now_utc;
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;
@@ -24,16 +25,24 @@ const AUTHOR: &str = "#author";
 pub type Member = (String, u64);
 
 /// What the author says of the archive.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct About {
-    /// Its title.
+    /// Title of the archive
+    #[arg(long)]
     pub title: String,
-    /// Whoever made it.
+    /// Whoever made it
+    #[arg(long, value_name = "NAME")]
     pub author: String,
-    /// Identifier of its licence in the list of SPDX, or an address.
+    /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
+    #[arg(long, value_name = "SPDX|URL")]
     pub licence: String,
-    /// The day, such as `2026-01-31`.
+    /// The day, such as `2026-01-31`
+    #[arg(skip = today())]
     pub day: String,
+}
+
+fn today() -> String {
+    now_utc().chars().take("2026-01-31".len()).collect()
 }
 
 impl About {
@@ -45,14 +54,11 @@ impl About {
     }
 }
 
-/// The metadata: files with their sizes and types, sessions with command, machine and time, programs with their digests.
+/// The metadata: files with their sizes, sessions with command, machine and time, programs with their digests.
 pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let (licence, id) = (about.licence_address(), |id: &str| json!({ "@id": id }));
-    let files = members.iter().map(|(path, bytes)| {
-        let kind = media_type(path);
-        json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string(), "encodingFormat": kind})
-    });
-    let files: Vec<Value> = files.collect();
+    let file = |(path, bytes): &Member| json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string()});
+    let files: Vec<Value> = members.iter().map(file).collect();
     let programs = distinct(lines.iter().filter_map(|line| match &line.entry {
         Entry::Run(run) if !run.program.is_empty() => {
             Some((run.setup.engine.clone(), run.program.clone()))
@@ -141,24 +147,6 @@ fn address(path: &str) -> String {
         _ => format!("%{byte:02X}"),
     };
     path.bytes().map(escape).collect()
-}
-
-fn media_type(path: &str) -> &'static str {
-    match path.rsplit('.').next().unwrap_or_default() {
-        "csv" => "text/csv",
-        "html" => "text/html",
-        "json" => "application/json",
-        "jsonl" => "application/jsonl",
-        "md" => "text/markdown",
-        "pdf" => "application/pdf",
-        "png" => "image/png",
-        "stl" => "model/stl",
-        "svg" => "image/svg+xml",
-        "tex" => "text/x-tex",
-        "toml" => "application/toml",
-        "txt" => "text/plain",
-        _ => "application/octet-stream",
-    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! The base tree of a case at any surface level, made by an engine.
 
 use crate::engine::failure::{End, Failure};
-use crate::engine::layout::SERIAL;
-use crate::engine::options::RunOptions;
+use crate::engine::layout::{RunOptions, SERIAL};
 use crate::engine::runner::Engine;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -52,9 +51,7 @@ impl<'a> BaseTrees<'a> {
     /// # Errors
     /// As [`Self::at`].
     pub fn with_seeds(&mut self, level: u8) -> Result<LeafSet, Failure> {
-        if let Some(seeds) = self.seeds.clone() {
-            self.case.table.insert("seeds".into(), seeds);
-        }
+        self.case.table.extend(self.seeds.clone().map(|seeds| ("seeds".to_owned(), seeds)));
         let tree = self.at(level);
         self.case.table.remove("seeds");
         tree

@@ -3,10 +3,10 @@
 
 use crate::engine::failure::End;
 use crate::engine::paths::Paths;
-use crate::engine::python;
+use crate::python;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::failure::{Failure, Unusable};
+use contract::failure::Failure;
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, Request};
@@ -83,7 +83,7 @@ pub fn import(
     paths: &Paths,
     limit: Duration,
 ) -> Result<Imported, Failure> {
-    let input = |error: Unusable| Failure::from(error.of_file(path));
+    let input = |error: Failure| error.of_file(path);
     let root = request.root.or(case.map(|case| case.root));
     parts(path).iter().try_for_each(|part| files::register_input(part))?;
     let format = format.map_or_else(|| import::guess(path), Ok).map_err(input)?;
@@ -144,7 +144,7 @@ fn read(
     limit: Duration,
 ) -> Result<Cells, Failure> {
     let (name, script) = match format {
-        Format::LeafWords | Format::P4est => return Ok(import::read(path, format, request)?),
+        Format::LeafWords | Format::P4est => return import::read(path, format, request),
         Format::Vtk => ("vtk", "import_vtk.py"),
         Format::Openfoam | Format::Table | Format::Discretize => ("numpy", "import_cells.py"),
     };
@@ -154,7 +154,7 @@ fn read(
         })?,
         _ => path.to_owned(),
     };
-    let place = tempfile::tempdir().map_err(Unusable::from)?;
+    let place = tempfile::tempdir().map_err(Failure::unreadable)?;
     let table = place.path().join("cells");
     let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
     let arguments = [mesh.as_os_str(), table.as_os_str(), asked.as_ref()];
@@ -171,11 +171,11 @@ fn read(
     let stated: Stated = stated
         .and_then(|text| serde_json::from_slice(&text).ok())
         .ok_or_else(|| Failure::input("was read, but the script reported no root"))?;
-    Ok(cells(&fs::read(&table).map_err(Unusable::from)?, stated)?)
+    cells(&fs::read(&table).map_err(Failure::unreadable)?, stated)
 }
 
 /// The cells of rows of numbers: corner, edge, and level and side if they are known.
-fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Unusable> {
+fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Failure> {
     let Stated { root, has_levels, has_sides, digest } = stated;
     let (numbers, _) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();

@@ -11,9 +11,8 @@ use super::random::Random;
 /// Minimum number of rounds for significance level `alpha`. With n rounds, a quarter of which the trimmed mean ignores at
 /// each end, no p-value is below 3^-(n - n/4): relabelling an ignored round does not change the effect. At least 8.
 pub fn rounds_min(alpha: f64) -> usize {
-    (8..=ROUNDS_MIN_LIMIT)
-        .find(|n| 3f64.powi((n / 4) as i32 - *n as i32) < alpha)
-        .unwrap_or(ROUNDS_MIN_LIMIT)
+    let p_min = |n: &usize| 3f64.powi((n / 4) as i32 - *n as i32);
+    (8..ROUNDS_MIN_LIMIT).find(|n| p_min(n) < alpha).unwrap_or(ROUNDS_MIN_LIMIT)
 }
 
 /// Largest value of [`rounds_min`], for levels that no number of samples here resolves.
@@ -61,30 +60,26 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     let mut random = Random(seed);
     let difference = |of: usize, r: &Round| r[of] - (r[(of + 1) % 3] + r[(of + 2) % 3]) / 2.0;
     let differences: Vec<f64> = rounds.iter().map(|r| difference(2, r)).collect();
-    let effect = trimmed_mean(&differences);
-    let permuted_effect = |random: &mut Random| {
+    let effect = trimmed_mean(differences.iter().copied());
+    let mut permuted_effect = || {
         let relabelled = rounds.iter().map(|r| difference((random.below(3) + 2) % 3, r));
-        trimmed_mean(&relabelled.collect::<Vec<_>>()).abs()
+        trimmed_mean(relabelled).abs()
     };
     let (mut as_large, mut drawn) = (0, 0);
     while drawn < PERMUTATIONS_MAX && as_large < EXCEEDANCES_MAX {
-        as_large += usize::from(permuted_effect(&mut random) >= effect.abs());
+        as_large += usize::from(permuted_effect() >= effect.abs());
         drawn += 1;
     }
-    let baseline_differences: Vec<f64> =
-        rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE).collect();
-    let mut null_effects = collect_draws(SAMPLES, || {
-        let flipped =
-            baseline_differences.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
-        trimmed_mean(&flipped.collect::<Vec<_>>()).abs()
-    });
-    null_effects.sort_by(f64::total_cmp);
-    let resampled = |random: &mut Random| {
-        let count = differences.len();
-        trimmed_mean(&(0..count).map(|_| differences[random.below(count)]).collect::<Vec<_>>())
-    };
-    let mut bootstrap_effects = collect_draws(SAMPLES / 4, || resampled(&mut random));
-    bootstrap_effects.sort_by(f64::total_cmp);
+    let of_baseline = rounds.iter().map(|r| (r[1] - r[0]) * SCALE_BASELINE_DIFFERENCE);
+    let of_baseline: Vec<f64> = of_baseline.collect();
+    let null_effects = sorted((0..SAMPLES).map(|_| {
+        let flipped = of_baseline.iter().map(|d| if random.below(2) == 0 { *d } else { -d });
+        trimmed_mean(flipped).abs()
+    }));
+    let bootstrap_effects = sorted((0..SAMPLES / 4).map(|_| {
+        let drawn = differences.iter().map(|_| differences[random.below(differences.len())]);
+        trimmed_mean(drawn)
+    }));
     let floor = quantile(&null_effects, 1.0 - alpha);
     let relative = |logarithm: f64| logarithm.exp_m1();
     Comparison {
@@ -97,9 +92,10 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
     }
 }
 
-/// Collects `count` draws.
-fn collect_draws(count: usize, mut draw: impl FnMut() -> f64) -> Vec<f64> {
-    (0..count).map(|_| draw()).collect()
+fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted
 }
 
 /// Returns a quantile of values in ascending order.
@@ -119,12 +115,29 @@ fn deviation(values: &[f64]) -> f64 {
 const TRIM: f64 = 0.25;
 
 /// Returns the mean of the middle half of the values: robust against the few rounds that other processes disturb.
-pub fn trimmed_mean(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
+pub fn trimmed_mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let sorted = sorted(values);
     let cut = (sorted.len() as f64 * TRIM) as usize;
     let kept = &sorted[cut..sorted.len() - cut];
     kept.iter().sum::<f64>() / kept.len().max(1) as f64
+}
+
+/// Control of the false discovery rate among many tests (Benjamini and Hochberg, 1995; valid for positively dependent
+/// tests too).
+///
+/// Returns for every p-value the least rate of false discoveries at which its test counts as a discovery, among all tests
+/// together. If nothing has changed, the probability of any discovery at rate q is at most q.
+pub fn adjusted(p_values: &[f64]) -> Vec<f64> {
+    let count = p_values.len() as f64;
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|a, b| p_values[*b].total_cmp(&p_values[*a]));
+    let mut adjusted = vec![1.0; p_values.len()];
+    let mut least: f64 = 1.0;
+    for (i, index) in order.into_iter().enumerate() {
+        least = least.min(p_values[index] * count / (count - i as f64));
+        adjusted[index] = least;
+    }
+    adjusted
 }
 
 #[cfg(test)]
@@ -175,7 +188,32 @@ mod tests {
 
     #[test]
     fn outliers_at_either_end_are_discarded() {
-        assert_eq!(trimmed_mean(&[1.0, 2.0, 3.0, 1000.0]), 2.5);
-        assert_eq!(trimmed_mean(&[7.0]), 7.0);
+        assert_eq!(trimmed_mean([1.0, 2.0, 3.0, 1000.0]), 2.5);
+        assert_eq!(trimmed_mean([7.0]), 7.0);
+    }
+
+    #[test]
+    fn the_published_example_has_four_discoveries() {
+        // Benjamini and Hochberg (1995), section 3.2: 15 tests at q = 0.05.
+        let p = [
+            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262,
+            0.5719, 0.6528, 0.7590, 1.0,
+        ];
+        let found = adjusted(&p);
+        assert_eq!(found.iter().filter(|q| **q <= 0.05).count(), 4);
+        assert!(found.windows(2).all(|pair| pair[0] <= pair[1]));
+        assert!(adjusted(&[]).is_empty() && adjusted(&[0.3]) == [0.3]);
+    }
+
+    #[test]
+    fn without_any_effect_a_discovery_is_as_rare_as_the_rate() {
+        let mut random = Random(1);
+        let mut run = || {
+            let p: Vec<f64> =
+                (0..20).map(|_| random.below(1 << 20) as f64 / f64::from(1 << 20)).collect();
+            adjusted(&p).iter().any(|q| *q <= 0.05)
+        };
+        let alarms = (0..2000).filter(|_| run()).count();
+        assert!((60..=140).contains(&alarms), "{alarms}");
     }
 }

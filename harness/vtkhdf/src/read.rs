@@ -33,8 +33,7 @@ fn unknown(what: &str) -> ReadError {
 /// A file whose metadata were read.
 #[derive(Debug)]
 pub struct TreeReader {
-    file: fs::File,
-    bytes: u64,
+    source: Source,
     /// The root and the nodes.
     pub shape: Shape,
     /// The bits of split nodes.
@@ -52,7 +51,7 @@ impl TreeReader {
     /// If the file cannot be read, or is another one than the writer makes.
     pub fn open(path: &Path) -> Result<Self> {
         let file = files::open(path)?;
-        let source = Source { bytes: file.metadata()?.len(), file: &file };
+        let source = Source { bytes: file.metadata()?.len(), file };
         let head = source.bytes_at(0, source.bytes.min(SUPERBLOCK_BYTES as u64))?;
         if !head.starts_with(&SIGNATURE) || head.get(8).is_some_and(|&version| version != 3) {
             return Err(unknown("it does not begin with a superblock of HDF5 1.10"));
@@ -69,14 +68,12 @@ impl TreeReader {
         let expected = metadata(&shape, &arrays, start);
         let found = (source.bytes_at(start, end.saturating_sub(start))?, head);
         if expected != found {
-            let what = "its metadata are not those of its tree".to_owned();
             let is_ours = found.0.windows(EDGE.len()).any(|bytes| bytes == EDGE.as_bytes());
             let error = if is_ours { ReadError::Damaged } else { ReadError::Unknown };
-            return Err(error(what));
+            return Err(error("its metadata are not those of its tree".to_owned()));
         }
-        let bytes = source.bytes;
         let [split, masked, sides] = arrays;
-        Ok(Self { file, bytes, shape, split, masked: Some(masked).filter(has_chunks), sides })
+        Ok(Self { source, shape, split, masked: Some(masked).filter(has_chunks), sides })
     }
 
     /// The bytes of a chunk, as many as every chunk has.
@@ -87,27 +84,25 @@ impl TreeReader {
         into.clear();
         into.resize(array.chunk_len as usize, 0);
         let Some(Extent { address, bytes }) = array.chunks[index] else { return Ok(()) };
-        let stored = Source { file: &self.file, bytes: self.bytes }.bytes_at(address, bytes)?;
+        let stored = self.source.bytes_at(address, bytes)?;
         let mut inflater = Decompress::new(true);
         let status = inflater.decompress(&stored, into, FlushDecompress::Finish);
         let is_whole = matches!(status, Ok(Status::StreamEnd))
             && inflater.total_in() == bytes
             && inflater.total_out() == into.len() as u64;
-        if is_whole {
-            Ok(())
-        } else {
-            Err(ReadError::Damaged(format!("the chunk at byte {address}")))
-        }
+        let why = || ReadError::Damaged(format!("the chunk at byte {address}"));
+        if is_whole { Ok(()) } else { Err(why()) }
     }
 }
 
 /// The bytes of a file.
-struct Source<'a> {
-    file: &'a fs::File,
+#[derive(Debug)]
+struct Source {
+    file: fs::File,
     bytes: u64,
 }
 
-impl Source<'_> {
+impl Source {
     fn bytes_at(&self, address: u64, bytes: u64) -> Result<Vec<u8>> {
         if address.checked_add(bytes).is_none_or(|end| end > self.bytes) {
             let end = address.saturating_add(bytes);

@@ -1,10 +1,9 @@
 //! Metadata of HDF5 files: tables of chunks, object headers and the superblock.
 
-use crate::checksum::lookup3;
 use crate::format::{
     ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, FILTER_DEFLATE, INDEX_FIXED_ARRAY,
     LAYOUT_CHUNKED, LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES,
-    UNDEFINED, datatype, message,
+    UNDEFINED, datatype, lookup3, message,
 };
 use flate2::{Compress, Compression, FlushCompress, Status};
 

@@ -102,11 +102,10 @@ pub const fn byte(bits: u64, j: u64) -> u8 {
 /// The octants `w` and their face neighbours within the brick.
 #[inline]
 pub const fn spread_faces(w: u64) -> u64 {
-    const fn along(w: u64, m: [u64; 4], unit: u32, gap: u32) -> u64 {
-        let low = m[0] | m[2];
-        ((w & low) << unit) | (w >> unit & low) | ((w & m[1]) << gap) | (w >> gap & m[1])
-    }
-    w | along(w, X, 1, 7) | along(w, Y, 2, 14) | along(w, Z, 4, 28)
+    let x = moved(w, 0, false) | moved(w, 0, true);
+    let y = moved(w, 1, false) | moved(w, 1, true);
+    let z = moved(w, 2, false) | moved(w, 2, true);
+    w | x | y | z
 }
 
 /// Flood fill: the octants of `within` that faces within `within` connect to those of `seed`.

@@ -121,12 +121,8 @@ impl BrickSet {
 
     /// The bits of brick `key`; 0 if the set has no octant in it.
     pub fn get(&self, key: u64) -> u64 {
-        let Ok(run) = self.runs.binary_search_by_key(&high_of(key), |r| r.high) else {
-            return 0;
-        };
-        let range = self.runs[run].start..self.runs.get(run + 1).map_or(self.len(), |r| r.start);
-        let found = self.low[range.clone()].binary_search(&(key as u32));
-        found.map_or(0, |i| self.bits[range.start + i])
+        let at = self.position(key);
+        if at < self.len() && self.key_at(at) == key { self.bits[at] } else { 0 }
     }
 
     /// Whether the octant with this Morton code is in the set.
@@ -200,26 +196,17 @@ impl BrickSet {
     /// If one is violated; the message names it and a key.
     pub fn check_invariants(&self) {
         assert_eq!(self.low.len(), self.bits.len(), "each key must have bits");
-        let first = self.runs.first().map_or(self.len(), |r| r.start);
-        assert_eq!(first, 0, "the first run must start at the first brick");
-        for pair in self.runs.windows(2) {
-            let [before, run] = [pair[0], pair[1]];
-            assert!(
-                before.high < run.high,
-                "run {:#x} must follow run {:#x}",
-                run.high,
-                before.high
-            );
-            assert!(before.start < run.start, "run {:#x} must have a brick", before.high);
+        let ascend = self.runs.is_sorted_by(|a, b| a.start < b.start);
+        assert!(ascend, "each run must have a brick");
+        let (mut same, mut before) = (Self::default(), None);
+        for Brick { key, bits } in self.bricks() {
+            assert!(bits != 0, "brick {key:#x} must not be empty");
+            if let Some(before) = before.replace(key) {
+                assert!(before < key, "brick {key:#x} must follow brick {before:#x}");
+            }
+            same.push(key, bits);
         }
-        let last = self.runs.last().map_or(0, |r| r.start + 1);
-        assert!(last <= self.len(), "the last run must have a brick");
-        for b in self.bricks() {
-            assert!(b.bits != 0, "brick {:#x} must not be empty", b.key);
-        }
-        for (a, b) in self.bricks().zip(self.bricks().skip(1)) {
-            assert!(a.key < b.key, "brick {:#x} must precede brick {:#x}", b.key, a.key);
-        }
+        assert!(*self == same, "each brick must be in the run of its upper half");
     }
 }
 

@@ -49,7 +49,8 @@ impl<'t> Reach<'t> {
         // A radius greater than the root's width reaches no more than the root.
         let radius = radius.min(1 << self.level);
         if radius <= MARGIN as u32 {
-            return dilate_tiles(sources, radius, false, self.tile, &mut self.out, &mut self.words);
+            self.words += self.tile.pass(sources, radius, false, &mut self.out);
+            return;
         }
         let near = self.near(sources, MARGIN as u32, false);
         self.dilate(near.bricks(), radius - MARGIN as u32);
@@ -59,7 +60,8 @@ impl<'t> Reach<'t> {
     /// the union. Sources come in Morton order.
     pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         if radius < 2 {
-            return dilate_tiles(sources, radius, true, self.tile, &mut self.out, &mut self.words);
+            self.words += self.tile.pass(sources, radius, true, &mut self.out);
+            return;
         }
         let odd = self.near(sources, radius & 1, true);
         self.dilate(odd.bricks(), radius / 2);
@@ -73,39 +75,13 @@ impl<'t> Reach<'t> {
         to_parents: bool,
     ) -> BrickSet {
         let mut near = Gathered::new(self.level);
-        dilate_tiles(sources, radius, to_parents, self.tile, &mut near, &mut self.words);
+        self.words += self.tile.pass(sources, radius, to_parents, &mut near);
         near.into_set()
     }
 
     /// The octants reached, and the work done.
     pub fn finish(self) -> (BrickSet, Words) {
         (self.out.into_set(), self.words)
-    }
-}
-
-/// One pass over the tiles. Adds to `out` the octants reached, or their parents if `to_parents`.
-fn dilate_tiles(
-    sources: impl Iterator<Item = Brick>,
-    radius: u32,
-    to_parents: bool,
-    tile: &mut Tile,
-    out: &mut Gathered,
-    words: &mut Words,
-) {
-    tile.set_radius(radius as usize);
-    let mut now = None;
-    for b in sources {
-        let key = b.key >> (3 * TILE_BRICKS_LOG2);
-        if let Some(done) = now.filter(|n| *n != key) {
-            tile.dilate(words);
-            tile.flush(done, to_parents, out);
-        }
-        now = Some(key);
-        tile.put(b);
-    }
-    if let Some(done) = now {
-        tile.dilate(words);
-        tile.flush(done, to_parents, out);
     }
 }
 

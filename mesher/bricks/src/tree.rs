@@ -60,7 +60,7 @@ impl Tree {
     /// If one is violated; the message names it, the level and an octant.
     pub fn check_structure(&self) {
         check_split(&self.split);
-        self.check_leaves(&self.crossing, "is crossing, but no leaf");
+        self.check_apart(&self.crossing, &[&self.split], "is crossing, but no leaf");
     }
 
     /// Checks that some sets hold leaves of this tree that do not cross.
@@ -68,21 +68,18 @@ impl Tree {
     /// # Panics
     /// If an octant of `sets` is no such leaf; `violation` completes the sentence that names it.
     pub fn check_open_leaves(&self, sets: &PerLevel, violation: &str) {
-        self.check_leaves(sets, violation);
-        for (l, (set, crossing)) in (0..).zip(sets.iter().zip(&self.crossing)) {
-            let mut crossing = crossing.cursor();
-            for b in set.bricks() {
-                assert_none(l, b.key, b.bits & crossing.get(b.key), violation);
-            }
-        }
+        self.check_apart(sets, &[&self.split, &self.crossing], violation);
     }
 
-    fn check_leaves(&self, sets: &PerLevel, violation: &str) {
+    /// Checks that some sets hold octants of this tree that are in none of `others`.
+    fn check_apart(&self, sets: &PerLevel, others: &[&PerLevel], violation: &str) {
         check_existing(&self.split, sets, violation);
-        for (l, (set, split)) in (0..).zip(sets.iter().zip(&self.split)) {
-            let mut split = split.cursor();
-            for b in set.bricks() {
-                assert_none(l, b.key, b.bits & split.get(b.key), violation);
+        for other in others {
+            for (l, (set, other)) in (0..).zip(sets.iter().zip(*other)) {
+                let mut other = other.cursor();
+                for b in set.bricks() {
+                    assert_none(l, b.key, b.bits & other.get(b.key), violation);
+                }
             }
         }
     }

@@ -4,13 +4,11 @@
 
 use crate::unfinished::{abandon_all, complete};
 use crate::uses::forget;
+use libc::{SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGPWR, SIGQUIT, SIGSTKFLT};
+use libc::{SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
-use signal_hook::consts::{
-    SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM,
-    SIGXCPU, SIGXFSZ,
-};
 use signal_hook::low_level::{self, pipe};
 use std::io::{self, Read};
 use std::mem::MaybeUninit;
@@ -26,19 +24,8 @@ pub const INTERRUPTED: i32 = 130;
 
 /// All that another process, a timer or a limit sends to end this one. SIGPIPE is ignored by the standard library.
 const SIGNALS: [i32; 13] = [
-    SIGINT,
-    SIGTERM,
-    SIGHUP,
-    SIGQUIT,
-    SIGUSR1,
-    SIGUSR2,
-    SIGALRM,
-    SIGVTALRM,
-    SIGPROF,
-    SIGXCPU,
-    SIGIO,
-    libc::SIGPWR,
-    libc::SIGSTKFLT,
+    SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU,
+    SIGIO, SIGPWR, SIGSTKFLT,
 ];
 
 /// Time for the thread that handles signals after the process was stopped at a point.

@@ -167,8 +167,8 @@ fn pilot(
             bytes_sides = pilot::bytes_sides(tree, &Counts::of_rank(tree, ownership));
         };
         let facets = &quantised.facets[..];
-        let &Quantised { bounds, counts, .. } = quantised;
-        let mesh = grow(Quantised { rules, bounds, facets, counts }, job, count)?;
+        let counts = quantised.counts;
+        let mesh = grow(Quantised { rules, facets, counts }, job, count)?;
         let (counts, ..) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
         Ok(pilot::amounts(bytes_sides, &mesh, counts.total(), job, boxes))
     };

@@ -5,6 +5,8 @@ use crate::pilot::Amounts;
 use bytemuck::{Pod, Zeroable};
 use mesher::record::peak_rss_bytes;
 use ranks::{Comm, gather};
+use rustix::param::page_size;
+use rustix::process::{Resource, getrlimit};
 use serde::Serialize;
 use std::fs::read_to_string;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -80,20 +82,13 @@ impl Rank {
 fn pages() -> [f64; 2] {
     let statm = read_to_string("/proc/self/statm").unwrap_or_default();
     let mut pages = statm.split_whitespace().map_while(|n| n.parse::<f64>().ok());
-    // SAFETY: the call reads a constant of the system.
-    let bytes = unsafe { libc::sysconf(libc::_SC_PAGESIZE) } as f64;
-    [(); 2].map(|()| pages.next().unwrap_or(0.0) * bytes)
+    [(); 2].map(|()| pages.next().unwrap_or(0.0) * page_size() as f64)
 }
 
 /// What the limit on its address space leaves this process, in bytes; infinity without a limit.
 pub fn address_space_left() -> f64 {
-    let mut limit = libc::rlimit { rlim_cur: libc::RLIM_INFINITY, rlim_max: libc::RLIM_INFINITY };
-    // SAFETY: the call only writes `limit`.
-    unsafe { libc::getrlimit(libc::RLIMIT_AS, &mut limit) };
-    match limit.rlim_cur {
-        libc::RLIM_INFINITY => f64::INFINITY,
-        bytes => (bytes as f64 - pages()[0]).max(0.0),
-    }
+    let limit = getrlimit(Resource::As).current;
+    limit.map_or(f64::INFINITY, |bytes| (bytes as f64 - pages()[0]).max(0.0))
 }
 
 fn available(meminfo: &str) -> f64 {

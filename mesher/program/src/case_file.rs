@@ -1,42 +1,81 @@
-//! The case file: all programs of this workspace read the same files.
+//! The case as its file states it, which all programs of this workspace read, or as the command line does beside an STL file.
 
+use clap::ArgAction;
 use geometries::Generator;
 use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
 use serde::Deserialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Default of `layer_cells_min`.
-pub const LAYER_CELLS_MIN: u32 = 4;
-/// Default of `root_scale`.
-pub const ROOT_SCALE: f64 = 10.0;
+const LAYER_CELLS_MIN: u32 = 4;
+const ROOT_SCALE: f64 = 10.0;
 
-#[derive(Deserialize)]
+/// The keys of a case file, all but the first two of which are options as well.
+#[derive(Clone, clap::Args, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
-    geometry: Option<String>,
+#[command(next_help_heading = "Options for an STL file")]
+pub struct Keys {
+    #[arg(skip)]
+    geometry: Option<PathBuf>,
+    #[arg(skip)]
     generator: Option<Generator>,
-    spacing_min: f64,
-    layer_cells_min: Option<i64>,
+    /// Greatest edge of cells at the surface
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    spacing_min: Option<f64>,
+    /// Least number of cells across a layer [default: 4]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    layer_cells_min: Option<u32>,
+    /// Side of the surface to keep [default: outside]
+    #[arg(long, value_enum)]
     keep: Option<Keep>,
-    keep_crossing: Option<bool>,
-    #[serde(default)]
-    seeds: Vec<[f64; 3]>,
-    #[serde(default)]
-    enclosed: Enclosed,
+    /// Remove crossing leaves from the mesh
+    #[arg(long = "drop-crossing", action = ArgAction::SetFalse)]
+    #[serde(default = "is_kept")]
+    keep_crossing: bool,
+    /// Edge of the root, in longest edges of the bounding box, on which it is centred [default: 10]
+    #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
     root_scale: Option<f64>,
-    root: Option<RootTable>,
+    /// Root cube: minimum corner and edge
+    #[arg(long, value_name = "X,Y,Z,EDGE", allow_hyphen_values = true, value_parser = root)]
+    root: Option<Root>,
+    /// Extent box: minimum corner, maximum corner, spacing; may be repeated
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = extent_box)]
     #[serde(default, rename = "box")]
     boxes: Vec<BoxSpec>,
+    /// Point in the flow, which then consists of the components with a seed, whatever the rays say; may be repeated
+    #[arg(long = "seed", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    #[serde(default)]
+    seeds: Vec<[f64; 3]>,
+    /// Treatment of outside components that do not reach the root's boundary, such as sealed cavities and
+    /// overlaps of solids [default: delete]
+    #[arg(long, value_enum)]
+    enclosed: Option<Enclosed>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RootTable {
-    origin: [f64; 3],
-    edge: f64,
+fn is_kept() -> bool {
+    true
+}
+
+fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
+    let values: Result<Vec<f64>, _> = s.split(',').map(|w| w.trim().parse()).collect();
+    values
+        .ok()
+        .and_then(|v| v.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+fn root(s: &str) -> Result<Root, String> {
+    numbers(s).map(|[x, y, z, edge]| Root { origin: [x, y, z], edge })
+}
+
+fn extent_box(s: &str) -> Result<BoxSpec, String> {
+    numbers(s).map(|[x, y, z, u, v, w, spacing]| BoxSpec {
+        min: [x, y, z],
+        max: [u, v, w],
+        spacing,
+    })
 }
 
 /// Reads a case file. The path of the geometry is relative to the file's directory.
@@ -61,48 +100,41 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
 /// # Errors
 /// If the text is malformed.
 pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
-    let fail = |e: &dyn std::fmt::Display| Error::input(format!("{}: {e}", path.display()));
-    let file: File = toml::from_str(text).map_err(|e| fail(&explain(text, &e)))?;
-    let folder = path.parent().unwrap_or(Path::new("."));
-    file.into_case(folder).map_err(|e| fail(&e))
+    let case = || {
+        let mut keys: Keys = toml::from_str(text).map_err(|e| explain(text, &e))?;
+        let source = match (keys.geometry.take(), keys.generator.take()) {
+            (Some(file), None) => Source::Stl(path.with_file_name(file)),
+            (None, Some(generator)) => Source::Generated(generator),
+            (Some(_), Some(_)) => return Err("give geometry or [generator], not both".to_owned()),
+            (None, None) => {
+                let why = "no geometry: give geometry = \"file.stl\" or a [generator] table";
+                return Err(why.to_owned());
+            }
+        };
+        if keys.root_scale.is_some() && keys.root.is_some() {
+            return Err("give root_scale or [root], not both".to_owned());
+        }
+        keys.case_of(source).ok_or_else(|| "missing field `spacing_min`".to_owned())
+    };
+    case().map_err(|e| Error::input(format!("{}: {e}", path.display())))
 }
 
-impl File {
-    fn into_case(self, folder: &Path) -> Result<Case, Error> {
-        let source = match (self.geometry, self.generator) {
-            (Some(path), None) => Source::Stl(folder.join(path)),
-            (None, Some(g)) => Source::Generated(g),
-            (Some(_), Some(_)) => {
-                return Err(Error::input("give geometry or [generator], not both"));
-            }
-            (None, None) => {
-                return Err(Error::input(
-                    "no geometry: give geometry = \"file.stl\" or a [generator] table",
-                ));
-            }
-        };
-        let root = match (self.root_scale, self.root) {
-            (Some(_), Some(_)) => return Err(Error::input("give root_scale or [root], not both")),
-            (_, Some(r)) => RootSpec::Exact(Root { origin: r.origin, edge: r.edge }),
-            (scale, None) => RootSpec::Scale(scale.unwrap_or(ROOT_SCALE)),
-        };
-        let n = self.layer_cells_min.unwrap_or(i64::from(LAYER_CELLS_MIN));
-        let layer_cells_min = u32::try_from(n).map_err(|_| {
-            Error::input(format!(
-                "layer_cells_min is {n}: give a whole number from 1 to {}",
-                u32::MAX
-            ))
-        })?;
-        Ok(Case {
+impl Keys {
+    /// The case with this geometry; none without a spacing.
+    pub fn case_of(self, source: Source) -> Option<Case> {
+        Some(Case {
             source,
-            spacing_min: self.spacing_min,
-            layer_cells_min,
+            spacing_min: self.spacing_min?,
+            layer_cells_min: self.layer_cells_min.unwrap_or(LAYER_CELLS_MIN),
             keep: self.keep.unwrap_or(Keep::Outside),
-            keep_crossing: self.keep_crossing.unwrap_or(true),
-            root,
+            keep_crossing: self.keep_crossing,
+            root: match self.root {
+                Some(root) => RootSpec::Exact(root),
+                None => RootSpec::Scale(self.root_scale.unwrap_or(ROOT_SCALE)),
+            },
             boxes: self.boxes,
             seeds: self.seeds,
-            enclosed: self.enclosed,
+            enclosed: self.enclosed.unwrap_or_default(),
         })
     }
 }
@@ -111,11 +143,8 @@ impl File {
 fn explain(text: &str, e: &toml::de::Error) -> String {
     let before = e.span().map_or("", |s| &text[..s.start]);
     let message = e.message().replace('\n', " ").replace("expected f64", "expected a number");
-    match before.matches('\n').count() {
-        // Of the file as a whole.
-        0 if message.starts_with("missing") => message,
-        lines => format!("line {}: {message}", lines + 1),
-    }
+    let message = message.replace("expected u32", "expected a whole number");
+    format!("line {}: {message}", before.matches('\n').count() + 1)
 }
 
 #[cfg(test)]
@@ -150,7 +179,7 @@ mod tests {
             ("geometry = \"a.stl\"\n", "spacing_min"),
             (
                 "geometry = \"a.stl\"\nspacing_min = 0.5\nlayer_cells_min = -1\n",
-                "layer_cells_min is -1",
+                "line 3: invalid value: integer `-1`, expected a whole number",
             ),
             ("geometry = \"a.stl\"\nspacing_min = 0.5\nkeep = \"none\"\n", "none"),
             (

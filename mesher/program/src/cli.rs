@@ -1,17 +1,18 @@
 //! The command line, and the case that it describes.
 
-use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser};
+use bricks::octant::{LEVEL_MAX, Level};
+use clap::Parser;
+use mesher::Options;
 use mesher::error::Error;
-use mesher::input::case::{BoxSpec, Case, RootSpec};
+use mesher::input::case::Case;
 use mesher::input::ingest::Source;
-use mesher::input::lattice::{Enclosed, Keep, Root};
 use mesher::output::write::Output;
 use mesher::partition::{Division, Partitioner, Weights};
-use program::case_file::{self, LAYER_CELLS_MIN, ROOT_SCALE};
+use program::case_file::{self, Keys};
 use ranks::{Comm, agree, launch, text_of_first, uncounted};
 use std::ffi::OsString;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::exit;
 use std::time::Duration;
 
@@ -23,11 +24,12 @@ pub const UNPRINTED: i32 = 4;
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
 /// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
-#[derive(Parser)]
-#[command(version = env!("MESHER_VERSION"))]
+#[derive(Clone, Parser)]
+#[command(version = env!("VERSION"))]
 pub struct Args {
     /// Case file (.toml), or STL file together with --spacing-min
-    input: PathBuf,
+    #[arg(required_unless_present = "serve")]
+    input: Option<PathBuf>,
     /// Write the mesh to this directory, which must be empty or not exist; default: write nothing
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -39,22 +41,22 @@ pub struct Args {
     pub json: Option<PathBuf>,
     /// Stop at the base tree T0: all leaves with their sides, none deleted, none graded
     #[arg(long)]
-    pub ungraded: bool,
+    ungraded: bool,
     /// Method that assigns base leaves to ranks
     #[arg(long, visible_alias = "preset", value_enum, default_value = "morton")]
-    pub partitioner: Partitioner,
+    partitioner: Partitioner,
     /// Weights of the partition [default: rebalance; unit with --preset paper]
     #[arg(long, value_enum)]
     weights: Option<Weights>,
     /// Level of the base leaves: 0 to 19, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
-    pub level_base: LevelBase,
+    level_base: LevelBase,
     /// Communication between ranks: auto, solo (one rank), mpi, or sim:RANKS[:SEED] (ranks simulated in this process)
     #[arg(long, default_value = "auto", value_parser = comm_choice)]
     pub comm: CommChoice,
     /// Check the invariants of the mesh after each phase; takes time and memory, and panics if one is violated
     #[arg(long, conflicts_with = "plan")]
-    pub check: bool,
+    check: bool,
     /// Make no mesh: print what the run would take, in cells, time, memory and files, from pilot runs at coarser spacings
     #[arg(long)]
     pub plan: bool,
@@ -63,7 +65,7 @@ pub struct Args {
     pub force: bool,
     /// Make no mesh of a geometry that leaks between spacings, which is a warning otherwise, but end with exit code 1
     #[arg(long, conflicts_with = "plan")]
-    pub strict: bool,
+    strict: bool,
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted
     #[arg(long, value_name = "DIR")]
     pub status: Option<PathBuf>,
@@ -73,8 +75,18 @@ pub struct Args {
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
+    /// Run one command line after another, which spares the start of MPI: each is a line of standard input, a JSON array of the
+    /// words after the program's name, and answered by its exit code on a line of standard output
+    #[arg(long, exclusive = true)]
+    pub serve: bool,
     #[command(flatten)]
-    body: Option<Body>,
+    keys: Option<Keys>,
+}
+
+impl Args {
+    fn input(&self) -> &Path {
+        self.input.as_deref().expect("a run has an input")
+    }
 }
 
 /// Files of a mesh, besides the manifest.
@@ -86,43 +98,8 @@ enum Files {
     Htg,
 }
 
-/// The case, if the input is an STL file.
-#[derive(clap::Args)]
-#[command(next_help_heading = "Options for an STL file")]
-struct Body {
-    /// Greatest edge of cells at the surface
-    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
-    spacing_min: Option<f64>,
-    /// Least number of cells across a layer [default: 4]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    layer_cells_min: Option<u32>,
-    /// Side of the surface to keep [default: outside]
-    #[arg(long, value_enum)]
-    keep: Option<Keep>,
-    /// Remove crossing leaves from the mesh
-    #[arg(long)]
-    drop_crossing: bool,
-    /// Edge of the root, in longest edges of the bounding box, on which it is centred [default: 10]
-    #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
-    root_scale: Option<f64>,
-    /// Root cube: minimum corner and edge
-    #[arg(long, value_name = "X,Y,Z,EDGE", allow_hyphen_values = true, value_parser = numbers::<4>)]
-    root: Option<[f64; 4]>,
-    /// Extent box: minimum corner, maximum corner, spacing; may be repeated
-    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = numbers::<7>)]
-    boxes: Vec<[f64; 7]>,
-    /// Point in the flow, which then consists of the components with a seed, whatever the rays say; may be repeated
-    #[arg(long = "seed", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
-    seeds: Vec<[f64; 3]>,
-    /// Treatment of outside components that do not reach the root's boundary, such as sealed cavities and
-    /// overlaps of solids [default: delete]
-    #[arg(long, value_enum)]
-    enclosed: Option<Enclosed>,
-}
-
-/// The level of the base leaves; chosen automatically if none.
-#[derive(Clone, Copy)]
-pub struct LevelBase(pub Option<u32>);
+/// The level of the base leaves; chosen automatically if none. (clap treats an `Option` of that name otherwise.)
+type LevelBase = Option<Level>;
 
 /// Communication between ranks.
 #[derive(Clone, Copy)]
@@ -154,12 +131,10 @@ impl CommChoice {
 }
 
 fn level_base(s: &str) -> Result<LevelBase, String> {
-    if s == "auto" {
-        return Ok(LevelBase(None));
-    }
-    match s.parse() {
-        Ok(l) if l <= bricks::octant::LEVEL_MAX => Ok(LevelBase(Some(l))),
-        _ => Err("give auto or a level from 0 to 19".into()),
+    let level = || s.parse().ok().filter(|l| *l <= LEVEL_MAX);
+    match s {
+        "auto" => Ok(None),
+        _ => level().map(Some).ok_or_else(|| "give auto or a level from 0 to 19".into()),
     }
 }
 
@@ -184,46 +159,12 @@ fn comm_choice(s: &str) -> Result<CommChoice, String> {
     choice.ok_or_else(|| "give auto, solo, mpi or sim:RANKS[:SEED] with 1 to 4096 ranks".into())
 }
 
-fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
-    let values: Result<Vec<f64>, _> = s.split(',').map(|w| w.trim().parse::<f64>()).collect();
-    values
-        .ok()
-        .and_then(|v| v.try_into().ok())
-        .ok_or_else(|| format!("give {N} numbers with commas between them"))
-}
-
-/// The definition of the command line.
-fn command() -> Command {
-    Args::command().arg(
-        Arg::new("serve").long("serve").exclusive(true).action(ArgAction::SetTrue).help(
-            "Run one command line after another, which spares the start of MPI: each is a line of standard input, a JSON array of the \
-             words after the program's name, and answered by its exit code on a line of standard output",
-        ),
-    )
-}
-
-/// What the command line asks for.
-pub enum Asked {
-    /// One run.
-    Run(Box<Args>),
-    /// The runs whose command lines are on the standard input.
-    Serve,
-}
-
 /// The command line. Help and version are printed here, on the first rank of a job, and end the process.
 ///
 /// # Errors
 /// In one sentence, as all other errors.
-pub fn parse<W: Into<OsString> + Clone>(
-    words: impl IntoIterator<Item = W>,
-) -> Result<Asked, Error> {
-    let parsed = command().try_get_matches_from(words).and_then(|mut m| {
-        if m.get_flag("serve") {
-            return Ok(Asked::Serve);
-        }
-        Args::from_arg_matches_mut(&mut m).map(|args| Asked::Run(Box::new(args)))
-    });
-    parsed.map_err(|e| {
+pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> Result<Args, Error> {
+    Args::try_parse_from(words).map_err(|e| {
         if !e.use_stderr() {
             let print = || e.print().and_then(|()| io::stdout().flush());
             match launch::is_first().then(print).transpose() {
@@ -243,13 +184,12 @@ pub fn parse<W: Into<OsString> + Clone>(
     })
 }
 
-/// How to divide the work among ranks.
+/// The options of a run.
 ///
 /// # Errors
 /// If the weights contradict the paper's.
-pub fn division(args: &Args) -> Result<Division, Error> {
-    let (partitioner, level_base) = (args.partitioner, args.level_base.0);
-    let weights = match (partitioner, args.weights) {
+pub fn options(args: &Args) -> Result<Options, Error> {
+    let weights = match (args.partitioner, args.weights) {
         (Partitioner::Paper, None | Some(Weights::Unit)) => Weights::Unit,
         (Partitioner::Paper, Some(_)) => {
             let why =
@@ -258,23 +198,25 @@ pub fn division(args: &Args) -> Result<Division, Error> {
         }
         (_, weights) => weights.unwrap_or_default(),
     };
-    Ok(Division { partitioner, weights, level_base })
-}
-
-/// The files to write; none without --out.
-pub fn output(args: &Args) -> Option<Output> {
     let has = |files| args.write.contains(&files);
     let (words, tree) = (has(Files::Words), has(Files::Htg));
-    args.out.clone().map(|directory| Output { directory, words, tree })
-}
-
-/// The case in advice to the user: only case files have a name.
-pub fn case_name(args: &Args) -> String {
-    if is_case_file(args) { args.input.display().to_string() } else { "CASE".to_owned() }
+    Ok(Options {
+        division: Division { partitioner: args.partitioner, weights, level_base: args.level_base },
+        ungraded: args.ungraded,
+        out: args.out.clone().map(|directory| Output { directory, words, tree }),
+        check: args.check,
+        strict: args.strict,
+        // Only case files have a name.
+        case_name: if is_case_file(args) {
+            args.input().display().to_string()
+        } else {
+            "CASE".to_owned()
+        },
+    })
 }
 
 fn is_case_file(args: &Args) -> bool {
-    args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    args.input().extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
 /// The case that the command line describes; a case file is read on rank 0. Collective.
@@ -282,42 +224,24 @@ fn is_case_file(args: &Args) -> bool {
 /// # Errors
 /// The same on all ranks.
 pub fn case(args: &Args, comm: &dyn Comm) -> Result<Case, Error> {
+    let input = args.input().display();
     if is_case_file(args) {
-        if args.body.is_some() {
+        if args.keys.is_some() {
             return Err(Error::input(format!(
-                "{} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line",
-                args.input.display()
+                "{input} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line"
             )));
         }
         let text = match comm.rank() {
-            0 => case_file::read_text(&args.input),
+            0 => case_file::read_text(args.input()),
             _ => Ok(String::new()),
         };
         let text = uncounted(comm, || agree(comm, text).map(|text| text_of_first(comm, &text)))?;
-        return case_file::parse(&text, &args.input);
+        return case_file::parse(&text, args.input());
     }
-    let Some(b @ Body { spacing_min: Some(spacing_min), .. }) = &args.body else {
-        return Err(Error::input(format!(
-            "{} is read as an STL file: give --spacing-min, or a case file (.toml)",
-            args.input.display()
-        )));
-    };
-    Ok(Case {
-        source: Source::Stl(args.input.clone()),
-        spacing_min: *spacing_min,
-        layer_cells_min: b.layer_cells_min.unwrap_or(LAYER_CELLS_MIN),
-        keep: b.keep.unwrap_or(Keep::Outside),
-        keep_crossing: !b.drop_crossing,
-        root: match b.root {
-            Some([x, y, z, edge]) => RootSpec::Exact(Root { origin: [x, y, z], edge }),
-            None => RootSpec::Scale(b.root_scale.unwrap_or(ROOT_SCALE)),
-        },
-        boxes: b
-            .boxes
-            .iter()
-            .map(|v| BoxSpec { min: [v[0], v[1], v[2]], max: [v[3], v[4], v[5]], spacing: v[6] })
-            .collect(),
-        seeds: b.seeds.clone(),
-        enclosed: b.enclosed.unwrap_or_default(),
+    let case =
+        args.keys.clone().and_then(|keys| keys.case_of(Source::Stl(args.input().to_owned())));
+    case.ok_or_else(|| {
+        let why = "is read as an STL file: give --spacing-min, or a case file (.toml)";
+        Error::input(format!("{input} {why}"))
     })
 }

@@ -4,16 +4,17 @@
 
 mod cli;
 
-use cli::{Args, Asked, CommChoice, UNPRINTED, case, parse};
+use cli::{Args, CommChoice, UNPRINTED, case, options, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
-use mesher::Options;
 use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
+use std::env::args_os;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
+use std::iter::once;
 use std::path::Path;
 use std::process::exit;
 use std::sync::Once;
@@ -34,7 +35,7 @@ const LINGER: Duration = Duration::from_millis(300);
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     fix_heap();
-    let asked = parse(std::env::args_os());
+    let asked = parse(args_os());
     let message = match (launch::is_first(), stderr().is_terminal()) {
         (false, _) => "",
         (true, false) => "mesher: interrupted\n",
@@ -44,11 +45,7 @@ fn main() {
     // Without handlers, signals end the process the default way.
     let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
     let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
-    let comm = match &asked {
-        Ok(Asked::Run(args)) => args.comm,
-        _ => CommChoice::Auto,
-    };
-    match choose(comm) {
+    match choose(asked.as_ref().map_or(CommChoice::Auto, |args| args.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&asked),
         Ok(CommChoice::Sim { ranks, seed }) => {
             abort_on_panic(|| exit(BUG));
@@ -103,7 +100,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
 const ADDRESS_SPACE_MPI: f64 = 384e6;
 
-fn run_mpi(asked: &Result<Asked, Error>) {
+fn run_mpi(asked: &Result<Args, Error>) {
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(
@@ -122,7 +119,7 @@ fn run_mpi(asked: &Result<Asked, Error>) {
     abort_on_panic(|| launch::abort(BUG));
     let code = match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
-        Err(e) => fail(&Error::Input(e), launch::is_first()),
+        Err(e) => fail(&Error::input(e), launch::is_first()),
     };
     drop(comm);
     exit(code);
@@ -176,41 +173,33 @@ fn print(done: &Done) -> i32 {
     }
 }
 
-/// The command line of rank 0, which all ranks follow, if it differs from this rank's. Collective.
-fn asked_of_first(comm: &dyn Comm) -> Option<Result<Asked, Error>> {
-    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into()).collect();
-    let mine = [&[env!("MESHER_VERSION").to_owned()], &words[1.min(words.len())..]].concat();
+/// The command line of rank 0, which all ranks follow. Collective.
+fn of_first(asked: &Result<Args, Error>, comm: &dyn Comm) -> Result<Args, Error> {
+    let words = args_os().skip(1).map(|w| w.to_string_lossy().into_owned());
+    let mine: Vec<String> = once(env!("VERSION").to_owned()).chain(words).collect();
     let mine = mine.join("\0");
-    let of_first = text_of_first(comm, &mine);
-    let version = |text: &str| text.split('\0').next().unwrap_or_default().to_owned();
-    let is_same = agree(
-        comm,
-        match version(&of_first) == version(&mine) {
-            true => Ok(()),
-            false => Err(Error::input(format!(
-                "rank {} is a mesher of version {}, rank 0 of {}: start the same program on all ranks",
-                comm.rank(),
-                version(&mine),
-                version(&of_first)
-            ))),
-        },
-    );
-    match is_same {
-        Err(e) => Some(Err(e)),
-        Ok(()) if of_first == mine => None,
-        Ok(()) => Some(parse(of_first.split('\0'))),
-    }
+    let first = text_of_first(comm, &mine);
+    let version = first.split('\0').next().unwrap_or_default();
+    let is_same = match version == env!("VERSION") {
+        true => Ok(()),
+        false => Err(Error::input(format!(
+            "rank {} is a mesher of version {}, rank 0 of {version}: start the same program on all ranks",
+            comm.rank(),
+            env!("VERSION")
+        ))),
+    };
+    agree(comm, is_same)?;
+    if first == mine { asked.clone() } else { parse(first.split('\0')) }
 }
 
 /// Does what the command line asks for, on one rank; returns the exit code, the same on all ranks. Collective.
-fn obey(asked: &Result<Asked, Error>, comm: &dyn Comm) -> i32 {
-    let of_first = uncounted(comm, || asked_of_first(comm));
-    match of_first.as_ref().unwrap_or(asked) {
-        Ok(Asked::Run(args)) => run(args, comm),
-        Ok(Asked::Serve) => serve(comm),
+fn obey(asked: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
+    match uncounted(comm, || of_first(asked, comm)) {
+        Ok(args) if args.serve => serve(comm),
+        Ok(args) => run(&args, comm),
         Err(e) => {
             interrupt::decided();
-            fail(e, comm.rank() == 0)
+            fail(&e, comm.rank() == 0)
         }
     }
 }
@@ -247,20 +236,18 @@ fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
         .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
     // These would end the service.
     let prints = |w: &String| ["-h", "--help", "-V", "--version"].contains(&w.as_str());
-    let of_job = || {
-        Error::input(
-            "a run of a service has no --help, --version, --serve or --stall-limit, and no --comm but that of the job",
-        )
+    let args = match words.iter().any(prints) {
+        true => None,
+        false => Some(parse(once("mesher".to_owned()).chain(words))?),
     };
-    if words.iter().any(prints) {
-        return Err(of_job());
-    }
-    match parse(std::iter::once("mesher".to_owned()).chain(words))? {
-        Asked::Run(mut args) if args.stall_limit.is_none() && args.comm.is_of(comm.size()) => {
+    match args.filter(|a| !a.serve && a.stall_limit.is_none() && a.comm.is_of(comm.size())) {
+        Some(mut args) => {
             args.quiet = true;
-            Ok(*args)
+            Ok(args)
         }
-        _ => Err(of_job()),
+        None => Err(Error::input(
+            "a run of a service has no --help, --version, --serve or --stall-limit, and no --comm but that of the job",
+        )),
     }
 }
 
@@ -348,14 +335,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
             }),
         )?;
     }
-    let options = Options {
-        division: cli::division(args)?,
-        ungraded: args.ungraded,
-        out: cli::output(args),
-        check: args.check,
-        strict: args.strict,
-        case_name: cli::case_name(args),
-    };
+    let options = options(args)?;
     let finish = |done: Done, advice: &str, json: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         interrupt::stop_at(format_args!("report:{}", comm.rank()));
         agree(comm, on_json(advice, &|path| write_atomically(path, json))).map(|()| done)

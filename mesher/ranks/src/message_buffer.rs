@@ -111,12 +111,6 @@ impl MessageBuffer {
     pub fn words_mut(&mut self) -> &mut [u64] {
         &mut self.words
     }
-
-    /// The message of a rank, empty if it has none. The messages must be in the order of the ranks.
-    pub fn of(&self, rank: usize) -> &[u64] {
-        let at = self.messages.binary_search_by_key(&rank, |l| l.rank);
-        at.map_or(&[], |at| &self.words[self.range(at)])
-    }
 }
 
 /// Messages with their ranks; consecutive ones of the same rank become one, and empty ones are dropped.

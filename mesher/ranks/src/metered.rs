@@ -37,27 +37,23 @@ impl<C: Comm> Metered<C> {
         Self { comm, total: Cell::default(), is_paused: Cell::default() }
     }
 
-    fn count(&self, messages: u64, words: u64) {
-        if !self.is_paused.get() {
-            let t = self.total.get();
-            let (messages, bytes) = (t.messages + messages, t.bytes + 8 * words);
-            self.total.set(Traffic { messages, bytes, ..t });
-        }
-    }
-
     /// Doublings from one rank to all ranks.
     fn doublings(&self) -> u64 {
         u64::from(self.size().next_power_of_two().ilog2())
     }
 
-    fn timed<T>(&self, call: impl FnOnce(&C) -> T) -> T {
+    /// Makes a call that sends as many messages and words as `sent` returns for its result.
+    fn metered<T>(&self, call: impl FnOnce(&C) -> T, sent: impl FnOnce(&T) -> [u64; 2]) -> T {
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = call(&self.comm);
         if !self.is_paused.get() {
-            let t = self.total.get();
-            let time_wall_s = t.time_wall_s + wall.elapsed().as_secs_f64();
-            let time_cpu_s = t.time_cpu_s + cpu.elapsed().as_secs_f64();
-            self.total.set(Traffic { time_wall_s, time_cpu_s, ..t });
+            let (total, [messages, words]) = (self.total.get(), sent(&result));
+            self.total.set(Traffic {
+                messages: total.messages + messages,
+                bytes: total.bytes + 8 * words,
+                time_wall_s: total.time_wall_s + wall.elapsed().as_secs_f64(),
+                time_cpu_s: total.time_cpu_s + cpu.elapsed().as_secs_f64(),
+            });
         }
         result
     }
@@ -73,24 +69,25 @@ impl<C: Comm> Comm for Metered<C> {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {
-        let gathered = self.timed(|comm| comm.all_gather(mine));
-        let ranks = self.size() as u64;
-        let all = gathered.words().len() as u64 + ranks;
-        self.count(2 * self.doublings(), all - all / ranks);
-        gathered
+        let (ranks, messages) = (self.size() as u64, 2 * self.doublings());
+        let words = |all: &Gathered| all.words().len() as u64 + ranks;
+        self.metered(
+            |comm| comm.all_gather(mine),
+            |all| [messages, words(all) - words(all) / ranks],
+        )
     }
 
     fn sums(&self, mine: &[u64]) -> Vec<u64> {
-        self.count(self.doublings(), self.doublings() * mine.len() as u64);
-        self.timed(|comm| comm.sums(mine))
+        let messages = self.doublings();
+        self.metered(|comm| comm.sums(mine), |_| [messages, messages * mine.len() as u64])
     }
 
     fn sparse_all_to_all(&self, to: MessageBuffer) -> MessageBuffer {
+        let mut sent = [1 + self.doublings(), 0];
         for (_, words) in to.messages().filter(|m| m.0 != self.rank()) {
-            self.count(1, words.len() as u64);
+            sent = [sent[0] + 1, sent[1] + words.len() as u64];
         }
-        self.count(1 + self.doublings(), 0);
-        self.timed(|comm| comm.sparse_all_to_all(to))
+        self.metered(|comm| comm.sparse_all_to_all(to), |_| sent)
     }
 
     fn ranks_in_process(&self) -> usize {

@@ -1,8 +1,8 @@
 //! Ranks of a real MPI job, through `rsmpi`.
 //!
 //! A sparse all-to-all sends point-to-point messages only to the ranks that need one: of a thousand ranks each sends to dozens. A
-//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. Messages
-//! are sent in chunks, as MPI counts in i32.
+//! dense all-to-all of mostly empty messages was measured to take a hundred times as long with several ranks per core. MPI counts words
+//! in i32: a message, or all that an allgather brings, of 16 GiB or more is a panic.
 //!
 //! With a limit for calls, collective calls are non-blocking: a rank that waits looks for questions of others (`stall`).
 
@@ -11,7 +11,6 @@ mod stall;
 use crate::{Comm, Gathered, MessageBuffer};
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
-use mpi::point_to_point::{Message, Status};
 use mpi::request::{Request, Scope};
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Equivalence, Source};
 use stall::Watch;
@@ -19,12 +18,9 @@ use std::cell::{Cell, OnceCell};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Greatest number of words in a chunk: 1 GiB; few in debug builds, so that tests send several chunks.
-const CHUNK: usize = if cfg!(debug_assertions) { 1 << 8 } else { 1 << 27 };
-/// Greatest number of words in one allgather, summed over the ranks.
-const GATHERED: usize = if cfg!(debug_assertions) { 1 << 10 } else { 1 << 27 };
 /// Tag of the message that begins another run. Sparse all-to-alls have 0 and 1.
 const NEXT_RUN: i32 = 2;
+const TOO_LONG: &str = "MPI must be able to count the words of a message";
 /// Longest sleep of a rank between two runs.
 const PAUSE_MAX: Duration = Duration::from_millis(50);
 
@@ -85,7 +81,28 @@ impl Comm for Mpi {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {
-        self.gather(mine).into()
+        let length = i32::try_from(mine.len()).expect(TOO_LONG);
+        let mut lengths = vec![0; self.size()];
+        match self.watch.get() {
+            None => self.world.all_gather_into(&length, &mut lengths[..]),
+            Some(watch) => mpi::request::scope(|scope| {
+                let all = &mut lengths[..];
+                complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
+            }),
+        }
+        let mut all = MessageBuffer::with_lengths(lengths.iter().map(|&n| n as usize));
+        i32::try_from(all.words().len()).expect(TOO_LONG);
+        let starts: Vec<i32> =
+            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
+        let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
+        match self.watch.get() {
+            None => self.world.all_gather_varcount_into(mine, &mut target),
+            Some(watch) => mpi::request::scope(|scope| {
+                let to = &mut target;
+                complete(watch, self.world.immediate_all_gather_varcount_into(scope, mine, to));
+            }),
+        }
+        all.into()
     }
 
     fn sums(&self, mine: &[u64]) -> Vec<u64> {
@@ -117,20 +134,18 @@ impl Comm for Mpi {
                     continue;
                 }
                 let process = self.world.process_at_rank(to as i32);
-                sends.extend(
-                    chunks(words).map(|chunk| {
-                        process.immediate_synchronous_send_with_tag(scope, chunk, tag)
-                    }),
-                );
+                sends.push(process.immediate_synchronous_send_with_tag(scope, words, tag));
             }
             let mut barrier = None;
             self.watch.get().into_iter().for_each(Watch::start);
             loop {
                 self.watch.get().into_iter().for_each(Watch::poll);
-                while let Some(first) =
+                while let Some((message, status)) =
                     self.world.any_process().immediate_matched_probe_with_tag(tag)
                 {
-                    self.receive(first, tag, &mut received);
+                    let words = status.count(u64::equivalent_datatype()) as usize;
+                    let from = status.source_rank() as usize;
+                    message.matched_receive_into(received.room(from, words));
                 }
                 sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
                 barrier = match barrier {
@@ -181,73 +196,4 @@ fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, 
         pending = pending.take().and_then(|request| request.test().err());
         pending.is_none()
     });
-}
-
-impl Mpi {
-    fn gather(&self, mine: &[u64]) -> MessageBuffer {
-        let mut counts = vec![0u64; self.size()];
-        let length = mine.len() as u64;
-        match self.watch.get() {
-            None => self.world.all_gather_into(&length, &mut counts[..]),
-            Some(watch) => mpi::request::scope(|scope| {
-                let all = &mut counts[..];
-                complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
-            }),
-        }
-        let longest = counts.iter().copied().max().unwrap_or(0) as usize;
-        // MPI counts the sum over the ranks in i32.
-        let step = (GATHERED / self.size()).max(1);
-        let parts: Vec<MessageBuffer> = (0..longest)
-            .step_by(step)
-            .map(|at| {
-                let part = |len: usize| len.saturating_sub(at).min(step);
-                let lengths: Vec<i32> = counts.iter().map(|&c| part(c as usize) as i32).collect();
-                self.all_gather_part(&mine[at.min(mine.len())..][..part(mine.len())], &lengths)
-            })
-            .collect();
-        match <[MessageBuffer; 1]>::try_from(parts) {
-            Ok([all]) => all,
-            Err(parts) => {
-                let words = |rank: usize| parts.iter().flat_map(move |p| p.of(rank));
-                (0..self.size()).map(|rank| (rank, words(rank).copied())).collect()
-            }
-        }
-    }
-
-    /// Gathers the given numbers of words from the ranks.
-    fn all_gather_part(&self, mine: &[u64], lengths: &[i32]) -> MessageBuffer {
-        let starts: Vec<i32> =
-            lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
-        let lengths_all = lengths.iter().map(|&n| n as usize);
-        let mut all = MessageBuffer::with_lengths(lengths_all);
-        let mut target = mpi::datatype::PartitionMut::new(all.words_mut(), lengths, &starts[..]);
-        match self.watch.get() {
-            None => self.world.all_gather_varcount_into(mine, &mut target),
-            Some(watch) => mpi::request::scope(|scope| {
-                let to = &mut target;
-                complete(watch, self.world.immediate_all_gather_varcount_into(scope, mine, to));
-            }),
-        }
-        all
-    }
-
-    /// Receives the message whose first chunk has been matched.
-    fn receive(&self, first: (Message, Status), tag: i32, received: &mut MessageBuffer) {
-        let from = first.1.source_rank();
-        let mut chunk = first;
-        loop {
-            let words = chunk.1.count(u64::equivalent_datatype()) as usize;
-            chunk.0.matched_receive_into(received.room(from as usize, words));
-            if words < CHUNK {
-                return;
-            }
-            chunk = self.world.process_at_rank(from).matched_probe_with_tag(tag);
-        }
-    }
-}
-
-/// A message in full chunks, and a last one that is shorter and may be empty: it marks the end of the message.
-fn chunks(words: &[u64]) -> impl Iterator<Item = &[u64]> {
-    let (full, last) = words.as_chunks::<CHUNK>();
-    full.iter().map(|chunk| &chunk[..]).chain([last])
 }

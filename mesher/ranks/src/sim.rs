@@ -14,6 +14,7 @@ pub use world::{Next, World};
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
 use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard};
 use world::Call;
 
@@ -45,24 +46,24 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
             let (threads, body) = (&threads, &body);
             let run = move || {
                 threads.wait(rank);
-                let leaving = Leaving { threads, rank };
-                let result = body(&Metered::new(Sim::new(rank, &threads.world, threads)));
-                drop(leaving);
+                let sim = Metered::new(Sim::new(rank, &threads.world, threads));
+                let result = catch_unwind(AssertUnwindSafe(|| body(&sim)));
+                threads.world.end(rank, result.is_err());
+                threads.pass_on();
                 result
             };
             let builder = std::thread::Builder::new().stack_size(16 << 20);
             builder.spawn_scoped(scope, run).expect("a thread per simulated rank")
         };
         let handles: Vec<_> = (0..size).map(spawn).collect();
-        handles.into_iter().map(|t| t.join()).collect()
+        handles.into_iter().map(|t| t.join().flatten()).collect()
     });
     let is_stopped =
         |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == STOPPED);
-    if let Some(at) = results.iter().position(|r| r.as_ref().is_err_and(|p| !is_stopped(p))) {
-        let panic = results.into_iter().nth(at).and_then(Result::err);
-        std::panic::resume_unwind(panic.expect("position found an error"));
-    }
-    results.into_iter().map(|r| r.unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
+    let (first, others): (Vec<_>, Vec<_>) =
+        results.into_iter().partition(|r| r.as_ref().is_err_and(|p| !is_stopped(p)));
+    let returned = |r: std::thread::Result<T>| r.unwrap_or_else(|p| resume_unwind(p));
+    first.into_iter().chain(others).map(returned).collect()
 }
 
 const STOPPED: &str = "stopped because another simulated rank panicked";
@@ -90,7 +91,7 @@ impl Threads {
         while *next != Next::Run(rank) {
             if *next == Next::Stop {
                 drop(next);
-                std::panic::panic_any(STOPPED);
+                panic_any(STOPPED);
             }
             next = self.turns[rank].wait(next).unwrap_or_else(|p| p.into_inner());
         }
@@ -105,19 +106,6 @@ impl Token for Threads {
     fn pass(&self, rank: usize) {
         self.pass_on();
         self.wait(rank);
-    }
-}
-
-/// Passes the token on when a rank ends, normally or by a panic.
-struct Leaving<'a> {
-    threads: &'a Threads,
-    rank: usize,
-}
-
-impl Drop for Leaving<'_> {
-    fn drop(&mut self) {
-        self.threads.world.end(self.rank, std::thread::panicking());
-        self.threads.pass_on();
     }
 }
 

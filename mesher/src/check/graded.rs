@@ -2,7 +2,7 @@
 //! from one octant to the next, and messages go to owners alone: nothing is shared with tiles, whole groups and redistribution.
 
 use super::{beside, is_in_leaf, to_owners};
-use crate::Mesh;
+use crate::mesh::Mesh;
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::octant::{Level, path};

@@ -287,16 +287,6 @@ fn a_brick_of_another_rank_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "leaves must tile the root")]
-fn leaves_that_overlap_a_coarser_one_are_found() {
-    let mut mesh = mesh(true, &Solo);
-    let l = deepest(&mesh.split);
-    let b = mesh.split[l].brick(0);
-    remove(&mut mesh.split[l - 1], |key| key == b.key >> 3);
-    is_complete(&mesh.split, &mesh.ownership, &Solo);
-}
-
-#[test]
 #[should_panic(expected = "has a side, but is no leaf off the surface")]
 fn a_crossing_leaf_that_is_deleted_is_found() {
     run(true, |m| m.sides.stored = m.crossing.clone(), check_sides);
@@ -491,16 +481,4 @@ fn a_deleted_octant_that_is_no_leaf_is_found() {
         add(&mut m.sides.stored[l + 1], code.expect("a deleted leaf") << 3);
     };
     check_leaves(corrupt, 0);
-}
-
-#[test]
-#[should_panic(expected = "leaves by level and by rank must add up")]
-fn totals_that_differ_are_found() {
-    let m = mesh(false, &Solo);
-    let (counts, digests, _) = finished::emit(&m, None, &Solo).expect("no interrupt");
-    let (report, mut parts) =
-        finished::finish(&m, &counts, &digests, None, &Solo).expect("no output");
-    totals(&report, &parts, counts.total(), &Solo);
-    parts[0][0] += 1;
-    totals(&report, &parts, counts.total(), &Solo);
 }

@@ -9,9 +9,8 @@ use crate::error::Error;
 use crate::input::stl;
 use geometries::{Facet, Generator};
 use ranks::{Comm, MessageBuffer, agree, gather, uncounted};
-use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::io::Read;
+use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -115,41 +114,25 @@ pub fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
     })
 }
 
-/// The first rank with another text than rank 0. Collective.
-fn other_rank(text: &str, comm: &dyn Comm) -> Option<usize> {
+/// The first rank with another value than rank 0. Collective.
+fn other_rank(value: &impl Hash, comm: &dyn Comm) -> Option<usize> {
     let mut hasher = DefaultHasher::new();
-    text.hash(&mut hasher);
+    value.hash(&mut hasher);
     let digests = gather(comm, &[hasher.finish()]);
     digests.iter().position(|&digest| digest != digests[0])
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.
-fn identity(path: &Path) -> String {
-    match path.metadata() {
-        Ok(m) => format!("{} {} {} {}", m.ino(), m.len(), m.mtime(), m.mtime_nsec()),
-        Err(e) => e.to_string(),
-    }
+fn identity(path: &Path) -> Result<impl Hash + PartialEq + use<>, ErrorKind> {
+    let m = path.metadata().map_err(|e| e.kind())?;
+    Ok((m.ino(), m.len(), m.mtime(), m.mtime_nsec()))
 }
 
-/// The file's length and digest, or why it cannot be read.
-fn content(path: &Path) -> String {
-    let read = || {
-        let mut file = File::open(path)?;
-        let mut hasher = DefaultHasher::new();
-        let (mut buffer, mut bytes) = (vec![0; 1 << 20], 0);
-        // What is not a regular file may have no end.
-        while file.metadata()?.is_file() {
-            match file.read(&mut buffer)? {
-                0 => break,
-                n => {
-                    hasher.write(&buffer[..n]);
-                    bytes += n;
-                }
-            }
-        }
-        Ok(format!("of {bytes} bytes, digest {:016x}", hasher.finish()))
-    };
-    read().unwrap_or_else(|e: std::io::Error| format!("{}: {e}", path.display()))
+/// The file's bytes, or why it cannot be read.
+fn content(path: &Path) -> Result<Vec<u8>, ErrorKind> {
+    // What is not a regular file may have no end.
+    let bytes = if path.is_file() { std::fs::read(path) } else { Ok(Vec::new()) };
+    bytes.map_err(|e| e.kind())
 }
 
 #[cfg(test)]
@@ -178,16 +161,21 @@ mod tests {
         for (name, text) in [("a.stl", "solid"), ("b.stl", "solid"), ("c.stl", "Solid")] {
             std::fs::write(path(name), text).unwrap();
         }
-        assert_ne!(identity(&path("a.stl")), identity(&path("b.stl")));
+        assert!(identity(&path("a.stl")) != identity(&path("b.stl")));
         assert_eq!(content(&path("a.stl")), content(&path("b.stl")));
         assert_ne!(content(&path("a.stl")), content(&path("c.stl")));
-        assert!(content(&path("absent")).contains("absent"));
-        assert!(content(&path("a.stl")).starts_with("of 5 bytes, digest "));
-        std::fs::write(path("large.stl"), vec![7; (2 << 20) + 3]).unwrap();
-        assert!(content(&path("large.stl")).starts_with("of 2097155 bytes, digest "));
-        assert_eq!(
-            content(place.path()),
-            format!("of 0 bytes, digest {:016x}", DefaultHasher::new().finish())
+        assert_eq!(content(place.path()), Ok(Vec::new()), "what is no file is not read");
+        assert_eq!(content(&path("absent")), content(place.path()));
+        let found = |of: [&str; 2]| {
+            let source = |rank: usize| Source::Stl(path(of[rank]));
+            let agreed = sim::run(2, 1, |comm| agree_on(&source(comm.rank()), comm));
+            agreed.into_iter().map(|agreed| agreed.map_err(|e| e.to_string())).collect::<Vec<_>>()
+        };
+        assert_eq!(found(["a.stl", "b.stl"]), [Ok(()), Ok(())]);
+        assert!(
+            found(["a.stl", "c.stl"]).iter().all(|agreed| agreed
+                .as_ref()
+                .is_err_and(|e| e.contains("rank 1 has another file")))
         );
     }
 }

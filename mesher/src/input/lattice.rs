@@ -11,7 +11,8 @@ use bricks::widest;
 use bytemuck::{Pod, Zeroable};
 
 /// The root cube, in the unit of the geometry.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Root {
     /// Minimum corner.
     pub origin: [f64; 3],
@@ -122,7 +123,7 @@ impl Root {
         let (origin, scale) = (self.origin, ROOT_EDGE as f64 / self.edge);
         let limit = ROOT_EDGE as f64 * 1.5;
         // False for a product with an infinite scale that is not a number.
-        let near = |c: f64, a: usize| off_centre(nearest(c, origin[a], scale)) <= limit;
+        let near = |c: f64, a: usize| off_centre(rounded(c, origin[a], scale)) <= limit;
         // Rounding is monotonic, so no vertex is too far if the bounds are not.
         if !facets.is_empty() && !(0..3).all(|a| near(bounds.lo[a], a) && near(bounds.hi[a], a)) {
             let outside = |v: &[f32; 3]| !(0..3).all(|a| near(f64::from(v[a]), a));
@@ -143,7 +144,7 @@ impl Root {
 
 /// The lattice coordinate nearest to `c`.
 #[inline(always)]
-fn nearest(c: f64, origin: f64, scale: f64) -> f64 {
+fn rounded(c: f64, origin: f64, scale: f64) -> f64 {
     ((c - origin) * scale).round_ties_even()
 }
 
@@ -164,7 +165,7 @@ fn quantise_lanes(facets: &mut [geometries::Facet], origin: &[f64; 3], scale: f6
     for f in facets {
         let c: [f32; 9] = bytemuck::cast(*f);
         let whole: &mut [i32; 9] = bytemuck::cast_mut(f);
-        *whole = std::array::from_fn(|i| nearest(f64::from(c[i]), origins[i], scale) as i32);
+        *whole = std::array::from_fn(|i| rounded(f64::from(c[i]), origins[i], scale) as i32);
     }
 }
 
@@ -204,7 +205,7 @@ pub fn box_mask(b: &ExtentBox, corner: [i64; 3], l: Level) -> u64 {
 }
 
 /// The parameters that, with the facets, define the mesh.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Rules {
     /// The root cube.
     pub root: Root,
@@ -224,10 +225,12 @@ pub struct Rules {
     pub enclosed: Enclosed,
 }
 
-/// A point that lies in the flow.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A point that lies in the flow. In JSON, the lattice point.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(transparent)]
 pub struct Seed {
     /// Its coordinates in the unit of the geometry.
+    #[serde(skip)]
     pub given: [f64; 3],
     /// The nearest lattice point, which may lie outside the root.
     pub lattice: [i64; 3],
@@ -380,8 +383,8 @@ mod tests {
             &[
                 ("meets", &|a| vec![extent(a).meets(point(a, 6), a[9] as i64).into()]),
                 ("box_mask", &|a| vec![box_mask(&extent(a), point(a, 6), a[9] as Level).into()]),
-                ("nearest", &|a| {
-                    vec![(nearest(quarters(a[0]), quarters(a[1]), quarters(a[2])) * 4.0) as i128]
+                ("rounded", &|a| {
+                    vec![(rounded(quarters(a[0]), quarters(a[1]), quarters(a[2])) * 4.0) as i128]
                 }),
                 ("off_centre", &|a| vec![(off_centre(quarters(a[0])) * 4.0) as i128]),
             ],

@@ -23,8 +23,6 @@ pub struct FacetCounts {
 pub struct Quantised<F = Vec<Facet>> {
     /// The rules, the same on all ranks.
     pub rules: Rules,
-    /// The bounds of all facets, the same on all ranks.
-    pub bounds: Bounds,
     /// This rank's facets on the lattice, in their order.
     pub facets: F,
     /// The same on all ranks.
@@ -45,5 +43,5 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     let digests = uncounted(comm, || gather(comm, &[digest::of_facets(&facets)]));
     let digest = digests.into_iter().fold(0, u128::wrapping_add);
     let counts = FacetCounts { total: slice.total, beyond_root, digest };
-    Ok(Quantised { rules, bounds, facets, counts })
+    Ok(Quantised { rules, facets, counts })
 }

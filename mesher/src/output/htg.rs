@@ -5,16 +5,17 @@
 //! compressed chunks to rank 0, the only one that writes. In one round each of up to `WINDOWS_MAX` ranks
 //! compresses one window, so memory does not grow with the mesh, and the file does not depend on the number of ranks.
 
-mod numbering;
-mod siblings;
-
-use crate::Mesh;
 use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::output::stream::{LevelCursors, Octants};
 use crate::output::write::{OutDir, TREE};
+use crate::partition::ownership::Ownership;
+use bricks::brick::{byte, children, parents};
+use bricks::brickset::ones;
+use bricks::octant::Level;
+use bricks::tree::{LEVELS, Tree};
 use files::Draft;
-use numbering::Numbering;
-use ranks::{Comm, MessageBuffer, pack_bytes, unpack_bytes};
-use siblings::{own_siblings, root};
+use ranks::{Comm, MessageBuffer, gather, pack_bytes, unpack_bytes};
 use std::io::{self, BufWriter};
 use std::iter::Peekable;
 use std::ops::Range;
@@ -148,4 +149,133 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> io::Result<()> {
         file.add(words[0], &chunks)?;
     }
     Ok(())
+}
+
+/// Where siblings are in the file. They are numbered from the root's children, which have number 0, level by level, and in Morton order
+/// within a level.
+struct Numbering<'a> {
+    /// Number of nodes of each level that has any, over all ranks.
+    nodes: Vec<u64>,
+    /// The first number in each interval of the curve, level by level.
+    first: Vec<u64>,
+    ownership: &'a Ownership,
+}
+
+impl<'a> Numbering<'a> {
+    /// Counts siblings by interval of the curve, and numbers them. Collective.
+    fn new(mesh: &'a Mesh, comm: &dyn Comm) -> Self {
+        let ownership = &mesh.ownership;
+        let intervals = ownership.boundaries().count();
+        let first = vec![0; LEVELS * intervals];
+        let mut numbering = Self { nodes: vec![1], first, ownership };
+        for l in 1..LEVELS as Level {
+            for b in Tree::exists(&mesh.split, l).filter(|b| ownership.owns(l, b.key)) {
+                let place = numbering.place(l, b.key);
+                numbering.first[place] += u64::from(b.bits.count_ones() / 8);
+            }
+        }
+        // Each interval has one owner, which has counted its siblings.
+        let counted = (0..).zip(&numbering.first).filter(|c| *c.1 > 0);
+        let counted: Vec<[u64; 2]> = counted.map(|(place, &count)| [place, count]).collect();
+        for [place, count] in gather(comm, &counted) {
+            numbering.first[place as usize] = count;
+        }
+        let mut next = 0;
+        for level in numbering.first.chunks_mut(intervals) {
+            let begin = next;
+            for count_or_first in level {
+                next += std::mem::replace(count_or_first, next);
+            }
+            numbering.nodes.extend((next > begin).then(|| 8 * (next - begin)));
+        }
+        numbering
+    }
+
+    /// The place in `first` of the interval that contains the minimum corner of a brick.
+    fn place(&self, l: Level, key: u64) -> usize {
+        let intervals = self.first.len() / LEVELS;
+        l as usize * intervals + self.ownership.interval(l, key)
+    }
+}
+
+/// The siblings in the bricks that this rank owns, with their numbers, in ascending order.
+fn own_siblings<'a>(
+    mesh: &'a Mesh,
+    numbering: &'a Numbering<'a>,
+) -> impl Iterator<Item = (u64, Siblings)> + 'a {
+    let of_level = move |l: Level| {
+        let mut path = Path::new(mesh, l);
+        // The place of the last brick, and the number of the next siblings.
+        let (mut last, mut next) = (None, 0);
+        let bricks = mesh.split[l as usize - 1].child_bricks();
+        bricks.filter(move |b| mesh.ownership.owns(l, b.key)).flat_map(move |b| {
+            let place = numbering.place(l, b.key);
+            if last.replace(place) != Some(place) {
+                next = numbering.first[place];
+            }
+            let (brick, groups, first) = (path.load(l, b.key), parents(b.bits), next);
+            next += u64::from(groups.count_ones());
+            let of_group = move |j| siblings(brick, u64::from(j));
+            (first..).zip(ones(u64::from(groups)).map(of_group))
+        })
+    };
+    (1..LEVELS as Level).flat_map(of_level)
+}
+
+/// The root.
+fn root(mesh: &Mesh) -> Siblings {
+    let root = siblings(Path::new(mesh, 0).load(0, 0), 0);
+    // The seven other octants of the brick do not exist.
+    let [split, deleted, crossing, inside] =
+        [root.split, root.deleted, root.crossing, root.inside].map(|bits| bits & 1);
+    Siblings { split, deleted, crossing, inside }
+}
+
+/// Siblings that exist: byte `j` of a brick.
+#[inline]
+fn siblings(Octants { split, crossing, inside, deleted }: Octants, j: u64) -> Siblings {
+    let kept = !split & !deleted;
+    Siblings {
+        split: byte(split, j),
+        deleted: byte(deleted & !split, j),
+        crossing: byte(crossing & kept, j),
+        inside: byte(inside & kept, j),
+    }
+}
+
+/// The bricks that contain the current one, of all coarser levels, and readers of the sets.
+struct Path<'a>(Vec<PathLevel<'a>>);
+
+struct PathLevel<'a> {
+    cursors: LevelCursors<'a>,
+    key: Option<u64>,
+    brick: Octants,
+}
+
+impl<'a> Path<'a> {
+    /// A path to bricks of level `deepest`.
+    fn new(mesh: &'a Mesh, deepest: Level) -> Self {
+        let level = |l: usize| {
+            let cursors = LevelCursors::new(&mesh.leaves(), l);
+            PathLevel { cursors, key: None, brick: Octants::default() }
+        };
+        Self((0..=deepest as usize).map(level).collect())
+    }
+
+    /// Reads a brick. Keys must not descend.
+    fn load(&mut self, l: Level, key: u64) -> Octants {
+        if self.0[l as usize].key == Some(key) {
+            return self.0[l as usize].brick;
+        }
+        let (mut crossing, mut inside) = (0, 0);
+        if l > 0 {
+            let above = self.load(l - 1, key >> 3);
+            let below = |sides: u64| children(byte(sides & above.split, key & 7));
+            (crossing, inside) = (below(above.crossing), below(above.inside));
+        }
+        let level = &mut self.0[l as usize];
+        level.key = Some(key);
+        level.brick = level.cursors.read(key, crossing, inside);
+        level.brick
+    }
 }

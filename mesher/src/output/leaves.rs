@@ -1,8 +1,8 @@
 //! The leaves of the finished mesh: digests, files and the manifest.
 
-use crate::Mesh;
 use crate::error::Error;
-use crate::output::manifest::{self, Manifest, MeshEntry, PartWords};
+use crate::mesh::Mesh;
+use crate::output::manifest::{self, Manifest, MeshEntry};
 use crate::output::stream::Counts;
 use crate::output::write::{OutDir, Part, part_name};
 use bricks::digest::Digests;
@@ -39,15 +39,14 @@ pub fn emit(
     Ok((counts, digests, heaviest.max))
 }
 
-/// Sums over the ranks, and writes the manifest if a directory is given. Returns the mesh in numbers, and the parts of all ranks.
-/// Collective.
+/// Sums over the ranks, and writes the manifest if a directory is given. Returns the mesh in numbers. Collective.
 pub fn finish(
     mesh: &Mesh,
     counts: &Counts,
     digests: &Digests,
     out: Option<&OutDir>,
     comm: &dyn Comm,
-) -> Result<(MeshEntry, Vec<PartWords>), Error> {
+) -> Result<MeshEntry, Error> {
     let (digests, parts) = manifest::gather(counts.total(), digests, comm);
     let counts = counts.gather(comm);
     let entry = MeshEntry::new(mesh, &counts, &digests);
@@ -59,7 +58,7 @@ pub fn finish(
         _ => Ok(()),
     };
     agree(comm, publish())?;
-    Ok((entry, parts))
+    Ok(entry)
 }
 
 /// The number of leaves in this rank's heaviest octant of a level, as they are streamed in Morton order. It bounds the load balance of

@@ -1,7 +1,7 @@
 //! The manifest of a mesh, `mesh.json`, and what it has in common with the report of the run: the mesh in numbers.
 
-use crate::Mesh;
-use crate::input::lattice::{Enclosed, ExtentBox, Keep, Root};
+use crate::input::lattice::Rules;
+use crate::mesh::Mesh;
 use crate::output::stream::Counts;
 use crate::output::write::{Output, TREE, part_name};
 use crate::sides::Summary;
@@ -18,14 +18,9 @@ use serde_json::{Value, json};
 pub struct MeshEntry {
     program: &'static str,
     tree: &'static str,
-    /// The root cube.
-    pub root: Root,
-    /// Surface level.
-    pub level_surface: Level,
-    layer_cells_min: u32,
-    keep: Keep,
-    keep_crossing: bool,
-    boxes: Vec<ExtentBox>,
+    /// The rules.
+    #[serde(flatten)]
+    pub rules: Rules,
     geometry: Value,
     /// What is closed at a coarser spacing, and open at that of the mesh.
     pub leaks: Vec<LeakEntry>,
@@ -34,8 +29,6 @@ pub struct MeshEntry {
     /// Leaves by level, 0 to 19.
     pub leaves_by_level: Vec<u64>,
     leaves_by_side: Value,
-    seeds: Vec<[i64; 3]>,
-    enclosed: Enclosed,
     components: Value,
     components_ambiguous: Value,
     /// The mesh's digest.
@@ -87,12 +80,7 @@ impl MeshEntry {
         Self {
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             tree: if mesh.is_base { "base" } else { "final" },
-            root: rules.root,
-            level_surface: rules.level_surface,
-            layer_cells_min: rules.layer_cells_min,
-            keep: rules.keep,
-            keep_crossing: rules.keep_crossing,
-            boxes: rules.boxes.clone(),
+            rules: rules.clone(),
             geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
             leaks: LeakEntry::of(mesh),
             leaves: counts.total(),
@@ -102,8 +90,6 @@ impl MeshEntry {
                 "inside": by_side[1],
                 "crossing": by_side[2],
             }),
-            seeds: rules.seeds.iter().map(|seed| seed.lattice).collect(),
-            enclosed: rules.enclosed,
             components: json!({
                 "outside": outside,
                 "inside": inside,

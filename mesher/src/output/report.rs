@@ -6,12 +6,12 @@
 //! - every quantity by rank has an entry for each rank; times are finite and not negative;
 //! - the wall time is that of the slowest rank.
 
+use crate::mesh::Mesh;
 use crate::output::manifest::MeshEntry;
 use crate::output::warnings;
 use crate::partition::Partitioner;
-use crate::record::{Phase, peak_rss_bytes};
+use crate::record::{Job, Phase, peak_rss_bytes};
 use crate::sides::Summary;
-use crate::{Job, Mesh};
 use bricks::octant::Level;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -174,7 +174,7 @@ fn imbalance(values: &[f64]) -> f64 {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { mesh, level_base, ranks, .. } = self;
-        let (edge, level_surface) = (mesh.root.edge, mesh.level_surface);
+        let (edge, level_surface) = (mesh.rules.root.edge, mesh.rules.level_surface);
         let [outside, inside, crossing] = mesh.by_side.map(grouped);
         writeln!(f, "facets         {}", grouped(self.facets))?;
         writeln!(f, "root edge      {edge} (level 0), surface level {level_surface}")?;
@@ -303,7 +303,7 @@ mod tests {
         let mut report = report();
         (report.facets, report.cells, report.phases) = (1280, 3_000_000, vec![phase]);
         (report.mesh.leaves_by_level, report.mesh.by_side) = (vec![0, 0, 1234], [1000, 2000, 3]);
-        (report.mesh.root.edge, report.mesh.level_surface) = (8.0, 2);
+        (report.mesh.rules.root.edge, report.mesh.rules.level_surface) = (8.0, 2);
         report.mesh.digest = "abc".into();
         let example = [0; 3];
         report.mesh.summary = Summary {

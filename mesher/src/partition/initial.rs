@@ -12,7 +12,6 @@ use crate::error::Error;
 use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::area::{self, FRACTIONS};
 use crate::partition::curve::{self, Bin, Boundary};
-#[cfg(feature = "metis")]
 use crate::partition::metis;
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, Weights};
@@ -100,7 +99,7 @@ fn by_base_leaves(
         leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
     }
     let by_metis = match division.partitioner {
-        Partitioner::Metis => assign_metis(&leaves, level, comm)?,
+        Partitioner::Metis => metis::assign(&leaves, level, comm)?,
         Partitioner::Morton | Partitioner::Paper => None,
     };
     let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
@@ -115,29 +114,9 @@ pub fn of_base_mesh(
     level_base: Level,
     comm: &dyn Comm,
 ) -> Result<Partition, Error> {
-    let boundaries = leaves.and_then(|leaves| assign_equal(&leaves, comm.size()));
+    let boundaries = leaves.and_then(|leaves| metis::assign_equal(&leaves, comm.size()));
     let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
     Ok(Partition { ownership, level_base, partitioner: Some(Partitioner::Paper) })
-}
-
-#[cfg(feature = "metis")]
-use metis::{assign as assign_metis, assign_equal};
-
-#[cfg(not(feature = "metis"))]
-fn assign_equal(_: &[(u64, Level)], _: usize) -> Result<Vec<Boundary>, Error> {
-    Err(without_metis())
-}
-
-#[cfg(not(feature = "metis"))]
-fn assign_metis(_: &[Bin], _: Level, _: &dyn Comm) -> Result<Option<Vec<Boundary>>, Error> {
-    Err(without_metis())
-}
-
-#[cfg(not(feature = "metis"))]
-fn without_metis() -> Error {
-    Error::input(
-        "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
-    )
 }
 
 fn all_to_rank_0() -> Vec<Boundary> {

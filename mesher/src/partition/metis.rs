@@ -2,12 +2,12 @@
 
 use crate::error::Error;
 use crate::partition::curve::{Bin, Boundary};
-use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
+use bricks::octant::Level;
+#[cfg(feature = "metis")]
+use bricks::octant::{LEVEL_MAX, neighbour, start57};
 use ranks::{Comm, agree, gather};
+#[cfg(feature = "metis")]
 use std::sync::{Mutex, PoisonError};
-
-/// METIS keeps its random state per process: threads that share it would change each other's parts.
-static TURN: Mutex<()> = Mutex::new(());
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
 const LEAVES_PER_RANK_MIN: usize = 8;
@@ -62,6 +62,7 @@ fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
 }
 
 /// The part of each base leaf.
+#[cfg(feature = "metis")]
 fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Error> {
     let total: u128 = weights.iter().copied().map(u128::from).sum();
     let (xadj, adjncy) = graph(leaves);
@@ -72,6 +73,8 @@ fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Err
     let failed = |e: &dyn std::fmt::Display| {
         Error::input(format!("METIS failed ({e}): use --partitioner morton"))
     };
+    // METIS keeps its random state per process: threads that share it would change each other's parts.
+    static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     metis::Graph::new(1, ranks as metis::Idx, &xadj, &adjncy)
         .map_err(|e| failed(&e))?
@@ -82,7 +85,16 @@ fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Err
     Ok(parts.into_iter().map(|part| part as u64).collect())
 }
 
+/// The part of each base leaf.
+#[cfg(not(feature = "metis"))]
+fn parts(_: &[Leaf], _: &[u64], _: usize) -> Result<Vec<u64>, Error> {
+    Err(Error::input(
+        "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
+    ))
+}
+
 /// The graph of base leaves that share part of a face, in the compressed form of METIS.
+#[cfg(feature = "metis")]
 fn graph(leaves: &[Leaf]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
     // The leaf that contains an octant.
     let leaf_at = |start: u64, l: Level| {
@@ -105,6 +117,7 @@ fn graph(leaves: &[Leaf]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
 }
 
 #[cfg(test)]
+#[cfg(feature = "metis")]
 mod tests {
     use super::*;
     use bricks::octant::position;

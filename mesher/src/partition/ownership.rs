@@ -136,6 +136,11 @@ impl Ownership {
         self.intervals.starts.iter().copied().zip(self.intervals.owners.iter().copied())
     }
 
+    /// The index, among those of all ranks, of the interval that contains the minimum corner of a brick.
+    pub fn interval(&self, l: Level, key: u64) -> usize {
+        self.intervals.at(brick_start(l, key))
+    }
+
     /// The owner at a level-19 code.
     #[inline]
     pub fn owner_at(&self, start: u64) -> usize {

@@ -154,7 +154,7 @@ impl Walk<'_> {
         self.merge_brick(l, frame);
         let nodes = self.nodes;
         let family = nodes.family(l, frame.node);
-        if family.bricks() == 0 {
+        if family.bricks == 0 {
             return;
         }
         // Looked up once for all children; each of them crosses three of the faces.
@@ -165,7 +165,7 @@ impl Walk<'_> {
             })
         });
         self.path.push(*frame);
-        for j in ones(u64::from(family.bricks())) {
+        for j in ones(u64::from(family.bricks)) {
             if let Some(child) = step_down(nodes, l, frame, &family, &beyond, u64::from(j)) {
                 self.visit(l + 1, &child);
             }

@@ -73,32 +73,19 @@ pub fn of_seeds(
             Some(None) => "lies in a leaf that the geometry crosses",
             Some(Some(_)) => continue,
         };
-        return Err(unusable(number, seed, problem, rules, tree, ownership, comm));
+        let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
+        let nearest = gather(comm, nearest(tree, ownership, near).as_slice()).into_iter().min();
+        let advice = match nearest {
+            Some([_, leaf]) => {
+                let [x, y, z] = rules.root.locate(Candidate(leaf).centroid());
+                format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
+            }
+            None => "the geometry crosses all leaves: decrease spacing_min".to_owned(),
+        };
+        let [x, y, z] = seed.given;
+        return Err(Error::input(format!("seed {number} at ({x}, {y}, {z}) {problem}; {advice}")));
     }
     Ok(found.values().copied().flatten().collect())
-}
-
-/// The error of a seed, with the nearest point that could replace it. Collective.
-fn unusable(
-    number: u64,
-    seed: &Seed,
-    problem: &str,
-    rules: &Rules,
-    tree: &Tree,
-    ownership: &Ownership,
-    comm: &dyn Comm,
-) -> Error {
-    let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
-    let all = gather(comm, nearest(tree, ownership, near).as_slice());
-    let [x, y, z] = seed.given;
-    let advice = match all.into_iter().min() {
-        Some([_, first]) => {
-            let [x, y, z] = rules.root.locate(Candidate(first).centroid());
-            format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
-        }
-        None => "the geometry crosses all leaves: decrease spacing_min".to_owned(),
-    };
-    Error::input(format!("seed {number} at ({x}, {y}, {z}) {problem}; {advice}"))
 }
 
 /// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance

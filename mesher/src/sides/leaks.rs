@@ -50,17 +50,12 @@ pub struct Leak {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Leaks(pub Vec<Leak>);
 
-/// One side of T0, cut at the level above the surface level. It is filled level by level from the deepest one, so that no set deeper
-/// than the cut is stored.
+/// One side of T0, cut at the level above the surface level, so that no octants deeper than the cut are stored.
 pub struct Region {
     is_inside: bool,
     cut: Level,
-    /// Octants that a facet crosses, that lie on the other side, or, at the cut, one of whose descendants does.
+    /// Leaves that a facet crosses or that lie on the other side, by level; of those deeper than the cut, the ancestors at the cut.
     walls: PerLevel,
-    /// What the leaves of the present level add.
-    added: BrickSet,
-    /// Octants of the present level that have a wall among their descendants.
-    from_below: BrickSet,
 }
 
 impl Region {
@@ -76,8 +71,6 @@ impl Region {
             is_inside,
             cut: rules.level_surface - 1,
             walls: per_level(),
-            added: BrickSet::default(),
-            from_below: BrickSet::default(),
         };
         sides.iter().map(region).collect()
     }
@@ -85,22 +78,13 @@ impl Region {
     /// Adds the leaves of a brick of level `l`: those that cross, those that do not, and which of these are inside.
     #[inline]
     pub fn push(&mut self, l: Level, key: u64, crossing: u64, open: u64, inside: u64) {
-        let walls = crossing | if self.is_inside { open & !inside } else { inside };
-        if l > self.cut {
-            self.added.push(key >> 3, u64::from(brick::parents(walls)) << (8 * (key & 7)));
-        } else {
-            self.added.push(key, walls);
+        let mut walls =
+            Brick { key, bits: crossing | if self.is_inside { open & !inside } else { inside } };
+        for _ in self.cut..l {
+            let parents = u64::from(brick::parents(walls.bits));
+            walls = Brick { key: walls.key >> 3, bits: parents << (8 * (walls.key & 7)) };
         }
-    }
-
-    /// Ends level `l`.
-    pub fn end_level(&mut self, l: Level) {
-        let (added, below) = (take(&mut self.added), take(&mut self.from_below));
-        if l > self.cut {
-            self.from_below = added.union(below.coarsen());
-        } else {
-            self.walls[l as usize] = added.union(below);
-        }
+        self.walls[l as usize].push(walls.key, walls.bits);
     }
 
     /// T0 cut at a level at or above that of the walls. Collective.
@@ -109,7 +93,8 @@ impl Region {
         let mut walls = self.walls.clone();
         for l in (cut + 1..LEVELS).rev() {
             let finer = take(&mut walls[l]);
-            walls[l - 1] = take(&mut walls[l - 1]).union(finer.coarsen());
+            let finer = if l > self.cut as usize { finer } else { finer.coarsen() };
+            walls[l - 1] = take(&mut walls[l - 1]).union(finer);
         }
         // A rank knows the walls in its own part of a brick that others have part of, too.
         ownership.synchronise_replicas(&mut [&mut walls], comm);
@@ -157,7 +142,7 @@ fn crossing_leaves(tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn
     let level = rules.level_surface;
     let owned = tree.crossing[level as usize].bricks().filter(|b| ownership.owns(level, b.key));
     let mine: u64 = owned.map(|b| u64::from(b.bits.count_ones())).sum();
-    comm.all_gather(&[mine]).words().iter().sum()
+    comm.sum(mine)
 }
 
 /// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not.

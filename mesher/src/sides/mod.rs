@@ -22,10 +22,10 @@ pub mod openness;
 pub mod rays;
 pub mod vote;
 
-use crate::Options;
 use crate::error::Error;
 use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
+use crate::record::Options;
 use bricks::brick::Brick;
 use bricks::facet::Facet;
 use bricks::octant::Level;
@@ -219,7 +219,7 @@ impl Sides {
         regions: &mut [leaks::Region],
     ) -> u64 {
         let mut leaves_enclosed = 0;
-        for l in (0..LEVELS as Level).rev() {
+        for l in 0..LEVELS as Level {
             let mut crossing = tree.crossing[l as usize].cursor();
             for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
                 let (mut open, mut within, mut enclosed) = (0, 0, 0);
@@ -244,7 +244,6 @@ impl Sides {
                     leaves_enclosed += u64::from(enclosed.count_ones());
                 }
             }
-            regions.iter_mut().for_each(|region| region.end_level(l));
         }
         leaves_enclosed
     }

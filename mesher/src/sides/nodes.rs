@@ -76,19 +76,14 @@ pub fn open_bricks<'a>(
 /// A node's children.
 #[derive(Clone, Copy)]
 pub struct Family {
-    split: u64,
+    /// The node's split octants.
+    pub split: u64,
     /// Mask of the octant groups that have a child brick.
-    bricks: u8,
+    pub bricks: u8,
     first: Node,
 }
 
 impl Family {
-    /// Mask of the octant groups that have a child brick.
-    #[inline]
-    pub fn bricks(&self) -> u8 {
-        self.bricks
-    }
-
     /// The child brick below octant group `j` and the mask of its octants that exist; none if no octant of
     /// the group is split.
     #[inline]
@@ -149,12 +144,6 @@ impl Nodes {
     /// Number of local components.
     pub fn component_count(&self) -> Component {
         self.masks.len() as Component
-    }
-
-    /// Split octants of a node.
-    #[inline]
-    pub fn split(&self, l: Level, n: Node) -> u64 {
-        self.levels[l as usize].split.get(n as usize).copied().unwrap_or(0)
     }
 
     /// The children of a node.
@@ -246,15 +235,15 @@ impl Finder<'_> {
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
-            let split = nodes.split(m, node);
-            let leaves = octants & !split;
+            let family = nodes.family(m, node);
+            let leaves = octants & !family.split;
             nodes.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
-            if octants & split == 0 || m == l {
+            if octants & family.split == 0 || m == l {
                 return;
             }
             if self.path.len() == m as usize + 1 {
                 let below = brick_above(l, key, m + 1);
-                let Some((node, _)) = nodes.family(m, node).child(below & 7) else { return };
+                let Some((node, _)) = family.child(below & 7) else { return };
                 self.path.push((below, node));
             }
         }

@@ -12,13 +12,13 @@
 
 use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
-use ranks::{Comm, MessageBuffer, uncounted};
+use ranks::{Comm, MessageBuffer, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 
 type Vertex = [i32; 3];
 
-/// A boundary of more words than this is not searched for loops: a soup of facets without common edges.
-const WORDS_MAX: u64 = 1 << 23;
+/// A boundary of more edges than this is not searched for loops: a soup of facets without common edges.
+const EDGES_MAX: u64 = (1 << 23) / 3;
 /// Least ratio of the area of what closes a sheet to that of the sheet: a quarter. A hemisphere has 0.5, a box without one side 0.2.
 const SHEET: f64 = 0.25;
 
@@ -36,9 +36,8 @@ fn boundary(facets: &[Facet]) -> u128 {
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface. Collective.
 pub fn is_closed(mine: &[Facet], comm: &dyn Comm) -> bool {
-    let mine = boundary(mine);
-    let all = uncounted(comm, || comm.all_gather(&[(mine >> 64) as u64, mine as u64]));
-    all.words().as_chunks().0.iter().fold([0; 2], |[a, b], [c, d]| [a ^ c, b ^ d]) == [0; 2]
+    let all = uncounted(comm, || gather(comm, &[boundary(mine)]));
+    all.into_iter().fold(0, |all, of| all ^ of) == 0
 }
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a sheet. Collective.
@@ -51,12 +50,9 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
         (0..3).for_each(|a| sums[a] += i128::from(normal[a]));
         sums[3] += length as i128;
     }
-    let words: [u64; 8] = bytemuck::cast(sums);
-    let all = uncounted(comm, || comm.all_gather(&words));
-    let [x, y, z, area] = all.words().as_chunks::<8>().0.iter().fold([0; 4], |sum, words| {
-        let of_rank: [i128; 4] = bytemuck::cast(*words);
-        std::array::from_fn(|i| sum[i] + of_rank[i])
-    });
+    let all = uncounted(comm, || gather(comm, &[sums]));
+    let add = |sum: [i128; 4], of: [i128; 4]| std::array::from_fn(|i| sum[i] + of[i]);
+    let [x, y, z, area] = all.into_iter().fold([0; 4], add);
     let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
     closing.min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
 }
@@ -76,12 +72,11 @@ fn enclosed_by_boundary(mine: &[Facet], comm: &dyn Comm) -> f64 {
     let mut edges: Vec<[u64; 3]> = received.values().collect();
     edges.sort_unstable();
     let odd = edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1);
-    let odd: Vec<u64> = odd.flat_map(|same| same[0]).collect();
-    if uncounted(comm, || comm.sum(odd.len() as u64)) > WORDS_MAX {
+    let odd: Vec<[u64; 3]> = odd.map(|same| same[0]).collect();
+    if uncounted(comm, || comm.sum(odd.len() as u64)) > EDGES_MAX {
         return f64::INFINITY;
     }
-    let all = uncounted(comm, || comm.all_gather(&odd));
-    let edges = all.words().as_chunks::<3>().0.iter().map(|words| bytemuck::cast(*words));
+    let edges = uncounted(comm, || gather(comm, &odd)).into_iter().map(bytemuck::cast);
     loops(edges).iter().map(|of| vector_area(of)).sum()
 }
 
@@ -135,9 +130,9 @@ pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
         v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
     };
     let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
-    let all = uncounted(comm, || comm.all_gather(&words));
-    let add = |[count, xor]: [u64; 2], [n, of]: &[u64; 2]| [count + n, xor ^ of];
-    let [count, xor] = all.words().as_chunks().0.iter().fold([0; 2], add);
+    let all = uncounted(comm, || gather(comm, &[words]));
+    let add = |[count, xor]: [u64; 2], [n, of]: [u64; 2]| [count + n, xor ^ of];
+    let [count, xor] = all.into_iter().fold([0; 2], add);
     count > 0 && xor == 0
 }
 

@@ -51,27 +51,19 @@ pub fn candidates(
     ownership: &Ownership,
 ) -> FirstLeaves {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
-    let mut of_brick: Vec<(u32, u64)> = Vec::new();
     for l in 0..LEVELS as Level {
         for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
             if !ownership.owns(l, key) {
                 continue;
             }
-            // Local components of one merged component: their leaves are interleaved in Morton order.
-            of_brick.clear();
             for (c, bits) in nodes.components(l, n) {
-                let merged = merged[c as usize];
-                match of_brick.iter_mut().find(|(other, _)| *other == merged) {
-                    Some((_, all)) => *all |= bits,
-                    None => of_brick.push((merged, bits)),
+                let list = &mut first[merged[c as usize] as usize];
+                // Local components of one brick may be parts of one component: then their leaves are interleaved in Morton order.
+                let is_of_brick = |last: &Candidate| *last >= Candidate::new(l, key << 6);
+                if list.len() < CANDIDATES || list.last().is_some_and(is_of_brick) {
+                    let leaf = |bit| Candidate::new(l, key << 6 | u64::from(bit));
+                    list.extend(ones(bits).map(leaf));
                 }
-            }
-            for &(merged, bits) in &of_brick {
-                let list = &mut first[merged as usize];
-                let room = CANDIDATES - list.len();
-                list.extend(
-                    ones(bits).take(room).map(|bit| Candidate::new(l, key << 6 | u64::from(bit))),
-                );
             }
         }
     }

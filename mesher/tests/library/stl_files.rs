@@ -1,6 +1,7 @@
 //! Unusual STL files are read completely, malformed ones are refused, and none makes the mesher crash.
 
 use crate::support::{Facet, config, cuboid};
+use geometries::StlFile;
 use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::input::{case::Case, lattice::Bounds, stl};
@@ -22,29 +23,25 @@ fn file(bytes: &[u8]) -> tempfile::NamedTempFile {
 
 #[test]
 fn unusual_files_are_read_bit_for_bit() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../geometries/tricky");
-    let want = read(&folder.join("binary.stl")).expect("an ordinary binary STL");
+    let valid: Vec<_> = geometries::stl_files().into_iter().filter(|f| f.is_valid).collect();
+    assert!(valid.len() >= 15, "only {} files", valid.len());
+    let plain = valid.iter().find(|f| f.name == "binary.stl").expect("an ordinary binary STL");
+    let want = read(file(&plain.bytes).path()).expect("an ordinary binary STL");
     assert_eq!(want.len(), 8);
     let bits = |facets: &[Facet]| -> Vec<u32> {
         facets.as_flattened().as_flattened().iter().map(|c| c.to_bits()).collect()
     };
-    let mut count = 0;
-    for entry in std::fs::read_dir(&folder).expect("the catalogue of tricky files") {
-        let path = entry.expect("a readable entry").path();
-        if path.extension().is_none_or(|e| e != "stl") {
-            continue;
-        }
-        let got = read(&path).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(bits(&got), bits(&want), "{}", path.display());
+    for StlFile { name, bytes, .. } in valid {
+        let file = file(&bytes);
+        let got = read(file.path()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(bits(&got), bits(&want), "{name}");
         let parts = sim::run(3, 11, |c| {
-            ingest::read(&Source::Stl(path.clone()), c)
+            ingest::read(&Source::Stl(file.path().to_owned()), c)
                 .expect("several ranks read what one rank reads")
                 .facets
         });
-        assert_eq!(bits(&parts.concat()), bits(&want), "{} on 3 ranks", path.display());
-        count += 1;
+        assert_eq!(bits(&parts.concat()), bits(&want), "{name} on 3 ranks");
     }
-    assert!(count >= 15, "only {count} tricky files");
 }
 
 fn binary(facets: &[Facet]) -> Vec<u8> {
@@ -135,8 +132,7 @@ proptest! {
         let bytes = if in_text { text(&body) } else { binary(&body) };
         let file = file(&damaged(bytes, &by));
         match read(file.path()) {
-            Err(Error::Input(message)) => prop_assert!(!message.is_empty() && !message.contains('\n'), "{}", message),
-            Err(other) => prop_assert!(false, "not an input error: {:?}", other),
+            Err(error) => is_input_error(&error)?,
             Ok(facets) => {
                 prop_assert!(facets.as_flattened().as_flattened().iter().all(|c| c.is_finite()));
                 mesh_coarsely(file.path(), &facets)?;
@@ -167,8 +163,7 @@ proptest! {
             max = [4.0, 1.0, 1.0]\nspacing = 0.05\n";
         let file = file(&damaged(GOOD.into(), &by));
         match program::case_file::read(file.path()) {
-            Err(Error::Input(message)) => prop_assert!(!message.contains('\n'), "{}", message),
-            Err(other) => prop_assert!(false, "not an input error: {:?}", other),
+            Err(error) => is_input_error(&error)?,
             Ok(case) => {
                 let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
                 if let Ok(rules) = case.rules(&unit) {
@@ -177,6 +172,13 @@ proptest! {
             }
         }
     }
+}
+
+/// One sentence, and the exit code of unusable input.
+fn is_input_error(error: &Error) -> Result<(), TestCaseError> {
+    let text = error.to_string();
+    prop_assert!(error.exit_code() == 2 && !text.is_empty() && !text.contains('\n'), "{}", text);
+    Ok(())
 }
 
 /// Meshes the facets with a few cells along their longest edge; of whatever size, it must not crash.
@@ -197,13 +199,16 @@ fn mesh_coarsely(path: &Path, facets: &[Facet]) -> Result<(), TestCaseError> {
     let options = crate::support::options(crate::support::Run::SOLO.division, false);
     match crate::support::words(&case, &options, &Solo) {
         Ok((words, ..)) => prop_assert!(words.is_sorted() && !words.is_empty()),
-        Err(e) => prop_assert!(longest == 0.0 && matches!(e, Error::Input(_)), "{}", e),
+        Err(e) => {
+            is_input_error(&e)?;
+            prop_assert!(longest == 0.0, "{}", e);
+        }
     }
     // A root that most facets are outside.
     let root = mesher::input::lattice::Root { origin: [0.0; 3], edge: 1.0 };
     (case.root, case.spacing_min) = (mesher::input::case::RootSpec::Exact(root), 0.25);
     if let Err(e) = crate::support::words(&case, &options, &Solo) {
-        prop_assert!(matches!(e, Error::Input(_)), "{}", e);
+        is_input_error(&e)?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use reference::{Case, Keep, base_tree};
 use std::cell::Cell;
 use std::collections::HashSet;
 use support::dense::{CROSSING, INSIDE};
-use support::leaf::leaves;
+use support::leaves;
 use support::random::{Facet, cases, for_all};
 use support::{ROOT_EDGE, case, crosses_by_axes};
 

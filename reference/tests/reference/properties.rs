@@ -6,8 +6,8 @@ use reference::{Components, Keep, base_tree, mesh};
 use std::cell::Cell;
 use support::ROOT_EDGE;
 use support::dense::{self, CROSSING, Dense, INSIDE};
-use support::leaf::{Leaf, leaves};
 use support::random::{RandomCase, cases, cases_with_a_cavity, for_all};
+use support::{Leaf, leaves};
 
 /// The finest level of the random cases of most properties: at most 4,096 leaves.
 const FINEST: u32 = 4;

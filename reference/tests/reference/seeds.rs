@@ -8,7 +8,7 @@ use reference::octant::Side;
 use reference::{Case, Enclosed, Error, Keep, base_tree, mesh};
 use std::cell::Cell;
 use support::dense::{self, CROSSING, Dense, INSIDE};
-use support::leaf::leaves;
+use support::leaves;
 use support::random::{RandomCase, cases, for_all};
 use support::{ROOT_EDGE, UNIT, block_of_units, case, sides};
 

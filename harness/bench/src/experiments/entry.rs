@@ -7,6 +7,7 @@
 use run::engine::report::SECONDS_MAX;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";
@@ -30,32 +31,41 @@ pub struct Line {
 impl Line {
     /// What cannot be true of any run, in one sentence.
     pub fn fault(&self) -> Option<String> {
-        let run = match &self.entry {
-            Entry::Run(run) => run,
+        let is_time = |time: &f64| (0.0..=SECONDS_MAX).contains(time);
+        match &self.entry {
             Entry::Network(Network { latency_s, bandwidth_bytes_per_s, .. }) => {
-                let is_possible = (0.0..=SECONDS_MAX).contains(latency_s)
-                    && *bandwidth_bytes_per_s > 0.0
-                    && bandwidth_bytes_per_s.is_finite();
-                return (!is_possible).then(|| "its network is not possible".to_owned());
+                let is_bandwidth =
+                    *bandwidth_bytes_per_s > 0.0 && bandwidth_bytes_per_s.is_finite();
+                let is_possible = is_time(latency_s) && is_bandwidth;
+                (!is_possible).then(|| "its network is not possible".to_owned())
             }
-            _ => return None,
-        };
-        let is_possible = |time: &f64| (0.0..=SECONDS_MAX).contains(time);
-        let phases = run.phases.iter().flat_map(|phase| [&phase.useful_s, &phase.wall_s]);
-        let of_ranks = phases.chain([&run.useful_s]);
-        let of_ranks = of_ranks.flat_map(|s| s.by_rank.iter().copied().chain([s.sum, s.max]));
-        let times = of_ranks.chain([run.time_wall_s]);
-        if let Some(time) = times.into_iter().find(|time| !is_possible(time)) {
-            return Some(format!("a time of {time:e} s is not possible"));
+            Entry::Run(run) if run.time_wall_s == 0.0 || run.setup.ranks == 0 => {
+                Some("it has no wall time, or no ranks".to_owned())
+            }
+            Entry::Run(run) => {
+                let phases = run.phases.iter().flat_map(|phase| [&phase.useful_s, &phase.wall_s]);
+                let of_ranks = phases.chain([&run.useful_s]);
+                let of_ranks =
+                    of_ranks.flat_map(|s| s.by_rank.iter().copied().chain([s.sum, s.max]));
+                let time = of_ranks.chain([run.time_wall_s]).find(|time| !is_time(time))?;
+                Some(format!("a time of {time:e} s is not possible"))
+            }
+            _ => None,
         }
-        (run.time_wall_s == 0.0 || run.setup.ranks == 0)
-            .then(|| "it has no wall time, or no ranks".to_owned())
     }
 
     /// Returns the session that the line begins, if it begins one.
     pub fn session(&self) -> Option<&Session> {
         match &self.entry {
             Entry::Session(session) => Some(session),
+            _ => None,
+        }
+    }
+
+    /// Returns the run of the line, if it has one.
+    pub fn run(&self) -> Option<&Run> {
+        match &self.entry {
+            Entry::Run(run) => Some(run),
             _ => None,
         }
     }
@@ -252,6 +262,15 @@ impl Setup {
         };
         let depth = self.level_base.map_or(String::new(), |level| format!(" depth {level}"));
         chosen + &depth
+    }
+}
+
+/// A run by all that was given.
+impl fmt::Display for Setup {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { engine, case, experiment, spacing_min, layer_cells_min: n, ranks, .. } = self;
+        let (comm, division) = (crate::name_of(&self.comm), self.division());
+        write!(f, "{engine} {case} {experiment} {spacing_min:e} n={n} {comm}:{ranks} {division}")
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which runs are worth starting: a slow program is not started on a mesh that it would not finish.
 
-use super::entry::{Entry, Line, Run, Setup};
+use super::entry::{Line, Run, Setup};
 use std::time::Duration;
 
 /// Returns the reason for which a run would exceed `limit` or the memory of the machine, extrapolated from the finest coarser
@@ -29,10 +29,7 @@ fn coarser<'a>(lines: &'a [Line], setup: &Setup) -> Option<&'a Run> {
         (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm)
             == (&setup.engine, &setup.case, setup.layer_cells_min, setup.ranks, setup.comm)
     };
-    let runs = lines.iter().filter_map(|line| match &line.entry {
-        Entry::Run(run) if same(&run.setup) => Some(&**run),
-        _ => None,
-    });
+    let runs = lines.iter().filter_map(Line::run).filter(|run| same(&run.setup));
     runs.filter(|run| run.setup.spacing_min > setup.spacing_min)
         .min_by(|a, b| a.setup.spacing_min.total_cmp(&b.setup.spacing_min))
 }
@@ -40,7 +37,7 @@ fn coarser<'a>(lines: &'a [Line], setup: &Setup) -> Option<&'a Run> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Machine, Session};
+    use crate::experiments::entry::{Comm, Entry, Machine, Session};
     use crate::testing::{line, run};
 
     #[test]

@@ -6,14 +6,17 @@
 //! Invariants, executed by [`Groups::check_invariants`] before anything is computed from them: a group has runs, all of its
 //! setup and with its number of cells if the mesh is the same; its time lies in its interval, and that in the range of the
 //! repetitions extended to it; sums and maxima over ranks agree with the values rank by rank.
+//!
+//! Programs are compared on one core. Their CPU times are those of whole processes, seen from outside: they include the start of the program
+//! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
+//! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::cause::sentence;
-use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Setup, Spread};
+use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
-use run::engine::takes::{EQUAL_RANKS, EQUAL_RUNS};
-use statistics::{Median, median};
+use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};
+use statistics::{Median, median, median_of};
 use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.
@@ -77,6 +80,19 @@ impl Group {
         bytes.expect("a group has runs")
     }
 
+    /// Returns the CPU time of the whole process, in seconds; `None` if a run does not have it.
+    pub fn cpu_s(&self) -> Option<Median> {
+        self.median_of(|run| Some(run.time_cpu_s).filter(|time| *time != 0.0))
+    }
+
+    /// Returns the CPU time of the geometry search, in seconds; `None` if the program does not report it.
+    pub fn search_s(&self) -> Option<Median> {
+        self.median_of(|run| {
+            let search = run.phases.iter().filter(|phase| phase.name == "search");
+            search.map(|phase| phase.useful_s.sum).reduce(|a, b| a + b)
+        })
+    }
+
     /// Whether more ranks than cores ran.
     pub fn oversubscribed(&self) -> bool {
         self.runs.iter().any(|r| r.oversubscribed)
@@ -114,8 +130,8 @@ fn quieten(typical: &mut Run, runs: &[Run]) {
     let mut total = vec![0.0; typical.setup.ranks];
     for (p, phase) in typical.phases.iter_mut().enumerate() {
         let of_rank = |rank: usize| {
-            let times: Vec<f64> = runs.iter().map(|r| r.phases[p].useful_s.by_rank[rank]).collect();
-            median(&times).expect("a group has runs").value
+            let of_run = |run: &Run| run.phases[p].useful_s.by_rank[rank];
+            median_of(&runs.iter().map(of_run).collect::<Vec<f64>>())
         };
         let times: Vec<f64> = (0..total.len()).map(of_rank).collect();
         phase.useful_s = Spread::of(&times);
@@ -140,41 +156,44 @@ pub struct Groups {
 impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
-        let (lines, origins) = apart(lines);
-        let mut lacks = BTreeMap::new();
-        let (mut left_out, mut runs) = (Vec::new(), Vec::new());
-        let mut digests = HashMap::new();
-        let (mut machines, mut networks) = (HashMap::new(), HashMap::new());
-        let machine =
-            |machines: &HashMap<&str, String>, session: &str| machines.get(session).cloned();
-        for line in &lines {
+        let (mut sessions, mut networks) = (HashMap::new(), HashMap::new());
+        let (mut origins, mut digests) = (OriginsOfRuns::default(), HashMap::new());
+        let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
+        let mut runs: Vec<(Run, Option<String>)> = Vec::new();
+        for line in lines {
+            let session: Option<&Session> = sessions.get(&line.session).copied();
+            let machine = session.map(|session| session.machine.label());
             match &line.entry {
-                Entry::Network(network) => {
-                    networks.insert(machine(&machines, &line.session), *network);
-                }
+                Entry::Network(network) => _ = networks.insert(machine, *network),
                 Entry::Session(session) => {
                     lacks.extend(session.lacks.clone());
-                    machines.insert(line.session.as_str(), session.machine.label());
+                    sessions.insert(&line.session, session);
                 }
                 Entry::LeftOut(left) => left_out.push(left.clone()),
                 Entry::Failure(Failure { setup, why, .. }) => {
                     let why = format!("{} failed: {why}", setup.engine);
                     left_out.push(LeftOut { setup: setup.clone(), why });
                 }
-                Entry::Run(run) if run.warm_up => {}
-                Entry::Run(run) => match another_mesh(run, &lacks, &mut digests) {
-                    None => runs.push((&**run, &line.session)),
-                    Some(why) => left_out.push(LeftOut { setup: run.setup.clone(), why }),
-                },
+                Entry::Run(run) => {
+                    let run = Run { setup: origins.apart(run, session), ..(**run).clone() };
+                    if run.warm_up {
+                        continue;
+                    }
+                    match another_mesh(&run, &lacks, &mut digests) {
+                        None => runs.push((run, machine)),
+                        Some(why) => left_out.push(LeftOut { setup: run.setup, why }),
+                    }
+                }
                 Entry::Former => {}
             }
         }
-        let group = |(setup, runs): (Setup, Vec<(&Run, &String)>)| {
+        let group = |(setup, runs): (Setup, Vec<&(Run, Option<String>)>)| {
             // All are of one machine.
-            let network = networks.get(&machine(&machines, runs[0].1)).copied().unwrap_or(ASSUMED);
+            let network = networks.get(&runs[0].1).copied().unwrap_or(ASSUMED);
             Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
         };
-        let all = by_key(runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
+        let all = by_key(&runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
+        let origins = [origins.programs.described(), origins.geometries.described()].concat();
         let groups = Self { all: all.collect(), left_out, lacks, origins };
         groups.check_invariants();
         groups
@@ -254,7 +273,7 @@ impl Groups {
 
     /// Returns the largest loss of efficiency of a group in one sentence.
     pub fn cause(&self, group: &Group) -> String {
-        sentence(&group.typical, &self.reference(group).typical, &group.network)
+        pop::cause(&group.typical, &self.reference(group).typical, &group.network)
     }
 
     /// Returns simulated groups, each with that of the same mesh on equally many ranks of MPI without oversubscription.
@@ -290,40 +309,84 @@ pub(crate) fn another_mesh(
         .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
 }
 
-/// Returns the lines with the runs of every further machine, build or geometry as those of another program or case, and a
-/// sentence for each program and case of which there are several.
-fn apart(lines: &[Line]) -> (Vec<Line>, Vec<String>) {
-    let mut machines: HashMap<&str, [String; 2]> = HashMap::new();
-    let (mut programs, mut geometries) = (Origins::default(), Origins::default());
-    let mut apart = lines.to_vec();
-    for (line, of) in apart.iter_mut().zip(lines) {
-        match &mut line.entry {
-            Entry::Session(session) => {
-                let machine = &session.machine;
-                machines.insert(&of.session, [machine.label(), machine.commit.clone()]);
-            }
-            Entry::Run(run) => {
-                let machine = machines.get(of.session.as_str());
-                // Old records have no digest of the program: the commit stands for it.
-                let origin = match (machine, run.program.as_str()) {
-                    (None, "") => String::new(),
-                    (None, program) => format!("program {program}"),
-                    (Some([label, commit]), "") => format!("{label}; commit {commit}"),
-                    (Some([label, _]), program) => format!("{label}; program {program}"),
-                };
-                let s = &mut run.setup;
-                if let Some(digest) = &run.geometry {
-                    let (case, n) = (&s.case, s.layer_cells_min);
-                    let mesh = format!("{case} at spacing {:e}, n {n}", s.spacing_min);
-                    s.case += &geometries.suffix(&mesh, digest);
-                }
-                s.engine += &programs.suffix(&s.engine, &origin);
-            }
-            _ => {}
+/// The machines and builds of programs, and the geometries of cases, seen so far.
+#[derive(Default)]
+struct OriginsOfRuns {
+    programs: Origins,
+    geometries: Origins,
+}
+
+impl OriginsOfRuns {
+    /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry.
+    fn apart(&mut self, run: &Run, session: Option<&Session>) -> Setup {
+        let mut setup = run.setup.clone();
+        let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
+        // Old records have no digest of the program: the commit stands for it.
+        let origin = match (session, run.program.as_str()) {
+            (None, "") => machine,
+            (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
+            (_, program) => format!("{machine}program {program}"),
+        };
+        setup.engine += &self.programs.suffix(&run.setup.engine, &origin);
+        if let Some(digest) = &run.geometry {
+            let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
+            let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
+            setup.case += &self.geometries.suffix(&mesh, digest);
         }
+        setup
     }
-    let sentences = programs.described().into_iter().chain(geometries.described());
-    (apart, sentences.collect())
+}
+
+/// The runs of one case and n by several programs.
+#[derive(Clone, Debug)]
+pub struct Comparison<'a> {
+    /// The case.
+    pub case: &'a str,
+    /// n.
+    pub layer_cells_min: u32,
+    /// At least two programs in the order of the record, each with its runs by cells.
+    pub programs: Vec<(&'a str, Vec<&'a Group>)>,
+    /// Runs that failed or were left out, and what the programs do not provide, a sentence each.
+    pub notes: Vec<String>,
+}
+
+fn is_on_one_core(setup: &Setup) -> bool {
+    setup.ranks == 1 && setup.comm != Comm::Sim
+}
+
+impl Groups {
+    /// Returns the comparisons of programs, in the order of the record.
+    pub fn comparisons(&self) -> Vec<Comparison<'_>> {
+        let is_compared = |g: &&Group| {
+            let by_size = ["strong", "spacing"].contains(&g.setup.experiment.as_str());
+            by_size && is_on_one_core(&g.setup) && g.cpu_s().is_some()
+        };
+        let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
+        let by_case = by_key(self.all.iter().filter(is_compared), of_case);
+        let all = by_case.into_iter().map(|(_, groups)| self.comparison(groups));
+        all.filter(|comparison| comparison.programs.len() > 1).collect()
+    }
+
+    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Comparison<'a> {
+        let (case, layer_cells_min) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
+        let mut programs = by_key(groups, |g| g.setup.engine.as_str());
+        programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
+        let left_out = self.left_out.iter().filter(|left| {
+            let s = &left.setup;
+            (&s.case, s.layer_cells_min) == (case, layer_cells_min) && is_on_one_core(s)
+        });
+        let left_out = left_out.map(|left| {
+            let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
+            let what = if is_repeated { "A run is missing" } else { "No mesh" };
+            format!("{what} at spacing {:.2e}: {}", left.setup.spacing_min, left.why)
+        });
+        let lacks = programs.iter().filter_map(|(name, _)| {
+            let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
+            Some(format!("{name} does not provide: {}", lacks.join(", ")))
+        });
+        let notes = left_out.chain(lacks).collect();
+        Comparison { case, layer_cells_min, programs, notes }
+    }
 }
 
 #[cfg(test)]

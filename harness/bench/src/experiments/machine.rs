@@ -1,7 +1,7 @@
 //! The description of the machine that runs the measurements.
 
 use super::entry::Machine;
-use crate::git;
+use crate::{git, printed};
 use contract::digest::mix;
 use std::fmt;
 use std::fs;
@@ -18,7 +18,8 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
             .map_or_else(|_| std::env::consts::OS.to_owned(), |r| format!("Linux {}", r.trim())),
         mpi: first_line(Command::new(mpirun).arg("--version")),
         compiler: first_line(Command::new("rustc").arg("--version")),
-        commit: commit(place),
+        commit: git(place, &["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
+            .unwrap_or_default(),
     }
 }
 
@@ -64,18 +65,13 @@ pub fn load_average() -> f64 {
 
 fn cpu(cpuinfo: &str) -> String {
     let value = |key: &str| {
-        let line =
-            cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|k| k.trim() == key))?;
-        Some(line.split_once(':')?.1.trim().to_owned())
+        let mut pairs = cpuinfo.lines().filter_map(|line| line.split_once(':'));
+        pairs.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim())
     };
     // A virtual machine may hide the name; family and model still identify the generation.
-    let number = |key| value(key).unwrap_or_else(|| "?".into());
-    match value("model name") {
-        Some(name) if !name.eq_ignore_ascii_case("unknown") => {
-            format!("{name} (family {}, model {})", number("cpu family"), number("model"))
-        }
-        _ => format!("unnamed (family {}, model {})", number("cpu family"), number("model")),
-    }
+    let name = value("model name").filter(|name| !name.eq_ignore_ascii_case("unknown"));
+    let [family, model] = ["cpu family", "model"].map(|key| value(key).unwrap_or("?"));
+    format!("{} (family {family}, model {model})", name.unwrap_or("unnamed"))
 }
 
 fn memory_bytes(meminfo: &str) -> u64 {
@@ -84,20 +80,10 @@ fn memory_bytes(meminfo: &str) -> u64 {
     kib.unwrap_or(0) * 1024
 }
 
-fn commit(place: &Path) -> String {
-    let Some(commit) = git(place, &["rev-parse", "--short=12", "HEAD"]) else {
-        return String::new();
-    };
-    let changes = git(place, &["status", "--porcelain", "--untracked-files=no"]);
-    let is_clean = changes.is_some_and(|changes| changes.is_empty());
-    format!("{commit}{}", if is_clean { "" } else { "-dirty" })
-}
-
 /// Returns the first line that a command prints; empty if it fails.
 fn first_line(command: &mut Command) -> String {
-    let output = command.output().ok().filter(|output| output.status.success());
-    let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
-    text.unwrap_or_default().lines().next().unwrap_or_default().trim().to_owned()
+    let text = printed(command).unwrap_or_default();
+    text.lines().next().unwrap_or_default().trim().to_owned()
 }
 
 #[cfg(test)]

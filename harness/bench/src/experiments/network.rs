@@ -1,9 +1,16 @@
 //! Latency and bandwidth of messages: measured by a ping-pong through the launcher, or given.
 
 use super::entry::Network;
+use super::execute::Runner;
 use contract::number::number;
+use run::engine::process::{self, Watch};
 use serde::Deserialize;
 use std::fmt;
+use std::fs;
+use std::time::Duration;
+
+/// Time after which the ping-pong is killed.
+const PING_PONG_LIMIT: Duration = Duration::from_secs(120);
 
 /// The default: a current cluster interconnect.
 pub const ASSUMED: Network =
@@ -22,41 +29,49 @@ impl fmt::Display for Network {
     }
 }
 
-/// The output of the program `pingpong`.
-#[derive(Debug, Deserialize)]
-struct PingPong {
-    /// `octree-pingpong/1`.
-    schema: String,
-    /// Message sizes with their median one-way times.
-    points: Vec<Ping>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Ping {
-    bytes: f64,
-    time_s: f64,
+/// Measures the network by ping-pongs on two ranks. Each may be disturbed, and all projections depend on the result: of three, that of
+/// median latency counts.
+///
+/// # Errors
+/// One sentence, if the ping-pong is missing or fails.
+pub fn measured(runner: &Runner) -> Result<Network, String> {
+    let program = runner.programs.mesher.program().with_file_name("pingpong");
+    if !program.is_file() {
+        let program = program.display();
+        return Err(format!("{program} is missing: build the mesher with --features mpi"));
+    }
+    let one = |_| {
+        let watch = Watch::new("pingpong", PING_PONG_LIMIT, runner.place);
+        let finished = process::run(&mut runner.launcher.command(2, &program), &watch);
+        let printed = finished.map_err(|failure| failure.to_string())?.stdout;
+        parse(&fs::read_to_string(printed).map_err(|error| error.to_string())?)
+    };
+    let mut three = (0..3).map(one).collect::<Result<Vec<Network>, String>>()?;
+    three.sort_by(|a, b| a.latency_s.total_cmp(&b.latency_s));
+    Ok(three[1])
 }
 
 /// Parses the output of `pingpong`: latency from the smallest message, bandwidth from the largest.
-///
-/// # Errors
-/// One sentence, if the output is malformed or the times do not grow.
-pub fn parse(text: &str) -> Result<Network, String> {
-    let result: PingPong = serde_json::from_str(text)
-        .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
-    if result.schema != "octree-pingpong/1" {
-        return Err(format!("the ping-pong's schema is {}", result.schema));
+fn parse(text: &str) -> Result<Network, String> {
+    /// Message sizes with their median one-way times.
+    #[derive(Deserialize)]
+    struct PingPong {
+        points: Vec<Ping>,
     }
-    let smallest = result.points.iter().min_by(|a, b| a.bytes.total_cmp(&b.bytes));
-    let largest = result.points.iter().max_by(|a, b| a.bytes.total_cmp(&b.bytes));
-    match (smallest, largest) {
-        (Some(s), Some(l)) if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => {
-            Ok(Network {
-                latency_s: s.time_s,
-                bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
-                measured: true,
-            })
-        }
+    #[derive(Deserialize)]
+    struct Ping {
+        bytes: f64,
+        time_s: f64,
+    }
+    let PingPong { mut points } = serde_json::from_str(text)
+        .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
+    points.sort_by(|a, b| a.bytes.total_cmp(&b.bytes));
+    match &points[..] {
+        [s, .., l] if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => Ok(Network {
+            latency_s: s.time_s,
+            bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
+            measured: true,
+        }),
         _ => Err("the ping-pong's times do not grow with the messages".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! Efficiencies as the POP centre of excellence defines them, measured or projected.
+//! Efficiencies as the POP centre of excellence defines them, measured or projected, and the cause of the largest loss.
 //!
 //! With `u[p][r]` the useful time (CPU outside calls to other ranks) of rank r in phase p and T the time
 //! that the run took:
@@ -33,8 +33,6 @@ pub struct Efficiency {
     pub transfer: f64,
     /// Useful work per cell of the reference run over that of this one.
     pub computation_scaling: f64,
-    /// T.
-    pub time_s: f64,
 }
 
 /// A factor of efficiency, or a product of factors.
@@ -80,7 +78,7 @@ const SHOWN_AS_ONE: f64 = 1.0005;
 const ROUNDING_S: f64 = 1e-6;
 
 /// Returns the modelled time of a phase's messages on one rank, in seconds.
-pub fn messages_s(phase: &Phase, network: &Network) -> f64 {
+fn messages_s(phase: &Phase, network: &Network) -> f64 {
     phase.messages.max * network.latency_s + phase.message_bytes.max / network.bandwidth_bytes_per_s
 }
 
@@ -90,11 +88,6 @@ pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
         Comm::Sim => phase.useful_s.max + messages_s(phase, network),
         Comm::Mpi | Comm::Solo => phase.wall_s.max,
     }
-}
-
-/// Returns the projected time in seconds: every phase takes as long as its slowest rank, plus the modelled messages.
-fn projected_s(run: &Run, network: &Network) -> f64 {
-    run.phases.iter().map(|p| p.useful_s.max + messages_s(p, network)).sum()
 }
 
 /// Returns the critical path on an ideal network, in seconds. A program that reports no phases has a single one.
@@ -108,7 +101,7 @@ fn path_s(run: &Run) -> f64 {
 /// Returns the time of a run in seconds: measured, or projected for simulated ranks.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
     match run.setup.comm {
-        Comm::Sim => projected_s(run, network),
+        Comm::Sim => run.phases.iter().map(|phase| phase_s(run, phase, network)).sum(),
         Comm::Mpi | Comm::Solo => run.time_wall_s,
     }
 }
@@ -116,35 +109,16 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
     let (time_s, path_s) = (time_s(run, network), path_s(run));
-    let before = per_cell(&reference.useful_s, reference);
-    factors(run, &run.useful_s, path_s, time_s, before)
-}
-
-/// Returns the efficiencies of one phase relative to the same phase of the reference run, if it exists.
-pub fn phase_efficiency(
-    run: &Run,
-    phase: &Phase,
-    reference: &Run,
-    network: &Network,
-) -> Efficiency {
-    let time_s = phase_s(run, phase, network);
-    let before = reference.phases.iter().find(|p| p.name == phase.name);
-    let before = before.map_or(0.0, |p| per_cell(&p.useful_s, reference));
-    factors(run, &phase.useful_s, phase.useful_s.max, time_s, before)
-}
-
-/// Returns the factors of a time in which the ranks work so long, along a path, with the work per cell of the reference.
-fn factors(run: &Run, useful_s: &Spread, path_s: f64, time_s: f64, before: f64) -> Efficiency {
+    let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {
-        load_balance: 1.0 / useful_s.lambda(run.setup.ranks),
-        serialisation: ratio(useful_s.max, path_s),
+        load_balance: 1.0 / run.useful_s.lambda(run.setup.ranks),
+        serialisation: ratio(run.useful_s.max, path_s),
         transfer: ratio(path_s, time_s),
-        computation_scaling: ratio(before, per_cell(useful_s, run)),
-        time_s,
+        computation_scaling: ratio(before, now),
     };
     // A sum of stored times has the errors of all.
     let off = |of_s: f64| 1e-9 + ROUNDING_S * (run.phases.len() + 1) as f64 / of_s.max(ROUNDING_S);
-    efficiency.check_invariants([useful_s.max, path_s].map(off));
+    efficiency.check_invariants([run.useful_s.max, path_s].map(off));
     Efficiency { load_balance: efficiency.load_balance.min(1.0), ..efficiency }
 }
 
@@ -186,6 +160,60 @@ fn ratio(a: f64, b: f64) -> f64 {
     if b > 0.0 { a / b } else { 1.0 }
 }
 
+/// Losses below this fraction are not explained.
+const LOSS_MIN: f64 = 0.03;
+
+/// What a phase contributes to a loss.
+type Weight<'a> = &'a dyn Fn(&Phase) -> f64;
+
+/// Returns the sentence for a run relative to its reference run, with the reason for an efficiency above 1.
+pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
+    let e = efficiency(run, reference, network);
+    let (ranks, global) = (run.setup.ranks, 100.0 * e.global());
+    let uneven = |phase: &Phase| phase.useful_s.max - phase.useful_s.sum / ranks as f64;
+    let idle = |phase: &Phase| match run.setup.comm {
+        Comm::Sim => messages_s(phase, network),
+        Comm::Mpi | Comm::Solo => phase.wall_s.max - phase.useful_s.max,
+    };
+    let more = |phase: &Phase| {
+        let before = reference.phases.iter().find(|before| before.name == phase.name);
+        per_cell(&phase.useful_s, run)
+            - before.map_or(0.0, |before| per_cell(&before.useful_s, reference))
+    };
+    let losses: [(f64, &str, Weight); 4] = [
+        (e.load_balance, "the work of the ranks is uneven", &uneven),
+        (e.serialisation, "work is balanced in total but not within phases", &uneven),
+        (e.transfer, "messages take time, or no rank computes", &idle),
+        (e.computation_scaling, "the ranks together compute more than the base case", &more),
+    ];
+    let worst = losses.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (factor, loss, weight) = worst.expect("four losses are compared");
+    let phase = run.phases.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let why = match phase {
+        _ if factor > 1.0 - LOSS_MIN => "no single cause costs more than 3 %".to_owned(),
+        None => "the program reports no phases".to_owned(),
+        Some(Phase { name, useful_s, .. }) => {
+            let (percent, lambda) = (100.0 * (1.0 - factor), useful_s.lambda(ranks));
+            let rank = useful_s.at;
+            let part = heaviest_base_leaf(run).filter(|leaf| leaf * ranks as f64 > 1.0);
+            let leaf = part.map_or(String::new(), |leaf| {
+                format!("; a single base leaf holds {:.1} % of the cells", 100.0 * leaf)
+            });
+            format!(
+                "{loss} ({percent:.0} %), mostly in `{name}`, where rank {rank} is slowest (lambda {lambda:.2}){leaf}"
+            )
+        }
+    };
+    let above = above_one(&[e]).map_or(String::new(), |reason| format!(". {reason}"));
+    format!("{global:.0} % at {ranks} ranks: {why}{above}")
+}
+
+/// Returns the fraction of all cells in the largest base leaf, if the program reports it.
+pub fn heaviest_base_leaf(run: &Run) -> Option<f64> {
+    let heaviest = run.counters.get("base_leaf_cells_max")?.max;
+    (run.cells > 0).then(|| heaviest / run.cells as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,7 +243,7 @@ mod tests {
         two.phases[1].messages = Spread::of(&[2.0, 0.0]);
         two.phases[1].message_bytes = Spread::of(&[0.0, 3.0]);
         let slow = Network { latency_s: 0.5, bandwidth_bytes_per_s: 1.0, measured: false };
-        close(projected_s(&two, &slow), 6.0 + 1.0 + 3.0);
+        close(time_s(&two, &slow), 6.0 + 1.0 + 3.0);
         close(efficiency(&two, &one, &slow).transfer, 0.6);
     }
 
@@ -295,9 +323,31 @@ mod tests {
         let mut two = run(Comm::Mpi, 100, &[("a", &[3.0, 1.0])]);
         two.time_wall_s = 5.0;
         let e = efficiency(&two, &two.clone(), &FREE);
-        close(e.time_s, 5.0);
         close(e.parallel(), 2.0 / 5.0);
-        let phase = phase_efficiency(&two, &two.phases[0], &two, &FREE);
-        close(phase.load_balance, 2.0 / 3.0);
+    }
+
+    #[test]
+    fn the_largest_loss_is_named() {
+        let one = run(Comm::Sim, 100, &[("read", &[0.1]), ("grade", &[4.0])]);
+        let mut two = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[3.0, 1.0])]);
+        let text = cause(&two, &one, &FREE);
+        assert!(
+            text.starts_with("67 % at 2 ranks: the work of the ranks is uneven (33 %), mostly in `grade`, where rank 0"),
+            "{text}"
+        );
+        two.counters.insert("base_leaf_cells_max".into(), Spread::of(&[70.0, 10.0]));
+        assert!(cause(&two, &one, &FREE).contains("a single base leaf holds 70.0 %"));
+
+        let mut fine = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[2.0, 2.0])]);
+        assert!(cause(&fine, &one, &FREE).contains("no single cause"));
+        fine.phases[1].messages = Spread::of(&[10.0, 10.0]);
+        let slow = Network { latency_s: 0.1, bandwidth_bytes_per_s: 1e9, measured: false };
+        assert!(cause(&fine, &one, &slow).contains("messages take time"));
+
+        let redundant = run(Comm::Sim, 100, &[("read", &[2.05, 2.05]), ("grade", &[2.0, 2.0])]);
+        assert!(cause(&redundant, &one, &FREE).contains("mostly in `read`"));
+
+        let crossed = run(Comm::Sim, 100, &[("read", &[0.05, 2.0]), ("grade", &[2.0, 0.05])]);
+        assert!(cause(&crossed, &one, &FREE).contains("not within phases"));
     }
 }

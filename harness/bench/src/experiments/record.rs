@@ -2,38 +2,15 @@
 
 use super::entry::{Entry, Line, SCHEMA};
 use crate::jsonl;
-use contract::files::named;
 use jiff::Timestamp;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The record of a session.
-#[derive(Debug)]
-pub struct Record {
-    path: PathBuf,
-    session: String,
-}
-
-impl Record {
-    /// The record of a new session.
-    pub fn new(path: &Path) -> Self {
-        let session = format!("{}-{}", now_utc(), std::process::id());
-        Self { path: path.to_owned(), session }
-    }
-
-    /// Appends a line, and returns it.
-    ///
-    /// # Errors
-    /// If the line could not be written completely.
-    pub fn append(&self, entry: Entry) -> io::Result<Line> {
-        let line = Line {
-            schema: SCHEMA.to_owned(),
-            session: self.session.clone(),
-            time_utc: now_utc(),
-            entry,
-        };
-        let appended = jsonl::append(&self.path, &line);
-        appended.map(|()| line).map_err(|error| named(&self.path, &error))
+impl Line {
+    /// A line of a session, as of now.
+    pub fn new(session: &str, entry: Entry) -> Self {
+        let (schema, session) = (SCHEMA.to_owned(), session.to_owned());
+        Self { schema, session, time_utc: now_utc(), entry }
     }
 }
 
@@ -74,43 +51,21 @@ mod tests {
         Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
     }
 
-    #[test]
-    fn concurrent_writers_do_not_interleave() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("deeper/record.jsonl");
-        std::thread::scope(|scope| {
-            for writer in 0..4 {
-                let path = &path;
-                scope.spawn(move || {
-                    let record = Record::new(path);
-                    (0..50).for_each(|i| {
-                        _ = record.append(network(f64::from(writer * 50 + i))).unwrap()
-                    });
-                });
-            }
-        });
-        let (lines, broken) = read(&path).unwrap();
-        assert!(broken.is_empty(), "{broken:?}");
-        let mut seen: Vec<u64> = Vec::new();
-        for line in lines {
-            let Entry::Network(n) = line.entry else { panic!() };
-            seen.push(n.latency_s as u64);
-        }
-        seen.sort_unstable();
-        assert_eq!(seen, (0..200).collect::<Vec<u64>>());
+    fn append(path: &Path, latency_s: f64) {
+        jsonl::append(path, &Line::new("s", network(latency_s))).unwrap();
     }
 
     #[test]
     fn an_interrupted_line_does_not_damage_others() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
-        Record::new(&path).append(network(1.0)).unwrap();
+        append(&path, 1.0);
         let mut text = std::fs::read_to_string(&path).unwrap();
         text.push_str(&text.clone()[..20]);
         std::fs::write(&path, &text).unwrap();
         let (lines, broken) = read(&path).unwrap();
         assert_eq!((lines.len(), broken.len(), broken[0].0), (1, 1, 2));
-        Record::new(&path).append(network(2.0)).unwrap();
+        append(&path, 2.0);
         let (lines, broken) = read(&path).unwrap();
         assert_eq!((lines.len(), broken.len()), (2, 0));
     }
@@ -119,7 +74,7 @@ mod tests {
     fn a_line_of_another_schema_is_reported() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("record.jsonl");
-        Record::new(&path).append(network(1.0)).unwrap();
+        append(&path, 1.0);
         let text = std::fs::read_to_string(&path).unwrap().replace("bench/1", "bench/9");
         std::fs::write(&path, text).unwrap();
         assert!(read(&path).unwrap().1[0].1.contains("octree-bench/9"));

@@ -60,12 +60,6 @@ pub enum LayerName {
     Time,
 }
 
-impl LayerName {
-    /// All layers.
-    pub const ALL: [Self; 5] =
-        [Self::Correctness, Self::Counters, Self::Memory, Self::Instructions, Self::Time];
-}
-
 impl fmt::Display for LayerName {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.pad(&crate::name_of(self))
@@ -136,14 +130,5 @@ impl Measures {
             true => Ok(measures),
             false => Err(format!("schema {:?}, not {SCHEMA:?}", measures.schema)),
         }
-    }
-
-    /// Returns the measures as JSON.
-    pub fn json(&self) -> String {
-        // Strings and whole numbers only.
-        let mut text =
-            serde_json::to_string_pretty(self).expect("measures are representable in JSON");
-        text.push('\n');
-        text
     }
 }

@@ -7,7 +7,6 @@
 //!
 //! Invariant: times of different sessions are never compared.
 
-mod build;
 mod correctness;
 pub mod measures;
 pub mod numbers;
@@ -17,9 +16,8 @@ mod subject;
 pub mod time;
 
 use crate::experiments::machine;
-use build::top_level;
-use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use contract::failure::Failure;
 use measures::{CaseMeasures, LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
@@ -30,11 +28,9 @@ use run::engine::interrupt;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
-use std::cell::RefCell;
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use subject::Subject;
+use subject::{Subject, top_level};
 
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
@@ -72,11 +68,6 @@ pub struct GateOptions {
 }
 
 impl GateOptions {
-    /// Where revisions are built and kept.
-    fn cache(&self) -> PathBuf {
-        self.repository.join("target/gate")
-    }
-
     /// Time limit of every single run.
     fn limit(&self) -> Duration {
         Duration::from_secs(self.timeout)
@@ -94,13 +85,11 @@ struct Bench<'a> {
     rules: &'a Rules,
     cases: Vec<Selected>,
     programs: &'a Programs,
-    candidate: Engine,
+    candidate: Subject,
     /// What the candidate is compared with; `None` if it is only measured.
     baseline: Option<Subject>,
     /// Directory for the files of runs.
     place: &'a Path,
-    /// Counters and memory, of which each layer takes its own, by program and case.
-    counted: RefCell<HashMap<(PathBuf, String), Result<CaseMeasures, Ended>>>,
 }
 
 /// Runs all requested layers and returns the report.
@@ -112,16 +101,17 @@ pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Fa
     let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
     let rules = Rules::read(&rules)?;
     let cases = rules.select(&options.case, programs)?;
-    let baseline = Subject::baseline(options, &programs.engine)?;
-    let candidate = Subject::candidate(options, &programs.engine, baseline.as_ref())?;
+    let engine = &programs.engine;
+    let baseline = options.baseline.as_ref().map(|named| Subject::find(named, options, engine));
+    let baseline = baseline.transpose()?;
+    let candidate = Subject::candidate(options, engine, baseline.as_ref())?;
     let place = tempfile::Builder::new().prefix("harness-gate-").tempdir()?;
     let machine = machine::describe(&programs.paths.mpirun, &options.repository).label();
-    let measures = Measures { machine, ..Measures::of_program(candidate.measured) };
-    let mut report =
-        GateReport::new(baseline.as_ref().map(|subject| subject.measured.clone()), measures);
-    let (candidate, counted) = (candidate.engine, RefCell::default());
+    let measures = Measures { machine, ..Measures::of_program(candidate.measured.clone()) };
+    let of_baseline = baseline.as_ref().map(|subject| subject.measured.clone());
+    let mut report = GateReport::new(of_baseline, measures);
     let (rules, place) = (&rules, place.path());
-    let bench = Bench { options, rules, cases, programs, candidate, baseline, place, counted };
+    let bench = Bench { options, rules, cases, programs, candidate, baseline, place };
     report.require_layers = options.require_layers;
     run_layers(&bench, &mut report)?;
     report.interrupted = interrupt::requested();
@@ -136,7 +126,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
         true => bench.asked(*name).next().is_some(),
         false => bench.options.layers.contains(name),
     };
-    for name in LayerName::ALL.into_iter().filter(requested) {
+    for name in LayerName::value_variants().iter().copied().filter(requested) {
         if interrupt::requested() {
             break;
         }
@@ -151,14 +141,14 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
             _ => numbers::layer(bench, measures, &mut layer),
         }
         for case in bench.asked(name) {
-            let note = |metric, why: &str| {
-                GateFinding::noted(&case.rule.name, metric, Verdict::LeftOut, why)
-            };
-            layer.findings.extend(case.path.as_ref().err().map(|why| note("runs", why)));
+            let (unread, no_mpi) = (case.path.as_ref().err(), case.no_mpi.as_ref());
             let on_ranks =
-                name != LayerName::Instructions && case.path.is_ok() && layer.left_out.is_none();
-            let why = case.no_mpi.as_ref().filter(|_| on_ranks);
-            layer.findings.extend(why.map(|why| note("ranks on MPI", why)));
+                name != LayerName::Instructions && unread.is_none() && layer.left_out.is_none();
+            let notes = [("runs", unread), ("ranks on MPI", no_mpi.filter(|_| on_ranks))];
+            for (metric, why) in notes.into_iter().filter_map(|(of, why)| Some((of, why?))) {
+                let (case, left_out) = (&case.rule.name, Verdict::LeftOut);
+                layer.findings.push(GateFinding::noted(case, metric, left_out, why));
+            }
         }
         layer.time_s = start.elapsed().as_secs_f64();
         report.layers.push(layer);
@@ -181,20 +171,16 @@ impl Bench<'_> {
     /// Returns what a layer measures of a program on a case; counters and memory are of the same runs.
     fn measured(
         &self,
-        engine: &Engine,
+        subject: &Subject,
         case: &Selected,
         layer: LayerName,
     ) -> Result<CaseMeasures, Ended> {
         if layer == LayerName::Instructions {
-            return numbers::instructions(self, engine, case);
+            return numbers::instructions(self, &subject.engine, case);
         }
-        let key = (engine.program().to_owned(), case.rule.name.clone());
-        if let Some(known) = self.counted.borrow().get(&key) {
-            return known.clone();
-        }
-        let counted = numbers::count(self, engine, case);
-        self.counted.borrow_mut().insert(key, counted.clone());
-        counted
+        let mut counted = subject.counted.borrow_mut();
+        let count = || numbers::count(self, &subject.engine, case);
+        counted.entry(case.rule.name.clone()).or_insert_with(count).clone()
     }
 
     /// Creates an empty directory for one run of an engine.

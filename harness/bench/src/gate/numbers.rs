@@ -7,11 +7,13 @@ use super::report::{GateFinding, Layer, Verdict, change_percent};
 use super::rules::Selected;
 use check::promises::Independence;
 use run::engine::failure::Failure;
-use run::engine::layout::{Layout, Ranks, SERIAL};
-use run::engine::options::RunOptions;
+use run::engine::layout::{Layout, Ranks, RunOptions, SERIAL};
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use std::collections::BTreeSet;
+use std::fmt::Display;
+use std::fs;
+use std::io;
 use std::path::Path;
 use std::process::Command;
 
@@ -34,51 +36,38 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         return;
     }
     for case in bench.cases_of(name) {
-        let noted = |metric, verdict, why: String| {
-            GateFinding::noted(&case.rule.name, metric, verdict, why)
+        let noted = |metric: &str, verdict, why: String| {
+            vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
         };
         let baseline = bench.baseline.as_ref();
-        let old = baseline.map(|subject| bench.measured(&subject.engine, case, name));
-        match (bench.measured(&bench.candidate, case, name), old) {
-            (Err(why), _) if why.is_interrupt() => break,
-            (Err(why), old) => {
-                let (verdict, why) = without_result(old, name, &why);
-                layer.findings.push(noted("runs", verdict, why));
-            }
-            (Ok(new), old) => {
-                measures.case(&case.rule.name).add(new.clone());
-                match old {
-                    Some(Ok(old)) => layer.findings.extend(compare(bench, case, name, &old, &new)),
-                    Some(Err(why)) => {
-                        let why = format!("the baseline has no result: {why}");
-                        layer.findings.push(noted("baseline", Verdict::Missing, why));
-                    }
-                    None => {
-                        let compared = new.of_layer(name).len() as u64;
-                        let verdict =
-                            if compared == 0 { Verdict::Missing } else { Verdict::Measured };
-                        let note = format!("{compared} quantities");
-                        let finding = noted(&name.to_string(), verdict, note);
-                        layer.findings.push(GateFinding { compared, ..finding });
-                    }
-                }
-            }
+        let old = baseline.map(|subject| bench.measured(subject, case, name));
+        let new = bench.measured(&bench.candidate, case, name);
+        if new.as_ref().is_err_and(Failure::is_interrupt) {
+            break;
         }
-    }
-}
-
-/// The verdict on a candidate without a result, given what the baseline has.
-fn without_result(
-    old: Option<Result<CaseMeasures, Failure>>,
-    layer: LayerName,
-    why: &Failure,
-) -> (Verdict, String) {
-    match old {
-        None => (Verdict::Regression, why.to_string()),
-        Some(Ok(old)) if !old.of_layer(layer).is_empty() => {
-            (Verdict::Regression, format!("the candidate has no result: {why}"))
+        if let Ok(new) = &new {
+            measures.case(&case.rule.name).add(new.clone());
         }
-        _ => (Verdict::Missing, format!("neither program has a result: {why}")),
+        layer.findings.extend(match (old, new) {
+            (Some(Ok(old)), Ok(new)) => compare(bench, case, name, &old, &new),
+            (Some(Err(why)), Ok(_)) => {
+                noted("baseline", Verdict::Missing, format!("the baseline has no result: {why}"))
+            }
+            (Some(Ok(old)), Err(why)) if !old.of_layer(name).is_empty() => {
+                noted("runs", Verdict::Regression, format!("the candidate has no result: {why}"))
+            }
+            (Some(_), Err(why)) => {
+                noted("runs", Verdict::Missing, format!("neither program has a result: {why}"))
+            }
+            (None, Err(why)) => noted("runs", Verdict::Regression, why.to_string()),
+            (None, Ok(new)) => {
+                let compared = new.of_layer(name).len() as u64;
+                let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
+                let mut found = noted(&name.to_string(), verdict, format!("{compared} quantities"));
+                found[0].compared = compared;
+                found
+            }
+        });
     }
 }
 
@@ -99,24 +88,26 @@ fn compare(
     }
     let tolerance = |metric: &str| bench.rules.tolerance.of_metric(metric, layer);
     let numbers = [old.of_layer(layer), new.of_layer(layer)];
-    let mut findings = compared_numbers(name, layer, numbers, &tolerance);
-    if layer == LayerName::Counters && (old.digest.is_some() || new.digest.is_some()) {
-        findings.insert(0, same_mesh(name, &old.digest, &new.digest));
-    }
-    findings
+    let digests = [&old.digest, &new.digest];
+    let mesh = (layer == LayerName::Counters).then(|| same_mesh(name, digests)).flatten();
+    mesh.into_iter().chain(compared_numbers(name, layer, numbers, &tolerance)).collect()
 }
 
-/// A different digest means a different mesh; the layer of correctness decides whether it is correct.
-fn same_mesh(case: &str, old: &Option<String>, new: &Option<String>) -> GateFinding {
-    let (verdict, note) = match (old, new) {
-        (Some(old), Some(new)) if old == new => (Verdict::Unchanged, new.clone()),
-        (Some(old), Some(new)) => (Verdict::Changed, format!("different mesh: {new} was {old}")),
-        (Some(old), None) => {
-            (Verdict::Missing, format!("the candidate's run report has none; it was {old}"))
-        }
-        (None, new) => (Verdict::Changed, format!("new, {}", new.as_deref().unwrap_or_default())),
+/// A different digest means a different mesh; the layer of correctness decides whether it is correct. `None` if neither side has one.
+fn same_mesh(case: &str, digests: [&Option<String>; 2]) -> Option<GateFinding> {
+    let (verdict, note) = match digests {
+        [None, None] => return None,
+        [Some(old), Some(new)] if old == new => (Verdict::Unchanged, new.clone()),
+        [Some(old), Some(new)] => (Verdict::Changed, format!("different mesh: {new} was {old}")),
+        [Some(old), None] => (Verdict::Missing, gone(old)),
+        [None, Some(new)] => (Verdict::Changed, format!("new, {new}")),
     };
-    GateFinding::noted(case, "digest", verdict, note)
+    Some(GateFinding::noted(case, "digest", verdict, note))
+}
+
+/// What is said of a quantity that the candidate no longer has.
+fn gone(old: impl Display) -> String {
+    format!("the candidate does not report it; it was {old}")
 }
 
 /// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
@@ -131,11 +122,7 @@ fn compared_numbers(
     let mut counters = names.iter().filter(|name| **name != CELLS).peekable();
     let mut findings = Vec::new();
     if counters.peek().is_some() && !counters.any(|name| is_in_both(name)) {
-        let why = format!(
-            "no quantity but {CELLS} is in both: the baseline has {}, the candidate {}",
-            old.len(),
-            new.len()
-        );
+        let why = format!("no quantity but {CELLS} is in both programs' reports");
         findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
     }
     findings.extend(names.into_iter().map(|metric| {
@@ -145,9 +132,7 @@ fn compared_numbers(
                 let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
                 GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
             }
-            [Some(old), None] => {
-                noted(Verdict::Missing, format!("the candidate does not report it; it was {old}"))
-            }
+            [Some(old), None] => noted(Verdict::Missing, gone(old)),
             [None, new] => noted(Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),
         }
     }));
@@ -249,21 +234,26 @@ pub(super) fn instructions(
     let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place));
     // A program that fails without valgrind, too, states the cause.
     counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
-    let count = counted_by_all(&place).map_err(|why| engine.unusable(why))?;
-    Ok(CaseMeasures { counted: [(INSTRUCTIONS.to_owned(), count)].into(), ..Default::default() })
+    match counted_by_all(&place) {
+        Ok(0) => Err(engine.unusable("has no profile with costs by valgrind".to_owned())),
+        Ok(count) => Ok(CaseMeasures {
+            counted: [(INSTRUCTIONS.to_owned(), count)].into(),
+            ..CaseMeasures::default()
+        }),
+        Err(error) => Err(engine.unusable(format!("left no profile: {error}"))),
+    }
 }
 
 /// The instructions of all processes. One that was replaced by another program has none.
-fn counted_by_all(place: &Path) -> Result<u64, String> {
-    let wrong = |error: std::io::Error| format!("left no profile: {}: {error}", place.display());
+fn counted_by_all(place: &Path) -> io::Result<u64> {
     let mut sum = 0;
-    for entry in std::fs::read_dir(place).map_err(wrong)? {
-        let entry = entry.map_err(wrong)?;
+    for entry in fs::read_dir(place)? {
+        let entry = entry?;
         if entry.file_name().to_string_lossy().starts_with(PROFILE) {
-            sum += instructions_in(&std::fs::read_to_string(entry.path()).map_err(wrong)?);
+            sum += instructions_in(&fs::read_to_string(entry.path())?);
         }
     }
-    if sum == 0 { Err("has no profile with costs by valgrind".into()) } else { Ok(sum) }
+    Ok(sum)
 }
 
 /// The total of a profile of callgrind, in its last line.

@@ -18,10 +18,11 @@ use std::num::NonZeroU64;
 pub const SCHEMA: &str = "octree-gate/1";
 
 /// The assessment of a finding, best first after those without a comparison.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Not examined, because a prerequisite is missing, for the reason in the note.
+    #[default]
     LeftOut,
     /// Measured, and nothing was given to compare with.
     Measured,
@@ -46,7 +47,7 @@ impl fmt::Display for Verdict {
 }
 
 /// One metric of one case.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct GateFinding {
     /// The case.
     pub case: String,
@@ -69,16 +70,8 @@ pub struct GateFinding {
 impl GateFinding {
     /// Returns a finding without numbers, which compared nothing.
     pub fn noted(case: &str, metric: &str, verdict: Verdict, note: impl Into<String>) -> Self {
-        Self {
-            case: case.to_owned(),
-            metric: metric.to_owned(),
-            verdict,
-            compared: 0,
-            baseline: None,
-            candidate: None,
-            change_percent: None,
-            note: note.into(),
-        }
+        let (case, metric, note) = (case.to_owned(), metric.to_owned(), note.into());
+        Self { case, metric, verdict, note, ..Self::default() }
     }
 
     /// Returns a finding about two values.
@@ -120,7 +113,7 @@ impl GateFinding {
 pub(super) const CHECKS: &str = "checks";
 
 /// Returns the change in percent; `None` of a baseline of 0.
-pub(super) fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
+pub(crate) fn change_percent(baseline: f64, candidate: f64) -> Option<f64> {
     match (baseline == candidate, baseline == 0.0) {
         (true, _) => Some(0.0),
         (_, true) => None,
@@ -170,7 +163,7 @@ pub enum End {
 }
 
 /// The whole comparison.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct GateReport {
     /// [`SCHEMA`].
     pub schema: String,
@@ -200,11 +193,8 @@ impl GateReport {
             program: format!("harness {}", env!("CARGO_PKG_VERSION")),
             baseline,
             candidate: candidate_measures.of.clone(),
-            layers: Vec::new(),
-            require_layers: false,
             candidate_measures,
-            interrupted: false,
-            time_s: 0.0,
+            ..Self::default()
         }
     }
 
@@ -216,39 +206,40 @@ impl GateReport {
         if self.layers.iter().any(|layer| layer.verdict() == Verdict::Regression) {
             return End::Regression;
         }
-        let mut total = 0;
-        for layer in &self.layers {
-            for case in &layer.cases {
-                let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
-                let compared: u64 = of_case().map(|finding| finding.compared).sum();
-                total += compared;
-                let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
-                let is_excused = layer.left_out.is_some()
-                    || of_case().next().is_some() && of_case().all(is_left_out);
-                if compared == 0 && (self.require_layers || !is_excused) {
-                    let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
-                    let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));
-                    let why = why.map_or("it has no quantity", String::as_str);
-                    let name = layer.name;
-                    return End::Incomplete(format!(
-                        "{name} of {case}: nothing was compared: {why}"
-                    ));
-                }
-            }
-            let is_missing = |f: &&GateFinding| {
-                f.verdict == Verdict::Missing
-                    || self.require_layers && f.verdict == Verdict::LeftOut
-            };
-            let mut missing = layer.findings.iter().filter(is_missing);
-            if let Some(GateFinding { case, metric, note, .. }) = missing.next() {
-                return End::Incomplete(format!("{} of {case}: {metric}: {note}", layer.name));
-            }
-            if layer.cases.is_empty() {
-                return End::Incomplete(format!("the rules have no case for {}", layer.name));
+        let unmet = self.layers.iter().find_map(|layer| self.unmet(layer));
+        let findings = self.layers.iter().flat_map(|layer| &layer.findings);
+        let total = findings.map(|finding| finding.compared).sum();
+        match (unmet, NonZeroU64::new(total)) {
+            (Some(why), _) => End::Incomplete(why),
+            (None, None) => End::Incomplete("nothing was compared".to_owned()),
+            (None, Some(total)) => End::Holds(total),
+        }
+    }
+
+    /// Returns what a layer was asked for and did not compare, and why.
+    fn unmet(&self, layer: &Layer) -> Option<String> {
+        let name = layer.name;
+        for case in &layer.cases {
+            let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
+            let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
+            let is_excused = layer.left_out.is_some()
+                || of_case().next().is_some() && of_case().all(is_left_out);
+            let is_compared = of_case().any(|finding| finding.compared > 0);
+            if !is_compared && (self.require_layers || !is_excused) {
+                let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
+                let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));
+                let why = why.map_or("it has no quantity", String::as_str);
+                return Some(format!("{name} of {case}: nothing was compared: {why}"));
             }
         }
-        let none = || End::Incomplete("nothing was compared".to_owned());
-        NonZeroU64::new(total).map_or_else(none, End::Holds)
+        let is_missing = |f: &&GateFinding| {
+            f.verdict == Verdict::Missing || self.require_layers && f.verdict == Verdict::LeftOut
+        };
+        if let Some(GateFinding { case, metric, note, .. }) = layer.findings.iter().find(is_missing)
+        {
+            return Some(format!("{name} of {case}: {metric}: {note}"));
+        }
+        layer.cases.is_empty().then(|| format!("the rules have no case for {name}"))
     }
 
     /// Executes the invariants at the head of this file.
@@ -267,4 +258,117 @@ impl GateReport {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn report(layers: Vec<Layer>) -> GateReport {
+        GateReport { layers, ..GateReport::new(None, Measures::default()) }
+    }
+
+    fn layer(findings: &[GateFinding]) -> Layer {
+        let cases = vec!["a".to_owned(), "b".to_owned()];
+        Layer { findings: findings.to_vec(), ..Layer::new(LayerName::Counters, cases) }
+    }
+
+    fn equal(case: &str) -> GateFinding {
+        GateFinding::of_values(case, "rays", Verdict::Unchanged, [7.0, 7.0], String::new())
+    }
+
+    #[test]
+    fn a_gate_that_compared_nothing_of_a_case_does_not_hold() {
+        let both = layer(&[equal("a"), equal("b")]);
+        assert_eq!(report(vec![both.clone()]).end(), End::Holds(NonZeroU64::new(2).unwrap()));
+        let is_incomplete = |layers: Vec<Layer>| matches!(report(layers).end(), End::Incomplete(_));
+        assert!(is_incomplete(vec![]), "no layer");
+        assert!(is_incomplete(vec![Layer::new(LayerName::Time, vec![])]), "no case");
+        assert!(is_incomplete(vec![layer(&[equal("a")])]), "nothing of b");
+        let missing = GateFinding::noted("b", "rays", Verdict::Missing, "not in the record");
+        assert!(is_incomplete(vec![layer(&[equal("a"), missing.clone()])]), "nothing of b");
+        assert!(is_incomplete(vec![layer(&[equal("a"), equal("b"), missing])]), "one of two of b");
+        let new = GateFinding::noted("b", "rays", Verdict::Changed, "new");
+        assert!(is_incomplete(vec![layer(&[equal("a"), new])]), "no shared quantity of b");
+        let out = GateFinding::noted("b", "rays", Verdict::LeftOut, "no boxes");
+        let some = report(vec![layer(&[equal("a"), out.clone()])]);
+        assert!(matches!(some.end(), End::Holds(_)));
+        assert!(matches!(GateReport { require_layers: true, ..some }.end(), End::Incomplete(_)));
+        let all = GateFinding { case: "a".into(), ..out.clone() };
+        assert!(is_incomplete(vec![layer(&[all, out])]), "all left out");
+        let skipped = Layer { left_out: Some("no valgrind".into()), ..layer(&[]) };
+        assert!(is_incomplete(vec![skipped.clone()]), "the only layer is left out");
+        assert!(matches!(report(vec![both, skipped]).end(), End::Holds(_)));
+    }
+
+    proptest! {
+        /// Whatever the findings are: a gate that holds compared something of every case that has a finding other than left out.
+        #[test]
+        fn a_gate_holds_only_on_comparisons(drawn in prop::collection::vec((0..3usize, 0..8usize), 0..12)) {
+            use Verdict::*;
+            let verdicts = [LeftOut, Measured, Improvement, Unchanged, Changed, Inconclusive, Missing, Regression];
+            let finding = |&(case, verdict): &(usize, usize)| {
+                let name = ["a", "b", "c"][case];
+                let compared = u64::from(!matches!(verdicts[verdict], LeftOut | Missing));
+                GateFinding { compared, ..GateFinding::noted(name, "m", verdicts[verdict], "why") }
+            };
+            let findings: Vec<GateFinding> = drawn.iter().map(finding).collect();
+            let cases = ["a", "b", "c"].map(str::to_owned).to_vec();
+            let layer = Layer { findings: findings.clone(), ..Layer::new(LayerName::Memory, cases) };
+            if let End::Holds(total) = report(vec![layer]).end() {
+                prop_assert_eq!(total.get(), findings.iter().map(|f| f.compared).sum::<u64>());
+                for case in ["a", "b", "c"] {
+                    let of_case: Vec<_> = findings.iter().filter(|f| f.case == case).collect();
+                    prop_assert!(!of_case.is_empty());
+                    prop_assert!(of_case.iter().all(|f| !matches!(f.verdict, Missing | Regression)));
+                }
+            }
+        }
+    }
+
+    fn planted(fault: impl FnOnce(&mut GateFinding)) {
+        let mut wrong =
+            GateFinding::of_values("a", "rays", Verdict::Regression, [10.0, 12.0], String::new());
+        fault(&mut wrong);
+        report(vec![layer(&[wrong, equal("b")])]).check_invariants();
+    }
+
+    #[test]
+    #[should_panic(expected = "the change is that of the values")]
+    fn a_change_that_its_values_do_not_have_is_noticed() {
+        planted(|finding| finding.change_percent = Some(-1.0));
+    }
+
+    #[test]
+    #[should_panic(expected = "the verdict has the sign of the change")]
+    fn a_regression_towards_less_is_noticed() {
+        planted(|finding| finding.verdict = Verdict::Improvement);
+    }
+
+    #[test]
+    #[should_panic(expected = "nothing was compared")]
+    fn a_missing_quantity_that_counts_is_noticed() {
+        planted(|finding| {
+            *finding =
+                GateFinding { compared: 1, ..GateFinding::noted("a", "m", Verdict::Missing, "") }
+        });
+    }
+
+    #[test]
+    #[should_panic(expected = "has no finding")]
+    fn a_case_without_a_finding_is_noticed() {
+        report(vec![layer(&[equal("a")])]).check_invariants();
+    }
+
+    #[test]
+    fn a_record_and_a_report_read_back() {
+        let mut measures =
+            Measures::of_program(Measured { named: "m".into(), ..Measured::default() });
+        measures.case("cube").exact.insert("rays".into(), u64::MAX);
+        let json = serde_json::to_string(&measures).unwrap();
+        assert_eq!(Measures::parse(json.as_bytes()).unwrap(), measures);
+        let text = serde_json::to_vec(&GateReport::new(None, measures.clone())).unwrap();
+        assert_eq!(Measures::parse(&text).unwrap(), measures);
+        assert!(Measures::parse(b"{\"cells\": 1}").is_err());
+        let other = json.replace("measures/1", "measures/9");
+        assert!(Measures::parse(other.as_bytes()).unwrap_err().contains("measures/9"));
+    }
+}

@@ -4,7 +4,6 @@ use super::measures::LayerName;
 use crate::refuse;
 use contract::case::Case;
 use contract::failure::Failure;
-use run::engine::launcher::Launcher;
 use run::engine::layout::Ranks;
 use run::engine::programs::Programs;
 use serde::Deserialize;
@@ -147,21 +146,21 @@ impl Rules {
     /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
     fn check(&self) -> Result<(), String> {
         let TimeRules { alpha, effect_min, rounds_min: fewest, rounds_max, .. } = self.time;
-        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0;
-        let wrong = "alpha must be between 0 and 0.5, and effect_min at least 0";
-        refuse(&[(!is_level, wrong)])?;
+        if !(alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0) {
+            return Err("alpha must be between 0 and 0.5, and effect_min at least 0".to_owned());
+        }
         let least = rounds_min(alpha);
         let few = format!(
             "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
         );
+        let Tolerance { counters, instructions, memory, of } = &self.tolerance;
+        let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
+        let are_percentages = tolerances.all(|percent| (0.0..=1e6).contains(percent));
         refuse(&[
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
+            (!are_percentages, "a tolerance must be between 0 and 1000000 percent"),
         ])?;
-        let Tolerance { counters, instructions, memory, of } = &self.tolerance;
-        let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
-        let is_percentage = tolerances.all(|percent| (0.0..=1e6).contains(percent));
-        refuse(&[(!is_percentage, "a tolerance must be between 0 and 1000000 percent")])?;
         for (i, case) in self.cases.iter().enumerate() {
             let is_second = self.cases[..i].iter().any(|other| other.name == case.name);
             let has_one = case.ranks.iter().chain(&case.mpi).any(|ranks| *ranks < 2);
@@ -183,9 +182,7 @@ impl Rules {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
             let known = known.join(", ");
-            return Err(Failure::input(format!(
-                "no case {name} in the gate's rules, which have {known}"
-            )));
+            return Err(format!("no case {name} in the gate's rules, which have {known}").into());
         }
         let named = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
         self.cases.iter().filter(named).map(|rule| Self::find(rule, programs)).collect()
@@ -199,25 +196,17 @@ impl Rules {
                 (found.path.clone(), found.absent.clone())
             }
         };
-        let (engine, mpirun) = (programs.engine.description(), &programs.paths.mpirun);
+        let engine = programs.engine.description();
         // Only a geometry that has to be fetched may be missing.
         let path = match absent {
             Some(why) => Err(why),
             None => engine.declines(&Case::read(&path)?).map_or(Ok(path), Err),
         };
         let (mut simulated, mut mpi) = (rule.ranks.clone(), rule.mpi.clone());
-        if engine.run.simulated.is_none() {
+        if engine.run.simulated.is_empty() {
             mpi.extend(simulated.drain(..).filter(|ranks| !rule.mpi.contains(ranks)));
         }
-        let none = format!("the description of {} has no command for ranks on MPI", engine.name);
-        let possible = refuse(&[
-            (
-                !Launcher::mpirun(mpirun).is_found(),
-                "mpirun is not on the PATH (ci/setup installs it)",
-            ),
-            (engine.run.parallel.is_none(), &none),
-        ]);
-        let no_mpi = possible.err().filter(|_| !mpi.is_empty());
+        let no_mpi = if mpi.is_empty() { None } else { programs.engine.lacks_mpi() };
         if no_mpi.is_some() {
             mpi.clear();
         }
@@ -242,6 +231,7 @@ impl Tolerance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::ValueEnum;
 
     fn read(text: &str) -> Result<Rules, String> {
         let place = tempfile::tempdir().unwrap();
@@ -254,7 +244,8 @@ mod tests {
     fn the_rules_of_this_repository_are_valid() {
         let text = include_str!("../../../engines/gate.toml");
         let rules = read(text).unwrap();
-        assert!(LayerName::ALL.iter().all(|l| rules.cases.iter().any(|c| c.layers.contains(l))));
+        let all = LayerName::value_variants();
+        assert!(all.iter().all(|l| rules.cases.iter().any(|c| c.layers.contains(l))));
     }
 
     #[test]

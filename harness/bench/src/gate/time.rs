@@ -12,12 +12,11 @@ use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{Selected, TimeRules};
+use super::subject::Subject;
 use run::engine::failure::Failure;
-use run::engine::layout::{Layout, Ranks};
-use run::engine::options::RunOptions;
+use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
-use statistics::comparison::{Comparison, Round, compare, trimmed_mean};
-use statistics::false_discovery::adjusted;
+use statistics::comparison::{Comparison, Round, adjusted, compare, trimmed_mean};
 use statistics::random::Random;
 
 /// CPU time of the whole process.
@@ -44,13 +43,10 @@ struct Quantity {
 
 /// Compares the times of candidate and baseline.
 pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
-    match &bench.baseline {
-        Some(baseline) => compared(bench, &baseline.engine, layer),
-        None => layer.left_out = Some("no baseline was given".to_owned()),
-    }
-}
-
-fn compared(bench: &Bench, baseline: &Engine, layer: &mut Layer) {
+    let Some(Subject { engine: baseline, .. }) = &bench.baseline else {
+        layer.left_out = Some("no baseline was given".to_owned());
+        return;
+    };
     let rules = &bench.rules.time;
     let mut measured: Vec<(&Selected, Ranks, [Quantity; 2])> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
@@ -106,7 +102,7 @@ fn rounds(
     let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
     let run = |index: usize| {
         let (engine, verdict) = match index {
-            CANDIDATE => (&bench.candidate, Verdict::Regression),
+            CANDIDATE => (&bench.candidate.engine, Verdict::Regression),
             _ => (baseline, Verdict::Missing),
         };
         let place = bench.enter(engine, "time/run").map_err(|why| (verdict, why))?;
@@ -150,8 +146,7 @@ impl Quantity {
     /// Times of baseline and candidate, in seconds. That of the candidate follows from the effect: means of their own would
     /// discard other rounds at their ends than the mean of the differences does, and could have a ratio of the other sign.
     fn times(&self) -> [f64; 2] {
-        let baseline: Vec<f64> = self.rounds.iter().map(|r| (r[0] + r[1]) / 2.0).collect();
-        let baseline = trimmed_mean(&baseline).exp();
+        let baseline = trimmed_mean(self.rounds.iter().map(|r| (r[0] + r[1]) / 2.0)).exp();
         [baseline, baseline * (1.0 + self.found.effect)]
     }
 

@@ -52,12 +52,7 @@ impl Shrunk {
     fn check_invariants(&self, given: &Trial, first: &Fault, budget: &Budget) {
         assert!(self.fault.is_same_as(first), "{} in place of {first}", self.fault);
         assert!(self.trials <= budget.trials.max(1), "{} of {} trials", self.trials, budget.trials);
-        let measures = |trial: &Trial| {
-            let count =
-                |key| trial.case.table.get(key).and_then(|v| v.as_array()).map_or(0, Vec::len);
-            [trial.case.facets.len(), count("box"), count("seeds"), trial.ranks.count()]
-        };
-        let (reduced, before) = (measures(&self.trial), measures(given));
+        let (reduced, before) = (self.trial.counts(), given.counts());
         let smaller = reduced.iter().zip(before).all(|(reduced, before)| *reduced <= before);
         assert!(smaller, "facets, boxes, seeds, ranks: {reduced:?} reduced from {before:?}");
         assert_eq!(self.facets_before, before[0], "facets before");
@@ -71,8 +66,7 @@ impl Shrunk {
 pub fn fault(judged: &[Judged], check: Option<&str>) -> Result<Option<Fault>, Failure> {
     let mut of_name = judged.iter().filter(|one| check.is_none_or(|name| one.0 == name)).peekable();
     if let (Some(name), None) = (check, of_name.peek()) {
-        let ran: Vec<&str> = judged.iter().map(|one| one.0).collect();
-        let ran = ran.join(", ");
+        let ran = judged.iter().map(|one| one.0).collect::<Vec<_>>().join(", ");
         let why = format!("left out: the check {name} was not run; those that were: {ran}");
         return Err(Failure::missing(why));
     }
@@ -106,9 +100,7 @@ pub fn shrink(
         // A trial that cannot be run does not count as the same failure.
         same(trial).is_ok_and(|fault| fault.is_some())
     };
-    let trial = reduce::reduce(given.clone(), &mut fails, &mut |text| {
-        crate::announce(&format!("harness shrink: {text}"))
-    });
+    let trial = reduce::reduce(given.clone(), &mut fails);
     let minimal = !spent(trials);
     let fault = same(&trial)?.ok_or_else(|| {
         Failure::input("the failure does not repeat: it depends on more than the case")

@@ -8,14 +8,14 @@ use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
 use run::engine::failure::{self, End};
-use run::engine::layout::{Layout, Ranks};
-use run::engine::options::RunOptions;
+use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 use tempfile::TempDir;
+use toml::Value;
 
 /// A case and the ranks on which it is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,14 @@ pub struct Trial {
     pub case: PlainCase,
     /// The ranks.
     pub ranks: Ranks,
+}
+
+impl Trial {
+    /// Numbers of facets, boxes, seeds and ranks.
+    pub(super) fn counts(&self) -> [usize; 4] {
+        let list = |key| self.case.table.get(key).and_then(Value::as_array).map_or(0, Vec::len);
+        [self.case.facets.len(), list("box"), list("seeds"), self.ranks.count()]
+    }
 }
 
 /// How a case fails a check.
@@ -62,64 +70,59 @@ impl fmt::Display for Fault {
 pub struct Probe {
     engine: Engine,
     reference: Engine,
-    /// What must make the same mesh, and its name; `None` if only promises are checked.
-    truth: Option<(Engine, &'static str)>,
-    /// Whether runs on ranks are compared with serial ones.
-    on_ranks: bool,
     limit: Duration,
     place: TempDir,
 }
 
 impl Probe {
-    /// A serial engine is compared with the reference if it promises the definition, and its own promises are checked if
-    /// not. An engine on several ranks is compared with its own serial run: if both runs are wrong in the same way, the
-    /// serial case is the simpler one to shrink. Each run may take `limit`.
+    /// Each run may take `limit`.
     ///
     /// # Errors
     /// If no directory for runs can be created.
-    pub fn new(
-        engine: Engine,
-        reference: Engine,
-        ranks: Ranks,
-        limit: Duration,
-    ) -> Result<Self, Failure> {
+    pub fn new(engine: Engine, reference: Engine, limit: Duration) -> Result<Self, Failure> {
         let place = tempfile::Builder::new().prefix("harness-shrink-").tempdir()?;
-        let promises = &engine.description().promises;
-        let truth = match ranks {
-            Ranks::Serial => promises.definition.then(|| (reference.clone(), "the reference")),
-            _ => promises
-                .is_independent_of(Independence::Ranks)
-                .then(|| (engine.clone(), "its serial run")),
-        };
-        Ok(Self { engine, reference, truth, on_ranks: ranks != Ranks::Serial, limit, place })
+        Ok(Self { engine, reference, limit, place })
     }
 
-    /// The checks of a trial, in order. A case that both programs refuse fails none.
+    /// What must make the same mesh as the engine on these ranks, and its name; `None` if only promises are checked.
+    fn truth(&self, ranks: Ranks) -> Option<(&Engine, &'static str)> {
+        let promises = &self.engine.description().promises;
+        match ranks {
+            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
+            _ => promises
+                .is_independent_of(Independence::Ranks)
+                .then_some((&self.engine, "its serial run")),
+        }
+    }
+
+    /// The checks of a trial, in order. A serial engine is compared with the reference if it promises the definition, and its own
+    /// promises are checked if not. An engine on several ranks is compared with its own serial run: if both runs are wrong in the same
+    /// way, the serial case is the simpler one to shrink. A case that both programs refuse fails none.
     ///
     /// # Errors
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
     pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, Failure> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
-        let path = self.write(&trial.case)?;
+        let path = trial.case.write(self.place.path(), self.engine.description().takes.stl)?;
         let case = Case::read(&path)?;
         if let Some(why) = self.engine.description().declines(&case) {
             return Err(left_out(&why));
         }
-        let truth = self.truth.as_ref().map(|(engine, name)| {
-            let mesh = self.run(engine, &path, Ranks::Serial, "truth", false);
-            mesh.map_err(|why| {
-                let none = "no mesh to compare with, because";
-                Failure::input(format!("{none} {name} failed: {why}"))
-            })
-        });
-        let truth = truth.transpose()?;
+        let truth = match self.truth(trial.ranks) {
+            None => None,
+            Some((engine, name)) => {
+                let mesh = self.run(engine, &path, Ranks::Serial, "truth", false);
+                let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
+                Some(mesh.map_err(none)?)
+            }
+        };
         let mesh = match self.run(&self.engine, &path, trial.ranks, "engine", false) {
             Ok(mesh) => mesh,
             Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, trial.ranks)?))]),
         };
         let subject = Subject::new(&case, &mesh);
         let results = match truth {
-            Some(truth) if self.on_ranks => {
+            Some(truth) if trial.ranks != Ranks::Serial => {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
             Some(truth) => {
@@ -159,10 +162,6 @@ impl Probe {
             results.push(CheckResult { name: "deterministic", ..compared });
         }
         Ok(results)
-    }
-
-    fn write(&self, case: &PlainCase) -> Result<PathBuf, Failure> {
-        Ok(case.write(self.place.path(), self.engine.description().takes.stl)?)
     }
 
     /// Runs an engine and reads its mesh.

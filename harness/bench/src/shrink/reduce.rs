@@ -1,9 +1,10 @@
 //! Removes everything that a failure does not need.
 //!
-//! Depth is reduced first, as that makes later trials cheaper; then facets, by delta debugging: halves, quarters and so on are
-//! removed as long as the rest still fails.
+//! Depth is reduced first, as that makes later trials cheaper; then facets and other lists, by delta debugging: halves, quarters and so
+//! on are removed as long as the rest still fails.
 
 use super::probe::Trial;
+use crate::announce;
 use contract::case::Facet;
 use run::engine::layout::Ranks;
 use toml::Value;
@@ -12,7 +13,7 @@ use toml::Value;
 pub type Fails<'a> = &'a mut dyn FnMut(&Trial) -> bool;
 
 /// Returns the smallest trial reachable by steps that all fail.
-pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Trial {
+pub fn reduce(trial: Trial, fails: Fails) -> Trial {
     let mut smallest = trial;
     loop {
         let before = smallest.clone();
@@ -23,19 +24,19 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
             let simpler = with(&smallest, key, value);
             smallest = first(smallest, fails, [simpler]);
         }
-        let thinner = thinner(&smallest);
-        smallest = first(smallest, fails, thinner);
-        let fewer_ranks = fewer_ranks(&smallest);
-        smallest = first(smallest, fails, fewer_ranks);
+        for simpler in [thinner, fewer_ranks] {
+            let changed = simpler(&smallest);
+            smallest = first(smallest, fails, changed);
+        }
         // Seeds that remain stay where they are: a case in which one has come to lie in a crossing leaf is refused by every program and
         // does not fail.
         for list in ["box", "seeds"] {
-            smallest = shorten(smallest, fails, list);
+            smallest = entries(smallest, fails, list);
         }
         if smallest == before {
             return smallest;
         }
-        report(size(&smallest));
+        announce(&format!("harness shrink: {}", size(&smallest)));
     }
 }
 
@@ -43,9 +44,7 @@ pub fn reduce(trial: Trial, fails: Fails, report: &mut dyn FnMut(String)) -> Tri
 pub fn size(trial: &Trial) -> String {
     let number =
         |key: &str| trial.case.table.get(key).map_or("default".to_owned(), Value::to_string);
-    let count = |key: &str| trial.case.table.get(key).and_then(Value::as_array).map_or(0, Vec::len);
-    let (boxes, seeds) = (count("box"), count("seeds"));
-    let facets = trial.case.facets.len();
+    let [facets, boxes, seeds, _] = trial.counts();
     let (spacing, n) = (number("spacing_min"), number("layer_cells_min"));
     format!(
         "{facets} facets, spacing_min {spacing}, layer_cells_min {n}, {boxes} boxes, {seeds} seeds, {}",
@@ -103,16 +102,30 @@ fn number(value: &Value) -> Option<f64> {
     value.as_float().or(value.as_integer().map(|whole| whole as f64))
 }
 
-/// Delta debugging (Zeller's ddmin, complements only) over facets. At the end no single facet can be removed.
+/// Removes facets.
 fn facets(trial: Trial, fails: Fails) -> Trial {
-    let of = |facets: Vec<Facet>| {
+    let of = |facets: &[Facet]| {
         let mut smaller = trial.clone();
-        smaller.case.facets = facets;
+        smaller.case.facets = facets.to_vec();
         smaller
     };
-    let mut kept = trial.case.facets.clone();
-    if !kept.is_empty() && fails(&of(Vec::new())) {
-        return of(Vec::new());
+    of(&minimal(trial.case.facets.clone(), |facets| fails(&of(facets))))
+}
+
+/// Removes entries of a list of the case file.
+fn entries(trial: Trial, fails: Fails, key: &str) -> Trial {
+    let Some(list) = trial.case.table.get(key).and_then(Value::as_array) else { return trial };
+    let of = |list: &[Value]| {
+        with(&trial, key, Some(list).filter(|list| !list.is_empty()).map(|l| l.to_vec().into()))
+    };
+    of(&minimal(list.clone(), |list| fails(&of(list))))
+}
+
+/// Delta debugging (Zeller's ddmin, complements only). At the end no single item can be removed.
+fn minimal<T: Clone>(items: Vec<T>, mut fails: impl FnMut(&[T]) -> bool) -> Vec<T> {
+    let mut kept = items;
+    if !kept.is_empty() && fails(&[]) {
+        return Vec::new();
     }
     let mut chunk = kept.len().div_ceil(2);
     while chunk > 0 && kept.len() > 1 {
@@ -120,14 +133,14 @@ fn facets(trial: Trial, fails: Fails) -> Trial {
         while from < kept.len() {
             let until = (from + chunk).min(kept.len());
             let rest = [&kept[..from], &kept[until..]].concat();
-            match !rest.is_empty() && fails(&of(rest.clone())) {
+            match !rest.is_empty() && fails(&rest) {
                 true => kept = rest,
                 false => from = until,
             }
         }
         chunk = if chunk == 1 { 0 } else { chunk.div_ceil(2) };
     }
-    of(kept)
+    kept
 }
 
 /// Reduces the layer to the smallest n.
@@ -144,25 +157,6 @@ fn fewer_ranks(trial: &Trial) -> Vec<Trial> {
         Ranks::Simulated { seed, .. } => Ranks::Simulated { ranks, seed },
     };
     (2..trial.ranks.count()).map(|ranks| Trial { ranks: fewer(ranks), ..trial.clone() }).collect()
-}
-
-/// Removes as many entries of a list as possible.
-fn shorten(trial: Trial, fails: Fails, key: &str) -> Trial {
-    let none = with(&trial, key, None);
-    let mut smallest = first(trial, fails, [none]);
-    let mut at = 0;
-    while let Some(list) =
-        smallest.case.table.get(key).and_then(Value::as_array).filter(|list| at < list.len())
-    {
-        let mut rest = list.clone();
-        rest.remove(at);
-        let fewer = with(&smallest, key, Some(Value::Array(rest)));
-        match fails(&fewer) {
-            true => smallest = fewer,
-            false => at += 1,
-        }
-    }
-    smallest
 }
 
 #[cfg(test)]
@@ -216,7 +210,7 @@ mod tests {
                 && boxed
                 && count(trial, "layer_cells_min") >= 2
         };
-        let smallest = reduce(given(), &mut fails, &mut |_| ());
+        let smallest = reduce(given(), &mut fails);
         assert_eq!(smallest.case.facets, [facet(17.0), facet(80.0)]);
         assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 3, seed: 7 });
         let table = &smallest.case.table;
@@ -235,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_failure_independent_of_the_case_leaves_an_empty_one() {
-        let smallest = reduce(given(), &mut |_| true, &mut |_| ());
+        let smallest = reduce(given(), &mut |_| true);
         assert!(smallest.case.facets.is_empty() && smallest.case.table.get("box").is_none());
         assert_eq!(smallest.ranks, Ranks::Simulated { ranks: 2, seed: 7 });
     }

@@ -4,14 +4,22 @@
 //! has exactly the runs, the other run and the phase that its measure requires.
 
 use super::measure::{self, Input, Measure};
-use super::series::{CELLS, are_ranks, mesher, one};
-pub use super::series::{Experiment, Series};
 use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
 use crate::refuse;
-use serde::{Deserialize, Deserializer};
+use run::engine::description::{Description, is_own};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+
+/// Valid numbers of cells.
+const CELLS: RangeInclusive<f64> = 1e3..=1e12;
+const WRONG_CELLS: &str = "cells is from 1e3 to 1e12";
+/// Valid numbers of ranks.
+const RANKS: RangeInclusive<usize> = 1..=65_536;
 
 /// The [`Setup::experiment`] of runs for targets.
 pub const EXPERIMENT: &str = "targets";
@@ -75,8 +83,31 @@ pub struct RunSpec {
     pub repeats: usize,
 }
 
+impl RunSpec {
+    /// The run's parameters on a mesh with this spacing and n.
+    pub(super) fn setup(&self, spacing_min: f64, layer_cells_min: u32) -> Setup {
+        Setup {
+            experiment: EXPERIMENT.to_owned(),
+            ranks: self.ranks,
+            comm: self.comm,
+            partitioner: self.partitioner.clone(),
+            weights: self.weights.clone(),
+            level_base: self.level_base,
+            ..Setup::serial(&self.mesh, spacing_min, layer_cells_min)
+        }
+    }
+}
+
 fn mpi() -> Comm {
     Comm::Mpi
+}
+
+fn one() -> usize {
+    1
+}
+
+fn mesher() -> Vec<String> {
+    vec!["mesher".to_owned()]
 }
 
 /// A target.
@@ -100,6 +131,57 @@ pub struct Row {
     pub at_least: Option<f64>,
     /// Upper bound.
     pub at_most: Option<f64>,
+}
+
+/// A kind of experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Experiment {
+    /// The same mesh on increasingly many ranks.
+    Strong,
+    /// The same number of cells per rank on increasingly many ranks; the spacing is chosen accordingly.
+    Weak,
+    /// Spacings that differ by factors of two.
+    Spacing,
+    /// The same spacing with increasing minimum layer thickness n.
+    Layers,
+    /// Weights of base leaves and partitioners.
+    Weights,
+}
+
+impl fmt::Display for Experiment {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&crate::name_of(self))
+    }
+}
+
+/// A series of runs on one case.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Series {
+    /// The kind of experiment.
+    pub experiment: Experiment,
+    /// A name in geometries/catalogue.toml, or the path of a case file.
+    pub case: String,
+    /// Cells, each a series: of the mesh (strong, weights), per rank (weak), of the largest mesh (spacing), at the case's n (layers).
+    /// If empty, the case's own spacing.
+    #[serde(default)]
+    pub cells: Vec<f64>,
+    /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files.
+    #[serde(default = "mesher")]
+    pub engines: Vec<String>,
+    /// Values of n; if empty, that of the case.
+    #[serde(default)]
+    pub layers: Vec<u32>,
+    /// Numbers of simulated ranks.
+    #[serde(default)]
+    pub sim: Vec<usize>,
+    /// Numbers of ranks on MPI. Without any ranks, the program is run serially.
+    #[serde(default)]
+    pub mpi: Vec<usize>,
+    /// Number of repetitions, after a warm-up.
+    #[serde(default = "one")]
+    pub repeats: usize,
 }
 
 /// Reads a name or a list of names.
@@ -136,23 +218,22 @@ impl Study {
     /// # Errors
     /// If no row and no experiment has one of the names.
     pub fn only(&mut self, names: &[String]) -> Result<(), String> {
-        if names.is_empty() {
-            return Ok(());
-        }
+        // A row of several runs has the name of the run at its end.
         let is_row = |row: &Row, name: &String| {
-            // A row of several runs has the name of the run at its end.
             row.name == *name || row.name == format!("{name}: {}", row.run[0])
         };
         let is_series = |series: &Series, name: &String| series.experiment.to_string() == *name;
-        let is_known = |name: &&String| {
-            self.row.iter().any(|row| is_row(row, name))
-                || self.series.iter().any(|series| is_series(series, name))
-        };
-        if let Some(name) = names.iter().find(|name| !is_known(name)) {
-            return Err(format!("no row and no experiment is called {name:?}"));
+        for name in names {
+            let is_known = self.row.iter().any(|row| is_row(row, name))
+                || self.series.iter().any(|series| is_series(series, name));
+            if !is_known {
+                return Err(format!("no row and no experiment is called {name:?}"));
+            }
         }
-        self.row.retain(|row| names.iter().any(|name| is_row(row, name)));
-        self.series.retain(|series| names.iter().any(|name| is_series(series, name)));
+        if !names.is_empty() {
+            self.row.retain(|row| names.iter().any(|name| is_row(row, name)));
+            self.series.retain(|series| names.iter().any(|name| is_series(series, name)));
+        }
         Ok(())
     }
 
@@ -163,28 +244,22 @@ impl Study {
     }
 
     /// Returns the runs that a row needs: its own and the one with which it is compared.
-    pub fn runs_of<'a>(&self, row: &'a Row) -> Vec<&'a String> {
-        row.run.iter().chain(&row.against).collect()
+    pub fn runs_of<'a>(&self, row: &'a Row) -> impl Iterator<Item = &'a String> + use<'a> {
+        row.run.iter().chain(&row.against)
     }
 
     /// Whether a setup of a record is the run of this name.
     pub(super) fn is_run(&self, name: &str, setup: &Setup) -> bool {
         let Some(run) = self.run.get(name) else { return false };
-        let mesh = &self.mesh[&run.mesh];
-        setup.experiment == EXPERIMENT
-            && setup.case == run.mesh
-            && (setup.ranks, setup.comm) == (run.ranks, run.comm)
-            && (&setup.partitioner, &setup.weights) == (&run.partitioner, &run.weights)
-            && setup.level_base == run.level_base
-            && mesh.spacing_min.is_none_or(|s| s == setup.spacing_min)
-            && mesh.layer_cells_min.is_none_or(|n| n == setup.layer_cells_min)
+        let Mesh { spacing_min, layer_cells_min, .. } = self.mesh[&run.mesh];
+        let (spacing, n) = (setup.spacing_min, setup.layer_cells_min);
+        *setup == run.setup(spacing_min.unwrap_or(spacing), layer_cells_min.unwrap_or(n))
     }
 
     /// Whether runs on a case of this name are of the study.
     pub fn has_case(&self, name: &str) -> bool {
-        let is_of =
-            |series: &Series| Path::new(&series.case).file_stem().is_some_and(|s| s == name);
-        self.mesh.contains_key(name) || self.series.iter().any(is_of)
+        let mut series = self.series.iter();
+        self.mesh.contains_key(name) || series.any(|series| stem(&series.case) == name)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -192,18 +267,21 @@ impl Study {
             return Err("it has no [[series]] and no [[row]]".to_owned());
         }
         self.series.iter().try_for_each(Series::check)?;
-        let stem = |case: &str| Path::new(case).file_stem().map(|name| name.to_owned());
-        let cases: Vec<&String> = self.series.iter().map(|series| &series.case).collect();
-        for (i, case) in cases.iter().enumerate() {
-            if let Some(other) = cases[..i].iter().find(|of| of != &case && stem(of) == stem(case))
-            {
+        let mut cases = BTreeMap::new();
+        for Series { case, .. } in &self.series {
+            let other = cases.insert(stem(case), case).filter(|other| *other != case);
+            if let Some(other) = other {
                 return Err(format!(
                     "the cases {other} and {case} have the same name in results: rename one"
                 ));
             }
         }
-        for (name, mesh) in &self.mesh {
-            mesh.check().map_err(|why| format!("mesh {name}: {why}"))?;
+        for (name, Mesh { spacing_min, cells, .. }) in &self.mesh {
+            refuse(&[
+                (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
+                (!cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
+            ])
+            .map_err(|why| format!("mesh {name}: {why}"))?;
         }
         for (name, run) in &self.run {
             self.check_run(run).map_err(|why| format!("run {name}: {why}"))?;
@@ -218,7 +296,7 @@ impl Study {
     }
 
     fn check_run(&self, run: &RunSpec) -> Result<(), String> {
-        let wrong_ranks = !are_ranks(&[run.ranks]) || run.comm == Comm::Solo && run.ranks != 1;
+        let wrong_ranks = !RANKS.contains(&run.ranks) || run.comm == Comm::Solo && run.ranks != 1;
         refuse(&[
             (!self.mesh.contains_key(&run.mesh), &format!("no mesh is called {:?}", run.mesh)),
             (wrong_ranks, &format!("it cannot have {} ranks", run.ranks)),
@@ -231,7 +309,7 @@ impl Study {
     }
 
     fn check_row(&self, row: &Row) -> Result<(), String> {
-        if let Some(name) = self.runs_of(row).into_iter().find(|n| !self.run.contains_key(*n)) {
+        if let Some(name) = self.runs_of(row).find(|n| !self.run.contains_key(*n)) {
             return Err(format!("no run is called {name:?}"));
         }
         let (name, input) = (row.measure.name, row.measure.input);
@@ -249,13 +327,72 @@ impl Study {
     }
 }
 
-impl Mesh {
+/// Returns the name of a case in results.
+fn stem(case: &str) -> Cow<'_, str> {
+    Path::new(case).file_stem().unwrap_or_default().to_string_lossy()
+}
+
+/// Weights and partitioner of a run, empty to leave the choice to the program.
+pub(super) type Choice = (&'static str, &'static str);
+
+/// The choices of the experiment on weights. `rebalance` with METIS is identical to `area`.
+const CHOICES: [Choice; 6] = [
+    ("", "paper"),
+    ("unit", "metis"),
+    ("unit", "morton"),
+    ("area", "metis"),
+    ("area", "morton"),
+    ("rebalance", "morton"),
+];
+
+impl Series {
+    /// Returns the numbers of cells, or that of the case.
+    pub(super) fn sizes(&self) -> Vec<Option<f64>> {
+        match self.cells.is_empty() {
+            true => vec![None],
+            false => self.cells.iter().copied().map(Some).collect(),
+        }
+    }
+
+    /// Returns the partitions that are compared.
+    pub(super) fn choices(&self) -> &'static [Choice] {
+        match self.experiment {
+            Experiment::Weights => &CHOICES,
+            _ => &[("", "")],
+        }
+    }
+
+    /// Returns the ranks on which an engine is run: those of the series that it offers. A serial run replaces ranks on MPI that
+    /// are missing; nothing can replace the ranks of experiments about ranks.
+    pub(super) fn layouts(&self, engine: &Description, no_mpi: bool) -> Vec<(Comm, usize)> {
+        let has_mpi = !engine.run.parallel.is_empty() && !no_mpi;
+        let sim = self.sim.iter().filter(|_| !engine.run.simulated.is_empty());
+        let mpi = self.mpi.iter().filter(|_| has_mpi);
+        let mut all: Vec<(Comm, usize)> =
+            sim.map(|r| (Comm::Sim, *r)).chain(mpi.map(|r| (Comm::Mpi, *r))).collect();
+        match self.experiment {
+            Experiment::Weights if !is_own(&engine.name) => all.clear(),
+            Experiment::Weights | Experiment::Weak => {}
+            _ if all.is_empty() || !self.mpi.is_empty() && !has_mpi => all.push((Comm::Solo, 1)),
+            _ => {}
+        }
+        all
+    }
+
     fn check(&self) -> Result<(), String> {
-        let Self { spacing_min, cells, .. } = self;
-        refuse(&[
-            (spacing_min.is_some() && cells.is_some(), "give spacing_min or cells, not both"),
-            (cells.is_some_and(|cells| !CELLS.contains(&cells)), "cells is from 1e3 to 1e12"),
-        ])
+        use Experiment::{Layers, Weak, Weights};
+        let (what, ranks) = (self.experiment, [&self.sim[..], &self.mpi].concat());
+        let is_about_ranks = matches!(what, Weak | Weights);
+        let wrong = [
+            (!ranks.iter().all(|ranks| RANKS.contains(ranks)), "ranks are from 1 to 65536"),
+            (self.repeats == 0, "repeats is at least 1"),
+            (self.engines.is_empty(), "it has no engines"),
+            (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
+            (what == Weak && self.cells.is_empty(), "give the cells of a rank"),
+            (is_about_ranks && ranks.is_empty(), "give ranks"),
+            (what == Layers && self.layers.is_empty(), "give layers"),
+        ];
+        refuse(&wrong).map_err(|why| format!("series {what} of {}: {why}", self.case))
     }
 }
 

@@ -51,22 +51,15 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin =
         |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
-    let built: HashMap<&String, &String> = lines.iter().filter_map(program).collect();
+    let built: HashMap<&String, &String> =
+        lines.iter().filter_map(Line::run).map(|run| (&run.setup.engine, &run.program)).collect();
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
     let is_of = |line: &&Line| {
         sessions.contains(&line.session.as_str())
-            && program(line).is_none_or(|(engine, of)| built[engine] == of)
+            && line.run().is_none_or(|run| *built[&run.setup.engine] == run.program)
     };
     lines.iter().filter(is_of).cloned().collect()
-}
-
-/// Program and build of a run.
-fn program(line: &Line) -> Option<(&String, &String)> {
-    match &line.entry {
-        Entry::Run(run) => Some((&run.setup.engine, &run.program)),
-        _ => None,
-    }
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
@@ -76,11 +69,9 @@ pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
             Judged { measured: Some((value, how)), ..unjudged(row, verdict(row, value), why) }
         }
         Err(why) => {
-            let failed = study.runs_of(row).into_iter().find_map(|n| failure(study, n, lines));
-            match failed {
-                Some(why) => unjudged(row, Verdict::Failed, why),
-                None => unjudged(row, Verdict::LeftOut, why),
-            }
+            let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
+            let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
+            unjudged(row, verdict, failed.unwrap_or(why))
         }
     };
     check_invariants(&judged);

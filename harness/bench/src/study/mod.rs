@@ -9,11 +9,8 @@ pub mod file;
 pub mod judge;
 pub mod measure;
 pub mod package;
-mod plan;
-mod series;
 mod session;
 
 pub use file::Study;
 pub use judge::judged;
-pub use plan::SessionOptions;
-pub use session::{Outcome, measure};
+pub use session::{Outcome, SessionOptions, measure};

@@ -3,7 +3,7 @@
 use super::Study;
 use contract::catalogue::Catalogue;
 use contract::failure::Failure;
-use contract::files::{self, named, read_text, write_atomically};
+use contract::files::{self, read_text, write_atomically};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -19,19 +19,19 @@ pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Fa
     let directory = Study::read(study)?.directory;
     let mut table = read(study)?;
     let mut package = Package { out, copied: BTreeMap::new() };
-    // No case may have its name.
-    let path = study.canonicalize().map_err(|error| named(study, &error))?;
-    package.copied.insert(STUDY.into(), path);
-    let meshes = table.get_mut("mesh").and_then(Value::as_table_mut);
-    let meshes = meshes.into_iter().flat_map(|meshes| meshes.iter_mut().map(|(_, mesh)| mesh));
-    let meshes: Vec<&mut Value> = meshes.collect();
-    for mesh in meshes {
-        package.case_of(mesh, &directory, catalogue)?;
+    // No case may have the name of the study.
+    package.copied.insert(STUDY.into(), canonical(study)?);
+    for (key, value) in &mut table {
+        let with_cases: Vec<&mut Value> = match (key.as_str(), value) {
+            ("mesh", Value::Table(meshes)) => meshes.iter_mut().map(|(_, mesh)| mesh).collect(),
+            ("series", Value::Array(series)) => series.iter_mut().collect(),
+            _ => Vec::new(),
+        };
+        for value in with_cases {
+            package.case_of(value, &directory, catalogue)?;
+        }
     }
-    for series in table.get_mut("series").and_then(Value::as_array_mut).into_iter().flatten() {
-        package.case_of(series, &directory, catalogue)?;
-    }
-    write(&out.join(STUDY), &table)
+    put(&out.join(STUDY), table.to_string().as_bytes())
 }
 
 fn read(path: &Path) -> Result<Table, Failure> {
@@ -39,8 +39,8 @@ fn read(path: &Path) -> Result<Table, Failure> {
     text.parse().map_err(|error: toml::de::Error| Failure::input(error).of_file(path))
 }
 
-fn write(path: &Path, table: &Table) -> Result<(), Failure> {
-    put(path, table.to_string().as_bytes())
+fn canonical(path: &Path) -> Result<PathBuf, Failure> {
+    path.canonicalize().map_err(|error| Failure::at(path, error))
 }
 
 /// Copies a file, which must be no pipe: it would be waited for.
@@ -86,13 +86,13 @@ impl Package<'_> {
                 copy(&body, &self.out.join(name))?;
             }
         }
-        write(&self.out.join(name), &table)
+        put(&self.out.join(name), table.to_string().as_bytes())
     }
 
     /// The name of a file in the directory, and whether it has not been copied yet.
     fn place(&mut self, path: &Path) -> Result<(PathBuf, bool), Failure> {
         let name = PathBuf::from(path.file_name().unwrap_or_default());
-        let path = path.canonicalize().map_err(|error| named(path, &error))?;
+        let path = canonical(path)?;
         match self.copied.insert(name.clone(), path.clone()) {
             Some(other) if other != path => Err(Failure::input(format!(
                 "{} and {} have one name: rename one",

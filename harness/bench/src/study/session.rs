@@ -3,22 +3,72 @@
 //! Repetitions are the outer loop, so that a drift of the machine affects all setups equally. Equal meshes have equal digests: the time of
 //! a wrong mesh is not a result.
 
-use super::file::{Row, Series, Study};
+use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, Verdict, judge, unjudged};
-use super::plan::{Plan, Planned, SessionOptions};
+use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    Comm, Entry, Failure as Failed, LeftOut, Line, Run, Session as Opening, Setup,
+    Comm, Entry, Failure as Failed, LeftOut, Line, Network, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
 use crate::experiments::group::another_mesh;
-use crate::experiments::record::Record;
+use crate::experiments::record::now_utc;
 use crate::experiments::{feasible, machine, network};
+use crate::jsonl;
+use clap::Args;
+use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::interrupt;
+use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
+use run::verify::options::whole_seconds;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+/// The options of a session, as on the command line.
+#[derive(Args, Clone, Debug)]
+pub struct SessionOptions {
+    /// No runs on MPI
+    #[arg(long)]
+    pub no_mpi: bool,
+    /// Repetitions of every run; 95 % intervals of a median need six
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    pub repeat: Option<u16>,
+    /// Command that starts ranks; {ranks} is replaced by their number
+    #[arg(long, default_value = "mpirun -n {ranks}", value_parser = Launcher::parse)]
+    pub launcher: Launcher,
+    /// Latency and bandwidth of messages in the projection [default: measured by a ping-pong]
+    #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
+    pub network: Option<Network>,
+    /// Time limit of every single run
+    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = whole_seconds)]
+    pub timeout: u64,
+}
+
+impl SessionOptions {
+    /// Returns how often a run is repeated that the file repeats so often.
+    fn repeats(&self, of_file: usize) -> usize {
+        self.repeat.map_or(of_file, usize::from)
+    }
+}
+
+/// A run to be repeated.
+struct Planned {
+    setup: Setup,
+    case: PathBuf,
+    repeats: usize,
+    /// Whether an uncounted run of its mesh comes first.
+    warm_up: bool,
+    /// Whether a run failed.
+    failed: bool,
+}
+
+impl Planned {
+    /// The program and the case.
+    fn mesh(&self) -> (String, PathBuf) {
+        (self.setup.engine.clone(), self.case.clone())
+    }
+}
 
 /// The result of a session.
 #[derive(Debug)]
@@ -46,13 +96,17 @@ pub fn measure(
 ) -> Result<Outcome, Failure> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir()?;
     let (launcher, limit) = (&options.launcher, Duration::from_secs(options.timeout));
-    let runner = Runner { programs, launcher, limit, place: place.path() };
     let mut session = Session {
-        plan: Plan { study, options, runner, progress, bases: BTreeMap::new() },
+        study,
+        options,
+        runner: Runner { programs, launcher, limit, place: place.path() },
+        progress,
+        name: format!("{}-{}", now_utc(), std::process::id()),
+        record,
         lines: Vec::new(),
-        record: Record::new(record),
+        bases: BTreeMap::new(),
+        sizes: BTreeMap::new(),
         digests: HashMap::new(),
-        network: false,
         made: BTreeSet::new(),
         warm: BTreeSet::new(),
     };
@@ -65,10 +119,9 @@ pub fn measure(
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, Verdict::LeftOut, "interrupted".to_owned())));
-    let needs_mpi =
-        |row: &Row| study.runs_of(row).into_iter().any(|name| study.run[name].comm == Comm::Mpi);
-    let is_missing = !options.no_mpi && !options.launcher.is_found();
-    let program = options.launcher.program();
+    let needs_mpi = |row: &Row| study.runs_of(row).any(|name| study.run[name].comm == Comm::Mpi);
+    let is_missing = !options.no_mpi && session.mpi_left_out().is_some();
+    let program = launcher.program();
     let missing = (is_missing && study.row.iter().any(needs_mpi))
         .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
@@ -76,13 +129,20 @@ pub fn measure(
 
 /// A running session.
 struct Session<'a> {
-    plan: Plan<'a>,
+    study: &'a Study,
+    options: &'a SessionOptions,
+    runner: Runner<'a>,
+    progress: &'a dyn Fn(&str),
+    /// Its identifier in the record.
+    name: String,
+    record: &'a Path,
     lines: Vec<Line>,
-    record: Record,
+    /// Geometries read so far, by case.
+    bases: BTreeMap<String, Base>,
+    /// The known sizes of meshes, by case and n.
+    sizes: BTreeMap<(String, u32), Sizes>,
     /// Digests of the meshes.
     digests: HashMap<String, String>,
-    /// Whether the cost of messages is known.
-    network: bool,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
@@ -93,8 +153,16 @@ impl Session<'_> {
     /// Executes the series and the rows, which are added as soon as they are judged.
     fn all(&mut self, rows: &mut Vec<Judged>) -> Result<(), Failure> {
         self.open()?;
-        let study = self.plan.study;
-        study.series.iter().try_for_each(|series| self.series(series))?;
+        let study = self.study;
+        for series in &study.series {
+            for cells in series.sizes() {
+                let mut points = Vec::new();
+                for engine in &series.engines {
+                    points.extend(self.of_series(series, engine, cells)?);
+                }
+                self.make(&mut points)?;
+            }
+        }
         for (row, number) in study.row.iter().zip(1..) {
             if interrupt::requested() {
                 return Err(Failure::interrupted());
@@ -102,7 +170,7 @@ impl Session<'_> {
             let judged = self.row(row)?;
             let [name, target, value, how, verdict] = judged.fields();
             let line = format!("{name}: {value} ({how}), target {target}: {verdict}");
-            (self.plan.progress)(&format!("row {number} of {}: {line}", study.row.len()));
+            (self.progress)(&format!("row {number} of {}: {line}", study.row.len()));
             rows.push(judged);
         }
         Ok(())
@@ -110,7 +178,7 @@ impl Session<'_> {
 
     /// Records the circumstances.
     fn open(&mut self) -> Result<(), Failure> {
-        let programs = self.plan.runner.programs;
+        let programs = self.runner.programs;
         let catalogue = programs.paths.catalogue.path();
         let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
         let lacks = |engine: String| {
@@ -119,45 +187,163 @@ impl Session<'_> {
         };
         let opening = Opening {
             command: std::env::args().collect(),
-            machine: machine::describe(&self.plan.runner.launcher.program(), repository),
+            machine: machine::describe(&self.runner.launcher.program(), repository),
             nodes: machine::nodes(),
             load_average: machine::load_average(),
-            lacks: self.plan.study.engines().into_iter().map(lacks).collect(),
+            lacks: self.study.engines().into_iter().map(lacks).collect(),
         };
         self.append(Entry::Session(Box::new(opening)))
     }
 
     fn append(&mut self, entry: Entry) -> Result<(), Failure> {
-        let line = self.record.append(entry)?;
+        let line = Line::new(&self.name, entry);
+        let appended = jsonl::append(self.record, &line);
         self.lines.push(line);
-        Ok(())
+        appended.map_err(|error| Failure::at(self.record, error))
     }
 
-    /// Runs a series: every size by all programs in turn.
-    fn series(&mut self, series: &Series) -> Result<(), Failure> {
-        for cells in series.sizes() {
-            let mut points = Vec::new();
-            for engine in &series.engines {
-                points.extend(self.plan.series(series, engine, cells)?);
-            }
-            self.make(&mut points)?;
+    /// Leaves a run out, with the reason.
+    fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
+        (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
+        self.append(Entry::LeftOut(LeftOut { setup, why }))
+    }
+
+    /// Returns the reason why runs on MPI are skipped; `None` if they are not.
+    fn mpi_left_out(&self) -> Option<&'static str> {
+        match self.options.no_mpi {
+            true => Some("--no-mpi was given"),
+            false => (!self.options.launcher.is_found()).then_some("the launcher is missing"),
         }
-        Ok(())
+    }
+
+    /// Plans the runs of a series by one engine at one size, and leaves out those that the engine declines.
+    fn of_series(
+        &mut self,
+        series: &Series,
+        engine: &str,
+        cells: Option<f64>,
+    ) -> Result<Vec<Planned>, Failure> {
+        let description = self.runner.programs.labelled(engine).description();
+        let layouts = series.layouts(description, self.mpi_left_out().is_some());
+        if layouts.is_empty() {
+            let experiment = series.experiment;
+            (self.progress)(&format!("{engine} cannot run the series {experiment}"));
+        }
+        let has_several_meshes = matches!(
+            series.experiment,
+            Experiment::Weak | Experiment::Spacing | Experiment::Layers
+        );
+        let base = self.base(&series.case)?;
+        let of_case = [base.layer_cells_min];
+        let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
+        let mut points = Vec::new();
+        for (&n, &(comm, ranks)) in layers.iter().flat_map(|n| layouts.iter().map(move |l| (n, l)))
+        {
+            for spacing in self.spacings(series, &base, cells, ranks)? {
+                let case = base.write(spacing, n, false)?;
+                let declined = description.declines(&Case::read(&case)?);
+                for (weights, partitioner) in series.choices() {
+                    let setup = Setup {
+                        experiment: series.experiment.to_string(),
+                        engine: engine.to_owned(),
+                        ranks,
+                        comm,
+                        weights: (*weights).to_owned(),
+                        partitioner: (*partitioner).to_owned(),
+                        series_cells: cells.filter(|_| has_several_meshes),
+                        ..Setup::serial(&base.name, spacing, n)
+                    };
+                    match &declined {
+                        Some(why) => self.leave_out(setup, why.clone())?,
+                        None => points.push(Planned {
+                            setup,
+                            case: case.clone(),
+                            repeats: self.options.repeats(series.repeats),
+                            warm_up: true,
+                            failed: false,
+                        }),
+                    }
+                }
+            }
+        }
+        Ok(points)
+    }
+
+    /// Returns the spacings of the meshes of a series for a number of ranks.
+    fn spacings(
+        &mut self,
+        series: &Series,
+        base: &Base,
+        cells: Option<f64>,
+        ranks: usize,
+    ) -> Result<Vec<f64>, Failure> {
+        let Some(cells) = cells else { return Ok(vec![base.spacing_min]) };
+        let is_weak = series.experiment == Experiment::Weak;
+        let target = if is_weak { cells * ranks as f64 } else { cells };
+        let finest = self.spacing(base, base.layer_cells_min, target)?;
+        if series.experiment != Experiment::Spacing {
+            return Ok(vec![finest]);
+        }
+        // Coarser by factors of two, while there are enough cells to measure.
+        let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
+        Ok((0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect())
+    }
+
+    /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
+    fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64, Failure> {
+        let sizes = self.sizes.entry((base.name.clone(), n)).or_default();
+        sizes.spacing(cells, base.coarse(), |spacing| {
+            let case = base.write(spacing, n, false)?;
+            let setup = Setup::serial(&base.name, spacing, n);
+            self.runner.run(&setup, &case, 0, true).map(|run| run.cells)
+        })
+    }
+
+    /// Plans the run of this name, and writes its case.
+    fn of_run(&mut self, name: &str) -> Result<Planned, Failure> {
+        let spec = &self.study.run[name];
+        let mesh = &self.study.mesh[&spec.mesh];
+        let base = self.base(&mesh.case)?;
+        let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
+        let spacing = match mesh.cells {
+            None => mesh.spacing_min.unwrap_or(base.spacing_min),
+            Some(cells) => {
+                (self.progress)(&format!("{}: looking for the spacing", spec.mesh));
+                self.spacing(&base, n, cells)?
+            }
+        };
+        let case = base.write(spacing, n, mesh.cells.is_none())?;
+        let repeats = self.options.repeats(spec.repeats);
+        let setup = spec.setup(spacing, n);
+        Ok(Planned { setup, case, repeats, warm_up: repeats > 1, failed: false })
+    }
+
+    /// Returns a case, whose geometry is written as a binary STL file, once.
+    fn base(&mut self, case: &str) -> Result<Base, Failure> {
+        if let Some(known) = self.bases.get(case) {
+            return Ok(known.clone());
+        }
+        (self.progress)(&format!("{case}: reading the geometry"));
+        let catalogue = &self.runner.programs.paths.catalogue;
+        let path = catalogue.case_file(case, &self.study.directory)?;
+        let base = Base::read(&path, self.runner.place)?;
+        self.bases.insert(case.to_owned(), base.clone());
+        Ok(base)
     }
 
     /// Executes the runs of a row that are not complete, and judges it.
     fn row(&mut self, row: &Row) -> Result<Judged, Failure> {
-        let study = self.plan.study;
+        let study = self.study;
         let mut points = Vec::new();
         for name in study.runs_of(row) {
             let is_mpi = study.run[name].comm == Comm::Mpi;
-            if let Some(why) = self.plan.mpi_left_out().filter(|_| is_mpi) {
+            if let Some(why) = self.mpi_left_out().filter(|_| is_mpi) {
                 return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
             }
             if self.made.contains(name) {
                 continue;
             }
-            match self.plan.run(name) {
+            match self.of_run(name) {
                 Ok(point) => points.push(point),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(Failure { why, .. }) => {
@@ -167,19 +353,15 @@ impl Session<'_> {
             }
         }
         self.make(&mut points)?;
-        self.made.extend(study.runs_of(row).into_iter().cloned());
+        self.made.extend(study.runs_of(row).cloned());
         Ok(judge(study, row, &self.lines))
     }
 
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
     /// the time or the memory is not run on that mesh.
     fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
-        for point in points.iter() {
-            if let Some(why) = &point.declined {
-                self.leave_out(point.setup.clone(), why.clone())?;
-            }
-        }
-        if points.iter().any(|p| p.setup.comm == Comm::Sim) {
+        let is_known = self.lines.iter().any(|line| matches!(line.entry, Entry::Network(_)));
+        if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
             self.measure_network()?;
         }
         for index in 0..points.len() {
@@ -188,7 +370,7 @@ impl Session<'_> {
             if !may_warm_up || !self.warm.insert(mesh.clone()) {
                 continue;
             }
-            match feasible::excess(&self.lines, &setup, self.plan.runner.limit) {
+            match feasible::excess(&self.lines, &setup, self.runner.limit) {
                 None => self.run(&mut points[index], 0, true)?,
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
@@ -204,20 +386,11 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Records the cost of messages, once.
+    /// Records the cost of messages, on which all projections depend.
     fn measure_network(&mut self) -> Result<(), Failure> {
-        if std::mem::replace(&mut self.network, true) {
-            return Ok(());
-        }
-        // All projections depend on it, and any one ping-pong may be disturbed: that of median latency counts.
-        let measured = || {
-            let one = |_| self.plan.runner.ping_pong().and_then(|text| network::parse(&text));
-            let mut three = (0..3).map(one).collect::<Result<Vec<_>, String>>()?;
-            three.sort_by(|a, b| a.latency_s.total_cmp(&b.latency_s));
-            Ok::<_, String>(three[1])
-        };
-        let network = self.plan.options.network.map_or_else(measured, Ok).unwrap_or_else(|why| {
-            (self.plan.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
+        let measured = || network::measured(&self.runner);
+        let network = self.options.network.map_or_else(measured, Ok).unwrap_or_else(|why| {
+            (self.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
             network::ASSUMED
         });
         self.append(Entry::Network(network))
@@ -226,29 +399,14 @@ impl Session<'_> {
     /// Runs a point and records the result.
     fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
         let s = &point.setup;
-        let repetition = match warm_up {
-            true => "warm-up".to_owned(),
-            false => format!("{}, repeat {}", s.division(), repeat + 1),
-        };
-        (self.plan.progress)(&format!(
-            "{} {} by {}: {} ranks ({}), spacing {:.3e}, n {}, {repetition}",
-            s.experiment,
-            s.case,
-            s.engine,
-            s.ranks,
-            crate::name_of(&s.comm),
-            s.spacing_min,
-            s.layer_cells_min,
-        ));
-        let run = self.plan.runner.run(s, &point.case, repeat, warm_up).and_then(|run| {
-            self.check_mesh(point, &run)?;
-            Ok(run)
-        });
-        match run {
+        let which = if warm_up { "warm-up".to_owned() } else { format!("repeat {}", repeat + 1) };
+        (self.progress)(&format!("{s}, {which}"));
+        let run = self.runner.run(s, &point.case, repeat, warm_up);
+        match run.and_then(|run| self.check_mesh(point, &run).map(|()| run)) {
             Ok(run) => self.append(Entry::Run(Box::new(run))),
             Err(failure) if failure.is_interrupt() => Err(failure),
             Err(Failure { why, .. }) => {
-                (self.plan.progress)(&format!("failed: {why}"));
+                (self.progress)(&format!("failed: {why}"));
                 point.failed = true;
                 let setup = point.setup.clone();
                 let command = format!("{} on {} ranks", setup.engine, setup.ranks);
@@ -257,30 +415,24 @@ impl Session<'_> {
         }
     }
 
-    /// Leaves a run out, with the reason.
-    fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
-        (self.plan.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
-        self.append(Entry::LeftOut(LeftOut { setup, why }))
-    }
-
     /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result. The mesh of an
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
-    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), String> {
-        let engine = self.plan.runner.programs.labelled(&point.setup.engine);
+    fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), Failure> {
+        let engine = self.runner.programs.labelled(&point.setup.engine);
         let (promises, s) = (&engine.description().promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {
             let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
             // Whether the mesher can be run is not a property of this engine.
-            let expected = self.plan.runner.run(&setup, &point.case, 0, true);
+            let expected = self.runner.run(&setup, &point.case, 0, true);
             if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
-                return Err(format!(
-                    "the mesh has digest {}, but that of the definition has {}",
-                    run.digest, expected.digest
-                ));
+                let (digest, of_definition) = (&run.digest, expected.digest);
+                return Err(Failure::input(format!(
+                    "the mesh has digest {digest}, but that of the definition has {of_definition}"
+                )));
             }
         }
         let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
         let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.digests);
-        other.map_or(Ok(()), Err)
+        other.map_or(Ok(()), |why| Err(Failure::input(why)))
     }
 }

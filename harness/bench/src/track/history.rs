@@ -126,15 +126,7 @@ impl Record {
         if let Ok(report) = serde_json::from_slice::<GateReport>(text) {
             let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
             for finding in times.flat_map(|layer| &layer.findings) {
-                let (ranks, time) =
-                    finding.metric.rsplit_once('/').unwrap_or(("", &finding.metric));
-                let name = match time {
-                    CPU => "seconds",
-                    WALL => "wall_seconds",
-                    _ => continue,
-                };
-                let name =
-                    if ranks.is_empty() { name.to_owned() } else { format!("{ranks}/{name}") };
+                let name = finding.metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
                 if let Some(seconds) = finding.candidate {
                     self.metrics.insert(format!("{}/{name}", finding.case), seconds);
                 }
@@ -177,7 +169,7 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let mut index: HashMap<String, usize> = HashMap::new();
     let (mut machines, mut geometries) = (Origins::default(), Origins::default());
-    let mut times = vec![Timestamp::MIN];
+    let mut records: Vec<(Timestamp, Record)> = Vec::new();
     for Line { number, is_finished, content } in lines {
         let wrong = |why: String| format!("line {number}: {why}");
         let mut record = match content {
@@ -193,43 +185,37 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             return Err(wrong(format!("schema {:?}, not {SCHEMA:?}", record.schema)));
         }
         let suffix = machines.suffix("", &record.machine);
-        let suffixes = record
-            .geometries
-            .iter()
-            .map(|(case, digest)| (case.clone(), geometries.suffix(case, digest)));
-        let suffixes: Vec<(String, String)> = suffixes.collect();
+        let mut of_geometry = record.geometries.clone();
+        of_geometry.iter_mut().for_each(|(case, of)| *of = geometries.suffix(case, of));
         let named = |(mut name, value): (String, f64)| {
             if is_of_machine(&name) {
                 name += &suffix;
             }
-            let of_case = |(case, _): &&(String, String)| {
-                name.strip_prefix(case.as_str()).is_some_and(|rest| rest.starts_with('/'))
-            };
-            if let Some((case, geometry)) = suffixes.iter().find(of_case) {
-                name.insert_str(case.len(), geometry);
+            let is_of = |case: &str| name.strip_prefix(case).is_some_and(|of| of.starts_with('/'));
+            if let Some((case, suffix)) = of_geometry.iter().find(|(case, _)| is_of(case)) {
+                name.insert_str(case.len(), suffix);
             }
             (name, value)
         };
         record.metrics = record.metrics.into_iter().map(named).collect();
         match index.get(&record.commit) {
             Some(&same) => {
-                history.records[same].metrics.extend(record.metrics);
-                history.records[same].accepted |= record.accepted;
+                let (_, same) = &mut records[same];
+                same.metrics.extend(record.metrics);
+                same.accepted |= record.accepted;
             }
             None => {
                 let time = match &*record.time {
-                    "" => times[times.len() - 1],
+                    "" => records.last().map_or(Timestamp::MIN, |(time, _)| *time),
                     time => time.parse().map_err(|why| wrong(format!("time: {why}")))?,
                 };
-                times.push(time);
-                index.insert(record.commit.clone(), history.records.len());
-                history.records.push(record);
+                index.insert(record.commit.clone(), records.len());
+                records.push((time, record));
             }
         }
     }
-    let mut in_order: Vec<_> = times.into_iter().skip(1).zip(history.records).collect();
-    in_order.sort_by_key(|(time, _)| *time);
-    history.records = in_order.into_iter().map(|(_, record)| record).collect();
+    records.sort_by_key(|(time, _)| *time);
+    history.records = records.into_iter().map(|(_, record)| record).collect();
     history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
     Ok(history)
 }
@@ -244,13 +230,14 @@ pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
     let matching: Vec<&Record> =
         records.iter().filter(|record| record.commit.starts_with(commit)).collect();
     let [record] = matching[..] else {
-        let why = match matching.len() {
-            0 => format!(
-                "has no values of commit {commit}: accept the first commit with the new values"
-            ),
-            _ => format!("has several commits that begin with {commit}: give more of the hash"),
+        let what = if matching.is_empty() {
+            "no values of commit"
+        } else {
+            "several commits that begin with"
         };
-        return Err(wrong(&why));
+        return Err(wrong(&format!(
+            "has {what} {commit}: give the whole hash of the first commit with the new values"
+        )));
     };
     let record = Record { metrics: BTreeMap::new(), accepted: true, ..record.clone() };
     jsonl::append(path, &record).map_err(|error| wrong(&error.to_string()))
@@ -348,17 +335,6 @@ mod tests {
         assert!(accept(&path, "f00").unwrap_err().contains("no values of commit f00"));
     }
 
-    #[test]
-    fn a_record_after_an_unfinished_line_has_a_line_of_its_own() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("history.jsonl");
-        append(&path, &record("a", &[("x", 1.0)])).unwrap();
-        let text = fs::read_to_string(&path).unwrap();
-        fs::write(&path, text.trim_end()).unwrap();
-        append(&path, &record("b", &[("x", 2.0)])).unwrap();
-        assert_eq!(read(&path).unwrap().records.len(), 2);
-    }
-
     /// Cut anywhere, a history keeps all its lines but the last, and the next record follows them.
     #[test]
     fn a_torn_last_line_costs_that_line() {
@@ -440,12 +416,12 @@ mod tests {
         measures.case("cube").exact.insert("rays".into(), 6);
         measures.case("cube").counted.insert("instructions".into(), 7);
         let mut one = record("a", &[]);
-        one.add(measures.json().as_bytes()).unwrap();
+        one.add(&serde_json::to_vec(&measures).unwrap()).unwrap();
         assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
         let elsewhere = Measures { machine: "other".into(), ..measures };
         assert!(
             Record { machine: "this".into(), ..one.clone() }
-                .add(elsewhere.json().as_bytes())
+                .add(&serde_json::to_vec(&elsewhere).unwrap())
                 .is_err()
         );
         assert!(one.add(b"{}").is_err());

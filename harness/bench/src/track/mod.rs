@@ -1,7 +1,7 @@
 //! `harness track`: a history of metrics by commit, and the commits at which they changed.
 //!
 //! [`history`] is the file; [`statistics::change_points`] finds steps in one metric, and
-//! [`statistics::false_discovery`] controls how many of all of them are false.
+//! [`statistics::comparison::adjusted`] controls how many of all of them are false.
 //!
 //! Invariant: the same history and options give the same result on every machine.
 //!
@@ -11,10 +11,12 @@
 
 pub mod history;
 
+use crate::gate::report::change_percent;
 use history::Record;
 use serde::Serialize;
 use statistics::change_points::{Change as Found, Rules, change_points};
-use statistics::false_discovery::adjusted;
+use statistics::comparison::adjusted;
+use std::collections::BTreeSet;
 
 /// Metrics that are results, not costs: a change is neither better nor worse.
 const NEUTRAL: [&str; 2] = ["cells", "leaves"];
@@ -86,7 +88,7 @@ impl Series {
             let Change { last_old, first_new, before, after, p, .. } = step;
             let commits = [at - 1, at].map(|at| &records[points[at].0].commit);
             assert_eq!([last_old, first_new], commits, "{name}: commits of a step");
-            let by = percent(*before, *after);
+            let by = change_percent(*before, *after);
             assert_eq!(step.percent, by, "{name}: the percentage is that of {before} and {after}");
             assert!(*p > 0.0 && *p <= 1.0, "{name}: {p} is a probability");
             from = at;
@@ -127,11 +129,10 @@ pub fn unit(name: &str) -> &'static str {
 /// Returns every metric of the history with its changes. Of all metrics with a change, at most the fraction `rules.alpha`
 /// is expected to have none in truth.
 pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
-    let mut names: Vec<&String> = records.iter().flat_map(|record| record.metrics.keys()).collect();
-    names.sort();
-    names.dedup();
+    let names: BTreeSet<&String> =
+        records.iter().flat_map(|record| record.metrics.keys()).collect();
     let all: Vec<Vec<(usize, f64)>> = names.iter().map(|name| points(name, records)).collect();
-    let values = |points: &[(usize, f64)]| points.iter().map(|p| p.1).collect::<Vec<f64>>();
+    let values = |points: &Vec<(usize, f64)>| points.iter().map(|p| p.1).collect::<Vec<f64>>();
     let mut found: Vec<Vec<Found>> =
         all.iter().map(|points| change_points(&values(points), rules)).collect();
     control(&mut found, rules.alpha);
@@ -165,17 +166,12 @@ fn series(name: &str, points: Vec<(usize, f64)>, found: Vec<Found>, records: &[R
         first_new: commit(at),
         before,
         after,
-        percent: percent(before, after),
+        percent: change_percent(before, after),
         p,
         accepted: is_accepted(at, &points, records),
     };
     let changes = found.into_iter().map(change).collect();
     Series { name: name.to_owned(), unit: unit(name), changes, points }
-}
-
-/// The change relative to a value that is not 0, in percent.
-fn percent(before: f64, after: f64) -> Option<f64> {
-    (before != 0.0).then(|| (after / before - 1.0) * 100.0)
 }
 
 /// Whether a commit near a step was accepted.

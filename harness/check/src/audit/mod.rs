@@ -12,24 +12,27 @@
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
 use std::path::Path;
 use std::time::Instant;
+use std::{fmt, fs, io};
 
 use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::leafset;
+use contract::files::write_atomically;
 use contract::manifest::Manifest;
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::octant::LEVEL_MAX;
 use contract::tree::Tree;
+use cpu_time::ProcessTime;
+use serde::Serialize;
 
-pub mod record;
+/// Name and version of the schema of an audit as JSON.
+const SCHEMA: &str = "octree-audit/1";
 
 /// The result of an audit.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct AuditReport {
     /// One result per check.
     pub checks: Vec<CheckResult>,
@@ -64,9 +67,34 @@ impl AuditReport {
         let formal = [checks::FILES, checks::manifest::NAME, "linear"];
         self.checks.iter().any(|c| !c.holds() || c.was_run() && !formal.contains(&c.name))
     }
-}
 
-impl AuditReport {
+    /// Writes the report as JSON, with the CPU time and peak memory of the process so far. They describe the audit only if the
+    /// process did nothing else, as in `harness audit`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        #[derive(Serialize)]
+        struct Record<'a> {
+            schema: &'a str,
+            holds: bool,
+            #[serde(flatten)]
+            report: &'a AuditReport,
+            time_cpu_s: f64,
+            /// 0 if the system does not report it.
+            peak_rss_bytes: u64,
+        }
+        let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let record = Record {
+            schema: SCHEMA,
+            holds: self.holds(),
+            report: self,
+            time_cpu_s: ProcessTime::now().as_duration().as_secs_f64(),
+            peak_rss_bytes: peak_rss_bytes(&status),
+        };
+        write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, &record)?))
+    }
+
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
         self.checks.iter().for_each(CheckResult::check_invariants);
@@ -105,6 +133,13 @@ impl fmt::Display for AuditReport {
              {time_read_s:.2} s: {rate:.1} M leaves/s"
         )
     }
+}
+
+/// The peak resident memory in the text of `/proc/self/status`.
+fn peak_rss_bytes(status: &str) -> u64 {
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
 }
 
 /// Name of the check that the tree has the leaves of the parts.
@@ -157,14 +192,13 @@ fn audit_within(
 fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
     let mut result = CheckResult::new(TREE);
     let mut digest = Digest::default();
-    let read = leafset::open_tree(dir, manifest).and_then(|tree| {
+    let read = Mesh::of_tree(dir, manifest).and_then(|tree| {
         let Some(tree) = tree else { return Ok(()) };
-        let read = tree.words(&mut |run| {
+        tree.stream(&mut |_, run| {
             result.examined += run.len() as u64;
             run.iter().for_each(|&word| digest.add(word));
             true
-        });
-        read.map_err(|why| leafset::of_tree(&tree, &why))
+        })
     });
     match read {
         Err(error) => result.report(error.to_string()),

@@ -2,7 +2,7 @@ use super::*;
 use crate::checks::CAPACITY;
 use crate::promises::Touching;
 use contract::import::htg::ImportedTree;
-use contract::leafset::LeafSet;
+use contract::leafset::{self, LeafSet};
 use contract::manifest::{Keep, Sides};
 use contract::testing::{leaf_set, random_words, words_of};
 use proptest::prelude::*;
@@ -219,4 +219,38 @@ fn a_tree_beside_parts_must_have_their_leaves() {
     assert!(text.ends_with(&other.manifest.digest.to_string()), "{text}");
     let (_, text) = tree_file(&correct, &bytes[..bytes.len() / 2]);
     assert!(text.contains(TREE_FILE) && text.contains("is damaged"), "{text}");
+}
+
+#[test]
+fn the_peak_of_memory_is_read_in_kilobytes() {
+    let status = "Name:\tharness\nVmPeak:\t   99 kB\nVmHWM:\t     3 kB\nVmRSS:\t     2 kB\n";
+    assert_eq!([peak_rss_bytes(status), peak_rss_bytes("Name:\tharness\n")], [3072, 0]);
+}
+
+#[test]
+fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
+    let place = tempfile::tempdir().unwrap();
+    let mut set = leaf_set(vec![correct()]);
+    let path = place.path().join("report.json");
+    for extra_leaves in [0, 1] {
+        set.manifest.leaves += extra_leaves;
+        let report = audited(&set);
+        report.write(&path).unwrap();
+        let read: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["schema"], SCHEMA);
+        assert_eq!(read["holds"], extra_leaves == 0);
+        assert_eq!(read["leaves"], report.leaves);
+        assert!(read["time_cpu_s"].is_f64() && read["peak_rss_bytes"].is_u64());
+        for (written, check) in read["checks"].as_array().unwrap().iter().zip(&report.checks) {
+            let mut expected = serde_json::json!({
+                "name": check.name, "examined": check.examined, "findings": check.findings_total
+            });
+            if let Some(why) = &check.nothing_to_check {
+                expected["nothing_to_check"] = why.as_str().into();
+            }
+            assert_eq!(*written, expected);
+        }
+        fs::remove_file(&path).unwrap();
+    }
 }

@@ -48,7 +48,7 @@ fn touching_leaves(
     };
     let what = &format!("leaves that {how} differ by {} levels or more", levels + 1);
     // Distances are integers: octants less than one cell apart touch.
-    check_gap(tree, (root, what), &|_| Some(1), directions, levels, result);
+    check_gap(tree, (root, what), |_| Some(1), directions, levels, result);
 }
 
 #[cfg(test)]

@@ -2,28 +2,30 @@
 //!
 //! A leaf of level `l + 1` or finer lies in a split octant of level `l`. So leaves of levels `l + 1` and `l -
 //! 1` have a minimum distance iff no leaf of level `l - 1` is nearer than that to a split octant of level `l`.
-//! The walk skips a subtree if everything near it is finer than whatever an octant in it requires.
+//! The walk skips a subtree if everything near it is at least as fine as whatever an octant in it requires.
 
 use super::CheckResult;
 use contract::lattice::Root;
+use contract::neighbourhood::{Coarsest, Neighbourhood, Region};
 use contract::octant::Octant;
-use contract::tree::{Coarsest, HOLES, Handle, Neighbourhood, Region, Tree};
+use contract::tree::{HOLES, Handle, Tree};
 
-/// What is required near an octant: within `margin` level-19 cells of it, no leaf is coarser than level `bound`.
+/// What is required near an octant: within `margin` level-19 cells of it, no leaf is coarser than these levels.
 #[derive(Clone, Copy)]
 pub struct Required {
     pub margin: i64,
-    pub bound: u8,
+    /// The level that the octant itself requires.
+    pub own: Option<u8>,
+    /// The finest level that an octant in it requires.
+    pub below: Option<u8>,
 }
 
 /// A required minimum distance.
-pub struct Clearance<'a> {
+pub struct Clearance<'a, R> {
     /// The mesh.
     pub tree: &'a Tree,
     /// What an octant with this content and level requires, if anything.
-    pub of: &'a dyn Fn(Handle, u8) -> Option<Required>,
-    /// The most that it or an octant in it requires; `None` if nothing.
-    pub within: &'a dyn Fn(Handle, u8) -> Option<Required>,
+    pub requires: R,
     /// The axes along which the margin extends an octant, for each region that coarse leaves must not meet.
     pub directions: &'a [[i64; 3]],
     /// A violation as text: of an octant, by the leaves in a part of it, and the coarse leaf.
@@ -33,50 +35,44 @@ pub struct Clearance<'a> {
 /// The margin along all axes at once: a Chebyshev distance.
 pub const ALL_AXES: [[i64; 3]; 1] = [[1, 1, 1]];
 
-impl Clearance<'_> {
-    /// Reports every octant that is too near to a coarse leaf.
+impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
+    /// Reports every octant other than the root that is too near to a coarse leaf.
     pub fn check(&self, result: &mut CheckResult) {
         self.below(&mut Trail::new(self.tree), result);
     }
 
+    /// Checks the children of the current octant. One search around all of them comes first; it usually finds nothing, and
+    /// usually not even that search is necessary.
     fn below(&self, trail: &mut Trail, result: &mut CheckResult) {
         let (handle, octant) = (trail.current().centre(), trail.current().octant);
-        let required = (self.of)(handle, octant.level);
-        if let Some(required) = required.filter(|&of| trail.has_coarser(self.tree, &octant, of)) {
-            self.report(trail, required, result);
-        }
-        if !handle.is_node() {
-            return;
-        }
-        let within = |digit: u8| {
-            let content = self.tree.child(handle, digit, octant.level);
-            (self.within)(content, octant.level + 1)
-        };
-        // One search around all children comes first; it usually finds nothing.
-        let most = (0..8).filter_map(within).reduce(|a, b| Required {
-            margin: a.margin.max(b.margin),
-            bound: a.bound.max(b.bound),
+        let children: [Option<Required>; 8] = std::array::from_fn(|digit| {
+            let content = self.tree.child(handle, digit as u8, octant.level);
+            (self.requires)(content, octant.level + 1)
         });
-        if !most.is_some_and(|most| trail.has_coarser(self.tree, &octant, most)) {
-            return;
-        }
-        for digit in 0..8 {
-            let child = octant.child(digit);
-            if within(digit).is_some_and(|most| trail.has_coarser(self.tree, &child, most)) {
-                trail.descend(self.tree, digit);
-                self.below(trail, result);
-                trail.ascend();
+        let present = || (0..).zip(&children).filter_map(|(digit, of)| Some((digit, of.as_ref()?)));
+        let Some(margin) = present().map(|(_, of)| of.margin).max() else { return };
+        let bound = present().filter_map(|(_, of)| of.own.or(of.below)).max();
+        let around = |(digit, _)| Region::around(&octant.child(digit), margin);
+        let region = || present().map(around).reduce(Region::hull).expect("a child is present");
+        let nearby = trail.coarsest_nearby(self.tree, margin, bound.unwrap_or(0), region);
+        for (digit, &Required { margin, own, below }) in present() {
+            let (own, is_deep) = (own.filter(|&own| own > nearby), below > Some(nearby));
+            if own.is_none() && !is_deep {
+                continue;
             }
+            trail.descend(self.tree, digit);
+            if let Some(bound) = own {
+                self.report(trail, margin, bound, result);
+            }
+            if is_deep {
+                self.below(trail, result);
+            }
+            trail.ascend();
         }
     }
 
     /// Repeats the search for each part of the current octant that has no holes, and reports the first coarse leaf.
-    fn report(
-        &self,
-        trail: &Trail,
-        Required { margin, bound }: Required,
-        result: &mut CheckResult,
-    ) {
+    fn report(&self, trail: &Trail, margin: i64, bound: u8, result: &mut CheckResult) {
         let (handle, octant) = (trail.current().centre(), trail.current().octant);
         let mut found = None;
         self.tree.walk_below(octant, handle, &mut |part, content| {
@@ -101,26 +97,23 @@ impl Clearance<'_> {
 pub fn check_gap(
     tree: &Tree,
     (root, what): (&Root, &str),
-    margin: &dyn Fn(u8) -> Option<i64>,
+    margin: impl Fn(u8) -> Option<i64>,
     directions: &[[i64; 3]],
     levels: u8,
     result: &mut CheckResult,
 ) {
-    let of = |handle: Handle, level: u8| {
-        let bound = (level + 1).saturating_sub(levels);
-        margin(level).filter(|_| handle.is_node()).map(|margin| Required { margin, bound })
-    };
-    let within = |handle: Handle, level: u8| {
-        let finest = (level..tree.finest_level(handle, level)).rev().find(|&l| margin(l).is_some());
-        let bound = (finest? + 1).saturating_sub(levels);
-        Some(Required { margin: margin(level)?, bound })
+    let requires = |handle: Handle, level: u8| {
+        let margin = handle.is_node().then(|| margin(level))??;
+        let finest = tree.finest_level(handle, level);
+        let below = (finest > level + 1).then(|| finest.saturating_sub(levels));
+        Some(Required { margin, own: Some((level + 1).saturating_sub(levels)), below })
     };
     let text = |split: &Octant, part: &Octant, coarse: &Octant| {
         let [part, coarse] = [part, coarse].map(|octant| root.describe(octant));
         let level = split.level;
         format!("{what}: {part} is refined beyond level {level}, but too near to the leaf {coarse}")
     };
-    Clearance { tree, of: &of, within: &within, directions, text: &text }.check(result);
+    Clearance { tree, requires, directions, text: &text }.check(result);
 }
 
 /// The neighbourhoods of all octants from the root to the current octant of a walk.
@@ -166,15 +159,19 @@ impl Trail {
         wide.handles.iter().all(|&handle| predicate(handle, wide.octant.level))
     }
 
-    /// Whether a leaf within `margin` of the current octant or of a child of it is coarser than `bound`.
-    fn has_coarser(
+    /// Level of the coarsest leaf in a region within `margin` of the current octant, if it is coarser than
+    /// `bound`; otherwise a level that is at least `bound` and at most that of the coarsest leaf.
+    fn coarsest_nearby(
         &self,
         tree: &Tree,
-        octant: &Octant,
-        Required { margin, bound }: Required,
-    ) -> bool {
-        let region = Region::around(octant, margin);
-        self.wide(margin).1 < bound && self.search(tree, margin, &region, bound).level < bound
+        margin: i64,
+        bound: u8,
+        region: impl Fn() -> Region,
+    ) -> u8 {
+        match self.wide(margin).1 {
+            coarsest if coarsest >= bound => coarsest,
+            _ => self.search(tree, margin, &region(), bound).level,
+        }
     }
 
     /// The coarsest leaf in a region within `margin` of the current octant, if it is coarser than `bound`.

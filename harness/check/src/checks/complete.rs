@@ -14,7 +14,7 @@ use super::region::Survey;
 use super::truth::{Found, Truth};
 use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
-use contract::octant::Octant;
+use contract::octant::{LEVEL_MAX, Octant};
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
@@ -77,17 +77,6 @@ fn report(result: &mut CheckResult, what: &str, octant: &Octant, terms: &Manifes
     result.report_with(|| format!("{what} {}", terms.root.describe(octant)));
 }
 
-/// Whether a leaf may have a deleted neighbour across a face.
-fn may_face_hole(terms: &Manifest, kind: Kind, level: u8) -> bool {
-    match (terms.keep_crossing, terms.keep) {
-        (true, Keep::All) => false,
-        // Crossing leaves separate the sides, so only they can have deleted neighbours.
-        (true, _) => kind == Side::Crossing as Kind,
-        // Crossing leaves are deleted, and every leaf that touched one is at least as fine as the surface.
-        (false, _) => level >= terms.level_surface,
-    }
-}
-
 /// Checks the boundaries of holes, from the leaves only.
 fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     if tree.root() == Handle::HOLE {
@@ -97,8 +86,14 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
         }
         return;
     }
-    contact::visit(tree, HOLES, &mut |octant, kind, across| {
-        if across & HOLES != 0 && !may_face_hole(terms, kind, octant.level) {
+    // Crossing leaves may have deleted neighbours, because they separate the sides, unless everything is kept. If they are deleted
+    // themselves, so may leaves beside them, which are at least as fine as the surface.
+    let separate = terms.keep_crossing && terms.keep != Keep::All;
+    let of = Side::ALL.into_iter().filter(|&side| !separate || side != Side::Crossing);
+    let of = of.fold(0, |all, side| all | 1 << side as u8);
+    let finest = if terms.keep_crossing { LEVEL_MAX + 1 } else { terms.level_surface };
+    contact::visit(tree, of, HOLES, &mut |octant, kind, across| {
+        if across & HOLES != 0 && octant.level < finest {
             result.report_with(|| {
                 let leaf = terms.root.describe(&octant);
                 let side = match terms.sides {

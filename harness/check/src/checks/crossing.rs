@@ -5,12 +5,11 @@
 //! finer than the surface, lies in a crossed octant of the surface's level. There is no band: one facet in one point decides.
 //! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does, if both are promised).
 
-use super::surface::Crossed;
-use super::truth::Truth;
+use super::facets::Facets;
 use super::{Check, CheckResult, Subject, contact};
 use contract::manifest::Sides;
 use contract::octant::Octant;
-use contract::tree::{Kind, Tree};
+use contract::tree::{Kind, Kinds};
 use contract::word::Side;
 
 pub(super) const CHECK: Check = Check {
@@ -31,61 +30,53 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let (Some(facets), Some(truth)) = (subject.facets(), subject.truth()) else {
         return result.lacks(super::NO_GEOMETRY);
     };
+    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: &Octant| {
+        result.report_with(|| {
+            let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
+            let (given, leaf) = (contact::name(kinds), subject.terms.root.describe(octant));
+            format!("{prefix}{what} the {given} leaf {leaf}")
+        });
+    };
     if !subject.promises.definition {
-        return by_itself(subject, &Crossed::new(facets, &subject.terms, None), result);
+        return by_itself(subject, facets, &mut report);
     }
+    // Leaves are crossing iff those of T0 are that contain them.
     for (prefix, _, pass) in subject.meshes() {
-        of_truth(prefix, pass.tree(), truth, subject, result);
+        truth.mislabelled(pass.tree(), &mut |found, side| {
+            let is_crossed = side == Side::Crossing;
+            if is_crossed || found.kinds == 1 << CROSSING {
+                report(prefix, is_crossed, found.kinds, &found.octant);
+            }
+        });
     }
-}
-
-/// Leaves are crossing iff those of T0 are that contain them.
-fn of_truth(prefix: &str, tree: &Tree, truth: &Truth, subject: &Subject, result: &mut CheckResult) {
-    truth.compare(tree, &mut |found| {
-        let Some(kind) = found.base.filter(|_| !found.is_hole()) else { return };
-        let crossed = kind == CROSSING;
-        if crossed != (found.kinds == 1 << CROSSING) {
-            report(prefix, crossed, found.kinds, &found.octant, subject, result);
-        }
-    });
 }
 
 /// Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
-fn by_itself(subject: &Subject, crossed: &Crossed, result: &mut CheckResult) {
+fn by_itself(
+    subject: &Subject,
+    facets: &Facets,
+    report: &mut dyn FnMut(&str, bool, Kinds, &Octant),
+) {
     let surface = subject.terms.level_surface;
     // The leaves of an octant follow each other.
     let mut last = None;
-    crossed.visit(subject.tree(), &mut |octant, kind, facet| {
-        result.examined += 1;
+    facets.leaves(subject.tree(), &mut |octant, kind, near| {
         let mut inherits = || {
             let above = octant.ancestor(surface.min(octant.level));
             let known = last.filter(|&(octant, _)| octant == above);
-            let (_, is_crossed) =
-                *last.insert(known.unwrap_or_else(|| (above, crossed.meets(&above))));
-            is_crossed
+            let meets = || {
+                let (low, high) = above.bounds();
+                facets.first_meeting(&facets.all(), low, high).is_some()
+            };
+            last.insert(known.unwrap_or_else(|| (above, meets()))).1
         };
-        let is_right = match facet {
-            Some(_) => kind == CROSSING,
-            None => kind != CROSSING || octant.level > surface && inherits(),
+        let is_right = match near.is_empty() {
+            false => kind == CROSSING,
+            true => kind != CROSSING || octant.level > surface && inherits(),
         };
         if !is_right {
-            report("", facet.is_some(), 1 << kind, &octant, subject, result);
+            report("", !near.is_empty(), 1 << kind, &octant);
         }
-    });
-}
-
-fn report(
-    prefix: &str,
-    crossed: bool,
-    kinds: u8,
-    octant: &Octant,
-    subject: &Subject,
-    result: &mut CheckResult,
-) {
-    let what = if crossed { "a facet crosses" } else { "no facet crosses" };
-    result.report_with(|| {
-        let (given, leaf) = (contact::name(kinds), subject.terms.root.describe(octant));
-        format!("{prefix}{what} the {given} leaf {leaf}")
     });
 }
 

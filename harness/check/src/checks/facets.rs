@@ -2,6 +2,7 @@
 
 use contract::lattice::FacetLattice;
 use contract::octant::Octant;
+use contract::tree::{Kind, Tree};
 use contract::triangle::Triangle;
 
 /// Facets, prepared for any number of walks.
@@ -33,6 +34,17 @@ impl Facets {
     /// sides: the root, and the children of octants for which `enter` returns true.
     pub fn walk(&self, margin: i64, enter: &mut dyn FnMut(Octant, &[u32]) -> bool) {
         self.walk_below(Octant::ROOT, &self.all(), margin, enter);
+    }
+
+    /// Visits every leaf in Morton order, with the facets that meet it.
+    pub fn leaves(&self, tree: &Tree, visit: &mut dyn FnMut(Octant, Kind, &[u32])) {
+        self.walk(0, &mut |octant, near| {
+            let handle = tree.at(&octant);
+            if let Some(kind) = handle.as_leaf() {
+                visit(octant, kind, near);
+            }
+            handle.is_node()
+        });
     }
 
     fn walk_below(

@@ -13,14 +13,11 @@ use super::truth::Truth;
 use super::{Check, CheckResult, Subject, for_definition, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
 use contract::octant::Octant;
-use contract::tree::Tree;
+use contract::tree::Handle;
 use contract::word::{self, Side};
 
-/// Name of the check.
-pub const NAME: &str = "kept";
-
 pub(super) const CHECK: Check = Check {
-    name: NAME,
+    name: "kept",
     wanted: for_definition,
     needs: |subject| if subject.truth().is_some() { None } else { some_leaves(subject) },
     run,
@@ -38,7 +35,7 @@ fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     result.examined = subject.examined_with(truth);
     for component in &truth.components {
         let leaves = component.leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
-        let example = leaves.clone().find(|leaf| has_leaves(subject.tree(), leaf));
+        let example = leaves.clone().find(|leaf| subject.tree().at(leaf) != Handle::HOLE);
         kept_or_deleted(component, example, &subject.terms, result);
     }
     let counts = count(&truth.components, &subject.inputs);
@@ -47,11 +44,6 @@ fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
             same_components(prefix, counted, &counts, &subject.terms, result);
         }
     }
-}
-
-/// Whether a mesh has any leaf in an octant, or one that contains it.
-fn has_leaves(tree: &Tree, octant: &Octant) -> bool {
-    tree.at(octant) != contract::tree::Handle::HOLE
 }
 
 /// A component has leaves in the mesh iff it is kept.

@@ -9,7 +9,7 @@
 //! 2:1 balance, which `balance` checks: an imbalance is one violation and is reported once.
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
-use super::surface::Crossed;
+use super::spacing::Crossed;
 use super::{Check, CheckResult, Subject, contact, several_levels, some_leaves};
 use contract::manifest::{Keep, Manifest, Tree as MeshKind};
 use contract::octant::{CELLS_PER_EDGE, Octant};
@@ -35,12 +35,9 @@ pub(super) const CHECK: Check = Check {
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     let terms = &subject.terms;
-    match subject.facets().filter(|_| !subject.promises.definition) {
+    match Crossed::of(subject).filter(|_| !subject.promises.definition) {
         // Such a promise says nothing about the sides of leaves.
-        Some(facets) => {
-            let crossed = Crossed::new(facets, terms, subject.promises.surface);
-            check_tree(&crossed.labelled(subject.tree()), terms, result);
-        }
+        Some(crossed) => check_tree(&crossed.labelled(subject.tree()), terms, result),
         None => check_tree(subject.tree_with_deleted(), terms, result),
     }
 }
@@ -53,7 +50,7 @@ fn check_tree(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     };
     if n > 1 {
         let what = &format!("a layer is thinner than {n} cells");
-        check_gap(tree, (&terms.root, what), &margin, &ALL_AXES, 1, result);
+        check_gap(tree, (&terms.root, what), margin, &ALL_AXES, 1, result);
     }
     check_surface_layer(tree, terms, result);
 }
@@ -82,16 +79,18 @@ const CROSSING_OR_DELETED: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
 
 /// No leaf near a crossing leaf is coarser than the surface level. Of crossing leaves that are coarser themselves, `spacing` reports.
 fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
-    let bound = terms.level_surface;
-    let required = |margin: i64| (margin > 0).then_some(Required { margin, bound });
-    let is_source = |handle: Handle| tree.kinds(handle) & CROSSING_OR_DELETED != 0;
-    let of = |handle: Handle, level: u8| {
-        let kind = handle.as_leaf().filter(|_| level >= bound && is_source(handle))?;
-        required(surface_margin(terms, kind, level))
-    };
-    let within = |handle: Handle, _| {
-        let most = surface_margin(terms, Side::Crossing as Kind, bound);
-        required(most).filter(|_| is_source(handle))
+    let surface = terms.level_surface;
+    let requires = |handle: Handle, level: u8| {
+        let is_source = tree.kinds(handle) & CROSSING_OR_DELETED != 0;
+        let (kind, of_level, own, below) = match handle.as_leaf().filter(|_| is_source) {
+            Some(kind) if level >= surface => (kind, level, Some(surface), None),
+            None if is_source && handle.is_node() => {
+                (Side::Crossing as Kind, surface, None, Some(surface))
+            }
+            _ => return None,
+        };
+        let margin = surface_margin(terms, kind, of_level);
+        (margin > 0).then_some(Required { margin, own, below })
     };
     let text = |leaf: &Octant, _: &Octant, coarse: &Octant| {
         let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
@@ -103,7 +102,7 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
             place(coarse)
         )
     };
-    Clearance { tree, of: &of, within: &within, directions: &ALL_AXES, text: &text }.check(result);
+    Clearance { tree, requires, directions: &ALL_AXES, text: &text }.check(result);
 }
 
 #[cfg(test)]

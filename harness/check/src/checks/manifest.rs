@@ -7,6 +7,7 @@
 use serde::Serialize;
 
 use super::{Check, CheckResult, Pass, Subject, always, json, nothing};
+use crate::inputs::INPUTS;
 use contract::lattice::Root;
 use contract::manifest::{BySide, Components, Geometry, Leak, Manifest, Sides, Tree};
 
@@ -107,18 +108,6 @@ fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
         }
     }
 }
-
-/// The inputs, by their keys.
-pub(crate) const INPUTS: [&str; 8] = [
-    "root",
-    "level_surface",
-    "layer_cells_min",
-    "keep",
-    "keep_crossing",
-    "boxes",
-    "seeds",
-    "enclosed",
-];
 
 /// The manifest has the counts and digests of the leaves, and the inputs and facets of the case.
 fn of_mesh(

@@ -15,7 +15,6 @@ pub mod facets;
 pub mod identical;
 pub mod kept;
 pub mod layer;
-mod leaks;
 pub mod manifest;
 mod pass;
 mod region;
@@ -24,7 +23,6 @@ pub mod sides;
 pub mod spacing;
 mod splits;
 mod subject;
-mod surface;
 pub mod truth;
 
 pub use result::{CheckResult, FILES, FINDINGS_LISTED, Outcome};
@@ -61,7 +59,7 @@ pub const CHECKS: [Check; 13] = [
     pass::CHECK,
     complete::CHECK,
     spacing::CHECK,
-    surface::CHECK,
+    spacing::SURFACE,
     spacing::BOXES,
     crossing::CHECK,
     sides::CHECK,

@@ -3,10 +3,9 @@
 //! The check `linear`: every word is a leaf, each part is sorted, and no two leaves overlap. Sections 7 and 8 of
 //! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` and `crossing` do).
 
-use super::{Check, CheckResult, Subject, always, identical, nothing};
+use super::{Check, CheckResult, always, identical, nothing};
 use contract::digest::Digest;
-use contract::failure::Unusable;
-use contract::lattice::Root;
+use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tally, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
@@ -33,11 +32,10 @@ impl Pass {
     ///
     /// # Errors
     /// If a part or the tree cannot be read.
-    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, Unusable> {
+    pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, Failure> {
         let mut state = State::new(&mesh.manifest, "", nodes_max);
         mesh.stream(&mut |part, run| {
             state.count(part, run);
-            state.order(part, run);
             state.build(run);
             true
         })?;
@@ -47,10 +45,7 @@ impl Pass {
     /// Takes the leaves of a mesh in memory. `prefix` begins every finding.
     pub(crate) fn of(set: &LeafSet, prefix: &'static str) -> Self {
         let mut state = State::new(&set.manifest, prefix, NODES_MAX);
-        for (part, words) in set.parts.iter().enumerate() {
-            state.count(part, words);
-            state.order(part, words);
-        }
+        (0..).zip(&set.parts).for_each(|(part, words)| state.count(part, words));
         state.build(&set.words);
         state.finish()
     }
@@ -59,62 +54,70 @@ impl Pass {
 struct State<'a> {
     prefix: &'static str,
     manifest: &'a Manifest,
-    root: Root,
     nodes_max: usize,
-    tally: Tally,
-    parts: Vec<(u64, Digest)>,
+    /// What was found so far, without counts and tree.
+    pass: Pass,
+    /// Number of leaves by the low seven bits of their words, which are level and side.
+    by_code: [u64; 128],
     /// The last word of each part so far.
     last_of_part: Vec<Option<u64>>,
     /// The last word that was added to the tree.
     last: u64,
     builder: Builder,
-    linear: CheckResult,
 }
 
 impl<'a> State<'a> {
     fn new(manifest: &'a Manifest, prefix: &'static str, nodes_max: usize) -> Self {
+        // A part without leaves gives no run.
+        let parts = manifest.parts.len();
+        let pass = Pass {
+            tally: Tally::default(),
+            parts: vec![(0, Digest::default()); parts],
+            linear: CheckResult::new(CHECK.name),
+            tree: None,
+        };
+        let (last_of_part, builder) = (vec![None; parts], Builder::default());
         Self {
             prefix,
             manifest,
-            root: manifest.root,
             nodes_max,
-            tally: Tally::default(),
-            parts: Vec::new(),
-            last_of_part: Vec::new(),
+            pass,
+            last_of_part,
             last: 0,
-            builder: Builder::default(),
-            linear: CheckResult::new(CHECK.name),
+            builder,
+            by_code: [0; 128],
         }
     }
 
-    /// Adds to counts and digests. Digests are summed per octant first, because this loop dominates the time of
-    /// the pass.
+    /// Adds to counts and digests, and checks the order. Digests are summed per octant first, because this loop dominates the
+    /// time of the pass.
     fn count(&mut self, part: usize, run: &[u64]) {
-        if self.parts.len() <= part {
-            self.parts.resize(part + 1, (0, Digest::default()));
+        let Pass { tally, parts, linear, .. } = &mut self.pass;
+        if parts.len() <= part {
+            parts.resize(part + 1, (0, Digest::default()));
             self.last_of_part.resize(part + 1, None);
         }
-        self.parts[part].0 += run.len() as u64;
+        parts[part].0 += run.len() as u64;
         for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
             let digest = Digest::of(words);
-            self.parts[part].1.merge(digest);
-            self.tally.octants[octant_index(words[0])].merge(digest);
+            parts[part].1.merge(digest);
+            tally.octants[octant_index(words[0])].merge(digest);
         }
-        run.iter().for_each(|&word| self.tally.count(word));
-    }
-
-    fn order(&mut self, part: usize, run: &[u64]) {
-        let mut before = self.last_of_part[part];
-        for &w in run {
-            if let Some(before) = before.filter(|&b| b >= w) {
-                let file = self.manifest.parts.get(part).map(|part| &part.file);
-                let file = file.or(self.manifest.hyper_tree_grid.as_ref());
-                let file = format!("{}{}", self.prefix, file.map_or("a part", String::as_str));
-                unsorted(&file, before, w, &self.root, &mut self.linear);
+        let mut last = self.last_of_part[part];
+        for &word in run {
+            self.by_code[(word & 127) as usize] += 1;
+            if let Some(before) = last.replace(word).filter(|&before| before >= word) {
+                linear.report_with(|| {
+                    let [before, word] =
+                        [before, word].map(|w| identical::describe(w, &self.manifest.root));
+                    let file = self.manifest.parts.get(part).map(|part| &part.file);
+                    let file = file.or(self.manifest.hyper_tree_grid.as_ref());
+                    let file = file.map_or("a part", String::as_str);
+                    format!("{}{file} is not sorted: {word} follows {before}", self.prefix)
+                });
             }
-            before = Some(w);
         }
-        self.last_of_part[part] = before;
+        self.last_of_part[part] = last;
     }
 
     /// Adds to the tree, unless it exceeds the limit: counts and digests continue without it.
@@ -122,74 +125,51 @@ impl<'a> State<'a> {
         if self.builder.nodes() > self.nodes_max {
             return;
         }
-        for &w in run {
-            match self.builder.push(w) {
-                Ok(()) => self.last = w,
-                Err(why) => {
-                    let (prefix, last) = (self.prefix, self.last);
-                    refused(prefix, why, w, last, &self.root, &mut self.linear);
+        for &word in run {
+            let Err(why) = self.builder.push(word) else {
+                self.last = word;
+                continue;
+            };
+            self.pass.linear.report_with(|| {
+                let [leaf, last] =
+                    [word, self.last].map(|word| identical::describe(word, &self.manifest.root));
+                match why {
+                    Refusal::Fault(_) => format!("{}not a leaf: {leaf}", self.prefix),
+                    Refusal::Overlap => {
+                        format!("{}two leaves overlap: {leaf} and {last}", self.prefix)
+                    }
                 }
-            }
+            });
         }
     }
 
     fn finish(mut self) -> Pass {
-        self.tally.finish();
-        self.linear.examined = self.tally.leaves;
-        // A part without leaves gives no run.
-        self.parts.resize(self.parts.len().max(self.manifest.parts.len()), (0, Digest::default()));
+        (0..).zip(self.by_code).for_each(|(code, leaves)| self.pass.tally.count(code, leaves));
+        self.pass.tally.finish();
+        self.pass.linear.examined = self.pass.tally.leaves;
         let fits = self.builder.nodes() <= self.nodes_max;
-        let tree = fits.then(|| self.builder.finish());
-        Pass { tally: self.tally, parts: self.parts, linear: self.linear, tree }
+        Pass { tree: fits.then(|| self.builder.finish()), ..self.pass }
     }
 }
-
-pub(super) const CHECK: Check = Check { name: "linear", wanted: always, needs: nothing, run };
 
 /// The pass over the leaves has found what there is to report.
-fn run(subject: &Subject, result: &mut CheckResult) {
-    *result = subject.pass.linear.clone();
-    if let Some((_, base)) = &subject.base {
-        result.append(&base.linear);
-    }
-}
-
-/// Reports a word that is not greater than its predecessor in a part.
-fn unsorted(part: &str, before: u64, word: u64, root: &Root, result: &mut CheckResult) {
-    result.report_with(|| {
-        let (before, word) = (identical::describe(before, root), identical::describe(word, root));
-        format!("{part} is not sorted: {word} follows {before}")
-    });
-}
-
-/// Reports a word that is not a leaf, or overlaps the last valid leaf.
-fn refused(
-    prefix: &str,
-    why: Refusal,
-    word: u64,
-    last: u64,
-    root: &Root,
-    result: &mut CheckResult,
-) {
-    result.report_with(|| {
-        let leaf = identical::describe(word, root);
-        match why {
-            Refusal::Fault(_) => format!("{prefix}not a leaf: {leaf}"),
-            Refusal::Overlap => {
-                format!(
-                    "{prefix}two leaves overlap: {leaf} and {}",
-                    identical::describe(last, root)
-                )
-            }
+pub(super) const CHECK: Check = Check {
+    name: "linear",
+    wanted: always,
+    needs: nothing,
+    run: |subject, result| {
+        *result = subject.pass.linear.clone();
+        if let Some((_, base)) = &subject.base {
+            result.append(&base.linear);
         }
-    });
-}
+    },
+};
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::Subject;
     use contract::case::Case;
-    use contract::leafset::LeafSet;
     use contract::testing::{leaf_set, words_of};
 
     #[test]

@@ -177,15 +177,10 @@ impl<'a> Survey<'a> {
         (self.band_cells * (UNITS_PER_EDGE >> self.terms.level_surface) as f64) as i64
     }
 
-    /// The facets that meet an octant or the band around it.
-    fn near(&self, octant: &Octant, candidates: &[u32]) -> Vec<u32> {
-        let ((low, high), band) = (octant.bounds(), self.band());
-        self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band))
-    }
-
     /// The position of a part beyond the band of an octant that no facet crosses. All of it lies on one side.
     fn beyond_band(&self, octant: Octant, candidates: &[u32]) -> Option<Position> {
-        let near = self.near(&octant, candidates);
+        let ((low, high), band) = (octant.bounds(), self.band());
+        let near = self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
         if near.is_empty() {
             return Some(self.position(octant));
         }

@@ -3,7 +3,7 @@
 //! Invariants: the listed findings are the first ones, and as many as there are, up to a limit, each with a text; a
 //! check that had nothing to check has examined nothing and found nothing; one that holds has examined something. `identical` counts leaves and lists one difference.
 
-use contract::failure::Unusable;
+use contract::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::num::NonZeroU64;
@@ -15,19 +15,23 @@ pub const FINDINGS_LISTED: usize = 4;
 pub const FILES: &str = "files";
 
 /// The result of a check on one mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CheckResult {
     /// Name of the check.
     pub name: &'static str,
     /// Number of objects examined: leaves, unless the note names something else.
     pub examined: u64,
     /// The first [`FINDINGS_LISTED`] findings: the violation and its position, by octant path and coordinates.
+    #[serde(skip)]
     pub findings: Vec<String>,
     /// Number of all findings.
+    #[serde(rename = "findings")]
     pub findings_total: u64,
     /// Numbers and limitations that are of interest even if the check passes.
+    #[serde(skip)]
     pub note: String,
     /// Why the mesh gave the check nothing to examine; such a check neither holds nor fails.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub nothing_to_check: Option<String>,
 }
 
@@ -45,7 +49,7 @@ impl CheckResult {
     }
 
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
-    pub fn unreadable(error: &Unusable) -> Self {
+    pub fn unreadable(error: &Failure) -> Self {
         let mut result = Self::new(FILES);
         result.report(error.to_string());
         result

@@ -8,14 +8,18 @@
 //! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
 //! definition is judged beyond a band around the geometry ([`super::region`]).
 
-use super::components::Component;
+use super::components::{self, Component};
 use super::contact;
+use super::facets::Facets;
 use super::region::Survey;
 use super::truth::Truth;
 use super::{Check, CheckResult, Subject, json, some_leaves};
-use contract::manifest::{Ambiguous, Manifest, Sides};
-use contract::tree::{HOLES, Kind, Tree};
-use contract::word::Side;
+use crate::oracle::is_watertight;
+use contract::case::Case;
+use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};
+use contract::octant::{LEVEL_MAX, Octant};
+use contract::tree::{HOLES, Tree};
+use contract::word::{self, Side};
 
 pub(super) const CHECK: Check = Check {
     name: "sides",
@@ -43,8 +47,19 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     not_kept(subject.tree(), terms, result);
     of_neighbours(subject.tree(), terms, result);
     let Some(truth) = subject.truth() else { return };
+    let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
     for (prefix, manifest, pass) in subject.meshes() {
-        of_components(prefix, pass.tree(), truth, subject, result);
+        truth.mislabelled(pass.tree(), &mut |found, side| {
+            result.report_with(|| {
+                let (given, leaf) =
+                    (contact::name(found.kinds), terms.root.describe(&found.octant));
+                let why = match side {
+                    Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
+                    _ => format!("{judges} show that its component is {side}"),
+                };
+                format!("{prefix}the leaf is {given}, but {why}: {leaf}")
+            });
+        });
         ambiguous(prefix, manifest, &truth.components, terms, result);
     }
     stated_leaks(subject, truth, result);
@@ -53,16 +68,16 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 /// The manifests state the leaks of T0, if they state any or none.
 fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     let (Some(case), Some(facets)) = (subject.case, subject.facets()) else { return };
-    let mut leaks = None;
+    let mut known = None;
     for (prefix, manifest, _) in subject.meshes() {
         let Some(stated) = &manifest.leaks else { continue };
-        let find = || super::leaks::find(case, facets, &subject.inputs, truth);
-        let leaks = leaks.get_or_insert_with(find);
-        if stated != leaks {
+        let find = || leaks(case, facets, &subject.inputs, truth);
+        let found = known.get_or_insert_with(find);
+        if stated != found {
             result.report(format!(
                 "{prefix}the manifest states the leaks {}, but T0 has {}",
                 json(stated),
-                json(leaks)
+                json(found)
             ));
         }
     }
@@ -70,41 +85,14 @@ fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
 
 /// Inside and outside leaves share no face.
 fn of_neighbours(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
-    let inside = 1 << Side::Inside as u8;
-    contact::visit(tree, inside, &mut |outside, kind, across| {
-        if kind == Side::Outside as Kind && across & inside != 0 {
+    let [outside, inside] = [Side::Outside, Side::Inside].map(|side| 1 << side as u8);
+    contact::visit(tree, outside, inside, &mut |outside, _, across| {
+        if across & inside != 0 {
             let leaf = terms.root.describe(&outside);
             result.report_with(|| {
                 format!("an inside leaf shares a face with the outside leaf {leaf}")
             });
         }
-    });
-}
-
-/// Leaves have the sides of the leaves of T0 that contain them.
-fn of_components(
-    prefix: &str,
-    tree: &Tree,
-    truth: &Truth,
-    subject: &Subject,
-    result: &mut CheckResult,
-) {
-    let judges = if subject.terms.seeds.is_empty() { "rays" } else { "seeds" };
-    truth.compare(tree, &mut |found| {
-        let Some(kind) = found.base.filter(|_| !found.is_hole()) else { return };
-        let side = Truth::side(kind);
-        if found.kinds == 1 << side as u8 {
-            return;
-        }
-        result.report_with(|| {
-            let (given, leaf) =
-                (contact::name(found.kinds), subject.terms.root.describe(&found.octant));
-            let why = match side {
-                Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
-                _ => format!("{judges} show that its component is {side}"),
-            };
-            format!("{prefix}the leaf is {given}, but {why}: {leaf}")
-        });
     });
 }
 
@@ -150,4 +138,57 @@ fn ambiguous(
             json(&example)
         ));
     }
+}
+
+/// The leaks of a case with this T0: regions that are closed at a coarser spacing and open at that of the mesh.
+fn leaks(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth) -> Vec<Leak> {
+    if !terms.seeds.is_empty() && is_watertight(&case.facets_lattice) {
+        return Vec::new();
+    }
+    let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
+    levels.flat_map(|level| between(case, facets, terms, truth, level)).collect()
+}
+
+/// The leaks between T0 cut at a level, and T0.
+fn between(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
+    let mut cut = Manifest { level_surface: level, ..terms.clone() };
+    cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
+    let make = |terms: &Manifest| {
+        let coarse = Truth::new(facets, &case.facets_lattice, terms);
+        coarse.expect("T0 that is cut has no more leaves than T0")
+    };
+    let mut coarse = make(&cut);
+    let seeded = components::seeded_leaves(&coarse.words, terms);
+    let is_crossing =
+        |&(leaf, _): &(u32, usize)| word::side(coarse.words[leaf as usize]) == Side::Crossing;
+    if seeded.iter().any(is_crossing) {
+        coarse = make(&Manifest { seeds: Vec::new(), ..cut });
+    }
+    let edge = |level: u8| terms.root.edge / f64::from(1u32 << level);
+    let leak = |component: &Component| {
+        let octants =
+            component.leaves.iter().map(|&leaf| word::octant(coarse.words[leaf as usize]));
+        let units: u64 = octants.map(|octant: Octant| 1 << (3 * (LEVEL_MAX - octant.level))).sum();
+        Leak {
+            spacing_coarse: edge(level),
+            spacing_fine: edge(terms.level_surface),
+            volume: units as f64 * edge(LEVEL_MAX).powi(3),
+            point: terms.root.to_user(component.first.centre()),
+        }
+    };
+    let has_leaked = |component: &&Component| {
+        // All leaves of T0 within a leaf that no facet crosses have one side.
+        let fine = truth.component_at(&component.first).map(|fine| fine.side);
+        let leaks = match (component.side, fine) {
+            (Side::Inside, Some(Side::Outside)) => {
+                terms.seeds.is_empty() || terms.keep != Keep::Inside
+            }
+            (Side::Outside, Some(Side::Inside)) => terms.keep == Keep::Inside,
+            _ => false,
+        };
+        leaks && components::seed_in(&component.leaves, &seeded).is_none()
+    };
+    let mut leaked: Vec<&Component> = coarse.components.iter().filter(has_leaked).collect();
+    leaked.sort_by_key(|component| (component.first.level, word::key_of(component.first.corner)));
+    leaked.into_iter().map(leak).collect()
 }

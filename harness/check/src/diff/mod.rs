@@ -15,16 +15,15 @@ use std::fmt;
 use std::path::Path;
 
 use crate::checks::identical::describe;
-use crate::checks::manifest::INPUTS;
+use crate::inputs;
 use crate::why::{self, Body};
 use contract::case::Case;
-use contract::failure::Unusable;
+use contract::failure::Failure;
 use contract::lattice::Root;
-use contract::manifest::{ExtentBox, Manifest, Sides, Tally};
+use contract::manifest::{Manifest, Sides, Tally};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word;
-use serde_json::{Value, json};
 
 /// The differences of two leaf sets.
 #[derive(Clone, Debug, Default)]
@@ -90,7 +89,7 @@ impl fmt::Display for DiffReport {
 ///
 /// # Errors
 /// If a directory cannot be read.
-pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Unusable> {
+pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failure> {
     let mut meshes = [("A", Mesh::open(a)?), ("B", Mesh::open(b)?)];
     let unknown = meshes.iter().find(|(_, mesh)| mesh.manifest.sides == Sides::Unknown);
     let without_sides = unknown.map(|(name, _)| *name);
@@ -127,8 +126,8 @@ fn level_3(index: u64) -> Octant {
 type Differing = (Option<u64>, Option<u64>);
 
 /// The first words that differ in an octant, in the bits of `mask`.
-fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Differing, Unusable> {
-    let words = |mesh: &Mesh| -> Result<Vec<u64>, Unusable> {
+fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Differing, Failure> {
+    let words = |mesh: &Mesh| -> Result<Vec<u64>, Failure> {
         Ok(mesh.octant(octant)?.into_iter().map(|word| word & mask).collect())
     };
     let (a, b) = (words(a)?, words(b)?);
@@ -148,7 +147,7 @@ fn leaves(a: Option<u64>, b: Option<u64>, sides_known: bool, root: &Root) -> Str
 
 /// The rule that decides which mesh is right, or why none does.
 fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
-    if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
+    if !inputs::differing(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
     let (body, caveat) = match case.map(|case| Body::of(case, &a.manifest)).transpose() {
@@ -167,42 +166,12 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
 /// Counts that follow from the sides.
 const OF_SIDES: [&str; 3] = ["components", "components_ambiguous", "leaves_by_side"];
 
-/// A manifest with its owner's name.
-type Owned<'a> = (&'a str, &'a Manifest);
-
-/// The differences of inputs, one line each, with names for the owners of both manifests.
-pub(crate) fn differing_inputs(a: Owned, b: Owned) -> Vec<String> {
-    let geometry = a.1.geometry.is_some() && b.1.geometry.is_some();
-    let keys = ["tree"].into_iter().chain(INPUTS).chain(geometry.then_some("geometry"));
-    compare(&keys.collect::<Vec<_>>(), a, b)
-}
-
 /// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
 fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
     let have_sides = a.sides == Sides::Known && b.sides == Sides::Known;
-    let (a, b) = (("A", a), ("B", b));
-    let mut fields = differing_inputs(a, b);
-    fields.extend(compare(&["leaves", "leaves_by_level"], a, b));
-    fields.extend(compare(if have_sides { &OF_SIDES } else { &[] }, a, b));
+    let counts = ["leaves", "leaves_by_level"].into_iter();
+    let counts: Vec<_> = counts.chain(OF_SIDES.into_iter().filter(|_| have_sides)).collect();
+    let mut fields = inputs::differing(("A", a), ("B", b));
+    fields.extend(inputs::compare(&counts, ("A", a), ("B", b)));
     fields
-}
-
-fn compare(keys: &[&str], (owner_a, a): Owned, (owner_b, b): Owned) -> Vec<String> {
-    let (a, b) = (stated(a), stated(b));
-    let line = |key: &&str| {
-        let (x, y) = (&a[*key], &b[*key]);
-        (x != y).then(|| format!("{key}: {x} in {owner_a}; {y} in {owner_b}"))
-    };
-    keys.iter().filter_map(line).collect()
-}
-
-/// The manifest as JSON, with boxes and seeds in the user's units.
-fn stated(manifest: &Manifest) -> Value {
-    let root = &manifest.root;
-    let user = |at: [i64; 3]| root.rounded(root.to_user(at));
-    let mut stated = serde_json::to_value(manifest).expect("a manifest is representable in JSON");
-    let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
-    stated["boxes"] = manifest.boxes.iter().map(extent).collect();
-    stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
-    stated
 }

@@ -31,6 +31,9 @@ pub struct Ballot<'a> {
     pub seeds: bool,
 }
 
+/// Minimum number of oracles whose unanimity counts.
+const MAJORITY: usize = 3;
+
 impl Ballot<'_> {
     /// Why no vote can fail the mesh; `None` if one can.
     pub fn advisory(&self) -> Option<&'static str> {
@@ -50,106 +53,73 @@ impl Ballot<'_> {
             false => self.exact.iter().flatten().count() as u64,
         }
     }
-}
 
-/// The contradictions between one oracle and the mesh.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Dissent {
-    /// The oracle's name.
-    pub name: String,
-    /// Number of points where they differ.
-    pub points: u64,
-    /// Number of these points where all exact rays agree with the oracle.
-    pub right: u64,
-    /// Number of these points where all exact rays agree with the mesh.
-    pub wrong: u64,
-}
-
-/// The result of a vote.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// One entry per oracle.
-    pub dissents: Vec<Dissent>,
-    /// Indices of points where all six exact rays contradict the mesh.
-    pub exact_against: Vec<usize>,
-    /// Indices of points where all oracles contradict the mesh.
-    pub all_against: Vec<usize>,
-}
-
-/// Counts the votes.
-pub fn count(ballot: &Ballot) -> Tally {
-    let dissent = |answer: &Answer| Dissent { name: answer.name.clone(), ..Dissent::default() };
-    let mut count =
-        Tally { dissents: ballot.oracles.iter().map(dissent).collect(), ..Tally::default() };
-    for (point, (&mesh, &exact)) in ballot.mesh.iter().zip(ballot.exact).enumerate() {
-        if exact == Some(!mesh) {
-            count.exact_against.push(point);
-        }
-        let mut against = 0;
-        for (answer, dissent) in ballot.oracles.iter().zip(&mut count.dissents) {
-            if answer.inside[point] != mesh {
-                against += 1;
-                dissent.points += 1;
-                dissent.right += u64::from(exact == Some(!mesh));
-                dissent.wrong += u64::from(exact == Some(mesh));
-            }
-        }
-        if against == ballot.oracles.len() && against >= MAJORITY {
-            count.all_against.push(point);
-        }
+    /// Indices of points that satisfy a predicate.
+    fn points(&self, predicate: impl Fn(usize) -> bool) -> Vec<usize> {
+        (0..self.mesh.len()).filter(|&point| predicate(point)).collect()
     }
-    count
-}
 
-/// Minimum number of oracles whose unanimity counts.
-const MAJORITY: usize = 3;
+    /// Indices of points where all six exact rays contradict the mesh.
+    fn exact_against(&self) -> Vec<usize> {
+        self.points(|point| self.exact[point] == Some(!self.mesh[point]))
+    }
 
-impl Tally {
-    /// The reason why the mesh fails; `None` if it does not. `points` are the coordinates of the points.
-    pub fn failure(&self, ballot: &Ballot, points: &[[f64; 3]]) -> Option<String> {
-        if ballot.advisory().is_some() {
+    /// Indices of points where all oracles contradict the mesh.
+    fn all_against(&self) -> Vec<usize> {
+        let is_against = |point| self.oracles.iter().all(|of| of.inside[point] != self.mesh[point]);
+        self.points(|point| self.oracles.len() >= MAJORITY && is_against(point))
+    }
+
+    /// The reason why the mesh fails; `None` if it does not. `places` are the coordinates of the points.
+    pub fn failure(&self, places: &[[f64; 3]]) -> Option<String> {
+        if self.advisory().is_some() {
             return None;
         }
         let sentence = |subject: &str, against: &[usize]| {
             let first = *against.first()?;
-            let side = if ballot.mesh[first] { "inside" } else { "outside" };
+            let side = if self.mesh[first] { "inside" } else { "outside" };
             Some(format!(
                 "{subject} contradict the mesh at {} points, first at {:?}, which is {side} in the mesh",
                 against.len(),
-                points[first]
+                places[first]
             ))
         };
-        let exact = sentence("all six exact rays", &self.exact_against);
-        let oracles =
-            (!ballot.doubled).then(|| sentence("all oracles", &self.all_against)).flatten();
-        let reasons: Vec<String> = exact.into_iter().chain(oracles).collect();
+        let exact = sentence("all six exact rays", &self.exact_against());
+        let oracles = (!self.doubled).then(|| sentence("all oracles", &self.all_against()));
+        let reasons: Vec<String> = exact.into_iter().chain(oracles.flatten()).collect();
         (!reasons.is_empty()).then(|| reasons.join("; "))
     }
 
     /// Remarks that are not failures, one sentence each.
-    pub fn notes(&self, ballot: &Ballot) -> Vec<String> {
-        let all = ballot.mesh.len();
-        let sentence = |dissent: &Dissent| {
-            let Dissent { name, points, right, wrong } = dissent;
-            let undecided = points - right - wrong;
-            let judged = match ballot.seeds {
+    pub fn notes(&self) -> Vec<String> {
+        let all = self.mesh.len();
+        let sentence = |Answer { name, inside }: &Answer| {
+            let differing = self.points(|point| inside[point] != self.mesh[point]);
+            let rays = |agree| {
+                differing
+                    .iter()
+                    .filter(|&&point| self.exact[point] == Some(agree == self.mesh[point]))
+                    .count()
+            };
+            let (points, right, wrong) = (differing.len(), rays(false), rays(true));
+            let judged = match self.seeds {
                 true => format!("exact rays agree with it at {right}"),
                 false => format!(
-                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {undecided}"
+                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {}",
+                    points - right - wrong
                 ),
             };
-            format!("{name} differs from the mesh at {points} of {all} points; {judged}")
+            (points > 0).then(|| {
+                format!("{name} differs from the mesh at {points} of {all} points; {judged}")
+            })
         };
-        let mut notes: Vec<String> =
-            self.dissents.iter().filter(|d| d.points > 0).map(sentence).collect();
-        if ballot.doubled && !self.all_against.is_empty() {
-            let count = self.all_against.len();
-            notes.push(format!("at {count} points all oracles contradict the mesh: facets coincide, and rays decide"));
+        let mut notes: Vec<String> = self.oracles.iter().filter_map(sentence).collect();
+        let (exact, oracles) = (self.exact_against().len(), self.all_against().len());
+        if self.doubled && oracles > 0 {
+            notes.push(format!("at {oracles} points all oracles contradict the mesh: facets coincide, and rays decide"));
         }
-        let Some(why) = ballot.advisory() else { return notes };
-        if !self.exact_against.is_empty() {
-            let count = self.exact_against.len();
-            notes.push(format!("at {count} points all six exact rays contradict the mesh: {why}"));
+        if let Some(why) = self.advisory().filter(|_| exact > 0) {
+            notes.push(format!("at {exact} points all six exact rays contradict the mesh: {why}"));
         }
         notes
     }
@@ -167,12 +137,13 @@ mod tests {
         all.iter().enumerate().map(answer).collect()
     }
 
-    /// Evaluates a ballot on three points which the mesh places outside, inside, inside.
+    /// Where exact rays contradict the mesh, the failure and the notes of a ballot on three points, which the mesh places outside,
+    /// inside, inside.
     fn vote(
         exact: [Option<bool>; 3],
         all: [&[u8]; 3],
         watertight: bool,
-    ) -> (Tally, Option<String>, Vec<String>) {
+    ) -> (Vec<usize>, Option<String>, Vec<String>) {
         vote_with_seeds(exact, all, watertight, false)
     }
 
@@ -181,15 +152,13 @@ mod tests {
         all: [&[u8]; 3],
         watertight: bool,
         seeds: bool,
-    ) -> (Tally, Option<String>, Vec<String>) {
+    ) -> (Vec<usize>, Option<String>, Vec<String>) {
         let (oracles, mesh) = (answers(all), [false, true, true]);
         let doubled = false;
         let ballot =
             Ballot { mesh: &mesh, exact: &exact, oracles: &oracles, watertight, doubled, seeds };
-        let count = count(&ballot);
-        let points = [[0.0; 3], [1.0; 3], [2.0; 3]];
-        let (failure, notes) = (count.failure(&ballot, &points), count.notes(&ballot));
-        (count, failure, notes)
+        let places = [[0.0; 3], [1.0; 3], [2.0; 3]];
+        (ballot.exact_against(), ballot.failure(&places), ballot.notes())
     }
 
     const TRUE: [Option<bool>; 3] = [Some(false), Some(true), Some(true)];
@@ -214,24 +183,18 @@ mod tests {
             seeds: false,
         };
         let judged = |doubled| {
-            let (ballot, points) = (ballot(doubled), [[0.0; 3]; 3]);
-            let count = count(&ballot);
-            (count.failure(&ballot, &points).is_some(), count.notes(&ballot).len())
+            let ballot = ballot(doubled);
+            (ballot.failure(&[[0.0; 3]; 3]).is_some(), ballot.notes().len())
         };
         assert_eq!((judged(false), judged(true)), ((true, 3), (false, 4)));
     }
 
     #[test]
     fn one_wrong_oracle_is_noted_and_does_not_fail() {
-        let (count, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
-        let dissent = Dissent { name: "oracle 1".into(), points: 2, right: 0, wrong: 2 };
-        assert_eq!((&count.dissents[1], failure), (&dissent, None));
-        assert_eq!(notes.len(), 1);
-        assert!(
-            notes[0].starts_with("oracle 1 differs from the mesh at 2 of 3 points"),
-            "{}",
-            notes[0]
-        );
+        let (_, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
+        let expected = "oracle 1 differs from the mesh at 2 of 3 points; by exact rays it is right at 0, wrong at 2, \
+            undecided at 0";
+        assert_eq!((failure, notes), (None, vec![expected.to_owned()]));
     }
 
     #[test]
@@ -245,8 +208,8 @@ mod tests {
     #[test]
     fn exact_rays_that_contradict_the_mesh_are_a_failure() {
         let exact = [Some(false), Some(false), Some(true)];
-        let (count, failure, _) = vote(exact, [YES, &[0, 0, 1], YES], true);
-        assert_eq!((count.exact_against, count.dissents[1].right), (vec![1], 1));
+        let (against, failure, notes) = vote(exact, [YES, &[0, 0, 1], YES], true);
+        assert!(against == [1] && notes[0].contains("right at 1, wrong at 0"), "{notes:?}");
         assert_eq!(
             failure.unwrap(),
             "all six exact rays contradict the mesh at 1 points, first at [1.0, 1.0, 1.0], which is inside in the mesh"
@@ -275,8 +238,8 @@ mod tests {
     fn with_seeds_no_vote_fails_the_mesh_and_every_contradiction_is_noted() {
         let no: &[u8] = &[1, 1, 0];
         let exact = [Some(true), Some(true), Some(false)];
-        let (count, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
-        assert_eq!((count.exact_against.len(), failure, notes.len()), (2, None, 4));
+        let (against, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
+        assert_eq!((against.len(), failure, notes.len()), (2, None, 4));
         assert!(
             notes[0].ends_with("at 2 of 3 points; exact rays agree with it at 2"),
             "{}",

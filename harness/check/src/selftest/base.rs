@@ -2,9 +2,10 @@
 //! must detect most of them.
 
 use super::SelftestCase;
-use super::edit::{self, has_side, merge, sibling_groups, split};
-use super::mutant::{AUDITED, INFORMED, Mutant, base, words};
-use contract::octant::{LEVEL_MAX, Octant};
+use super::mutant::{
+    self, AUDITED, INFORMED, Mutant, base, has_side, merge, sibling_groups, split, words,
+};
+use contract::octant::LEVEL_MAX;
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
@@ -24,15 +25,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     base("T0 one level too coarse along the whole surface", "spacing", INFORMED, |s| {
         let groups = siblings_of_surface(s);
-        let parent = |&i: &usize| word::octant(edit::parent(s.base.words[i]));
-        let merged: Vec<Octant> = groups.iter().map(parent).collect();
-        let mut words = merge(&s.base.words, &groups);
-        for w in &mut words {
-            if merged.binary_search_by_key(&word::key(*w), |o| word::key_of(o.corner)).is_ok() {
-                *w = edit::with_side(*w, Side::Crossing);
-            }
-        }
-        (!groups.is_empty()).then_some(words)
+        (!groups.is_empty()).then(|| merged_crossing(&s.base.words, &groups))
     }),
     words("crossing leaves of the mesh merged", "spacing", AUDITED, |s| {
         let words = &s.mesh.words;
@@ -52,14 +45,20 @@ fn siblings_of_surface(s: &SelftestCase) -> Vec<usize> {
     sibling_groups(&sideless).into_iter().filter(of_surface).collect()
 }
 
+/// The words with groups of siblings merged into crossing leaves.
+fn merged_crossing(words: &[u64], groups: &[usize]) -> Vec<u64> {
+    let mut merged = merge(words, groups);
+    for at in groups.iter().enumerate().map(|(before, i)| i - 7 * before) {
+        merged[at] = mutant::with_side(merged[at], Side::Crossing);
+    }
+    merged
+}
+
 /// Merges siblings of which at least one is crossing. (All eight rarely are.)
 fn coarse_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.base.words;
     let crosses = |&i: &usize| words[i..i + 8].iter().any(|&w| has_side(w, Side::Crossing));
-    let i = siblings_of_surface(s).into_iter().find(crosses)?;
-    let mut all = words.clone();
-    all.splice(i..i + 8, [edit::with_side(edit::parent(words[i]), Side::Crossing)]);
-    Some(all)
+    Some(merged_crossing(words, &[siblings_of_surface(s).into_iter().find(crosses)?]))
 }
 
 /// The words with eight siblings merged whose level a box requires.
@@ -89,6 +88,7 @@ fn fine_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     #[test]

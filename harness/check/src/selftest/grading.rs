@@ -5,11 +5,13 @@
 //! property in the corruption's name.
 
 use super::SelftestCase;
-use super::edit::{self, has_side, merge, sibling_groups, split};
-use super::mutant::{AUDITED, INFORMED, Mutant, words};
+use super::mutant::{
+    self, AUDITED, INFORMED, Mutant, has_side, merge, sibling_groups, split, words,
+};
 use contract::manifest::Keep;
+use contract::neighbourhood::{Neighbourhood, OFFSETS};
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
-use contract::tree::{Neighbourhood, OFFSETS, Tree};
+use contract::tree::Tree;
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
@@ -21,7 +23,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("two levels apart over a corner only", "balance", AUDITED, |s| {
         split_where(s, |coarser| coarser[1] == 0 && coarser[2] == 0 && coarser[3] > 0)
-            .or_else(|| merged_at_finer_corner(s))
+            .or_else(|| merge_where(s, |l, near| near.touching > l && near.in_edge <= l))
     }),
     words("leaf split twice", "balance", AUDITED, split_twice),
     words("octant that balance requires merged", "balance", AUDITED, |s| {
@@ -58,7 +60,8 @@ fn coarser_neighbours(neighbourhood: &Neighbourhood) -> [usize; 4] {
 fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Option<Vec<u64>> {
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
-        word::level(w) < LEVEL_MAX && predicate(coarser_neighbours(&edit::neighbourhood(&tree, w)))
+        word::level(w) < LEVEL_MAX
+            && predicate(coarser_neighbours(&mutant::neighbourhood(&tree, w)))
     };
     Some(split(&s.mesh.words, s.mesh.words.iter().position(fit)?))
 }
@@ -67,18 +70,6 @@ fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Opti
 fn merged_where(s: &SelftestCase, fit: impl Fn(usize) -> bool) -> Option<Vec<u64>> {
     let i = graded_siblings(s).into_iter().find(|&i| fit(i))?;
     Some(merge(&s.mesh.words, &[i]))
-}
-
-/// Merges siblings that touch finer leaves at corners only.
-fn merged_at_finer_corner(s: &SelftestCase) -> Option<Vec<u64>> {
-    let words = &s.mesh.words;
-    merged_where(s, |i| {
-        let merged = word::octant(edit::parent(words[i]));
-        let finer = |w: &&u64| word::level(**w) > merged.level + 1;
-        let touching = |w: &&u64| merged.distance(&word::octant(**w)) == 0;
-        let mut near = words.iter().filter(|w| finer(w) && touching(w)).peekable();
-        near.peek().is_some() && near.all(|&w| meet_in_corner(&merged, &word::octant(w)))
-    })
 }
 
 /// Whether two octants have exactly one common point.
@@ -93,7 +84,7 @@ fn split_twice(s: &SelftestCase) -> Option<Vec<u64>> {
     // split, so the neighbour must be across a low face.
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
-        let neighbourhood = edit::neighbourhood(&tree, w);
+        let neighbourhood = mutant::neighbourhood(&tree, w);
         word::level(w) + 1 < LEVEL_MAX && neighbourhood.at_offset([-1, 0, 0]).as_leaf().is_some()
     };
     let i = s.mesh.words.iter().position(fit)?;
@@ -114,6 +105,8 @@ fn graded_siblings(s: &SelftestCase) -> Vec<usize> {
 struct Surroundings {
     /// Level of the finest leaf that touches them.
     touching: u8,
+    /// Level of the finest leaf that shares part of an edge or a face with them.
+    in_edge: u8,
     /// Level of the finest leaf within n cells of the siblings' level.
     within_layer: u8,
     /// Whether the siblings are in the layer around a crossing leaf, and their parent is coarser than the surface.
@@ -124,12 +117,13 @@ struct Surroundings {
 /// checks.
 fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
     let words = &s.mesh.words;
-    let merged = word::octant(edit::parent(words[i]));
+    let merged = word::octant(mutant::parent(words[i]));
     let cell = i64::from(merged.edge() / 2);
     let n = i64::from(s.case.layer_cells_min);
     let surface = s.case.level_surface;
     let cell_surface = i64::from(CELLS_PER_EDGE >> surface);
-    let mut found = Surroundings { touching: 0, within_layer: 0, in_surface_layer: false };
+    let mut found =
+        Surroundings { touching: 0, in_edge: 0, within_layer: 0, in_surface_layer: false };
     for &w in words {
         let leaf = word::octant(w);
         if merged.contains(&leaf) {
@@ -138,6 +132,9 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
         let distance = merged.distance(&leaf);
         if distance == 0 {
             found.touching = found.touching.max(leaf.level);
+            if !meet_in_corner(&merged, &leaf) {
+                found.in_edge = found.in_edge.max(leaf.level);
+            }
         }
         if distance < n * cell {
             found.within_layer = found.within_layer.max(leaf.level);
@@ -195,7 +192,7 @@ fn halo_missing(s: &SelftestCase) -> Option<Vec<u64>> {
 fn extra_layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
     let touches = |i: usize| {
-        let merged = word::octant(edit::parent(words[i]));
+        let merged = word::octant(mutant::parent(words[i]));
         let mut crossing = s.base.words.iter().filter(|&&w| has_side(w, Side::Crossing));
         word::level(words[i]) == s.case.level_surface
             && crossing.any(|&w| merged.distance(&word::octant(w)) == 0)
@@ -261,7 +258,7 @@ mod tests {
             );
             let correct =
                 SelftestCase { case, mesh: leaf_set(vec![words]), base: leaf_set(vec![]) };
-            let Surroundings { touching, within_layer, in_surface_layer } =
+            let Surroundings { touching, within_layer, in_surface_layer, .. } =
                 surroundings(&correct, 0);
             (touching, within_layer, in_surface_layer)
         };

@@ -1,7 +1,8 @@
 //! Removed, duplicated and moved leaves, which the checks `linear`, `complete` and `identical` must detect.
 
-use super::edit::{self, changed, has_side, middle, sibling_groups, split};
-use super::mutant::{AUDITED, INFORMED, Mutant, sets, words};
+use super::mutant::{
+    self, AUDITED, INFORMED, Mutant, changed, has_side, middle, sets, sibling_groups, split, words,
+};
 use contract::manifest::Keep;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::{HOLES, Tree};
@@ -12,19 +13,19 @@ pub(super) const MUTANTS: &[Mutant] = &[
         changed(s, |_| true, |words, i| words.push(words[i]))
     }),
     words("leaf duplicated with another side", "linear", AUDITED, |s| {
-        changed(s, |_| true, |words, i| words.push(edit::other_side(words[i])))
+        changed(s, |_| true, |words, i| words.push(mutant::other_side(words[i])))
     }),
     words("leaf kept beside its children", "linear", AUDITED, |s| {
-        changed(s, is_not_finest, |words, i| words.extend(edit::children(words[i])))
+        changed(s, is_not_finest, |words, i| words.extend(mutant::children(words[i])))
     }),
     words("leaf of twice the size among its siblings", "linear", AUDITED, |s| {
         let first = |w| word::octant(w).digit() == 0;
-        let parent = |w| word::octant(edit::parent(w));
+        let parent = |w| word::octant(mutant::parent(w));
         let within =
             |pair: &[u64]| first(pair[0]) && parent(pair[0]).contains(&word::octant(pair[1]));
         let mut words = s.mesh.words.clone();
         let i = words.windows(2).position(within)?;
-        words[i] = edit::parent(words[i]);
+        words[i] = mutant::parent(words[i]);
         Some(words)
     }),
     words("leaf deeper than the deepest level", "linear", AUDITED, |s| {
@@ -40,7 +41,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     words("all leaves shifted by one finest cell", "linear", AUDITED, |s| {
         let finest = s.mesh.words.iter().map(|&w| word::level(w)).max()?;
         let has_coarser = s.mesh.words.iter().any(|&w| word::level(w) < finest);
-        has_coarser.then(|| edit::shifted(&s.mesh.words, CELLS_PER_EDGE >> finest))
+        has_coarser.then(|| mutant::shifted(&s.mesh.words, CELLS_PER_EDGE >> finest))
     }),
     sets("part not sorted", "linear", AUDITED, |s, mutation| {
         let mut parts = s.mesh.parts.clone();
@@ -51,20 +52,20 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Some(())
     }),
     words("all leaves shifted by half the root", "crossing", INFORMED, |s| {
-        let words = edit::shifted(&s.mesh.words, CELLS_PER_EDGE / 2);
+        let words = mutant::shifted(&s.mesh.words, CELLS_PER_EDGE / 2);
         let crossing = s.mesh.words.iter().any(|&w| has_side(w, Side::Crossing));
         let moved = words.iter().any(|w| s.mesh.words.binary_search(w).is_err());
         (crossing && moved).then_some(words)
     }),
     words("mesh mirrored", "identical", INFORMED, |s| {
-        Some(edit::mirrored(&s.mesh.words)).filter(|words| *words != s.mesh.words)
+        Some(mutant::mirrored(&s.mesh.words)).filter(|words| *words != s.mesh.words)
     }),
     words("leaf removed away from the surface", "complete", AUDITED, |s| {
         // Next to deleted crossing leaves, one more hole would be indistinguishable from them.
         let tree = Tree::of_words(&s.mesh.words);
         let near_surface = HOLES | 1 << Side::Crossing as u8;
         let away = |w: u64| {
-            let around = edit::neighbourhood(&tree, w);
+            let around = mutant::neighbourhood(&tree, w);
             word::level(w) < s.case.level_surface
                 && around.handles.iter().all(|&h| tree.kinds(h) & near_surface == 0)
         };
@@ -99,7 +100,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let words = &s.mesh.words;
         let of_base =
             |&i: &usize| words[i..i + 8].iter().all(|w| s.base.words.binary_search(w).is_ok());
-        Some(edit::merge(words, &[sibling_groups(words).into_iter().find(of_base)?]))
+        Some(mutant::merge(words, &[sibling_groups(words).into_iter().find(of_base)?]))
     }),
     words("leaf split needlessly", "identical", INFORMED, |s| {
         Some(split(&s.mesh.words, middle(&s.mesh.words, is_not_finest)?))

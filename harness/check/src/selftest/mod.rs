@@ -20,12 +20,9 @@ use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 
 mod base;
-mod edit;
 mod files;
 mod grading;
-mod kept;
 mod leaves;
-mod manifests;
 mod mutant;
 mod sides;
 
@@ -43,16 +40,7 @@ pub const CASES: [(&str, &str); 6] = [
 
 /// All corruptions.
 pub fn catalogue() -> Vec<Mutant> {
-    [
-        leaves::MUTANTS,
-        sides::MUTANTS,
-        kept::MUTANTS,
-        base::MUTANTS,
-        grading::MUTANTS,
-        manifests::MUTANTS,
-        files::MUTANTS,
-    ]
-    .concat()
+    [leaves::MUTANTS, sides::MUTANTS, base::MUTANTS, grading::MUTANTS, files::MUTANTS].concat()
 }
 
 /// A correct mesh with its case and T0: the starting point of corruptions.
@@ -165,7 +153,7 @@ impl fmt::Display for SelftestReport {
 /// If a file in `scratch` cannot be written or read.
 pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestReport> {
     let mut report = SelftestReport::default();
-    let cases: Vec<SelftestCase> = cases.iter().map(edit::in_parts).collect();
+    let cases: Vec<SelftestCase> = cases.iter().map(mutant::in_parts).collect();
     for correct in &cases {
         let unchanged = Mutation::of(correct);
         let examined = examine(correct, &unchanged, &scratch.join("unchanged"))?;

@@ -21,8 +21,9 @@
 //! requires the split of its ancestors. So the leaf of T0 at a point is the first octant on the way down that no rule splits.
 
 use super::Mesh;
+use contract::neighbourhood::OFFSETS;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
-use contract::tree::{Handle, OFFSETS};
+use contract::tree::Handle;
 use contract::word;
 use contract::word::Side;
 use std::ops::RangeInclusive;

@@ -2,8 +2,6 @@
 
 mod agreement;
 mod kept;
-mod many_parts;
 mod no_false_alarms;
-mod promises;
 mod selftest;
 mod support;

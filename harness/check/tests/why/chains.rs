@@ -1,10 +1,39 @@
 //! Every link of a chain is a leaf of the mesh that forces the split by the stated rule, and every chain leads to a cause.
+//!
+//! A cause is checked by meshing without it. With `keep = "all"` a split has a sufficient cause among single facets and
+//! boxes: the mesh of that facet or box alone has the split. Removing all sufficient ones removes the split.
 
-use super::brute::Brute;
 use super::*;
 use check::why::answer::{Answer, Rule, Split};
+use contract::manifest::Manifest;
 use contract::octant::Octant;
+use contract::triangle::Triangle;
 use contract::word::{self, Side};
+
+/// What splits an octant in a mesh whose crossing leaves are kept, by the definition: slow, simple, and without the search structures of
+/// the library.
+struct Brute<'a> {
+    case: &'a Case,
+    terms: Manifest,
+}
+
+impl Brute<'_> {
+    /// Whether T0 splits an octant.
+    fn base_splits(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        let crossed = || self.case.facets_lattice.iter().any(|f| Triangle::new(f).meets(low, high));
+        self.terms.box_that_splits(octant).is_some()
+            || octant.level < self.terms.level_surface && crossed()
+    }
+
+    /// Whether a leaf forces an octant to split by its layer, and by balance.
+    fn forces(&self, leaf: &Octant, octant: &Octant) -> (bool, bool) {
+        let distance = octant.distance(leaf);
+        let reach = i64::from(self.terms.layer_cells_min - 1) * i64::from(leaf.edge());
+        let is_finer = leaf.level > octant.level && !octant.contains(leaf);
+        (is_finer && distance < reach, is_finer && leaf.level > octant.level + 1 && distance == 0)
+    }
+}
 
 /// Checks one answer link by link, with the numbers of the definition.
 fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
@@ -171,7 +200,7 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     let why = with_mesh(&correct.mesh, None, |mesh| mesh.at([99.0, 0.0, 0.0]).unwrap_err());
     assert!(why.contains("outside the root"), "{why}");
     let mut other = correct.case.clone();
-    other.layer_cells_min += 1;
+    other.rules.layer_cells_min += 1;
     let why = Body::of(&other, &correct.mesh.manifest).unwrap_err();
     let n = other.layer_cells_min;
     let expected = format!(
@@ -183,4 +212,69 @@ fn a_point_outside_the_root_and_another_case_are_refused() {
     correct.mesh.manifest.sides = contract::manifest::Sides::Unknown;
     let why = Body::of(&correct.case, &correct.mesh.manifest).unwrap_err();
     assert!(why.contains("than the case (the sides of the mesh are unknown); give"), "{why}");
+}
+
+/// Whether the leaves split an octant.
+fn splits(words: &[u64], octant: &Octant) -> bool {
+    words
+        .iter()
+        .map(|&w| word::octant(w))
+        .any(|leaf| leaf.level > octant.level && octant.contains(&leaf))
+}
+
+/// The facets and boxes of a case in which everything is kept.
+struct Inputs {
+    level: i32,
+    n: u32,
+    facets: Vec<Facet>,
+    boxes: Vec<String>,
+}
+
+impl Inputs {
+    /// The case of some of the facets and boxes.
+    fn made(&self, facets: impl Fn(usize) -> bool, boxes: impl Fn(usize) -> bool) -> SelftestCase {
+        let spacing = 16.0 * 0.5f64.powi(self.level);
+        let n = self.n;
+        let mut text =
+            format!("spacing_min = {spacing:?}\nlayer_cells_min = {n}\nkeep = 'all'\n{ROOT}");
+        (0..self.boxes.len()).filter(|&b| boxes(b)).for_each(|b| text += &self.boxes[b]);
+        let facets = (0..self.facets.len()).filter(|&f| facets(f)).map(|f| self.facets[f]);
+        super::made(&text, &facets.collect::<Vec<_>>())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn a_split_disappears_with_its_sufficient_causes_and_each_reported_one_is_sufficient(
+        level in 3i32..=5, n in 1u32..=4, facets in soup(1..4), boxes in boxes(0..2, 6),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), 4),
+    ) {
+        let inputs = Inputs { level, n, facets, boxes };
+        let correct = inputs.made(|_| true, |_| true);
+        // The meshes of single facets and of single boxes.
+        let facet_alone: Vec<Vec<u64>> =
+            (0..inputs.facets.len()).map(|f| inputs.made(|i| i == f, |_| false).mesh.words).collect();
+        let box_alone: Vec<Vec<u64>> =
+            (0..inputs.boxes.len()).map(|b| inputs.made(|_| false, |i| i == b).mesh.words).collect();
+        let answers = with_mesh(&correct.mesh, Some(&correct.case), |mesh| {
+            let leaf = |pick: &prop::sample::Index| word::octant(*pick.get(&correct.mesh.words));
+            let centre = |octant: Octant| correct.case.root.to_user(octant.centre());
+            picks.iter().map(|pick| mesh.at(centre(leaf(pick))).unwrap()).collect::<Vec<_>>()
+        });
+        for split in answers.iter().flat_map(|answer| &answer.split) {
+            let octant = &split.octant;
+            let cause = split.cause.as_ref().unwrap();
+            prop_assert!(!cause.facets.is_empty() || !cause.boxes.is_empty());
+            for &facet in &cause.facets {
+                prop_assert!(splits(&facet_alone[facet as usize], octant), "facet {facet}: {split:#?}");
+            }
+            for &b in &cause.boxes {
+                prop_assert!(splits(&box_alone[b], octant), "box {b}: {split:#?}");
+            }
+            let rest = inputs.made(|f| !splits(&facet_alone[f], octant), |b| !splits(&box_alone[b], octant));
+            prop_assert!(!splits(&rest.mesh.words, octant), "{split:#?}");
+        }
+    }
 }

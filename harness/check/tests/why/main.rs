@@ -4,8 +4,6 @@
 #[allow(dead_code)]
 mod support;
 
-mod brute;
-mod causes;
 mod chains;
 mod least;
 mod sides;

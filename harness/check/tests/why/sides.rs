@@ -14,9 +14,9 @@ const NESTED: &str = "spacing_min = 0.125\nlayer_cells_min = 1\nkeep = \"all\"\n
 fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
     let mut correct = support::selftest_case("nested", NESTED);
     correct.case.seeds = seeds.to_vec();
-    correct.case.seeds_lattice =
-        seeds.iter().map(|&seed| correct.case.root.quantise_seed(seed).unwrap()).collect();
-    correct.base.manifest.seeds = correct.case.seeds_lattice.clone();
+    let quantised = seeds.iter().map(|&seed| correct.case.root.quantise_seed(seed).unwrap());
+    correct.case.rules.seeds = quantised.collect();
+    correct.base.manifest.seeds = correct.case.rules.seeds.clone();
     let terms = correct.case.inputs();
     let mut words = correct.base.words.clone();
     for component in components::find(&words.clone(), &terms, &correct.case.facets_lattice) {

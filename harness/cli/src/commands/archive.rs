@@ -1,19 +1,25 @@
-//! `harness archive`: a report that others can replay.
+//! `harness archive`: a report that others can replay; `harness replay`: repeats its runs.
 
+use super::bench::programs;
 use super::report::{read, records_in};
-use super::values::Input;
-use bench::experiments::entry::Entry;
-use bench::experiments::record::now_utc;
-use bench::replay::Expected;
-use bench::study::Study;
-use bench::study::package::{copy, package};
+use crate::options::{Input, ProgramArguments};
+use crate::output::put;
+use bench::experiments::entry::{Entry, Line, Session};
+use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
+use bench::study::package::{self, copy, package};
+use bench::study::{self, SessionOptions, Study};
 use clap::Args;
-use contract::failure::{EXIT_HOLDS, Failure};
-use contract::files::{Staging, named, nearest_directory, write_atomically};
-use report::archive::{About, EXPECTED, METADATA, Member, RECORD, STUDY, metadata, readme};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
+use contract::files::{Staging, nearest_directory};
+use report::archive::{About, EXPECTED, METADATA, RECORD, STUDY, metadata, readme};
+use report::json::pretty;
+use report::table::Table;
+use run::engine::description::is_own;
 use run::engine::paths::Paths;
+use run::engine::runner::Engine;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// `harness archive`.
 #[derive(Args, Debug)]
@@ -25,15 +31,8 @@ pub struct Arguments {
     /// Directory to make, which must not exist
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Title of the archive
-    #[arg(long)]
-    pub title: String,
-    /// Whoever made it
-    #[arg(long, value_name = "NAME")]
-    pub author: String,
-    /// Its licence: an identifier of the list of SPDX, such as CC-BY-4.0, or an address
-    #[arg(long, value_name = "SPDX|URL")]
-    pub licence: String,
+    #[command(flatten)]
+    about: About,
 }
 
 /// Makes the archive; returns the exit code.
@@ -41,7 +40,7 @@ pub struct Arguments {
 /// # Errors
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { report, study, out, title, author, licence } = arguments;
+    let Arguments { report, study, out, about } = arguments;
     if out.exists() {
         return Err(Failure::input(format!("{} exists: name another directory", out.display())));
     }
@@ -64,18 +63,20 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         );
         return Err(Failure::input(why));
     }
-    let wrong = |error| named(out, &error);
+    let wrong = |error| Failure::at(out, error);
     let staging = Staging::beside(out).map_err(wrong)?;
     let place = staging.path();
-    copy_tree(report, place, &|path| records.iter().all(|record| record != path))?;
+    for name in list(report)? {
+        let (from, to) = (report.join(&name), place.join(&name));
+        if !records.contains(&from) {
+            to.parent().map_or(Ok(()), fs::create_dir_all)?;
+            copy(&from, &to)?;
+        }
+    }
     let text = lines.iter().map(|line| serde_json::to_string(line).expect("plain data") + "\n");
-    let put = |name: &str, text: String| {
-        let path = place.join(name);
-        write_atomically(&path, |out| out.write_all(text.as_bytes()))
-            .map_err(|error| Failure::at(&path, error))
-    };
+    let put = |name: &str, text: String| put(&place.join(name), &text);
     put(RECORD, text.collect())?;
-    put(EXPECTED, expected.json())?;
+    put(EXPECTED, pretty(&expected))?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
     let catalogue = Paths::find().catalogue;
@@ -84,46 +85,176 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if sources.is_file() {
         copy(&sources, &of_study.join("SOURCES.md"))?;
     }
-    let day = now_utc().chars().take("2026-01-31".len()).collect();
-    let about =
-        About { title: title.clone(), author: author.clone(), licence: licence.clone(), day };
     let page = if place.join("README.md").exists() { "REPLAY.md" } else { "README.md" };
-    put(page, readme(&about, &lines, &expected))?;
+    put(page, readme(about, &lines, &expected))?;
     let mut members = Vec::new();
-    list(place, "", &mut members)?;
-    members.sort();
-    let described = metadata(&about, &members, &lines);
-    put(METADATA, serde_json::to_string_pretty(&described).expect("plain data") + "\n")?;
+    for name in list(place)? {
+        let bytes = fs::metadata(place.join(&name))?.len();
+        members.push((name, bytes));
+    }
+    let described = metadata(about, &members, &lines);
+    put(METADATA, pretty(&described))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
     let (values, files) = (expected.values.len(), members.len() + 1);
     println!("{}: {files} files, {values} values to be met by a replay", out.display());
     Ok(EXIT_HOLDS)
 }
 
-/// Copies the files of a directory and of those in it that are `wanted`. Links to directories, which may lead in a circle, are refused.
-fn copy_tree(from: &Path, to: &Path, wanted: &dyn Fn(&PathBuf) -> bool) -> Result<(), Failure> {
-    for entry in fs::read_dir(from).map_err(|error| Failure::at(from, error))? {
-        let entry = entry?;
-        let (path, copied) = (entry.path(), to.join(entry.file_name()));
-        if entry.file_type()?.is_dir() {
-            fs::create_dir(&copied).map_err(|error| Failure::at(&copied, error))?;
-            copy_tree(&path, &copied, wanted)?;
-        } else if wanted(&path) {
-            copy(&path, &copied)?;
-        }
-    }
-    Ok(())
-}
-
-/// Lists the files below a directory, whose path begins with `prefix`.
-fn list(directory: &Path, prefix: &str, members: &mut Vec<Member>) -> Result<(), Failure> {
+/// The paths of the files in a directory and those in it. A link to a directory, which may lead in a circle, counts as a file.
+fn list(directory: &Path) -> Result<Vec<String>, Failure> {
+    let mut names = Vec::new();
     for entry in fs::read_dir(directory).map_err(|error| Failure::at(directory, error))? {
         let entry = entry?;
-        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-        match entry.metadata()? {
-            file if file.is_file() => members.push((name, file.len())),
-            _ => list(&entry.path(), &format!("{name}/"), members)?,
+        let name = entry.file_name().to_string_lossy().into_owned();
+        match entry.file_type()?.is_dir() {
+            true => {
+                names.extend(list(&entry.path())?.iter().map(|below| format!("{name}/{below}")))
+            }
+            false => names.push(name),
         }
     }
-    Ok(())
+    names.sort();
+    Ok(names)
+}
+
+/// `harness replay`.
+#[derive(Args, Debug)]
+pub struct ReplayArguments {
+    /// The archive: a directory that `harness archive` made
+    pub archive: Input,
+    /// Time that the runs may take, by the clock of the archive's machine; the number of repetitions follows from it
+    #[arg(long, value_name = "MINUTES", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
+    pub minutes: u16,
+    /// File of JSON lines to append the runs to [default: none remain]
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    #[command(flatten)]
+    session: SessionOptions,
+    #[command(flatten)]
+    programs: ProgramArguments,
+}
+
+/// Repeats the runs and prints expected values beside measured ones; returns the exit code.
+///
+/// # Errors
+/// If the archive cannot be read, a program is missing, or the time does not suffice for one repetition.
+pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
+    let ReplayArguments { archive, record, session, .. } = arguments;
+    let expected = Expected::of(&read(&[archive.join(RECORD)])?)?;
+    let path = archive.join(EXPECTED);
+    let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+    if text != pretty(&expected) {
+        let why = "does not follow from the record: it was changed, or is of another version of the harness. The record's values are compared";
+        eprintln!("harness: {} {why}", path.display());
+    }
+    let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
+    let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
+    let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };
+    leave_out_missing(&mut study)?;
+    let programs = programs(arguments.programs.given(), &mut study)?;
+    let place = tempfile::tempdir()?;
+    let temporary = place.path().join("replay.jsonl");
+    let record = record.as_deref().unwrap_or(&temporary);
+    let start = Instant::now();
+    let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
+    let outcome = study::measure(&session, record, &study, &programs, &progress)?;
+    if outcome.interrupted {
+        return Ok(EXIT_INTERRUPTED);
+    }
+    if let Some(missing) = &outcome.missing {
+        eprintln!("harness: {missing}");
+    }
+    let replayed = expected.compare(&outcome.lines);
+    let session = outcome.lines.iter().find_map(Line::session);
+    print!("{}", table(&replayed, session).text());
+    let commit = session.map_or("", |session| &session.machine.commit);
+    if commit != expected.commit {
+        println!(
+            "the archive is of commit {}, and this repository is at {commit}: counts may differ",
+            expected.commit
+        );
+    }
+    Ok(code(&replayed))
+}
+
+/// Removes the programs of others that are not installed here, and says so.
+fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
+    let paths = Paths::find();
+    for name in study.engines().iter().filter(|name| !is_own(name)) {
+        let found = Engine::find(name, None, &paths);
+        if found.as_ref().is_ok_and(|engine| engine.program().is_file()) {
+            continue;
+        }
+        eprintln!("harness: {name} is not installed here: its runs are left out");
+        study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
+    }
+    study.series.retain(|series| !series.engines.is_empty());
+    match study.series.is_empty() && study.row.is_empty() {
+        true => Err(Failure::missing("no program of the archive is installed here")),
+        false => Ok(()),
+    }
+}
+
+/// A row per run with the number of exact values that are equal, and one for each other value.
+fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
+    let shown = |found: &Found| match found {
+        Found::Exact(text) => text.clone(),
+        Found::Ratio { value, .. } | Found::Time(value) => format!("{value:.4}"),
+    };
+    let band = |found: &Found| match found {
+        Found::Exact(_) => "exact".to_owned(),
+        Found::Ratio { low, high, .. } => format!("{low:.3} to {high:.3}"),
+        Found::Time(_) => "not compared".to_owned(),
+    };
+    let row = |row: &Row| {
+        let Value { run, quantity, found } = &row.expected;
+        let verdict = match (row.verdict, &row.measured) {
+            (Verdict::Equal, _) => "equal",
+            (Verdict::Differs, _) => "DIFFERS",
+            (Verdict::Inside, _) => "inside",
+            (Verdict::Outside, _) => "OUTSIDE",
+            (Verdict::Missing, _) => "missing",
+            (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how,
+            (Verdict::NotCompared, _) => "",
+        };
+        let measured = row.measured.as_ref().map(shown).unwrap_or_default();
+        let (expected, verdict) = (shown(found), verdict.to_owned());
+        vec![run.clone(), quantity.clone(), expected, band(found), measured, verdict]
+    };
+    let mut rows = Vec::new();
+    for of_run in replayed.0.chunk_by(|a, b| a.expected.run == b.expected.run) {
+        let equal = of_run.iter().filter(|row| row.verdict == Verdict::Equal).count();
+        let count = equal.to_string();
+        let all = [&of_run[0].expected.run, "digests and counts", &count, "exact", &count, "equal"];
+        rows.extend((equal > 0).then(|| all.map(str::to_owned).to_vec()));
+        rows.extend(of_run.iter().filter(|r| r.verdict != Verdict::Equal).map(row));
+    }
+    let count = |verdict| replayed.count(verdict);
+    let mut notes = vec![format!(
+        "exact: {} equal, {} differ; ratios: {} inside of their bands, {} outside; {} missing; {} not compared",
+        count(Verdict::Equal),
+        count(Verdict::Differs),
+        count(Verdict::Inside),
+        count(Verdict::Outside),
+        count(Verdict::Missing),
+        count(Verdict::NotCompared)
+    )];
+    let busy = session.filter(|s| s.load_average > 0.5 * s.machine.cores as f64);
+    notes.extend(busy.map(|s| {
+        let Session { load_average, machine, .. } = s;
+        format!(
+            "the load was {load_average} on {} cores when it began: ratios need an idle machine",
+            machine.cores
+        )
+    }));
+    let columns = vec!["run", "quantity", "expected", "band", "measured", "verdict"];
+    Table { columns, rows, notes, ..Table::default() }
+}
+
+fn code(replayed: &Replayed) -> u8 {
+    match () {
+        () if !replayed.holds() => EXIT_FAILED,
+        () if !replayed.is_judged() || replayed.count(Verdict::Missing) > 0 => EXIT_MISSING,
+        () => EXIT_HOLDS,
+    }
 }

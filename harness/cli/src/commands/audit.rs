@@ -1,15 +1,12 @@
 //! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
 use super::import::Source;
-use super::values::{Input, Output};
-use check::audit::record::AuditRecord;
+use crate::options::{Input, Output};
 use check::audit::{AuditReport, audit_against};
 use check::forest;
 use check::promises::{Promises, Touching};
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING};
-use contract::files::named;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::proof;
@@ -125,8 +122,7 @@ fn print(report: &AuditReport, json: Option<&Path>) -> Result<(), Failure> {
     report.check_invariants();
     println!("{report}");
     if let Some(path) = json {
-        let written = AuditRecord::of(report).write(path);
-        written.map_err(|error| named(path, &error))?;
+        report.write(path).map_err(|error| Failure::at(path, error))?;
     }
     Ok(())
 }

@@ -1,25 +1,22 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
-use super::files::put;
-use super::programs::ProgramArguments;
+use crate::options::ProgramArguments;
+use crate::output::{put, unwritten};
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::experiments::record;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, SessionOptions, Study};
 use clap::Args;
-use contract::failure::Failure;
 use contract::failure::{
-    EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING, exit_first,
+    EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, exit_first,
 };
-use contract::files::named;
 use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
 use run::engine::programs::{Given, Programs};
 use run::engine::runner::Engine;
-use rustix::fs::{Access, access};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,8 +58,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let code = if arguments.show { show(arguments)? } else { measure(arguments)? };
     if let Some(directory) = &arguments.report {
-        super::report::write(directory, &[])
-            .map_err(|why| Failure { code: exit_first(code, EXIT_INPUT), why })?;
+        super::report::write(directory, &[]).map_err(|why| unwritten(code)(why.into()))?;
     }
     Ok(code)
 }
@@ -82,10 +78,8 @@ fn read(arguments: &Arguments) -> Result<Study, String> {
 fn measure(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(directory) = &arguments.report {
         // A report that could not be written is refused before the runs.
-        fs::create_dir_all(directory).map_err(|error| named(directory, &error))?;
-        // A trial file would remain if a signal arrived at that moment.
-        access(directory, Access::WRITE_OK | Access::EXEC_OK)
-            .map_err(|error| named(directory, &error.into()))?;
+        fs::create_dir_all(directory).map_err(|error| Failure::at(directory, error))?;
+        files::check_writable(&directory.join(PAGE))?;
     }
     let mut study = read(arguments)?;
     let programs = programs(arguments.programs.given(), &mut study)?;
@@ -157,7 +151,7 @@ fn record_path(arguments: &Arguments) -> PathBuf {
 fn show(arguments: &Arguments) -> Result<u8, Failure> {
     let study = read(arguments)?;
     let path = record_path(arguments);
-    let (lines, broken) = record::read(&path).map_err(|error| named(&path, &error))?;
+    let (lines, broken) = record::read(&path).map_err(|error| Failure::at(&path, error))?;
     for (line, why) in &broken {
         eprintln!("harness: line {line} is skipped: {why}");
     }
@@ -188,10 +182,7 @@ fn publish(
     print!("{}", page::text(rows));
     if let Some(directory) = report {
         let path = directory.join(PAGE);
-        put(&path, &page::markdown(rows, &machine(lines))).map_err(|error| Failure {
-            code: exit_first(code, EXIT_INPUT),
-            why: error.to_string(),
-        })?;
+        put(&path, &page::markdown(rows, &machine(lines))).map_err(unwritten(code))?;
         println!("table: {}", path.display());
     }
     Ok(code)

@@ -1,12 +1,11 @@
 //! `harness diff`: prints the first difference between two meshes.
 
 use super::import::Source;
-use super::values::Input;
+use crate::options::Input;
 use check::checks::CheckResult;
 use check::{diff, forest};
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 
 /// `harness diff`.
 #[derive(Args, Debug)]

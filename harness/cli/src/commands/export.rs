@@ -1,16 +1,14 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
-use super::selection::SelectionArguments;
-use super::values::{Input, read_case};
+use crate::options::{Input, SelectionArguments, read_case};
 use clap::Args;
-use contract::failure::EXIT_HOLDS;
-use contract::failure::Failure;
+use contract::failure::{EXIT_HOLDS, Failure};
+use contract::mesh::Mesh;
 use export::format::{self, FORMATS, Format};
-use export::mesh::Mesh;
 use export::options::{Label, Options, Regions, Summary};
 use run::engine::paths::Paths;
-use run::engine::python;
 use run::progress::Progress;
+use run::python;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;

@@ -1,25 +1,19 @@
 //! `harness gate`: compares a candidate with a baseline and reports.
 
-use super::files::put_forms;
-use super::programs::ProgramArguments;
-use super::values::Output;
+use crate::options::{EngineArguments, Output};
+use crate::output::put_forms;
 use bench::gate::report::End;
 use bench::gate::{GateOptions, gate};
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use report::gate::{junit, markdown, text};
 use report::json::pretty;
-use run::engine::programs::Programs;
 
 /// `harness gate`.
 #[derive(Args, Debug)]
 pub struct Arguments {
     #[command(flatten)]
     options: GateOptions,
-    /// Name in harness/engines or path of an engine description
-    #[arg(long, default_value = "mesher")]
-    engine: String,
     /// Write the exact measures of the candidate, for `harness track`
     #[arg(long, value_name = "FILE")]
     record: Option<Output>,
@@ -33,7 +27,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     markdown: Option<Output>,
     #[command(flatten)]
-    programs: ProgramArguments,
+    engine: EngineArguments,
 }
 
 /// Compares, prints and writes; returns the exit code.
@@ -41,8 +35,7 @@ pub struct Arguments {
 /// # Errors
 /// If the gate cannot start, or a report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let programs = Programs::find_with_engine(&arguments.engine, arguments.programs.given())?;
-    let report = gate(&arguments.options, &programs)?;
+    let report = gate(&arguments.options, &arguments.engine.find()?)?;
     print!("{}", text(&report));
     let code = match report.end() {
         End::Holds(_) => EXIT_HOLDS,
@@ -54,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     put_forms(
         code,
         &[
-            (&arguments.record, &|| report.candidate_measures.json()),
+            (&arguments.record, &|| pretty(&report.candidate_measures)),
             (&arguments.junit, &|| junit(&report)),
             (&arguments.json, &|| pretty(&report)),
             (&arguments.markdown, &|| summary.clone()),

@@ -1,16 +1,14 @@
 //! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
-use std::num::NonZero;
-
-use super::files::put;
-use super::values::{self, Output, root};
+use crate::options::{self, Output, root};
+use crate::output::put;
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::lattice::Root;
 use geometry::diagnose;
 use geometry::input::{Input, Requested};
 use report::json::pretty;
+use std::num::NonZero;
 
 /// `harness geometry`.
 #[derive(Args, Debug)]
@@ -20,7 +18,7 @@ use report::json::pretty;
 )]
 pub struct Arguments {
     /// An STL file, or a case file (.toml), which provides root and spacing
-    file: values::Input,
+    file: options::Input,
     /// Upper bound on the edge length of the cells at the surface, in the units of the file
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     spacing_min: Option<f64>,

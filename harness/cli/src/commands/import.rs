@@ -1,10 +1,9 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
-use super::values::{Input, read_case, root};
+use crate::options::{Input, read_case, root, whole_seconds};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::EXIT_HOLDS;
-use contract::failure::Failure;
+use contract::failure::{EXIT_HOLDS, Failure};
 use contract::import::forest::{self, Forest};
 use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
@@ -57,7 +56,7 @@ pub struct Source {
     #[arg(long, value_enum, default_value_t)]
     position: Position,
     /// Time limit of a reader in Python
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = super::values::whole_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = whole_seconds)]
     timeout: u64,
 }
 

@@ -1,12 +1,10 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
-use super::programs::ProgramArguments;
-use super::values::{Output, Point, with_extension};
+use crate::options::{Output, Point, ProgramArguments, whole_seconds, with_extension};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
-use contract::files::{Content, named, write_together};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::files::{Content, write_together};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::watch::Watch;
@@ -57,7 +55,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.vtp", value_parser = with_extension(&["vtp"]))]
     vtk: Option<Output>,
     /// Time limit of every single run of the mesher
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
     timeout: u64,
     /// Paths of the programs.
     #[command(flatten)]
@@ -155,7 +153,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     if interrupt::requested() {
         return Err(Failure::interrupted());
     }
-    write_together(&files, |path, error| Failure::from(named(path, &error)))
+    write_together(&files, Failure::at)
 }
 
 fn target(text: &str) -> Result<Target, String> {

@@ -1,15 +1,11 @@
 //! A mesh on disk, or one that is made from a case first.
 
-use super::programs::ProgramArguments;
-use super::values::Input;
+use crate::options::{EngineArguments, Input, whole_seconds};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::Failure;
-use contract::files::named;
-use run::engine::layout::Layout;
-use run::engine::options::RunOptions;
+use run::engine::layout::{Layout, RunOptions};
 use run::engine::programs::Programs;
-use run::engine::runner::Engine;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -24,23 +20,12 @@ pub struct MeshArguments {
     /// The case file of a leaf-set directory, which provides the geometry
     #[arg(long, value_name = "CASE")]
     pub case: Option<Input>,
-    /// How a case is meshed.
-    #[command(flatten)]
-    pub engine: EngineArguments,
-}
-
-/// The program that meshes a case.
-#[derive(Args, Debug)]
-pub struct EngineArguments {
-    /// The program that meshes a case: name in harness/engines or path of an engine description
-    #[arg(long, default_value = "mesher")]
-    engine: String,
     /// Time limit for meshing a case
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = super::values::whole_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
     timeout: u64,
-    /// Paths of the programs.
+    /// The program that meshes a case.
     #[command(flatten)]
-    programs: ProgramArguments,
+    engine: EngineArguments,
 }
 
 /// A leaf-set directory and the case of its mesh, if that is known. A directory that was made is deleted with it.
@@ -65,52 +50,21 @@ impl MeshArguments {
             return Ok(Meshed { dir: given.to_owned(), case, _made: None });
         }
         if self.case.is_some() {
-            let shown = given.display();
-            return Err(Failure::input(format!(
-                "{shown} is not a leaf-set directory, which --case requires"
-            )));
+            let why = "is not a leaf-set directory, which --case requires";
+            return Err(Failure::input(format!("{} {why}", given.display())));
         }
         let Programs { engine, paths, .. } = self.engine.find()?;
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
-        self.engine.mesh(&engine, &path, layout, ungraded)
-    }
-}
-
-impl EngineArguments {
-    /// The programs.
-    ///
-    /// # Errors
-    /// If the engine is not known.
-    pub fn find(&self) -> Result<Programs, String> {
-        Programs::find_with_engine(&self.engine, self.programs.given())
-    }
-
-    /// Time limit of a run.
-    pub fn limit(&self) -> Duration {
-        Duration::from_secs(self.timeout)
-    }
-
-    /// Meshes a case file in a temporary directory.
-    ///
-    /// # Errors
-    /// If the case cannot be read or meshed.
-    pub fn mesh(
-        &self,
-        engine: &Engine,
-        path: &Path,
-        layout: &Layout,
-        ungraded: bool,
-    ) -> Result<Meshed, Failure> {
-        let case = Case::read(path)?;
+        let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let (dir, logs) = (made.path().join("mesh"), made.path().join("logs"));
-        fs::create_dir(&logs).map_err(|error| named(&logs, &error))?;
-        let prepared = engine.prepare(path, &made.path().join("case"))?;
+        fs::create_dir(&logs).map_err(|error| Failure::at(&logs, error))?;
+        let prepared = engine.prepare(&path, &made.path().join("case"))?;
         let options = RunOptions {
             mesh: Some(&dir),
             report: false,
             ungraded,
-            ..RunOptions::new(&logs, self.limit())
+            ..RunOptions::new(&logs, Duration::from_secs(self.timeout))
         };
         engine.run(&prepared, layout, &options)?;
         Ok(Meshed { dir, case: Some(case), _made: Some(made) })

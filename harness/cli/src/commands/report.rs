@@ -1,12 +1,11 @@
 //! `harness report`: draws figures and a page from records.
 
-use super::values::Input;
+use crate::options::Input;
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::record;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
-use report::benchmark::numbers::Number;
-use report::benchmark::prose::{self, Checked};
+use report::benchmark::numbers::{Checked, Number, check};
 use report::benchmark::report;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -34,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for path in &arguments.check {
         let shown = path.display();
         let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
-        let Checked { compared, findings } = prose::check(&text, &numbers);
+        let Checked { compared, findings } = check(&text, &numbers);
         if compared == 0 {
             let why = "has no number that the record could have, so nothing was compared";
             return Err(Failure::missing(format!("{shown} {why}")));

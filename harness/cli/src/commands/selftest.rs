@@ -1,16 +1,13 @@
 //! `harness selftest`: corrupts correct meshes and prints what no check detects.
 
-use super::programs::ProgramArguments;
+use crate::options::ProgramArguments;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
-use contract::files::named;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::leafset;
 use run::engine::failure::End;
-use run::engine::layout::SERIAL;
-use run::engine::options::RunOptions;
+use run::engine::layout::{RunOptions, SERIAL};
 use run::engine::programs::Programs;
 use std::fs;
 use std::path::Path;
@@ -49,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let cases = meshed.collect::<Result<Vec<SelftestCase>, Failure>>()?;
     let mutants = scratch.path().join("mutants");
     let report = fs::create_dir(&mutants).and_then(|()| selftest::run(&cases, &mutants));
-    let report = report.map_err(|error| named(&mutants, &error))?;
+    let report = report.map_err(|error| Failure::at(&mutants, error))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
 }

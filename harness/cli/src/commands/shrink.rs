@@ -1,26 +1,23 @@
 //! `harness shrink`: reduces a failing case and writes it as a directory.
 
-use super::programs::ProgramArguments;
+use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
 use bench::shrink::{Budget, fault, replaced, shrink, write};
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
-use contract::files::named;
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
-use run::engine::programs::Programs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+
+/// Maximum number of trials.
+const TRIALS: usize = 5000;
 
 /// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail; 3 the engine does not support it.
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
-    /// Name in harness/engines or path of an engine description
-    #[arg(long, default_value = "mesher")]
-    engine: String,
     /// Compare a run on N ranks with the serial run [default: the serial run with the reference]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     ranks: Option<u32>,
@@ -39,17 +36,14 @@ pub struct Arguments {
     /// Directory for the reduced case [default: shrunk-CASE]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Maximum number of trials
-    #[arg(long, value_name = "N", default_value_t = 5000)]
-    trials: usize,
     /// Maximum time
     #[arg(long, value_name = "SECONDS", default_value_t = 900)]
     budget: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = super::values::whole_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = whole_seconds)]
     timeout: u64,
     #[command(flatten)]
-    programs: ProgramArguments,
+    engine: EngineArguments,
 }
 
 /// Shrinks, prints and writes; returns the exit code.
@@ -57,9 +51,8 @@ pub struct Arguments {
 /// # Errors
 /// If the engine does not support the case, or a program cannot be run.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let given = arguments.programs.given();
-    let program = given.mesher.as_ref().map(|path| path.to_string_lossy().into_owned());
-    let programs = Programs::find_with_engine(&arguments.engine, given)?;
+    let EngineArguments { engine, programs: given } = &arguments.engine;
+    let programs = arguments.engine.find()?;
     let limit = Duration::from_secs(arguments.timeout);
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
@@ -76,9 +69,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             format!("{exists} would be replaced: remove it, or give another directory with --out");
         return Err(Failure::input(why));
     }
-    let probe = Probe::new(programs.engine, programs.reference, ranks, limit)?;
-    let given = Trial { case: PlainCase::read(&path)?, ranks };
-    let judged = probe.judge(&given)?;
+    let probe = Probe::new(programs.engine, programs.reference, limit)?;
+    let trial = Trial { case: PlainCase::read(&path)?, ranks };
+    let judged = probe.judge(&trial)?;
     let Some(first) = fault(&judged, arguments.check.as_deref())? else {
         match &arguments.check {
             Some(name) => println!("the case does not fail {name}"),
@@ -91,11 +84,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return Ok(EXIT_FAILED);
     }
     eprintln!("harness shrink: the case fails {first}");
-    let budget = Budget { trials: arguments.trials, time: Duration::from_secs(arguments.budget) };
-    let shrunk = shrink(given, &first, &budget, |trial| probe.judge(trial))?;
-    let mut options = vec!["--engine", &arguments.engine];
-    options.extend(program.iter().flat_map(|program| ["--mesher", program]));
-    let readme = write(&shrunk, &options, &out).map_err(|error| named(&out, &error))?;
+    let budget = Budget { trials: TRIALS, time: Duration::from_secs(arguments.budget) };
+    let shrunk = shrink(trial, &first, &budget, |trial| probe.judge(trial))?;
+    let mut options = vec!["--engine", engine];
+    let mesher = given.mesher.as_deref().map(Path::to_string_lossy);
+    options.extend(mesher.iter().flat_map(|mesher| ["--mesher", mesher]));
+    let readme = write(&shrunk, &options, &out).map_err(|error| Failure::at(&out, error))?;
     println!("{readme}\nThe case is in {}", out.display());
     Ok(EXIT_FAILED)
 }

@@ -1,13 +1,12 @@
 //! `harness track`: appends metrics to the history and reports change points.
 
-use super::files::put_forms;
-use super::values::{Input, Output, percentage, probability};
+use crate::options::{Input, Output, number_in};
+use crate::output::put_forms;
 use bench::jsonl;
 use bench::track::analyse;
 use bench::track::history::{self, History, Record};
 use clap::Args;
-use contract::failure::Failure;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::json::pretty;
 use report::track::{junit, page, summary};
 use statistics::change_points::Rules;
@@ -49,11 +48,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     fail_recent: usize,
     /// Rate of false discoveries: the probability of any false change point if nothing changed
-    #[arg(long, default_value_t = 0.01, value_parser = probability)]
+    #[arg(long, default_value_t = 0.01, value_parser = number_in(1e-6..=1.0))]
     alpha: f64,
-    /// Ignore smaller changes; percent
-    #[arg(long, default_value_t = 0.1, value_parser = percentage)]
-    effect_min: f64,
 }
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
@@ -86,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for warning in &warnings {
         eprintln!("harness: {}: {warning}", arguments.history.display());
     }
-    let rules = Rules { alpha: arguments.alpha, effect_min: arguments.effect_min / 100.0 };
+    let rules = Rules { alpha: arguments.alpha, ..Rules::default() };
     let all = analyse(&records, &rules);
     println!("{} commits, {} metrics", records.len(), all.len());
     if all.is_empty() {

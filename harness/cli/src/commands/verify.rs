@@ -1,13 +1,10 @@
 //! `harness verify`: verifies the selected cases and reports.
 
-use super::files::{put, put_forms};
-use super::programs::ProgramArguments;
-use super::values::Output;
+use crate::options::{EngineArguments, Output};
+use crate::output::{put, put_forms};
 use clap::Args;
 use contract::failure::Failure;
-use report::verification::machine::{json, junit};
-use report::verification::{markdown, table};
-use run::engine::programs::Programs;
+use report::verification::{json, junit, markdown, table};
 use run::verify::options::Options;
 use run::verify::verify;
 
@@ -18,26 +15,22 @@ pub struct Arguments {
     pub options: Options,
     /// Write the report as JUnit XML
     #[arg(long, value_name = "FILE")]
-    pub junit: Option<Output>,
+    junit: Option<Output>,
     /// Write the report as JSON
     #[arg(long, value_name = "FILE")]
-    pub json: Option<Output>,
-    /// Verify another mesher: name in harness/engines or path of a description
-    #[arg(long, value_name = "ENGINE", default_value = "mesher")]
-    pub engine: String,
-    /// Paths of the programs.
+    json: Option<Output>,
     #[command(flatten)]
-    pub programs: ProgramArguments,
+    engine: EngineArguments,
 }
 
 /// Verifies, prints and writes; returns the exit code.
 ///
 /// # Errors
 /// If the verification cannot begin, or a report cannot be written.
-pub fn run(arguments: Arguments) -> Result<u8, Failure> {
-    let Arguments { options, junit: junit_file, json: json_file, engine, programs } = arguments;
-    let programs = Programs::find_with_engine(&engine, programs.given())?;
-    let report = verify(&options, &programs)?;
+pub fn run(
+    Arguments { options, junit: junit_file, json: json_file, engine }: &Arguments,
+) -> Result<u8, Failure> {
+    let report = verify(options, &engine.find()?)?;
     print!("{}", table(&report));
     let text = markdown(&report);
     // All forms go into the directory of `--out`.
@@ -53,7 +46,7 @@ pub fn run(arguments: Arguments) -> Result<u8, Failure> {
     }
     put_forms(
         report.exit_code(),
-        &[(&junit_file, &|| junit(&report)), (&json_file, &|| json(&report))],
+        &[(junit_file, &|| junit(&report)), (json_file, &|| json(&report))],
         Some(&text),
     )
 }

@@ -1,11 +1,10 @@
 //! `harness why`: explains the leaf at a point.
 
 use super::meshed::MeshArguments;
-use super::values::Point;
+use crate::options::Point;
 use check::why::{Body, Mesh};
 use clap::Args;
-use contract::failure::EXIT_HOLDS;
-use contract::failure::Failure;
+use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh;
 use run::engine::layout::SERIAL;
 

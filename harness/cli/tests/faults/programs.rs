@@ -245,20 +245,9 @@ pub fn all(with_mpi: bool) -> Vec<Program> {
                 &["l.json", "l.vtp", "l.svg"],
             )
         },
-        new(
-            "picture .svg",
-            Harness,
-            "picture mesh --case case.toml --out p.svg",
-            &["p.svg", "p.csv"],
-        ),
+        new("picture .svg", Harness, "picture mesh --case case.toml --out p.svg", &["p.svg"]),
         new("export .vtp", Harness, "export mesh n.vtp --case case.toml", &["n.vtp"]),
         new("export .stl", Harness, "export mesh n.stl", &["n.stl"]),
-        new(
-            "picture --view",
-            Harness,
-            "picture mesh --case case.toml --view --out p.svg",
-            &["p.svg"],
-        ),
         Program {
             varying: &["a.json"],
             refusals: &[1, 2],

@@ -29,10 +29,10 @@ fn seeds_are_points_of_the_root_and_enclosed_components_are_deleted_by_default()
         Case::from_parts(&format!("spacing_min = 1.0\n{keys}\n{root}"), vec![UNIT])
     };
     let case = with("").unwrap();
-    assert_eq!((case.seeds, case.enclosed), (vec![], Enclosed::Delete));
+    assert_eq!((case.enclosed, case.seeds), (Enclosed::Delete, vec![]));
     let case = with("seeds = [[0, 1.5, -4], [1, 1, 1]]\nenclosed = 'keep'").unwrap();
     assert_eq!(case.seeds, [[0.0, 1.5, -4.0], [1.0; 3]]);
-    assert_eq!(case.seeds_lattice, [[4 << 24, 11 << 23, 0], [5 << 24; 3]]);
+    assert_eq!(case.rules.seeds, [[4 << 24, 11 << 23, 0], [5 << 24; 3]]);
     assert_eq!(case.enclosed, Enclosed::Keep);
     let why = with("seeds = [[0, 0, 0], [4, 0, 0]]").unwrap_err();
     assert!(

@@ -1,4 +1,4 @@
-//! Cells as a foreign file states them, and their leaf words.
+//! Cells as a foreign file states them, their leaf words, and the root if the file states none.
 //!
 //! Every cell becomes the leaf of one octant or an error that names the cell: its edge is the root's edge halved a whole
 //! number of times, its minimum corner is a multiple of its edge from the root's, both within [`TOLERANCE`] of its
@@ -7,7 +7,7 @@
 
 use super::TOLERANCE;
 use crate::digest::Digest;
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word::{self, Leaf, Side};
@@ -50,7 +50,7 @@ impl Cells {
     ///
     /// # Errors
     /// If a cell is not a leaf of an oct-tree with this root, or overlaps another.
-    pub fn words(&self, root: &Root) -> Result<Vec<u64>, Unusable> {
+    pub fn words(&self, root: &Root) -> Result<Vec<u64>, Failure> {
         let mut words = self.words_in_order(root)?;
         self.agree_with_levels(&words)?;
         words.sort_unstable();
@@ -62,7 +62,7 @@ impl Cells {
         }
     }
 
-    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, Unusable> {
+    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, Failure> {
         let word = |i: usize| {
             let octant = octant(self.corners[i], self.edges[i], root)
                 .map_err(|why| self.misfit(i, root, &why))?;
@@ -73,12 +73,12 @@ impl Cells {
     }
 
     /// The levels of the words differ from those of the file by one constant.
-    fn agree_with_levels(&self, words: &[u64]) -> Result<(), Unusable> {
+    fn agree_with_levels(&self, words: &[u64]) -> Result<(), Failure> {
         let Some(levels) = &self.levels else { return Ok(()) };
         let offset = |i: usize| i64::from(word::level(words[i])).wrapping_sub(levels[i]);
         match (1..words.len()).find(|&i| offset(i) != offset(0)) {
             None => Ok(()),
-            Some(i) => Err(Unusable::because(format!(
+            Some(i) => Err(Failure::input(format!(
                 "cell {i} has level {} and edge {}, but cell 0 has level {} and edge {}: levels and edges contradict each \
                  other",
                 levels[i], self.edges[i], levels[0], self.edges[0]
@@ -86,41 +86,85 @@ impl Cells {
         }
     }
 
-    fn misfit(&self, i: usize, root: &Root, why: &str) -> Unusable {
+    fn misfit(&self, i: usize, root: &Root, why: &str) -> Failure {
         let (corner, edge, Root { origin, edge: root }) = (self.corners[i], self.edges[i], root);
-        Unusable::because(format!(
+        Failure::input(format!(
             "cell {i} (corner {corner:?}, edge {edge}) {why}, where the root has the corner {origin:?} and the edge {root}: \
              correct the mesh, or the root with --root X,Y,Z,EDGE"
         ))
     }
 
     /// The error for two words that overlap; `words` are those of the cells in the order of the file.
-    fn overlap(&self, words: &[u64], pair: &[u64]) -> Unusable {
+    fn overlap(&self, words: &[u64], pair: &[u64]) -> Failure {
         let at =
             |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
         let both: Vec<_> = (0..words.len()).filter(|&i| pair.contains(&words[i])).map(at).collect();
-        Unusable::because(format!("{} overlaps {}: remove one of them", both[1], both[0]))
+        Failure::input(format!("{} overlaps {}: remove one of them", both[1], both[0]))
+    }
+
+    /// The least root in which the cells can be leaves of one oct-tree, for a file that states none: its edge is a power of two of the coarsest
+    /// cell's edge, and its faces are on the grid of the coarsest cells. It is the mesher's root if the mesh fills that; a mesh that fills less of
+    /// its root may have a larger one.
+    ///
+    /// # Errors
+    /// If there are no cells, if a number is not finite, or if the cells need more levels than exist.
+    pub fn least_root(&self) -> Result<Root, Failure> {
+        let unusable = |why: &str| {
+            Failure::input(format!(
+                "the root cannot be derived from the cells, because {why}: give it with --root X,Y,Z,EDGE"
+            ))
+        };
+        let (edges, corners) = (&self.edges, &self.corners);
+        let coarsest = (0..self.len()).max_by(|&a, &b| edges[a].total_cmp(&edges[b]));
+        let (edge, corner) = coarsest
+            .map(|cell| (edges[cell], corners[cell]))
+            .ok_or_else(|| unusable("there are none"))?;
+        let finest = edges.iter().copied().fold(f64::INFINITY, f64::min);
+        let along = |axis: usize| corners.iter().map(move |corner| corner[axis]);
+        let low = [0, 1, 2].map(|axis| along(axis).fold(f64::INFINITY, f64::min));
+        let ends = |axis: usize| along(axis).zip(edges).map(|(low, edge)| low + edge);
+        let high = [0, 1, 2].map(|axis| ends(axis).fold(f64::NEG_INFINITY, f64::max));
+        let depth = (edge / finest).log2().round();
+        let finite = low.iter().chain(&high).all(|c| c.is_finite()) && finest > 0.0;
+        if !finite || !depth.is_finite() {
+            return Err(unusable("a coordinate is not finite, or an edge is not positive"));
+        }
+        if depth > f64::from(LEVEL_MAX) {
+            return Err(Failure::input(format!(
+                "has cells of {} levels, with edges from {finest} to {edge}, and the levels of a mesh are 0 to {LEVEL_MAX}",
+                depth + 1.0,
+            )));
+        }
+        // The extent of all cells is known more precisely than the edge of one, and is a whole number of finest cells.
+        let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        let scale = f64::from(1u32 << depth as u32);
+        let edge = extent / (extent / (edge / scale)).round() * scale;
+        let (mut origin, mut along) = ([0.0; 3], 1.0f64);
+        for axis in 0..3 {
+            let below = (corner[axis] - low[axis]) / edge;
+            let whole = (below - 0.01).ceil();
+            let exact = (below - whole).abs() <= 0.01;
+            origin[axis] = if exact { low[axis] } else { corner[axis] - whole * edge };
+            along = along.max(((high[axis] - origin[axis]) / edge - 0.01).ceil());
+        }
+        Ok(Root { origin, edge: edge * along.log2().ceil().exp2() })
     }
 }
 
 /// The octant of a cell.
 fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
+    let wrong = |why: &str| Err(why.to_owned());
     if !(edge > 0.0 && edge.is_finite() && corner.iter().all(|c| c.is_finite())) {
-        return Err(
-            "has an edge that is not positive, or coordinates that are not finite".to_owned()
-        );
+        return wrong("has an edge that is not positive, or coordinates that are not finite");
     }
     let depth = (root.edge / edge).log2().round();
-    let level = if (0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
-        depth as u8
-    } else {
+    if !(0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
         return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
-    };
+    }
+    let level = depth as u8;
     let edge_of_level = root.edge / f64::from(1u32 << level);
     if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
-        return Err(
-            "has an edge that is not the root's edge halved a whole number of times".to_owned()
-        );
+        return wrong("has an edge that is not the root's edge halved a whole number of times");
     }
     let mut cell = [0; 3];
     for axis in 0..3 {
@@ -133,7 +177,7 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
             ));
         }
         if !(0.0..f64::from(1u32 << level)).contains(&index) {
-            return Err("lies outside the root".to_owned());
+            return wrong("lies outside the root");
         }
         cell[axis] = index as u32 * (CELLS_PER_EDGE >> level);
     }
@@ -223,5 +267,80 @@ mod tests {
         cells.levels = Some(vec![3, 5]);
         let message = cells.words(&root).unwrap_err().to_string();
         assert!(message.contains("cell 1 has level 5"), "{message}");
+    }
+}
+
+#[cfg(test)]
+mod roots {
+    use super::*;
+    use crate::import::testing::cells_of;
+    use crate::testing::words_of;
+
+    const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
+
+    #[test]
+    fn cells_that_fill_their_root_give_it_back() {
+        for depth in 0..5 {
+            let words =
+                words_of(|o| o.level == 0 && depth > 0 || o.level < depth && o.corner == [0; 3]);
+            assert_eq!(cells_of(&words, &ROOT).least_root().unwrap(), ROOT);
+        }
+    }
+
+    /// Leaves remain leaves in the derived root, whose levels differ from theirs by a constant.
+    #[test]
+    fn part_of_a_mesh_is_an_octree_in_its_least_root() {
+        let words = words_of(|o| o.level < 2 || o.level < 4 && o.corner[0] >> 17 == 2);
+        for part in [&words[3..], &words[..words.len() / 2], &words[words.len() / 3..][..5]] {
+            let cells = cells_of(part, &ROOT);
+            let root = cells.least_root().unwrap();
+            assert!(root.edge <= ROOT.edge * 2.0);
+            assert_eq!(cells.words(&root).unwrap().len(), part.len());
+        }
+    }
+
+    #[test]
+    fn the_root_begins_a_whole_number_of_coarsest_cells_below_the_first() {
+        let mut cells = Cells::default();
+        for (x, edge) in [(2.0, 2.0), (4.0, 2.0), (1.0, 1.0)] {
+            cells.push([x, 0.0, 0.0], edge);
+        }
+        assert_eq!(cells.least_root().unwrap(), Root { origin: [0.0; 3], edge: 8.0 });
+    }
+
+    #[test]
+    fn single_precision_coordinates_are_precise_enough() {
+        let words = words_of(|o| o.level == 0 || o.level < 10 && o.corner == [0; 3]);
+        let mut cells = cells_of(&words, &Root { origin: [0.1, 0.2, 0.3], edge: 0.7 });
+        for i in 0..cells.len() {
+            let far = cells.corners[i].map(|c| f64::from((c + cells.edges[i]) as f32));
+            cells.corners[i] = cells.corners[i].map(|c| f64::from(c as f32));
+            cells.edges[i] = far[0] - cells.corners[i][0];
+        }
+        let root = cells.least_root().unwrap();
+        assert_eq!(cells.words(&root).unwrap(), words);
+    }
+
+    #[test]
+    fn cells_without_a_root_are_an_error() {
+        assert!(Cells::default().least_root().is_err());
+        for edge in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let mut cells = Cells::default();
+            cells.push([0.0; 3], edge);
+            cells.push([0.0; 3], 1.0);
+            let message = cells.least_root().unwrap_err().to_string();
+            assert!(message.contains("--root"), "{message}");
+        }
+        for corner in [f64::NAN, f64::INFINITY, -f64::INFINITY] {
+            let mut cells = Cells::default();
+            cells.push([0.0; 3], 1.0);
+            cells.push([1.0, corner, 0.0], 1.0);
+            let message = cells.least_root().map_err(|error| error.to_string());
+            // A coordinate that is not a number bounds nothing, and is found when the cells become leaves.
+            assert!(
+                corner.is_nan() || message.is_err_and(|why| why.contains("--root")),
+                "{corner}"
+            );
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! No memory is allocated for a count before the file has been seen to be long enough for it. Nothing else is checked here: indices
 //! and quadrants are those of the file.
 
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::files;
 use std::path::Path;
 
@@ -97,8 +97,8 @@ pub fn is_head(head: &[u8]) -> bool {
 ///
 /// # Errors
 /// If the file cannot be read or is damaged.
-pub fn read(path: &Path) -> Result<Forest, Unusable> {
-    let bytes = files::read(path)?;
+pub fn read(path: &Path) -> Result<Forest, Failure> {
+    let bytes = files::read(path).map_err(Failure::unreadable)?;
     let mut input = Input { bytes: &bytes, at: 0 };
     let (connectivity, format) = connectivity(&mut input)?;
     let mut forest = Forest { connectivity, leaves: Vec::new(), data_bytes: 0 };
@@ -118,10 +118,10 @@ pub fn read(path: &Path) -> Result<Forest, Unusable> {
         let stride = own_bytes as u64 + data_bytes;
         let records = input.items(count, stride)?.chunks_exact(stride as usize);
         let quadrant = |record: &[u8]| {
-            let number = |i| integer(&record[4 * i..][..4]);
-            let z = if dimension == 3 { number(2) } else { 0 };
+            let numbers: Vec<i32> = integers(&record[..own_bytes]).collect();
+            let z = if dimension == 3 { numbers[2] } else { 0 };
             let data = record.get(own_bytes).copied().unwrap_or(0);
-            Quadrant { corner: [number(0), number(1), z], level: number(dimension), data }
+            Quadrant { corner: [numbers[0], numbers[1], z], level: numbers[dimension], data }
         };
         forest.leaves.push(records.map(quadrant).collect());
         begin = end;
@@ -132,12 +132,12 @@ pub fn read(path: &Path) -> Result<Forest, Unusable> {
     }
 }
 
-pub(super) fn damaged(why: &str) -> Unusable {
-    Unusable::because(format!("is not a usable file of p4est, because {why}"))
+pub(super) fn damaged(why: &str) -> Failure {
+    Failure::input(format!("is not a usable file of p4est, because {why}"))
 }
 
-fn integer(four: &[u8]) -> i32 {
-    i32::from_le_bytes(four.try_into().expect("four bytes"))
+fn integers(bytes: &[u8]) -> impl Iterator<Item = i32> {
+    bytes.as_chunks().0.iter().map(|four| i32::from_le_bytes(*four))
 }
 
 /// The bytes of the file, and how many have been read.
@@ -148,47 +148,37 @@ struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// The next `count` items of `size` bytes each.
-    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], Unusable> {
+    fn items(&mut self, count: u64, size: u64) -> Result<&'a [u8], Failure> {
         let left = &self.bytes[self.at..];
-        match count
-            .checked_mul(size)
-            .and_then(|n| usize::try_from(n).ok())
-            .filter(|&n| n <= left.len())
-        {
-            Some(n) => {
-                self.at += n;
-                Ok(&left[..n])
-            }
-            None => Err(damaged(&format!(
-                "it ends at byte {} within {count} items of {size} bytes",
-                self.bytes.len()
-            ))),
-        }
+        let bytes = count.checked_mul(size).and_then(|bytes| usize::try_from(bytes).ok());
+        let end = self.bytes.len();
+        let ends =
+            || damaged(&format!("it ends at byte {end} within {count} items of {size} bytes"));
+        let items = bytes.and_then(|bytes| left.get(..bytes)).ok_or_else(ends)?;
+        self.at += items.len();
+        Ok(items)
     }
 
-    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, Unusable> {
-        let bytes = self.items(count, 8)?;
-        Ok(bytes
-            .chunks_exact(8)
-            .map(|b| u64::from_le_bytes(b.try_into().expect("eight bytes")))
-            .collect())
+    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, Failure> {
+        let (numbers, _) = self.items(count, 8)?.as_chunks::<8>();
+        Ok(numbers.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
     }
 
-    fn array<const N: usize>(&mut self) -> Result<[u64; N], Unusable> {
+    fn array<const N: usize>(&mut self) -> Result<[u64; N], Failure> {
         Ok(self.numbers(N as u64)?.try_into().expect("as many numbers as were read"))
     }
 
     /// As many indices for each of `count` items.
-    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, Unusable> {
-        Ok(self.items(count, 4 * each)?.chunks_exact(4).map(integer).collect())
+    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, Failure> {
+        Ok(integers(self.items(count, 4 * each)?).collect())
     }
 
-    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, Unusable> {
+    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, Failure> {
         Ok(self.items(count, each)?.iter().map(|&byte| byte.cast_signed()).collect())
     }
 
     /// The lists of `count` edges or corners, but for `of_tree`.
-    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Unusable> {
+    fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Failure> {
         let offsets = self.indices(count.saturating_add(1), 1)?;
         let pairs = if count > 0 { pairs } else { 0 };
         let (trees, places) = (self.indices(pairs, 1)?, self.small(pairs, 1)?);
@@ -196,32 +186,23 @@ impl<'a> Input<'a> {
     }
 
     /// Skips the zero bytes up to a multiple of [`ALIGNMENT`].
-    fn align(&mut self) -> Result<(), Unusable> {
+    fn align(&mut self) -> Result<(), Failure> {
         let padding = self.at.next_multiple_of(ALIGNMENT) - self.at;
         self.items(padding as u64, 1).map(drop)
     }
 }
 
 /// The connectivity, and the format of the file.
-fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Unusable> {
+fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
     let (dimension, expected) = match input.items(8, 1)? {
         b"p4est\0\0\0" => FORMATS[0],
         b"p8est\0\0\0" => FORMATS[1],
         _ => return Err(damaged("it does not begin with p4est or p8est")),
     };
     input.items(24, 1)?;
-    let [
-        format,
-        index_bytes,
-        vertices,
-        trees,
-        edges,
-        edge_trees,
-        corners,
-        corner_trees,
-        attribute_bytes,
-        _,
-    ] = input.array::<10>()?;
+    let [format, index_bytes] = input.array()?;
+    let [vertices, trees, edges, edge_trees] = input.array()?;
+    let [corners, corner_trees, attribute_bytes, _] = input.array()?;
     if format.swap_bytes() == expected {
         return Err(damaged("its bytes are swapped: a big-endian machine wrote it"));
     }
@@ -231,12 +212,9 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Unusable> {
         )));
     }
     let if_any = |count: u64| if count > 0 { trees } else { 0 };
-    let children = 1 << dimension;
-    let faces = 2 * dimension as u64;
-    let coordinate = |b: &[u8]| f64::from_le_bytes(b.try_into().expect("eight bytes"));
-    let coordinates = input.items(vertices, 24)?.chunks_exact(24);
-    let vertices_read =
-        coordinates.map(|c| [0, 8, 16].map(|at| coordinate(&c[at..at + 8]))).collect();
+    let (children, faces) = (1 << dimension, 2 * dimension as u64);
+    let (points, _) = input.items(vertices, 24)?.as_chunks::<8>();
+    let coordinates: Vec<f64> = points.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     let tree_to_edge = input.indices(if_any(edges), 12)?;
     let tree_to_vertex = input.indices(if_any(vertices), children)?;
     let tree_to_corner = input.indices(if_any(corners), children)?;
@@ -250,7 +228,7 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Unusable> {
     let connectivity = Connectivity {
         dimension,
         trees: trees as usize,
-        vertices: vertices_read,
+        vertices: coordinates.as_chunks().0.to_vec(),
         tree_to_vertex,
         tree_to_tree,
         tree_to_face,
@@ -266,7 +244,7 @@ fn forest_header(
     input: &mut Input,
     trees: usize,
     expected: u64,
-) -> Result<(Vec<u64>, u64), Unusable> {
+) -> Result<(Vec<u64>, u64), Failure> {
     let [format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
     if format != expected || coordinate_bytes != 4 {
         return Err(damaged("the header of the forest has another format than the connectivity"));

@@ -4,7 +4,7 @@
 use super::leaf_set;
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset;
@@ -39,8 +39,8 @@ impl ImportedTree {
         root: Option<Root>,
         case: Option<&Case>,
         program: String,
-    ) -> Result<Option<Self>, Unusable> {
-        let content = |error: TreeError| Unusable::because(error.to_string());
+    ) -> Result<Option<Self>, Failure> {
+        let content = |error: TreeError| Failure::input(error.to_string());
         // Another array is VTK's to find.
         if sides.is_some_and(|sides| sides != SIDE) {
             return Ok(None);

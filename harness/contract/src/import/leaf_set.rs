@@ -1,10 +1,10 @@
 //! Imported cells as a leaf set with its manifest.
 
+use super::TOLERANCE;
 use super::cells::Cells;
-use super::{TOLERANCE, root};
 use crate::case::Case;
 use crate::digest::Digest;
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Sides, Tally, Tree};
@@ -22,16 +22,16 @@ pub fn leaf_set(
     given: Option<Root>,
     case: Option<&Case>,
     program: String,
-) -> Result<LeafSet, Unusable> {
+) -> Result<LeafSet, Failure> {
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
-    let root = stated.map_or_else(|| root::derive(cells), Ok)?;
+    let root = stated.map_or_else(|| cells.least_root(), Ok)?;
     if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
-        return Err(Unusable::because(format!("has a root that is not a cube: {root}")));
+        return Err(Failure::input(format!("has a root that is not a cube: {root}")));
     }
     let words = cells.words(&root)?;
     let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);
     if !cells.digest.is_none_or(is_of_digest) {
-        return Err(Unusable::because("has other leaves than its digest states: it is damaged"));
+        return Err(Failure::input("has other leaves than its digest states: it is damaged"));
     }
     let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };

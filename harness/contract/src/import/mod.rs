@@ -3,7 +3,7 @@
 //! - [`words`](mod@words), [`p4est`]: the formats that are read here, as cubes; [`forest`]: the files of p4est as they are. VTK, tables, discretize and OpenFOAM are read in Python,
 //!   which the crate `run` starts;
 //! - [`htg`]: the trees that this repository writes in VTKHDF, of any size;
-//! - [`cells`]: cubes as leaf words, verified cell by cell; [`root`]: the root, if the file states none;
+//! - [`cells`]: cubes as leaf words, verified cell by cell, and the root, if the file states none;
 //! - [`leaf_set()`]: the mesh with its manifest.
 //!
 //! No reader allocates memory for a count before the file has been seen to be long enough for it.
@@ -13,19 +13,18 @@ pub mod forest;
 pub mod htg;
 mod leaf_set;
 pub mod p4est;
-pub mod root;
 #[cfg(test)]
 mod testing;
 pub mod words;
 
-use crate::failure::Unusable;
+use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
 use cells::Cells;
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 pub use leaf_set::leaf_set;
@@ -84,42 +83,46 @@ pub struct Request {
 /// # Errors
 /// If it cannot be read, or has none of the formats. Parts of a leaf set without a manifest must be requested by their
 /// format: a program that writes manifests did not finish such a directory.
-pub fn guess(path: &Path) -> Result<Format, Unusable> {
-    let is_directory = fs::metadata(path)?.is_dir();
-    if path.join(manifest::FILE).is_file() {
-        return Err(Unusable::because(format!(
-            "is a complete leaf set, with its manifest {}: use it as it is",
-            manifest::FILE
-        )));
-    }
-    if is_directory && path.join(manifest::part_name(0)).is_file() {
-        return Err(Unusable::because(format!(
-            "has parts and no {}, so the program that wrote them may not have finished: if it writes none, choose \
+pub fn guess(path: &Path) -> Result<Format, Failure> {
+    let is_directory = fs::metadata(path).map_err(Failure::unreadable)?.is_dir();
+    refuse_leaf_set(path)?;
+    let has_parts = is_directory && path.join(manifest::part_name(0)).is_file();
+    let is_manifest = !is_directory && path.ends_with(manifest::FILE);
+    let mistakes = [
+        (
+            has_parts,
+            "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
              --format leaf-words",
-            manifest::FILE
-        )));
+        ),
+        (is_manifest, "is the manifest of a leaf set: give its directory"),
+        (
+            path.extension().is_some_and(|extension| extension == "toml"),
+            "is a case file by its name: give a mesh",
+        ),
+    ];
+    if let Some((_, why)) = mistakes.into_iter().find(|(is_made, _)| *is_made) {
+        return Err(Failure::input(why));
     }
-    let named = |name: &str| path.file_name().is_some_and(|of_path| of_path == name);
-    if !is_directory && named(manifest::FILE) {
-        return Err(Unusable::because("is the manifest of a leaf set: give its directory"));
-    }
-    if path.extension().is_some_and(|extension| extension == "toml") {
-        return Err(Unusable::because("is a case file by its name: give a mesh"));
-    }
+    let mut head = Vec::new();
     let format = match is_directory {
         true => poly_mesh(path).map(|_| Format::Openfoam),
-        false => of_content(&head(path)?),
+        false => {
+            let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
+            read.map_err(Failure::unreadable)?;
+            of_content(&head)
+        }
     };
-    format.ok_or_else(|| {
-        Unusable::because("its format was not recognised: choose one with --format (see --help)")
-    })
+    let unknown = "its format was not recognised: choose one with --format (see --help)";
+    format.ok_or_else(|| Failure::input(unknown))
 }
 
-/// The first bytes of a file.
-fn head(path: &Path) -> io::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    ::files::open(path)?.take(4096).read_to_end(&mut head)?;
-    Ok(head)
+/// Refuses a directory that is a leaf set already.
+fn refuse_leaf_set(path: &Path) -> Result<(), Failure> {
+    let why = "is a complete leaf set, with its manifest mesh.json: use it as it is";
+    match path.join(manifest::FILE).exists() {
+        true => Err(Failure::input(why)),
+        false => Ok(()),
+    }
 }
 
 fn of_content(head: &[u8]) -> Option<Format> {
@@ -131,14 +134,12 @@ fn of_content(head: &[u8]) -> Option<Format> {
                 && text.contains(",), ");
         return Some(if is_words { Format::LeafWords } else { Format::Table });
     }
-    if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") {
-        return Some(Format::Vtk);
-    }
+    // Binary data may follow XML in the same file.
+    let is_xml = || head.windows(8).any(|bytes| bytes == b"<VTKFile");
     if forest::is_head(head) {
         return Some(Format::P4est);
     }
-    // Binary data may follow in the same file.
-    if head.windows(8).any(|bytes| bytes == b"<VTKFile") {
+    if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") || is_xml() {
         return Some(Format::Vtk);
     }
     let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
@@ -175,11 +176,11 @@ fn incomplete(head: &[u8]) -> usize {
 ///
 /// # Errors
 /// If the file cannot be read, or is not of this format.
-pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Unusable> {
+pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Failure> {
     match format {
         Format::LeafWords => words::read(path, request),
         Format::P4est => p4est::read(path, request),
-        _ => Err(Unusable::because("is read in Python")),
+        _ => Err(Failure::input("is read in Python")),
     }
 }
 
@@ -187,10 +188,10 @@ pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Unu
 ///
 /// # Errors
 /// If there is none.
-pub fn side(code: f64, cell: usize) -> Result<Side, Unusable> {
+pub fn side(code: f64, cell: usize) -> Result<Side, Failure> {
     let known = Side::ALL.into_iter().find(|&side| f64::from(side as u8) == code);
     known.ok_or_else(|| {
-        Unusable::because(format!(
+        Failure::input(format!(
             "cell {cell} has the side {code}, and the sides are 0 (outside), 1 (inside) and 2 (crossing)"
         ))
     })

@@ -8,8 +8,8 @@
 
 use super::cells::Cells;
 use super::forest::{self, Connectivity, Quadrant, damaged};
-use super::{Request, root, side};
-use crate::failure::Unusable;
+use super::{Request, side};
+use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use crate::word;
@@ -28,11 +28,11 @@ pub const FILLER: u8 = 3;
 ///
 /// # Errors
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
+pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     let forest = forest::read(path)?;
     if forest.connectivity.dimension == 2 {
         let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
-        return Err(Unusable::because(why));
+        return Err(Failure::input(why));
     }
     if forest.leaves.is_empty() {
         return Err(damaged("it is a connectivity without leaves"));
@@ -41,14 +41,14 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
     let with_sides = sides_requested(request, forest.data_bytes)?;
     let stated = match (trees.corners.as_slice(), trees.edges.as_slice()) {
         (&[origin], &[edge]) => Root { origin, edge },
-        _ => root::derive(&trees)?,
+        _ => trees.least_root()?,
     };
     let placed = request.root.unwrap_or(stated);
     let units = 1e-9 * placed.edge;
     let ends = |root: &Root| [root.origin[0], root.origin[1], root.origin[2], root.edge];
     let is_there = ends(&stated).iter().zip(ends(&placed)).all(|(a, b)| (a - b).abs() <= units);
     if request.is_root_of_case && stated != UNIT && !is_there {
-        return Err(Unusable::because(format!(
+        return Err(Failure::input(format!(
             "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
         )));
     }
@@ -65,11 +65,11 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
 }
 
 /// Whether the sides are to be read from the quadrants' data.
-fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, Unusable> {
+fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, Failure> {
     match (request.sides.as_deref(), data_bytes) {
         (None, _) => Ok(false),
         (Some(SIDES), 1) => Ok(true),
-        (Some(name), _) => Err(Unusable::because(format!(
+        (Some(name), _) => Err(Failure::input(format!(
             "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides {SIDES} \
              if the quadrants have one byte of data, their side"
         ))),
@@ -77,7 +77,7 @@ fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, Unusable>
 }
 
 /// The trees as cells.
-fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Unusable> {
+fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
     let Connectivity { vertices, tree_to_vertex, attributes, .. } = connectivity;
     match (vertices.len(), connectivity.trees) {
         (0, 1) => Ok(Cells { corners: vec![[0.0; 3]], edges: vec![1.0], ..Cells::default() }),
@@ -96,7 +96,7 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Unusable> {
 }
 
 /// The cubes of the trees, from the coordinates of all vertices and the eight vertices of each tree.
-fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Unusable> {
+fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Failure> {
     let vertex = |&index: &i32| coordinates.get(usize::try_from(index).ok()?);
     let mut trees = Cells::default();
     for (tree, indices) in tree_to_vertex.chunks_exact(8).enumerate() {
@@ -124,7 +124,7 @@ fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Unus
 const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
 
 /// Adds the quadrants of a tree, which are complete: each begins where the one before it ends, on the Morton curve.
-fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Unusable> {
+fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Failure> {
     let Some(last) = quadrants.last() else { return Err(damaged("a tree has no quadrants")) };
     let ends_there = |&length: &i64| {
         let edge = length.checked_shr(last.level.try_into().ok()?)?;

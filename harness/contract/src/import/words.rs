@@ -1,11 +1,10 @@
 //! Bare leaf words: one array, or the parts of a directory without a manifest.
 
-use super::Request;
 use super::cells::Cells;
-use crate::failure::Unusable;
+use super::{Request, refuse_leaf_set};
+use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::leafset::read_parts;
-use crate::manifest;
 use crate::npy::PartFile;
 use crate::word::{self, Side};
 use std::path::Path;
@@ -21,26 +20,16 @@ const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
 ///
 /// # Errors
 /// If a part cannot be read, or a word is not a leaf.
-pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
-    let content = |why: String| Unusable::because(why);
+pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     if let Some(name) = request.sides.as_deref().filter(|name| *name != SIDES) {
-        return Err(content(format!(
+        return Err(Failure::input(format!(
             "leaf words have no array {name}: request their sides with --sides {SIDES}"
         )));
     }
+    refuse_leaf_set(path)?;
     let parts = match path.is_dir() {
-        true if path.join(manifest::FILE).exists() => {
-            return Err(content(format!(
-                "has a manifest ({}), so it is a leaf set already: use it as it is",
-                manifest::FILE
-            )));
-        }
-        true => read_parts(path).map_err(|error| content(error.to_string()))?,
-        false => {
-            let file =
-                PartFile::open(path).map_err(|error| content(format!("the part {error}")))?;
-            vec![(String::new(), file.read_all()?)]
-        }
+        true => read_parts(path)?,
+        false => vec![(String::new(), PartFile::open(path)?.read_all()?)],
     };
     let (with_sides, root) = (request.sides.is_some(), request.root.unwrap_or(UNIT));
     let mut cells =
@@ -55,7 +44,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
                     None => "; with its bytes swapped it would be a leaf",
                     Some(_) => "",
                 };
-                return Err(content(format!(
+                return Err(Failure::input(format!(
                     "{part}cell {cell} is the word {word:#018x}, in which {why}{swapped}"
                 )));
             }
@@ -71,8 +60,8 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Unusable> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::npy;
     use crate::testing::words_with_sides;
+    use crate::{manifest, npy};
     use std::fs;
 
     fn words() -> Vec<u64> {
@@ -97,12 +86,8 @@ mod tests {
             assert_eq!(cells.words(&request(sides).root.unwrap()).unwrap(), expected);
         }
         fs::write(place.path().join(manifest::FILE), "{}").unwrap();
-        assert!(
-            read(place.path(), &request(true))
-                .unwrap_err()
-                .to_string()
-                .contains("a leaf set already")
-        );
+        let why = read(place.path(), &request(true)).unwrap_err().to_string();
+        assert!(why.starts_with("is a complete leaf set"), "{why}");
     }
 
     #[test]

@@ -86,7 +86,7 @@ fn a_tally_counts_words_by_level_side_and_octant() {
     assert_eq!(tally.digest, Digest::of(&words));
     assert_eq!(tally.octants[511], Digest::of(&words[2..3]));
     let mut counted = Tally::default();
-    counted.count(words[1]);
+    counted.count(words[1], 1);
     assert_eq!((counted.leaves, counted.by_side.inside, counted.by_level[3]), (1, 1, 1));
     assert_eq!(
         (part_name(0), part_name(123_456)),

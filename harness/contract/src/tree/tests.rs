@@ -1,4 +1,5 @@
 use super::*;
+use crate::neighbourhood::{Neighbourhood, OFFSETS, Region};
 use crate::testing::{octants_of, random_words, words_of};
 use proptest::prelude::*;
 

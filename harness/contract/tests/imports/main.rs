@@ -3,7 +3,7 @@
 mod damage;
 mod trees;
 
-use contract::failure::Unusable;
+use contract::failure::Failure;
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, Request, leaf_set};
@@ -27,7 +27,7 @@ fn root([x, y, z, edge]: [f64; 4]) -> Root {
     Root { origin: [x, y, z], edge }
 }
 
-fn imported(path: &Path, request: &Request) -> Result<LeafSet, Unusable> {
+fn imported(path: &Path, request: &Request) -> Result<LeafSet, Failure> {
     let cells = import::read(path, import::guess(path)?, request)?;
     leaf_set(&cells, request.root, None, "test".to_owned())
 }

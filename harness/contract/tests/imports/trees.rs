@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn tree(path: &Path) -> Result<Option<ImportedTree>, Unusable> {
+fn tree(path: &Path) -> Result<Option<ImportedTree>, Failure> {
     ImportedTree::open(path, None, None, None, "test".to_owned())
 }
 

@@ -1,6 +1,6 @@
 """Writes small meshes with discretize's own writers, and their cells as x,y,z,edge.
 
-    pip install discretize==0.12.0 && python discretize_meshes.py
+    pip install discretize==0.12.0 && python discretize_meshes.py && tar --create --gzip --file discretize.tar.gz *.csv *.json *.msh
 """
 
 import numpy as np

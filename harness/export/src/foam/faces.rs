@@ -10,10 +10,9 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
 use super::patches::Patches;
-use super::points::Points;
-use crate::leaves::{Leaves, Point};
+use crate::leaves::{Leaves, squares};
 use crate::options::Options;
-use crate::squares::squares;
+use crate::points::{Point, Points};
 use contract::failure::Failure;
 
 /// The faces.
@@ -54,14 +53,14 @@ impl Faces {
                     Some(across) => owned.extend(square.is_high.then_some((across, i))),
                     None => {
                         let patch = &mut of_patches[patches.of(square)];
-                        points.polygon(square, &mut patch.vertices);
+                        points.polygon(square.corners(square.is_high), &mut patch.vertices);
                         patch.end(cell);
                     }
                 }
             }
             owned.sort_unstable();
             for &(across, i) in &owned {
-                points.polygon(&of_cell[i], &mut all.vertices);
+                points.polygon(of_cell[i].corners(true), &mut all.vertices);
                 all.end(cell);
                 all.neighbour.push(across);
             }
@@ -115,8 +114,7 @@ impl Faces {
             self.owner.iter().chain(&self.neighbour).all(|&cell| cell < cells),
             "a face of cell {cells} or beyond"
         );
-        let (mut used, mut sums) =
-            (vec![false; points.count() as usize], vec![0u64; cells as usize]);
+        let (mut used, mut sums) = (vec![false; points.all.len()], vec![0u64; cells as usize]);
         let mut volume = 0;
         for (face, &owner) in self.owner.iter().enumerate() {
             let vertices = self.vertices(face);
@@ -131,7 +129,7 @@ impl Faces {
             *to = to.wrapping_add(sum);
             match self.neighbour.get(face) {
                 Some(&across) => sums[across as usize] = sums[across as usize].wrapping_sub(sum),
-                None => volume += volume_below(vertices.iter().map(|&v| points.at(v))),
+                None => volume += volume_below(vertices.iter().map(|&v| points.all[v as usize])),
             }
         }
         assert_eq!(used.iter().position(|used| !used), None, "a point belongs to no face");

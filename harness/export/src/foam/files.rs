@@ -10,6 +10,7 @@ use contract::word;
 
 use super::Mesh;
 use crate::options::{Label, Options};
+use crate::points::Point;
 use contract::failure::Failure;
 
 impl Mesh<'_> {
@@ -19,9 +20,9 @@ impl Mesh<'_> {
     /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
     pub fn write(&self, dir: &Path) -> Result<(), Failure> {
         let Self { faces, options, .. } = self;
-        let (points, cells) = (self.points.count(), self.leaves.count());
+        let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
-        if vertices.max(points.into()) > label_max(options.label) {
+        if vertices.max(points) > label_max(options.label) {
             return Err(Failure::input(
                 "the mesh has more faces than 32-bit labels can number: choose --label 64",
             ));
@@ -54,9 +55,9 @@ impl Mesh<'_> {
         file.labels(vertices, faces.all().flatten().map(|&point| point.into()))?;
         file.finish()?;
         let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
-        let place =
-            |point| self.root.to_user(self.points.at(point).map(|c| i64::from(c) * UNITS_PER_CELL));
-        file.points(points.into(), (0..points).map(place))?;
+        let units = |at: &Point| at.map(|c| i64::from(c) * UNITS_PER_CELL);
+        let place = |at: &Point| self.root.to_user(units(at)).map(f64::to_le_bytes);
+        file.list(points, self.points.all.iter().map(place))?;
         file.finish()?;
         self.write_boundary(dir)
     }
@@ -120,35 +121,22 @@ impl<'a> ListFile<'a> {
     /// Adds a list of `count` labels.
     fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<(), Failure> {
         match self.options.label {
-            Label::Bits32 => self.list(count, labels.map(|label| (label as i32).to_le_bytes())),
-            Label::Bits64 => self.list(count, labels.map(i64::to_le_bytes)),
+            Label::Bits32 => self.list(count, labels.map(|label| [(label as i32).to_le_bytes()])),
+            Label::Bits64 => self.list(count, labels.map(|label| [label.to_le_bytes()])),
         }
     }
 
-    /// Adds a list of `count` points.
-    fn points(
+    /// Adds a list of `count` items, of which each has `K` numbers of `N` bytes. A list without items has no parentheses.
+    fn list<const N: usize, const K: usize>(
         &mut self,
         count: u64,
-        points: impl Iterator<Item = [f64; 3]>,
-    ) -> Result<(), Failure> {
-        let bytes = |point: [f64; 3]| -> [u8; 24] {
-            let all = point.map(f64::to_le_bytes);
-            std::array::from_fn(|i| all[i / 8][i % 8])
-        };
-        self.list(count, points.map(bytes))
-    }
-
-    /// A list without items has no parentheses.
-    fn list<const N: usize>(
-        &mut self,
-        count: u64,
-        items: impl Iterator<Item = [u8; N]>,
+        items: impl Iterator<Item = [[u8; N]; K]>,
     ) -> Result<(), Failure> {
         let [begin, end] = if count == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{count}\n{begin}")?;
         for (item, number) in items.zip(0..) {
             self.options.check_at(number)?;
-            self.out.write_all(&item)?;
+            self.out.write_all(item.as_flattened())?;
         }
         Ok(writeln!(self.out, "{end}")?)
     }

@@ -6,35 +6,37 @@
 //!
 //! All is held in arrays, with 200 bytes per cell at most: less than a third of what OpenFOAM needs to read the mesh.
 //!
-//! - [`leaves`](crate::leaves): the cells, and a walk over them; [`squares`](crate::squares): their faces; [`points`]: the points; [`faces`](mod@faces): all faces, and the invariants;
-//! - [`regions`], [`patches`]; [`files`](mod@files): OpenFOAM's syntax.
+//! - [`leaves`](crate::leaves): the cells, a walk over them, and their squares; [`faces`](mod@faces): all faces, and the invariants;
+//! - [`patches`]; [`files`](mod@files): OpenFOAM's syntax.
 
 mod faces;
 mod files;
 mod patches;
-mod points;
-mod regions;
 #[cfg(test)]
 mod tests;
 
+use std::cmp::Reverse;
 use std::fs;
 use std::path::Path;
 
+use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
 use contract::lattice::Root;
 use contract::manifest::Sides;
-use contract::word::Side;
+use contract::mesh;
+use contract::octant::CELLS_PER_EDGE;
+use contract::sets::Sets;
+use contract::word::{self, Side};
 
-use crate::leaves::Leaves;
-use crate::mesh;
-use crate::options::{self, Options, Summary};
-use crate::selection::Selection;
-use contract::failure::Failure;
+use crate::leaves::{Leaves, squares};
+use crate::options::{Options, Regions, Summary};
+use crate::points::{Point, Points};
+use crate::selection::{Selection, nothing_selected};
 use faces::Faces;
-
 use patches::{Patches, SIDES};
-use points::Points;
-use regions::Regions;
+
+/// Greatest number of points, so that adding those of one more cell cannot exceed 32 bits.
+const POINTS_MAX: usize = 4_000_000_000;
 
 /// A mesh for OpenFOAM.
 pub struct Mesh<'a> {
@@ -104,7 +106,6 @@ fn read<'a>(
     selection: &Selection,
     options: &'a Options<'a>,
 ) -> Result<Mesh<'a>, Failure> {
-    let root = mesh.manifest.root;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.parts.len() > 1).then(Vec::new);
     let leaves = Leaves::read(mesh, selection, options, &mut |leaf, is_selected| {
@@ -114,41 +115,92 @@ fn read<'a>(
         true
     })?;
     if leaves.count() == 0 {
-        return Err(mesh.nothing_selected());
+        return Err(nothing_selected(mesh));
     }
     let patches = Patches::new(options.case, *selection != Selection::default());
-    let patches = patches.map_err(Failure::input)?;
-    let has_sides = mesh.manifest.sides == Sides::Known;
-    build(leaves, Mesh { has_sides, ..Mesh::empty(patches, ranks, root, options) })
+    let mut of_mesh = Mesh::new(leaves, ranks, patches.map_err(Failure::input)?, options)?;
+    of_mesh.root = mesh.manifest.root;
+    of_mesh.has_sides = mesh.manifest.sides == Sides::Known;
+    Ok(of_mesh)
 }
 
-/// Leaves out the regions that are not to be exported, and finds points and faces.
-fn build<'a>(mut leaves: Leaves, mut mesh: Mesh<'a>) -> Result<Mesh<'a>, Failure> {
-    let regions = Regions::new(&leaves, mesh.options)?;
-    mesh.regions = regions.count;
-    if mesh.options.regions == options::Regions::Largest && regions.count > 1 {
-        leaves = leaves.retain(|cell| regions.is_in_largest(cell));
-        if let Some(ranks) = &mut mesh.ranks {
-            let mut cells = 0..;
-            ranks.retain(|_| cells.next().is_some_and(|cell| regions.is_in_largest(cell)));
+/// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then by cells.
+fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32), Failure> {
+    // Sets of cells, which are represented by their first cells.
+    let mut sets = Sets::new(leaves.count() as usize);
+    let mut of_cell = Vec::new();
+    leaves.walk(options, &mut |cell, around| {
+        squares(leaves, around, &mut of_cell);
+        let high = of_cell.iter().filter(|square| square.is_high);
+        for across in high.filter_map(|square| square.across.as_cell()) {
+            sets.union(cell, across);
         }
+        Ok(())
+    })?;
+    let of_cell: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
+    let mut sizes = vec![(0, 0); of_cell.len()];
+    for (&set, word) in of_cell.iter().zip(leaves.cells()) {
+        let (volume, cells) = &mut sizes[set as usize];
+        (*volume, *cells) = (*volume + word::span(word::level(word)), *cells + 1);
     }
-    mesh.points = Points::new(&leaves, mesh.options)?;
-    mesh.faces = Faces::new(&leaves, &mesh.points, &mesh.patches, mesh.options)?;
-    mesh.faces.check_invariants(&leaves, &mesh.points);
-    mesh.leaves = leaves;
-    Ok(mesh)
+    let count = sizes.iter().filter(|size| size.1 > 0).count();
+    let largest = (0..).zip(sizes).min_by_key(|&(_, size)| Reverse(size));
+    Ok((of_cell, count, largest.map_or(0, |(cell, _)| cell)))
+}
+
+/// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They ascend in Morton
+/// order.
+fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
+    let (mut points, mut of_cell) = (Points::default(), Vec::new());
+    leaves.walk(options, &mut |_, around| {
+        squares(leaves, around, &mut of_cell);
+        let (low, edge) = (around.octant.corner, around.octant.edge());
+        for digit in 0..8 {
+            points.add(std::array::from_fn(|a| low[a] + edge * (digit >> a & 1)));
+        }
+        let of_boundary = of_cell.iter().filter(|square| square.across.as_cell().is_none());
+        for corner in of_boundary.flat_map(|square| square.corners(true)) {
+            points.add(corner);
+        }
+        match points.all.len() {
+            ..=POINTS_MAX => Ok(()),
+            _ => Err(Failure::input(format!(
+                "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
+            ))),
+        }
+    })?;
+    points.sort_by(key);
+    Ok(points)
+}
+
+/// The Morton code of a point. One on the root's maximum faces has a 20th bit along an axis.
+fn key(point: &Point) -> (u32, u64) {
+    let beyond = (0..3).map(|a| (point[a] / CELLS_PER_EDGE) << a).sum();
+    (beyond, word::key_of(point.map(|c| c % CELLS_PER_EDGE)))
 }
 
 impl<'a> Mesh<'a> {
-    fn empty(
+    /// The mesh of these cells in the unit cube, without the regions that are not to be exported.
+    fn new(
+        mut leaves: Leaves,
+        mut ranks: Option<Vec<u32>>,
         patches: Patches,
-        ranks: Option<Vec<u32>>,
-        root: Root,
         options: &'a Options<'a>,
-    ) -> Self {
-        let (leaves, points, faces) = Default::default();
-        Self { leaves, points, faces, patches, ranks, root, has_sides: true, regions: 0, options }
+    ) -> Result<Self, Failure> {
+        let (of_cell, regions, largest) = regions(&leaves, options)?;
+        if options.regions == Regions::Largest && regions > 1 {
+            let is_kept = |cell: u32| of_cell[cell as usize] == largest;
+            leaves = leaves.retain(is_kept);
+            if let Some(ranks) = &mut ranks {
+                let mut cells = 0..;
+                ranks.retain(|_| cells.next().is_some_and(is_kept));
+            }
+        }
+        let points = points(&leaves, options)?;
+        let faces = Faces::new(&leaves, &points, &patches, options)?;
+        faces.check_invariants(&leaves, &points);
+        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        Ok(Self { leaves, points, faces, patches, ranks, root, has_sides: true, regions, options })
     }
 
     /// What the user should know: patches, solids without faces, regions.
@@ -168,10 +220,8 @@ impl<'a> Mesh<'a> {
         }
         if self.regions > 1 {
             let outcome = match self.options.regions {
-                options::Regions::All => {
-                    "most solvers accept one: --regions largest leaves out the others"
-                }
-                options::Regions::Largest => "only the largest was exported",
+                Regions::All => "most solvers accept one: --regions largest leaves out the others",
+                Regions::Largest => "only the largest was exported",
             };
             notes.push(format!("{} regions that no face connects: {outcome}", self.regions));
         }

@@ -8,8 +8,7 @@ use contract::octant::UNITS_PER_CELL;
 use contract::stl;
 use geometry::tree::{FacetTree, Point};
 
-use crate::leaves::Content;
-use crate::squares::Square;
+use crate::leaves::{Content, Square};
 
 /// Patches of the root's sides.
 pub const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];
@@ -88,7 +87,7 @@ impl Patches {
     /// The patch of the solid with the facet nearest to the centre of a face.
     fn nearest(&self, square: &Square) -> usize {
         let Some(facets) = &self.facets else { return SIDES.len() };
-        let [low, _, high, _] = square.corners();
+        let [low, _, high, _] = square.corners(true);
         let units = UNITS_PER_CELL as f64 / 2.0;
         let centre = [0, 1, 2].map(|a| (f64::from(low[a]) + f64::from(high[a])) * units);
         let centre = Point::from(centre);

@@ -1,7 +1,12 @@
 //! The surface that a mesh hands over to a near-body mesher: the faces at which its cells end at crossing leaves, deleted or not, as
 //! polygons for VTK (`.vtp`) or triangles (`.stl`), whose normals point away from the body.
 //!
-//! - [`faces`](mod@faces): squares; [`polygons`]: the same with hanging nodes, so that they fit together.
+//! A leaf on a side (not crossing) borders leaves of its own side and crossing leaves only, because a component is kept or deleted as
+//! a whole. Where it borders neither the root's boundary nor a leaf on a side, a crossing leaf was deleted, or is there. Such
+//! a face is exposed. A face that is exposed in part is divided into quarters, and these again, until each is exposed or
+//! not; so no two squares of the front overlap, and a whole face is one square whatever the crossing leaves are like.
+//!
+//! [`Polygons`] are the same squares with hanging nodes, so that they fit together.
 //!
 //! The *gap* of a face is the least distance of any of its points from a facet of the case. Distances are those of the facets on the lattice, on which
 //! the mesh was made; a vertex is at most half a lattice unit along each axis from where the user put it.
@@ -9,32 +14,73 @@
 //! Invariants, which are executed before a file has its name: those of [`Polygons::check_invariants`]; a gap is that of a face that no facet enters,
 //! and not greater than the distance of the face's centre.
 
-pub mod faces;
-pub mod polygons;
+mod polygons;
+#[cfg(test)]
+mod tests;
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use contract::case::Case;
+use contract::failure::Failure;
 use contract::files::fill_atomically;
 use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::mesh::Mesh;
 use contract::number::number;
 use contract::octant::UNITS_PER_CELL;
-use contract::word;
+use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
 use geometry::tree::{FacetTree, Point};
 use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
-use crate::mesh::Mesh;
+use crate::leaves::{Content, Leaves, Square, squares};
 use crate::options::{Options, Summary};
 use crate::polydata::{self, array};
 use crate::selection::Selection;
-use contract::failure::Failure;
-use faces::{Face, front};
 use polygons::Polygons;
+
+/// A square of the front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    /// The square; its level is that of the leaf, or deeper if only part of the leaf's face is exposed.
+    pub square: Square,
+    /// The word of the leaf, which is not crossing.
+    pub leaf: u64,
+}
+
+impl Face {
+    /// Whether the leaf is on the positive side.
+    fn is_leaf_above(&self) -> bool {
+        !self.square.is_high
+    }
+
+    /// The four corners in level-19 cells, counterclockwise as seen from the leaf.
+    fn corners(&self) -> [[u32; 3]; 4] {
+        self.square.corners(self.is_leaf_above())
+    }
+}
 
 /// A front: its root, faces and polygons.
 type Front = (Root, Vec<Face>, Polygons);
+
+/// The faces of the selected leaves that belong to the front.
+///
+/// # Errors
+/// If the mesh is not a linear oct-tree or cannot be read, or if the user interrupts.
+fn front(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Vec<Face>, Failure> {
+    // Without crossing leaves, exposed faces are those at holes.
+    let leaves =
+        Leaves::read(mesh, selection, options, &mut |leaf, _| leaf.side != Side::Crossing)?;
+    let (mut faces, mut of_cell, mut words) = (Vec::new(), Vec::new(), leaves.cells());
+    leaves.walk(options, &mut |_, around| {
+        let leaf = words.next().expect("cells are visited in the order of their words");
+        squares(&leaves, around, &mut of_cell);
+        let exposed = of_cell.iter().filter(|square| square.across == Content::Hole);
+        faces.extend(exposed.map(|&square| Face { square, leaf }));
+        Ok(())
+    })?;
+    Ok(faces)
+}
 
 /// Writes the polygons, with the cell data `level` and `side` of the leaf, its `spacing`, and with a case the `gap` of each face.
 ///
@@ -58,7 +104,7 @@ pub fn vtp(
         ];
         cell.extend(gaps.map(|gaps| array("gap", gaps)));
         let piece = PolyDataPiece {
-            points: polygons.points.iter().flat_map(point).collect::<Vec<f64>>().into(),
+            points: polygons.points.all.iter().flat_map(point).collect::<Vec<f64>>().into(),
             polys: Some(VertexNumbers::XML {
                 connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
                 offsets: polygons.ends.clone(),
@@ -127,7 +173,7 @@ fn write(
 fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
     let single = |at: [i64; 3]| root.to_user(at).map(|c| c as f32);
     let point =
-        |index: &u32| polygons.points[*index as usize].map(|c| i64::from(c) * UNITS_PER_CELL);
+        |index: &u32| polygons.points.all[*index as usize].map(|c| i64::from(c) * UNITS_PER_CELL);
     let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
     for (face, corners) in faces.iter().zip(polygons.iter()) {
         let corner = |i: usize| single(point(&corners[i % corners.len()]));
@@ -136,7 +182,7 @@ fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
             continue;
         }
         // A fan from a corner could have triangles without area.
-        let half = i64::from(face.edge()) * UNITS_PER_CELL / 2;
+        let half = i64::from(face.square.edge()) * UNITS_PER_CELL / 2;
         let middle = std::array::from_fn(|a| {
             let along = if a == face.square.axis { 0 } else { half };
             i64::from(face.square.corner[a]) * UNITS_PER_CELL + along
@@ -176,6 +222,3 @@ fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, 
 fn edge_of_level(root: &Root, level: u8) -> f64 {
     root.edge / f64::from(1u32 << level)
 }
-
-#[cfg(test)]
-mod tests;

@@ -4,33 +4,56 @@
 //! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
-//! - `header`: the XML, and which arrays exist; `piece`: the arrays; `points`: their numbers; `zlib`: their compression.
+//! - `piece`: the arrays of a piece; `zlib`: their compression.
 
-mod header;
 mod piece;
-mod points;
 mod zlib;
 
+use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 use std::thread;
 
 use contract::digest::Digest;
 use contract::files;
+use contract::lattice::Root;
+use contract::manifest::Sides;
+use contract::mesh::Mesh;
 
-use crate::mesh::Mesh;
-use crate::options::{Options, Summary};
+use crate::options::{Options, Summary, Written};
 use crate::selection::Selection;
-use crate::written::Written;
 use contract::failure::Failure;
-use header::{Content, Place};
-use piece::{Encoded, Encoder};
+use piece::{Encoder, Piece, Place};
 
 /// Maximum number of leaves in a piece.
-pub const PIECE: u64 = 1 << 19;
+pub const PIECE: usize = 1 << 19;
 
 /// What follows the data.
 const END: &str = "\n  </AppendedData>\n</VTKFile>\n";
+
+/// An array: its section in the XML, name, and VTK's name of the type.
+type Array = (&'static str, &'static str, &'static str);
+
+/// The arrays of a piece, in the order in which they are written. Ranks or sides are missing if they are unknown.
+const ARRAYS: [Array; 9] = [
+    ("Points", "Points", "Float64"),
+    ("Cells", "connectivity", "Int64"),
+    ("Cells", "offsets", "Int64"),
+    ("Cells", "types", "UInt8"),
+    ("CellData", "level", "UInt8"),
+    ("CellData", "rank", "UInt32"),
+    ("CellData", "spacing", "Float64"),
+    ("CellData", "id", "Int64"),
+    ("CellData", "side", "UInt8"),
+];
+
+/// What a file states about itself before it has leaves.
+#[derive(Debug)]
+struct Content {
+    root: Root,
+    /// Those of [`ARRAYS`] that it has.
+    arrays: Vec<Array>,
+}
 
 /// Writes the file. The XML precedes the data that it describes. Its place is reserved for as many pieces as there will be, and it is
 /// written last.
@@ -43,18 +66,27 @@ pub fn write(
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Summary, Failure> {
-    let leaves = mesh.count(selection, &|| options.check())?;
-    let content = Content::of(mesh);
+    let leaves = selection.count(mesh, &|| options.check())?;
+    let is_known = |(_, name, _): &Array| match *name {
+        "rank" => mesh.has_ranks(),
+        "side" => mesh.manifest.sides == Sides::Known,
+        _ => true,
+    };
+    let arrays: Vec<Array> = ARRAYS.into_iter().filter(is_known).collect();
+    let longest =
+        Place { points: u64::MAX, cells: u64::MAX, offsets: vec![u64::MAX; arrays.len()] };
+    let content = Content { root: mesh.manifest.root, arrays };
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, named, |file| {
         let (mut places, mut digest, mut data_bytes) = (Vec::new(), Digest::default(), 0);
-        let longest = vec![Place::longest(); leaves.div_ceil(PIECE) as usize];
+        let longest = vec![longest; leaves.div_ceil(PIECE as u64) as usize];
         let header_bytes = content.header(&longest, digest, 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
-        encode(mesh, selection, leaves, &content, options, &mut |piece| {
+        encode(mesh, selection, leaves, &content, options, &mut |mut piece| {
             // The user's interrupt waits for a flush to end, so none may have much to flush.
             file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
-            places.push(piece.place(data_bytes));
+            piece.place.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
+            places.push(piece.place);
             data_bytes += piece.bytes.len() as u64;
             digest.merge(piece.digest);
             Ok(())
@@ -77,14 +109,15 @@ fn encode(
     leaves: u64,
     content: &Content,
     options: &Options<'_>,
-    take: &mut dyn FnMut(Encoded) -> Result<(), Failure>,
+    take: &mut dyn FnMut(Piece) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let (mut written, check) = (Written::default(), || options.check());
     let mut flush = |encoders: &mut [Encoder]| {
         check()?;
-        let pieces: Vec<Encoded> = thread::scope(|scope| {
-            let encode = |encoder| scope.spawn(move || Encoder::encode(encoder, content));
-            let threads: Vec<_> = encoders.iter_mut().map(encode).collect();
+        let filled = encoders.iter_mut().filter(|encoder| !encoder.leaves.is_empty());
+        let pieces: Vec<Piece> = thread::scope(|scope| {
+            let threads: Vec<_> =
+                filled.map(|encoder| scope.spawn(|| encoder.encode(content))).collect();
             threads.into_iter().map(|thread| thread.join().expect("it does not panic")).collect()
         });
         for piece in pieces {
@@ -95,22 +128,65 @@ fn encode(
         }
         Ok::<(), Failure>(())
     };
-    let jobs = options.jobs.get().min(leaves.div_ceil(PIECE) as usize);
+    let jobs = options.jobs.get().min(leaves.div_ceil(PIECE as u64) as usize);
     let mut encoders: Vec<Encoder> = (0..jobs).map(|_| Encoder::default()).collect();
-    let mut filling = 0;
-    mesh.visit(selection, &check, &mut |leaf| {
-        if encoders[filling].leaves.len() as u64 == PIECE {
-            filling += 1;
-            if filling == jobs {
-                flush(&mut encoders)?;
-                encoders.iter_mut().for_each(|encoder| encoder.leaves.clear());
-                filling = 0;
-            }
+    let mut waiting = 0;
+    selection.visit(mesh, &check, &mut |leaf| {
+        if waiting == jobs * PIECE {
+            flush(&mut encoders)?;
+            waiting = 0;
         }
-        encoders[filling].leaves.push(leaf);
+        encoders[waiting / PIECE].leaves.push(leaf);
+        waiting += 1;
         Ok(())
     })?;
-    flush(&mut encoders[..=filling])?;
+    flush(&mut encoders)?;
     written.check_invariants(mesh, selection, leaves);
     Ok(())
+}
+
+impl Content {
+    /// The file up to the appended data, with the digest of its leaves, filled up with blanks to `length` bytes.
+    fn header(&self, places: &[Place], digest: Digest, length: usize) -> String {
+        let Root { origin: [x, y, z], edge } = self.root;
+        // VTK reads text as the codes of its characters.
+        let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
+        let mut xml = format!(
+            "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
+             <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+             compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n    <FieldData>\n      \
+             <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
+             {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
+             <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
+             </FieldData>\n"
+        );
+        for place in places {
+            self.piece(place, &mut xml);
+        }
+        let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
+        let blanks = length.saturating_sub(xml.len() + end.len());
+        xml + &" ".repeat(blanks) + end
+    }
+
+    fn piece(&self, Place { points, cells, offsets }: &Place, xml: &mut String) {
+        *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
+        let arrays: Vec<_> = self.arrays.iter().zip(offsets).collect();
+        for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {
+            let section = arrays[0].0.0;
+            let (scalars, components) = match section {
+                "CellData" => (" Scalars=\"level\"", ""),
+                "Points" => ("", " NumberOfComponents=\"3\""),
+                _ => ("", ""),
+            };
+            *xml += &format!("      <{section}{scalars}>\n");
+            for ((_, name, kind), offset) in arrays {
+                let _ = writeln!(
+                    xml,
+                    "        <DataArray type=\"{kind}\" Name=\"{name}\"{components} format=\"appended\" offset=\"{offset}\"/>"
+                );
+            }
+            *xml += &format!("      </{section}>\n");
+        }
+        *xml += "    </Piece>\n";
+    }
 }

@@ -24,22 +24,22 @@ impl Default for Zlib {
 }
 
 impl Zlib {
-    /// Appends an array of `count` values of `N` bytes to `out`.
-    pub fn append<const N: usize>(
+    /// Appends an array of values, which consist of `K` numbers of `N` bytes.
+    pub fn append<const N: usize, const K: usize>(
         &mut self,
-        count: usize,
-        mut values: impl Iterator<Item = [u8; N]>,
+        values: impl ExactSizeIterator<Item = [[u8; N]; K]>,
         out: &mut Vec<u8>,
     ) {
-        const { assert!(BLOCK.is_multiple_of(N)) };
-        let bytes = count * N;
+        const { assert!(BLOCK.is_multiple_of(N * K)) };
+        let bytes = values.len() * N * K;
+        let mut values = values;
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
         let header = out.len();
         out.resize(header + 8 * (numbers.len() + numbers[0]), 0);
         for begin in (0..bytes).step_by(BLOCK) {
             let block = &mut self.block[..BLOCK.min(bytes - begin)];
-            let slots = block.chunks_exact_mut(N).zip(&mut values);
-            slots.for_each(|(slot, value)| slot.copy_from_slice(&value));
+            let slots = block.chunks_exact_mut(N * K).zip(&mut values);
+            slots.for_each(|(slot, value)| slot.copy_from_slice(value.as_flattened()));
             let start = out.len();
             out.resize(start + self.compressor.zlib_compress_bound(block.len()), 0);
             let written = self.compressor.zlib_compress(block, &mut out[start..]);
@@ -61,9 +61,9 @@ mod tests {
     fn an_array_is_the_content_of_its_blocks() {
         let mut zlib = Zlib::default();
         for count in [0, 1, 5, BLOCK / 8 - 1, BLOCK / 8, BLOCK / 8 + 1, BLOCK / 4] {
-            let values = |i: usize| ((i * i) as u64).to_le_bytes();
+            let values = |i: usize| [((i * i) as u64).to_le_bytes()];
             let mut out = b"before".to_vec();
-            zlib.append(count, (0..count).map(values), &mut out);
+            zlib.append((0..count).map(values), &mut out);
             let mut number = out[6..].chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
             let mut next = || number.next().unwrap() as usize;
             let (blocks, size, last) = (next(), next(), next());
@@ -78,7 +78,7 @@ mod tests {
                 at += compressed;
             }
             assert_eq!(at, out.len());
-            assert!(content == (0..count).flat_map(values).collect::<Vec<u8>>());
+            assert!(content == (0..count).flat_map(values).flatten().collect::<Vec<u8>>());
         }
     }
 }

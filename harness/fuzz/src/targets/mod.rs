@@ -1,24 +1,21 @@
 //! The targets.
 
-mod case_file;
-mod forest;
-mod leaf_set;
-mod stl;
+mod cases;
+mod meshes;
 mod texts;
-mod tree_file;
 pub(crate) mod whole_case;
 
 use crate::Target;
 
 /// All targets.
 pub const TARGETS: [Target; 15] = [
-    Target { name: "stl", run: stl::bytes },
-    Target { name: "stl-grammar", run: stl::grammar },
-    Target { name: "case", run: case_file::run },
-    Target { name: "manifest", run: leaf_set::manifest },
-    Target { name: "npy-words", run: leaf_set::words },
-    Target { name: "p4est", run: forest::run },
-    Target { name: "tree-file", run: tree_file::run },
+    Target { name: "stl", run: cases::stl },
+    Target { name: "stl-grammar", run: cases::stl_grammar },
+    Target { name: "case", run: cases::case },
+    Target { name: "manifest", run: meshes::manifest },
+    Target { name: "npy-words", run: meshes::words },
+    Target { name: "p4est", run: meshes::forest },
+    Target { name: "tree-file", run: meshes::tree_file },
     Target { name: "engine", run: texts::engine },
     Target { name: "rules", run: texts::rules },
     Target { name: "targets", run: texts::targets },

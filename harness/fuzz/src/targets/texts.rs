@@ -5,7 +5,6 @@ use bench::experiments::record;
 use bench::gate::Rules;
 use bench::gate::measures::Measures;
 use bench::track::history::{self, Record};
-use check::audit::record::AuditRecord;
 use contract::catalogue::{Catalogue, Size};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
@@ -56,16 +55,15 @@ pub(super) fn history(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     records.is_ok_and(|history| !history.records.is_empty())
 }
 
-/// The reports of a run, of `harness audit` and of `harness gate`.
+/// The reports of a run and of `harness gate`.
 pub(super) fn reports(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let path = scratch.file("report.json", bytes);
     let run = RunReport::read(path);
     if let Ok(report) = &run {
         let _ = (report.peak_rss_bytes_total(), report.time_cpu_s());
     }
-    let audit = AuditRecord::read(path);
     let gate = Measures::parse(bytes);
     let added = Record::new("commit".to_owned()).add(bytes);
     assert_eq!(gate.is_ok(), added.is_ok());
-    run.is_ok() || audit.is_ok() || gate.is_ok()
+    run.is_ok() || gate.is_ok()
 }

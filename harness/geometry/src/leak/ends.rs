@@ -56,27 +56,19 @@ pub fn is_free(leaf: u64) -> bool {
     word::side(leaf) != Side::Crossing
 }
 
-/// The centre of a leaf.
-pub fn centre(leaf: u64) -> [i64; 3] {
-    word::octant(leaf).centre()
-}
-
-/// Why an end is not in a free leaf, with the nearest centre of one.
-pub fn crossed(what: &str, at: Point, words: &[u64], root: &Root) -> Option<String> {
-    if is_free(leaf_at(words, at)) {
-        return None;
-    }
-    let free = words.iter().filter(|&&w| is_free(w)).map(|&w| centre(w));
+/// The sentence about an end in a leaf that facets cross, with the nearest centre of a free one.
+pub fn crossed(what: &str, at: Point, words: &[u64], root: &Root) -> String {
+    let free = words.iter().filter(|&&w| is_free(w)).map(|&w| word::octant(w).centre());
     let distance = |centre: &[i64; 3]| Point::from_array(centre.map(|c| c as f64)).distance(at);
     let nearest = free.min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let place = format!("{what} {:?} is in a leaf that facets cross", to_user(root, at));
-    Some(match nearest {
+    match nearest {
         Some(near) => format!(
             "{place}; the nearest centre of a free leaf is {:?}",
             root.rounded(root.to_user(near))
         ),
         None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
-    })
+    }
 }
 
 impl<F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'_, F> {
@@ -126,7 +118,8 @@ impl<F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'_, F> {
         self.make_tree(level)?;
         for &place in places {
             let Ok(at) = on_lattice("--from", place, &root) else { continue };
-            if self.search(level, (end, Some(at)))? == Some(true) {
+            let ends = (end, Some(at));
+            if self.crossed(level, ends).is_none() && self.search(level, ends)? {
                 return Ok(Some(place));
             }
         }

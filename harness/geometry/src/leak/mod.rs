@@ -3,7 +3,7 @@
 //!
 //! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
 //! - [`ends`]: where paths start and end;
-//! - [`report`]: the answer as data; [`invariants`]: what it satisfies; [`text`]: the answer for a terminal.
+//! - [`report`]: the answer as data and for a terminal; [`invariants`]: what it satisfies.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
 //! narrower of the two passes from one to the other, so an opening that joins leaves of edge e is at least e wide. An
@@ -14,7 +14,6 @@ mod invariants;
 mod passage;
 pub mod report;
 mod space;
-mod text;
 
 use std::collections::BTreeMap;
 
@@ -25,6 +24,9 @@ use contract::watch::Watch;
 use ends::Target;
 use report::{Answers, Closes, Report, SCHEMA, Spacing};
 use space::{Goal, Space};
+
+/// The ends of a path on the lattice; the second is `None` for the far field.
+type Ends = (Point, Option<Point>);
 
 /// A case whose openings are searched.
 pub struct Leaks<'a, F> {
@@ -71,9 +73,10 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         };
         let ends = (start, end);
         self.make_tree(level)?;
-        let Some(is_leak) = self.search(level, ends)? else {
-            return Err(Failure::input(self.crossed_end(level, ends)));
-        };
+        if let Some((what, at)) = self.crossed(level, ends) {
+            return Err(Failure::input(ends::crossed(what, at, &self.trees[&level], root)));
+        }
+        let is_leak = self.search(level, ends)?;
         let spacing = Spacing::of(level, root);
         let mut report = Report { from, to, spacing, is_leak, closes: None, passage: None };
         if is_leak {
@@ -101,43 +104,32 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         Ok(())
     }
 
-    /// Whether free leaves of a base tree join the ends; `None` if facets cross the leaf of one. The coarsest leaves are searched first: few
-    /// of them lead far.
-    fn search(
-        &self,
-        level: u8,
-        (from, to): (Point, Option<Point>),
-    ) -> Result<Option<bool>, Failure> {
-        self.watch.step(&format!("searching the base tree of level {level}"));
-        let words = &self.trees[&level];
-        let is_crossed = |at: Point| !ends::is_free(ends::leaf_at(words, at));
-        if is_crossed(from) || to.is_some_and(is_crossed) {
-            return Ok(None);
-        }
-        let mut space = Space::new(words, &self.facets)?;
-        let stop = || self.watch.is_interrupted();
-        let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
-        let edge = |space: &mut Space, cell| space.edge(cell);
-        Ok(Some(space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some()))
+    /// An end of which facets cross the leaf in a base tree.
+    fn crossed(&self, level: u8, (from, to): Ends) -> Option<(&'static str, Point)> {
+        let ends = [Some(("--from", from)), to.map(|to| ("--to", to))];
+        let is_crossed =
+            |end: &(_, Point)| !ends::is_free(ends::leaf_at(&self.trees[&level], end.1));
+        ends.into_iter().flatten().find(is_crossed)
     }
 
-    /// Why an end is not in a free leaf, for the user.
-    fn crossed_end(&self, level: u8, (from, to): (Point, Option<Point>)) -> String {
-        let (words, root) = (&self.trees[&level], &self.case.root);
-        let crossed = |what, at| ends::crossed(what, at, words, root);
-        crossed("--from", from)
-            .or_else(|| to.and_then(|to| crossed("--to", to)))
-            .expect("an end is crossed")
+    /// Whether free leaves of a base tree join the ends, which lie in some. The coarsest leaves are searched first: few of them lead far.
+    fn search(&self, level: u8, (from, to): Ends) -> Result<bool, Failure> {
+        self.watch.step(&format!("searching the base tree of level {level}"));
+        let mut space = Space::new(&self.trees[&level], &self.facets)?;
+        let stop = || self.watch.is_interrupted();
+        let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
+        let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
+        Ok(space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some())
     }
 
     /// Coarsens the surface until the ends are not joined.
-    fn coarsen(&mut self, ends: (Point, Option<Point>)) -> Result<Option<Closes>, Failure> {
+    fn coarsen(&mut self, ends: Ends) -> Result<Option<Closes>, Failure> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
-            let found = self.search(level, ends)?;
-            if found != Some(true) {
+            let is_end_crossed = self.crossed(level, ends).is_some();
+            if is_end_crossed || !self.search(level, ends)? {
                 let spacing = Spacing::of(level, &self.case.root);
-                return Ok(Some(Closes { spacing, is_end_crossed: found.is_none() }));
+                return Ok(Some(Closes { spacing, is_end_crossed }));
             }
         }
         Ok(None)

@@ -1,10 +1,12 @@
-//! The answer as data; JSON of the schema `octree-leak/4` when serialised. Lengths are in the user's units.
+//! The answer as data, as JSON of the schema `octree-leak/4` when serialised, and for a terminal. Lengths are in the user's units.
 //!
 //! Its invariants are in [`super::invariants`].
 
 use super::ends::Target;
 use contract::lattice::Root;
+use contract::number::number;
 use serde::Serialize;
+use std::fmt;
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-leak/4";
@@ -49,7 +51,7 @@ pub struct Point {
 pub struct Narrowest {
     /// Centre of the largest ball that passes on this path.
     pub at: [f64; 3],
-    /// Its diameter, to 1 %.
+    /// Its diameter.
     pub width: f64,
     /// A ball of this diameter passes on this path.
     pub width_min: f64,
@@ -110,4 +112,187 @@ pub struct Answers {
     pub root: Root,
     /// The answers.
     pub examined: Vec<Report>,
+}
+
+/// Facets at the rim that are printed.
+const FACETS_MAX: usize = 24;
+const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
+
+impl fmt::Display for Answers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, report) in self.examined.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            report.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let to = match &self.to {
+            Target::Point(at) => point(at),
+            Target::Far => "the far field".to_owned(),
+        };
+        writeln!(f, "from      {}", point(&self.from))?;
+        writeln!(f, "to        {to}")?;
+        writeln!(f, "spacing   {}", spacing(&self.spacing))?;
+        match (&self.passage, &self.closes) {
+            (None, _) => writeln!(f, "\nno leak at this spacing"),
+            (Some(passage), closes) => {
+                let verdict = match passage.narrowest.is_end {
+                    true => {
+                        "JOINED: start and end lie in one space, or one of them within the opening"
+                    }
+                    false => "LEAK: free leaves join start and end",
+                };
+                let closed = match closes {
+                    None => ", at every spacing".to_owned(),
+                    Some(Closes { spacing: at, is_end_crossed }) => {
+                        let crossed = if *is_end_crossed { ENDS_CROSSED } else { "" };
+                        format!("; closed at spacing {}{crossed}", spacing(at))
+                    }
+                };
+                writeln!(f, "\n{verdict}{closed}")?;
+                describe(passage, f)
+            }
+        }
+    }
+}
+
+fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let narrowest = &passage.narrowest;
+    let [min, width, max] = [narrowest.width_min, narrowest.width, narrowest.width_max].map(number);
+    let cells = number(narrowest.width_cells);
+    writeln!(f, "\nThe narrowest place of the widest path")?;
+    writeln!(
+        f,
+        "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}"
+    )?;
+    if !narrowest.is_end {
+        writeln!(
+            f,
+            "          Spacings above {max} close it wherever the lattice lies; a finer one may close it on this lattice only."
+        )?;
+    }
+    writeln!(f, "at        {}", point(&narrowest.at))?;
+    let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
+    let listed: Vec<String> = listed.collect();
+    let more = match narrowest.facets.len().saturating_sub(FACETS_MAX) {
+        0 => String::new(),
+        more => format!(" and {more} more (--json)"),
+    };
+    writeln!(f, "facets    {}{more}", listed.join(", "))?;
+    if narrowest.is_end {
+        writeln!(
+            f,
+            "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
+        )?;
+    }
+    Ok(())
+}
+
+fn spacing(spacing: &Spacing) -> String {
+    format!("{} (level {})", rounded_up(spacing.spacing), spacing.level)
+}
+
+/// A spacing with three significant digits, rounded up: a case with this spacing has the same level.
+fn rounded_up(spacing: f64) -> String {
+    let unit = 10f64.powi(spacing.log10().floor() as i32 - 2);
+    let text = number(spacing);
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded < spacing => number(spacing + unit),
+        _ => text,
+    }
+}
+
+fn point(at: &[f64; 3]) -> String {
+    let [x, y, z] = at;
+    format!("({x}, {y}, {z})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn narrowest(facets: std::ops::Range<u32>, index: usize, is_end: bool) -> Narrowest {
+        Narrowest {
+            at: [0.5, 0.0, -1.25],
+            width: 0.125,
+            width_min: 0.124,
+            width_max: 0.128,
+            width_cells: 0.25,
+            facets: facets.collect(),
+            index,
+            is_end,
+        }
+    }
+
+    /// A leak through an opening, along a path of this many points.
+    fn leak(points: usize, narrowest: Narrowest) -> Report {
+        let root = Root { origin: [0.0; 3], edge: 8.0 };
+        let point = |i: usize| Point { at: [i as f64, 0.0, 1.0], width: 0.5 + i as f64 };
+        let spacing = Spacing::of(4, &root);
+        let points: Vec<Point> = (0..points).map(point).collect();
+        Report {
+            from: [0.0, 0.25, 1.0],
+            to: Target::Far,
+            spacing,
+            is_leak: true,
+            closes: Some(Closes { spacing: Spacing::of(2, &root), is_end_crossed: true }),
+            passage: Some(Passage { spacing, narrowest, inner: (0, points.len() - 1), points }),
+        }
+    }
+
+    const HEAD: &str =
+        "from      (0, 0.25, 1)\nto        the far field\nspacing   0.500 (level 4)\n\n";
+
+    #[test]
+    fn a_leak_is_described_with_its_opening_and_its_path() {
+        let expected = "LEAK: free leaves join start and end; closed at spacing 2.00 (level 2), where facets cross the leaf of the start or the end\n\
+            \nThe narrowest place of the widest path\n\
+            width     0.125 (0.250 cells of the case's spacing): diameter of the largest ball that passes, 0.124 to 0.128\n          \
+            Spacings above 0.128 close it wherever the lattice lies; a finer one may close it on this lattice only.\n\
+            at        (0.5, 0, -1.25)\nfacets    3, 4\n";
+        assert_eq!(leak(3, narrowest(3..5, 1, false)).to_string(), format!("{HEAD}{expected}"));
+    }
+
+    #[test]
+    fn of_long_rims_the_first_part_is_printed() {
+        let facets = |count| leak(1, narrowest(0..count, 0, false)).to_string();
+        assert!(facets(24).contains(" 22, 23\n"));
+        assert!(facets(26).contains(" 22, 23 and 2 more (--json)\n"));
+    }
+
+    #[test]
+    fn a_path_that_is_narrowest_at_its_end_has_no_opening() {
+        let mut report = leak(1, narrowest(3..4, 0, true));
+        (report.closes, report.to) = (None, Target::Point([1.0, 2.0, 3.5]));
+        let text = report.to_string();
+        let start = "from      (0, 0.25, 1)\nto        (1, 2, 3.5)\n";
+        assert!(text.starts_with(start), "{text}");
+        let verdict = "\nJOINED: start and end lie in one space, or one of them within the opening, at every spacing\n";
+        assert!(text.contains(verdict), "{text}");
+        let remark = "facets    3\n          This is an end of the path: no place on the way is narrower, so there is no opening between \
+            the ends.\n";
+        assert!(text.contains(remark) && !text.contains("Spacings above"), "{text}");
+    }
+
+    #[test]
+    fn without_a_leak_the_answer_is_one_line() {
+        let mut report = leak(1, narrowest(3..4, 0, false));
+        (report.is_leak, report.closes, report.passage) = (false, None, None);
+        assert_eq!(report.to_string(), format!("{HEAD}no leak at this spacing\n"));
+    }
+
+    #[test]
+    fn a_printed_spacing_has_the_level_of_the_exact_one() {
+        for exact in [8.265 / 512.0, 4.28 / 128.0, 0.25, 0.9996, 1.0 / 3.0, 1234.5, 7.3e-9, 8.1e12]
+        {
+            let printed: f64 = rounded_up(exact).parse().unwrap();
+            assert!(printed >= exact && printed < 1.02 * exact, "{exact}: {printed}");
+        }
+    }
 }

@@ -4,34 +4,52 @@
 //! leaves, and cells that were opened.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use crate::tree::{FacetTree, Point};
 use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
-use contract::octant::Octant;
+use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, KEY_END, Side};
 
-/// Bit of an entry that refers to a node; without it, the entry is the number of a cell.
-const NODE: u32 = 1 << 31;
-
-/// Bisections of the root to the edge of a lattice unit.
-const DEPTH: u32 = UNITS_PER_EDGE.ilog2();
-
+/// A cell; lengths are in lattice units.
 #[derive(Clone, Copy, Debug)]
-struct Cell {
-    low: [i32; 3],
-    edge: i32,
-    is_open: bool,
+pub struct Cell {
+    low: [u32; 3],
+    edge: u32,
+    /// Whether paths may enter it. Of a cell that facets cross, its parts that they do not touch become passable.
+    pub is_open: bool,
     /// Distance from the centre to the nearest facet; not a number before it is needed.
-    clearance: f32,
+    pub clearance: f32,
+}
+
+impl Cell {
+    /// The edge length.
+    pub fn edge(&self) -> f64 {
+        self.edge.into()
+    }
+
+    /// The centre.
+    pub fn centre(&self) -> Point {
+        Point::from_array(self.low.map(|c| f64::from(c) + self.edge() / 2.0))
+    }
+
+    /// Distance from the centre to the corners.
+    pub fn half_diagonal(&self) -> f64 {
+        3f64.sqrt() / 2.0 * self.edge()
+    }
+
+    fn is_far(&self) -> bool {
+        self.low.iter().any(|&c| c == 0 || i64::from(c + self.edge) == UNITS_PER_EDGE)
+    }
 }
 
 /// The cells.
 pub struct Space<'a> {
-    cells: Vec<Cell>,
-    nodes: Vec<[u32; 8]>,
-    root: u32,
+    /// All of them.
+    pub cells: Vec<Cell>,
+    /// Indices of the cells by the Morton code of their minimum corner.
+    order: BTreeMap<u128, u32>,
     /// The facets of the case.
     pub facets: &'a FacetTree,
 }
@@ -52,136 +70,82 @@ impl<'a> Space<'a> {
     /// One sentence, if the words are not leaves that tile the root.
     pub fn new(words: &[u64], facets: &'a FacetTree) -> Result<Self, String> {
         let mut end = 0;
+        let mut cells = Vec::with_capacity(words.len());
         for (i, &w) in words.iter().enumerate() {
-            if word::fault(w).is_some() || word::key(w) != end || i >= NODE as usize {
+            if word::fault(w).is_some() || word::key(w) != end {
                 return Err(format!("the base tree is not a tree: leaf {i} is wrong"));
             }
             end += word::span(word::level(w));
+            let (low, high) = word::octant(w).bounds();
+            let is_open = word::side(w) != Side::Crossing;
+            let (low, edge) = (low.map(|c| c as u32), (high[0] - low[0]) as u32);
+            cells.push(Cell { low, edge, is_open, clearance: f32::NAN });
         }
         if end != KEY_END {
             return Err("the base tree is not a tree: it does not fill the root".to_owned());
         }
-        let cells = Vec::with_capacity(words.len());
-        let mut space = Self { cells, nodes: Vec::new(), root: 0, facets };
-        space.root = space.add(words, Octant::ROOT);
-        Ok(space)
-    }
-
-    /// Adds the leaves in an octant and returns its entry.
-    fn add(&mut self, words: &[u64], octant: Octant) -> u32 {
-        if words.len() == 1 && word::level(words[0]) == octant.level {
-            let ((low, high), is_open) = (octant.bounds(), word::side(words[0]) != Side::Crossing);
-            let low = low.map(|c| c as i32);
-            let edge = high[0] as i32 - low[0];
-            self.cells.push(Cell { low, edge, is_open, clearance: f32::NAN });
-            return self.cells.len() as u32 - 1;
-        }
-        let node = self.nodes.len();
-        self.nodes.push([0; 8]);
-        let mut rest = words;
-        for digit in 0..8 {
-            let child = octant.child(digit);
-            let end = word::key_of(child.corner) + word::span(child.level);
-            let (of_child, after) = rest.split_at(rest.partition_point(|&w| word::key(w) < end));
-            self.nodes[node][usize::from(digit)] = self.add(of_child, child);
-            rest = after;
-        }
-        NODE | node as u32
+        let order = cells.iter().zip(0..).map(|(cell, i)| (key(cell.low), i)).collect();
+        Ok(Self { cells, order, facets })
     }
 
     /// The cell that contains a point of the root.
     pub fn locate(&self, at: Point) -> u32 {
         let last = UNITS_PER_EDGE as f64 - 1.0;
-        let at = at.to_array().map(|c| c.clamp(0.0, last) as i32);
-        self.find(at, 1).0
+        self.at(at.to_array().map(|c| c.clamp(0.0, last) as u32))
     }
 
-    /// The entry of the octant of this edge that contains a point, or of the cell that contains the octant; and the entry's
-    /// place in a node.
-    fn find(&self, at: [i32; 3], edge: i32) -> (u32, Option<(usize, usize)>) {
-        let (mut entry, mut place, mut half) = (self.root, None, 1 << (DEPTH - 1));
-        while entry & NODE != 0 && half >= edge {
-            let digit = (0..3).map(|a| usize::from(at[a] & half != 0) << a).sum();
-            let node = (entry & !NODE) as usize;
-            (entry, place) = (self.nodes[node][digit], Some((node, digit)));
-            half /= 2;
-        }
-        (entry, place)
+    fn at(&self, at: [u32; 3]) -> u32 {
+        let before = self.order.range(..=key(at)).next_back();
+        *before.expect("the cells tile the root").1
     }
 
     /// Calls `visit` with every cell that shares part of a face with this one.
     pub fn neighbours(&self, cell: u32, visit: &mut impl FnMut(u32)) {
         let Cell { low, edge, .. } = self.cells[cell as usize];
         for axis in 0..3 {
-            for (across, is_above) in [(low[axis] - 1, false), (low[axis] + edge, true)] {
+            let (below, above) = (low[axis].checked_sub(edge), low[axis] + edge);
+            let above = (i64::from(above) < UNITS_PER_EDGE).then_some(above);
+            for (across, is_upper) in [(below, true), (above, false)] {
                 let mut at = low;
-                at[axis] = across;
-                if (0..UNITS_PER_EDGE).contains(&i64::from(across)) {
-                    self.facing(self.find(at, edge).0, axis, !is_above, visit);
+                if let Some(across) = across {
+                    at[axis] = across;
+                    self.facing((at, edge), axis, is_upper, visit);
                 }
             }
         }
     }
 
-    /// The cells of an entry at its upper or lower face.
-    fn facing(&self, entry: u32, axis: usize, is_upper: bool, visit: &mut impl FnMut(u32)) {
-        if entry & NODE == 0 {
-            return visit(entry);
+    /// The cells in a cube, or the one around it, at its upper or lower face.
+    fn facing(
+        &self,
+        (low, edge): ([u32; 3], u32),
+        axis: usize,
+        is_upper: bool,
+        visit: &mut impl FnMut(u32),
+    ) {
+        let cell = self.at(low);
+        if self.cells[cell as usize].edge >= edge {
+            return visit(cell);
         }
-        for (digit, &child) in self.nodes[(entry & !NODE) as usize].iter().enumerate() {
-            if (digit >> axis & 1 == 1) == is_upper {
-                self.facing(child, axis, is_upper, visit);
-            }
+        for digit in (0..8).filter(|digit| (digit >> axis & 1 == 1) == is_upper) {
+            self.facing((child(low, edge, digit), edge / 2), axis, is_upper, visit);
         }
     }
 
     /// Divides a cell into eight, which are as open as it was.
     pub fn split(&mut self, cell: u32) {
         let whole = self.cells[cell as usize];
-        let half = whole.edge / 2;
-        let child = |digit: usize| Cell {
-            low: std::array::from_fn(|a| whole.low[a] + half * (digit >> a & 1) as i32),
-            edge: half,
+        let parts: [Cell; 8] = std::array::from_fn(|digit| Cell {
+            low: child(whole.low, whole.edge, digit as u32),
+            edge: whole.edge / 2,
             clearance: f32::NAN,
             ..whole
-        };
-        let first = self.cells.len() as u32;
-        let place = self.find(whole.low, whole.edge).1;
-        self.cells[cell as usize] = child(0);
-        self.cells.extend((1..8).map(child));
-        let node = NODE | self.nodes.len() as u32;
-        let added = |digit: u32| if digit == 0 { cell } else { first + digit - 1 };
-        self.nodes.push(std::array::from_fn(|digit| added(digit as u32)));
-        match place {
-            Some((above, digit)) => self.nodes[above][digit] = node,
-            None => self.root = node,
+        });
+        self.cells[cell as usize] = parts[0];
+        for part in &parts[1..] {
+            self.order.insert(key(part.low), self.cells.len() as u32);
+            self.cells.push(*part);
         }
-    }
-
-    /// Number of cells.
-    pub fn count(&self) -> u32 {
-        self.cells.len() as u32
-    }
-
-    /// Whether paths may enter a cell.
-    pub fn is_open(&self, cell: u32) -> bool {
-        self.cells[cell as usize].is_open
-    }
-
-    /// Lets paths enter a cell that facets cross: its parts that they do not touch become passable.
-    pub fn open(&mut self, cell: u32) {
-        self.cells[cell as usize].is_open = true;
-    }
-
-    /// The edge of a cell, in lattice units.
-    pub fn edge(&self, cell: u32) -> f64 {
-        self.cells[cell as usize].edge.into()
-    }
-
-    /// The centre of a cell.
-    pub fn centre(&self, cell: u32) -> Point {
-        let Cell { low, edge, .. } = self.cells[cell as usize];
-        Point::from_array(low.map(|c| f64::from(c) + f64::from(edge) / 2.0))
     }
 
     /// The centre of the common part of two cells' faces.
@@ -193,33 +157,19 @@ impl<'a> Space<'a> {
         }))
     }
 
-    fn is_far(&self, cell: u32) -> bool {
-        let Cell { low, edge, .. } = self.cells[cell as usize];
-        low.iter().any(|&c| c == 0 || i64::from(c + edge) == UNITS_PER_EDGE)
-    }
-
-    /// Distance from the centre of a cell to the nearest facet, as far as it is known.
-    pub fn known_clearance(&self, cell: u32) -> Option<f64> {
-        Some(f64::from(self.cells[cell as usize].clearance)).filter(|c| !c.is_nan())
-    }
-
     /// Distance from the centre of a cell to the nearest facet.
     pub fn clearance(&mut self, cell: u32) -> f64 {
-        if self.cells[cell as usize].clearance.is_nan() {
-            self.cells[cell as usize].clearance = self.facets.distance(self.centre(cell)) as f32;
+        let cell = &mut self.cells[cell as usize];
+        if cell.clearance.is_nan() {
+            cell.clearance = self.facets.distance(cell.centre()) as f32;
         }
-        self.cells[cell as usize].clearance.into()
+        cell.clearance.into()
     }
 
     /// No ball of a greater radius has its centre in the cell.
     pub fn radius(&mut self, cell: u32) -> f64 {
         // Exceeds the rounding to f32.
-        (self.clearance(cell) + self.half_diagonal(cell)) * (1.0 + 1e-6)
-    }
-
-    /// Distance from the centre of a cell to its corners.
-    pub fn half_diagonal(&self, cell: u32) -> f64 {
-        3f64.sqrt() / 2.0 * self.edge(cell)
+        (self.clearance(cell) + self.cells[cell as usize].half_diagonal()) * (1.0 + 1e-6)
     }
 
     /// The path between open cells whose least width is greatest, widths above `cap` being equal, and this width. Of paths that are
@@ -253,7 +203,7 @@ impl<'a> Space<'a> {
             if label != labels[cell as usize] {
                 continue;
             }
-            if end.map_or_else(|| self.is_far(cell), |end| cell == end) {
+            if end.map_or_else(|| self.cells[cell as usize].is_far(), |end| cell == end) {
                 let mut path = vec![cell];
                 while path[path.len() - 1] != start {
                     path.push(via[path[path.len() - 1] as usize]);
@@ -267,13 +217,14 @@ impl<'a> Space<'a> {
             joined.clear();
             self.neighbours(cell, &mut |next| joined.push(next));
             for &next in &joined {
-                if !self.is_open(next) {
+                if !self.cells[next as usize].is_open {
                     continue;
                 }
                 let wide = width(self, next) as f32;
-                let step = self.centre(cell).distance(self.centre(next)) as f32;
+                let [here, there] = [cell, next].map(|cell| self.cells[cell as usize]);
+                let step = here.centre().distance(there.centre()) as f32;
                 // Up to twice its length or more where the step is as narrow as possible.
-                let clearance = self.cells[next as usize].clearance;
+                let clearance = there.clearance;
                 let detour = if cap.is_finite() { (cap / clearance).min(8.0) } else { 0.0 };
                 let through = (label.0.min(wide), label.1 + step * (1.0 + detour));
                 let best = labels[next as usize];
@@ -286,4 +237,16 @@ impl<'a> Space<'a> {
         }
         Ok(None)
     }
+}
+
+/// The Morton code of a lattice unit.
+fn key(at: [u32; 3]) -> u128 {
+    const CELL: u32 = UNITS_PER_CELL as u32;
+    let [of_cell, within] = [at.map(|c| c / CELL), at.map(|c| c % CELL)].map(word::key_of);
+    u128::from(of_cell) << (3 * CELL.ilog2()) | u128::from(within)
+}
+
+/// The minimum corner of a child of a cube.
+fn child(low: [u32; 3], edge: u32, digit: u32) -> [u32; 3] {
+    std::array::from_fn(|axis| low[axis] + edge / 2 * (digit >> axis & 1))
 }

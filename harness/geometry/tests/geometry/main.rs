@@ -324,10 +324,11 @@ fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
         at([15.0, 8.0, 0.0], cube()),
     ]
     .concat();
-    for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no-cells")] {
+    let mut texts = String::new();
+    for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no cells")] {
         let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
         let input = Input::new(facets.clone(), &requested).unwrap();
-        let text = diagnose(&input, first).to_string();
-        assert_text(&text, &format!("tests/geometry/expected/{name}.txt"));
+        texts += &format!("== {name}\n{}", diagnose(&input, first));
     }
+    assert_text(&texts, "tests/geometry/expected.txt");
 }

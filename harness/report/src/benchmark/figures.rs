@@ -1,8 +1,8 @@
 //! Figures over cells: run time (counterparts of the paper's Figures 17 and 18), rate and memory. All numbers of the paper are those of `reports/paper.md`.
 
-use super::groups::{Subject, point, provenance, repetitions};
+use super::groups::{Subject, cited, is_counterpart, point, provenance, repetitions};
 use super::scaling;
-use crate::figure::{Axis, Figure, Point, Provenance, Series};
+use crate::figure::{Axis, Figure, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
@@ -31,17 +31,6 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
         }
     }
     all
-}
-
-/// Whether a case is the counterpart of the paper's UAV, around which its meshes with a run time are.
-pub fn is_counterpart(case: &str) -> bool {
-    case.starts_with("uav")
-}
-
-/// Values of the paper, which are not joined.
-pub fn cited(name: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    let points = points.into_iter().map(|(x, y)| Point::exact(x, y)).collect();
-    Series::new(name, Provenance::Cited, 5, points).not_joined()
 }
 
 /// The paper's runs of which the text states cells, ranks and time, by a value of them, and a sentence on them.

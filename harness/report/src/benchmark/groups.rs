@@ -1,6 +1,6 @@
 //! Groups of runs in the form that figures and tables need: by case, as points, with provenance and labels.
 
-use crate::figure::{Point, Provenance};
+use crate::figure::{Point, Provenance, Series};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
@@ -126,4 +126,15 @@ pub fn cells_label(cells: u64) -> String {
     };
     let text = if value < 9.5 { format!("{value:.1}") } else { format!("{value:.0}") };
     format!("{}{unit}", text.trim_end_matches(".0").replace('.', "p"))
+}
+
+/// Whether a case is the counterpart of the paper's UAV, around which its meshes with a run time are.
+pub fn is_counterpart(case: &str) -> bool {
+    case.starts_with("uav")
+}
+
+/// Values of the paper, which are not joined.
+pub fn cited(name: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
+    let points = points.into_iter().map(|(x, y)| Point::exact(x, y)).collect();
+    Series::new(name, Provenance::Cited, 5, points).not_joined()
 }

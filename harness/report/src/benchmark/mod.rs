@@ -1,12 +1,9 @@
 //! `harness report DIR`: figures, a page, a LaTeX fragment and macros of the numbers from records.
 
-mod bars;
 mod figures;
 mod groups;
 pub mod numbers;
 mod page;
-pub mod prose;
-mod rules;
 mod scaling;
 pub mod tables;
 
@@ -16,8 +13,8 @@ use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
 use contract::files::{named, write_atomically};
 use numbers::{Number, numbers};
+use page::Broken;
 pub use page::machines;
-use rules::Broken;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -50,7 +47,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     fs::create_dir_all(&place)?;
     let drawn: Vec<(&Figure, String)> =
         figures.iter().map(|figure| write_figure(&place, figure)).collect::<io::Result<_>>()?;
-    let broken = rules::broken(&groups, lines);
+    let broken = page::broken(&groups, lines);
     let page = directory.join("index.html");
     write(&page, page::page(&groups, &drawn, &broken, lines))?;
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;

@@ -3,10 +3,15 @@
 //!
 //! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. A partition that
 //! was chosen follows the experiment, as in `weights-metis-unit`. The same setup with another n has a number at its end: `speedup-2`.
+//!
+//! `harness report DIR --check paper.tex` compares the numbers of a text with the record. A finding is a `\result` of a key that the record
+//! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
+//! more significant digits that is written by hand and that no result rounds to.
 
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
+use regex::{Captures, Match, Regex};
 use statistics::Median;
 use std::fmt::Write;
 
@@ -85,7 +90,7 @@ const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \resu
 ";
 
 /// The unit of a result in LaTeX.
-pub fn unit_tex(number: &Number) -> String {
+fn unit_tex(number: &Number) -> String {
     number.unit.replace("10^6", "$10^6$")
 }
 
@@ -97,6 +102,111 @@ pub fn tex(numbers: &[Number]) -> String {
         let _ = writeln!(out, "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{unit}}}");
     }
     out
+}
+
+/// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths.
+const NOT_READ: [&str; 3] = [
+    r"\\[a-zA-Z]*(?:label|ref|cite|input|result|includegraphics|url|usepackage|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
+    r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
+    r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
+];
+
+/// What a text has.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Checked {
+    /// Numbers that were compared with the record.
+    pub compared: usize,
+    /// What is wrong, with line numbers.
+    pub findings: Vec<String>,
+}
+
+/// Compares the numbers of a LaTeX text with the results of a record.
+pub fn check(text: &str, numbers: &[Number]) -> Checked {
+    let mut found: Vec<(usize, Option<String>)> = Vec::new();
+    let code = without(r"(?m)%.*$", &without(r"\\%", text));
+    for definition in all(r"(?m)^\s*\\defresult.*$", &code) {
+        found.push((definition.start(), defines_otherwise(definition.as_str(), numbers)));
+    }
+    let code = without(r"(?m)^\s*\\defresult.*$", &code);
+    let uses = pattern(r"\\result\s*(?:\[([^\]]*)\])?\s*\{\s*([^}]*?)\s*\}");
+    found.extend(uses.captures_iter(&code).map(|of| {
+        let option = of.get(1).map_or("value", |option| option.as_str());
+        (of.get(0).map_or(0, |whole| whole.start()), misused(option, &of[2], numbers))
+    }));
+    let code = NOT_READ.iter().fold(code, |code, pattern| without(pattern, &code));
+    for literal in all(r"[0-9.]*[0-9]", &code).into_iter().filter(|number| is_result(number, &code))
+    {
+        let number = literal.as_str();
+        let is_known = numbers.iter().any(|result| rounds_to(result, number));
+        let why = || format!("{number} is written by hand, and no result rounds to it");
+        found.push((literal.start(), (!is_known).then(why)));
+    }
+    found.sort_by_key(|(at, _)| *at);
+    let line = |at: usize| 1 + text[..at].matches('\n').count();
+    let finding = |(at, why): &(usize, Option<String>)| {
+        why.as_ref().map(|why| format!("line {}: {why}", line(*at)))
+    };
+    Checked { compared: found.len(), findings: found.iter().filter_map(finding).collect() }
+}
+
+fn pattern(text: &str) -> Regex {
+    Regex::new(text).expect("a constant pattern is valid")
+}
+
+fn all<'a>(of: &str, text: &'a str) -> Vec<Match<'a>> {
+    pattern(of).find_iter(text).collect()
+}
+
+/// The text with blanks in place of a pattern, so that everything else keeps its place.
+fn without(of: &str, text: &str) -> String {
+    let blank = |found: &Captures| -> String {
+        found[0].bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }).collect()
+    };
+    pattern(of).replace_all(text, blank).into_owned()
+}
+
+/// Whether digits are a number with a decimal point and three or more significant digits; one that begins with its point is not the end of
+/// a word.
+fn is_result(found: &Match, code: &str) -> bool {
+    let number = found.as_str();
+    let digits = number.trim_start_matches(['0', '.']).replace('.', "").len();
+    let is_end = number.starts_with('.') && code[..found.start()].ends_with(char::is_alphanumeric);
+    number.matches('.').count() == 1 && digits >= 3 && !is_end
+}
+
+/// What a definition says that the record does not say.
+fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
+    let groups = arguments.split('{').skip(1).filter_map(|group| Some(group.split_once('}')?.0));
+    let [key, here @ ..] = &groups.collect::<Vec<_>>()[..] else {
+        return Some("\\defresult needs four arguments".to_owned());
+    };
+    let Some(n) = numbers.iter().find(|number| number.key == *key) else {
+        return Some(format!("the record has no result {key}"));
+    };
+    let [here, there] = [here, &[&n.value, &n.interval, &unit_tex(n)]].map(|of| of.join(" "));
+    (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
+}
+
+/// Why a use of `\result` has no text.
+fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
+    match (option, numbers.iter().find(|number| number.key == key)) {
+        (_, None) => Some(format!("the record has no result {key}")),
+        ("interval", Some(n)) if n.interval.is_empty() => Some(format!("{key} has no interval")),
+        ("value" | "interval" | "unit", _) => None,
+        _ => Some(format!("\\result has no option {option}: give value, interval or unit")),
+    }
+}
+
+/// Whether a result, its interval's ends included, is this number when it is rounded to as many decimals.
+fn rounds_to(number: &Number, literal: &str) -> bool {
+    let decimals = literal.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let literal =
+        &if literal.starts_with('.') { format!("0{literal}") } else { literal.to_owned() };
+    let ends = number.interval.split("--");
+    ends.chain([number.value.as_str()]).any(|text| {
+        let value: Result<f64, _> = text.replace(',', "").parse();
+        value.is_ok_and(|value| text == *literal || format!("{value:.decimals$}") == *literal)
+    })
 }
 
 #[cfg(test)]
@@ -130,5 +240,43 @@ mod tests {
     fn three_digits_are_significant() {
         let shown = [0.0, 0.012345, 1.0, 99.96, 123456.0].map(digits);
         assert_eq!(shown, ["0", "0.0123", "1.00", "100.0", "123456"]);
+    }
+
+    fn number(key: &str, value: &str, interval: &str) -> Number {
+        Number { key: key.into(), value: value.into(), interval: interval.into(), unit: "s" }
+    }
+
+    #[test]
+    fn unknown_keys_old_copies_and_numbers_by_hand_are_found() {
+        let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
+        let findings = |text: &str| check(text, &record).findings;
+        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
+                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\%\n\
+                     \\defresult{a/time}{1.234}{1.10--1.30}{s}";
+        assert_eq!(check(right, &record), Checked { compared: 7, findings: vec![] });
+        for (text, part) in [
+            ("\\result{a/tim}", "line 1: the record has no result a/tim"),
+            ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),
+            ("12.34\\%", "12.34 is written by hand"),
+            ("77.77\\,s", "77.77 is written by hand"),
+            ("x\n1.25 s", "line 2: 1.25 is written by hand"),
+            ("\\textbf{12.4}", "12.4 is written by hand"),
+            (
+                "\\defresult{a/time}{1.3}{1.10--1.30}{s}",
+                "a/time is 1.3 1.10--1.30 s here and 1.234 1.10--1.30 s in the record",
+            ),
+            ("\\defresult{a/time}{1.234}{1.10--1.30}{ms}", "1.10--1.30 ms here"),
+            ("[9.87, 1.23]", "9.87 is written by hand"),
+            ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
+            ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
+            ("a factor of .987", ".987 is written by hand"),
+            ("\\result[intervall]{a/time}", "no option intervall"),
+            ("\\result[interval]{a/speedup}", "a/speedup has no interval"),
+            ("\\defresult{b}{1.3}{}{}", "no result b"),
+        ] {
+            let found = findings(text);
+            assert!(found.len() == 1 && found[0].contains(part), "{text}: {found:?}");
+        }
+        assert_eq!(check("No number at all.", &record).compared, 0);
     }
 }

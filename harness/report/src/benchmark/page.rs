@@ -1,7 +1,7 @@
-//! The page of a benchmark report.
+//! The page of a benchmark report, and which of the twelve rules of Hoefler and Belli, "Scientific Benchmarking of Parallel Computing
+//! Systems" (SC15), a record breaks. reports/README.md lists the rules, and how every report keeps those that no record can break.
 
 use super::groups::{Subject, is_summarised};
-use super::rules::Broken;
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure, page as whole_page, with_code};
@@ -73,4 +73,98 @@ fn commands(lines: &[Line]) -> Vec<String> {
         shlex::try_join(words).expect("an argument of a process has no zero bytes")
     });
     distinct(commands)
+}
+
+/// A rule that the record breaks: its number, 1 to 12, and the reason in a sentence.
+pub type Broken = (usize, String);
+
+/// The rules that a record breaks, in the order of the rules.
+pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {
+    let mut broken = Vec::new();
+    let failures = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
+    if failures > 0 {
+        broken.push((2, format!("{failures} runs failed and are missing in the figures")));
+    }
+    // Efficiencies are of medians per rank, and counts repeat exactly.
+    let has_interval = |experiment: &str| ["strong", "spacing", "layers"].contains(&experiment);
+    let shown = groups.all.iter().filter(|g| has_interval(&g.setup.experiment));
+    let poor: Vec<usize> =
+        shown.filter(|g| g.time_s.coverage < 0.95).map(|g| g.runs.len()).collect();
+    if let Some(least) = poor.iter().min() {
+        let count = poor.len();
+        broken.push((5, format!(
+            "{count} configurations have fewer than the six runs that an interval with 95 % coverage needs (minimum: {least})"
+        )));
+    }
+    let sessions = || lines.iter().filter_map(Line::session);
+    let mut require = |holds: bool, why: &str| {
+        if !holds {
+            broken.push((9, why.to_owned()));
+        }
+    };
+    let is_documented = sessions().all(|session| {
+        let m = &session.machine;
+        let known = [&m.cpu, &m.kernel, &m.compiler, &m.commit].iter().all(|v| !v.is_empty());
+        known && m.memory_bytes > 0
+    });
+    let why = "machine, compiler or commit are missing in the record";
+    require(sessions().next().is_some() && is_documented, why);
+    let is_clean = sessions().all(|session| !session.machine.commit.ends_with("-dirty"));
+    require(is_clean, "a session ran with files that differ from its commit");
+    let disturbed = sessions().find(|s| s.load_average > 0.5 * s.machine.cores as f64);
+    let why = |load| {
+        format!("other processes may have disturbed a session, whose load average was {load:.1}")
+    };
+    require(disturbed.is_none(), &disturbed.map_or(String::new(), |s| why(s.load_average)));
+    broken
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::experiments::entry::{Comm, Session};
+    use bench::testing::{line, run};
+
+    fn session(load_average: f64, commit: &str) -> Line {
+        let machine = Machine {
+            cpu: "c".into(),
+            cores: 2,
+            memory_bytes: 1,
+            kernel: "k".into(),
+            mpi: String::new(),
+            compiler: "r".into(),
+            commit: commit.into(),
+        };
+        let (command, lacks) = (vec![], Default::default());
+        line(Entry::Session(Box::new(Session {
+            command,
+            machine,
+            nodes: String::new(),
+            load_average,
+            lacks,
+        })))
+    }
+
+    fn rules(lines: &[Line]) -> Vec<usize> {
+        broken(&Groups::of(lines), lines).into_iter().map(|(rule, _)| rule).collect()
+    }
+
+    #[test]
+    fn a_disturbed_machine_and_uncommitted_files_break_rule_9_and_so_does_a_record_without_sessions()
+     {
+        assert_eq!(rules(&[session(0.1, "abc")]), [0; 0]);
+        assert_eq!(rules(&[session(1.9, "abc")]), [9]);
+        assert_eq!(rules(&[session(0.1, "abc-dirty")]), [9]);
+        assert_eq!(rules(&[]), [9]);
+    }
+
+    #[test]
+    fn times_without_an_interval_break_rule_5() {
+        let one = || line(Entry::Run(Box::new(run(Comm::Mpi, 9, &[("a", &[1.0])]))));
+        let mut lines = vec![session(0.1, "abc")];
+        lines.extend((0..5).map(|_| one()));
+        assert_eq!(rules(&lines), [5]);
+        lines.push(one());
+        assert_eq!(rules(&lines), [0; 0]);
+    }
 }

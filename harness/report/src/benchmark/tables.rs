@@ -3,10 +3,9 @@
 use super::groups::{Subject, is_summarised};
 use crate::table::Table;
 use bench::experiments::entry::Comm;
-use bench::experiments::group::{Group, Groups};
+use bench::experiments::group::{Comparison, Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, above_one, phase_s};
-use bench::experiments::programs::Comparison;
 use bench::order::{by_key, distinct};
 
 /// All tables: experiments, projections, phases, programs.

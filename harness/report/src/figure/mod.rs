@@ -1,4 +1,4 @@
-//! The model of a figure: axes, series of points or stacked bars, vertical lines. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
+//! The model of a figure: axes, series of points, stacked bars or cells of a map, vertical lines. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
 //! ([`format`](mod@format)), and for LaTeX the values as CSV and an axis of `pgfplots` that reads them ([`latex`]).
 //!
 //! Points are joined only where interpolation between them is meaningful; captions state the confidence intervals. The rest of the invariants is asserted before
@@ -13,12 +13,14 @@ pub mod axes;
 pub mod canvas;
 pub mod format;
 pub mod latex;
+pub mod map;
 pub mod svg;
 #[cfg(all(test, feature = "figures"))]
 pub(crate) mod tests;
 
 use axes::Scale;
 pub use axes::tick_label;
+use map::Map;
 
 use std::collections::BTreeSet;
 
@@ -162,7 +164,8 @@ pub struct Figure {
     pub series: Vec<Series>,
     pub bars: Option<Bars>,
     pub marks: Vec<Mark>,
-    /// Height in units of which the width has [`canvas::WIDTH`].
+    pub map: Option<Map>,
+    /// Height in units of which the width has [`canvas::WIDTH`]; without effect on a map.
     pub height: u32,
 }
 
@@ -175,7 +178,8 @@ impl Figure {
         [x, y]: [Axis; 2],
         series: Vec<Series>,
     ) -> Self {
-        Self { id, title, caption, x, y, series, bars: None, marks: Vec::new(), height: 1040 }
+        let (bars, marks, map) = (None, Vec::new(), None);
+        Self { id, title, caption, x, y, series, bars, marks, map, height: 1040 }
     }
 
     /// The axes with their ends and ticks.

@@ -4,15 +4,15 @@
 //! Logarithmic axes are given their key points, because `plotters` drops the lowest tick.
 
 use super::axes::{BELOW, Scale};
-use super::canvas::{COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
-use super::{Bars, Figure, Mark, Provenance, Series};
+use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
+use super::map::{CAPTION, outline, paint, size};
+use super::{Bars, Figure, Provenance, Series};
 use maud::html;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use std::ops::Range;
 
 /// Corners of the markers around their centre. The first one is a circle.
 pub const MARKERS: [&[(i32, i32)]; 6] = [
@@ -26,8 +26,6 @@ pub const MARKERS: [&[(i32, i32)]; 6] = [
 
 /// Length of a line in the legend.
 const LENGTH: i32 = SYMBOL as i32 - 18;
-/// Space at the right of the data, and between the label of the vertical axis and the edge of the page.
-const BESIDE: [f64; 2] = [40.0, 10.0];
 /// Length of a tick. Labels at the corner do not touch.
 const TICK: i32 = 16;
 /// Width of lines of data.
@@ -40,98 +38,127 @@ const GAP: f64 = 0.2;
 const DRAWN: &str = "a string accepts every element";
 
 type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// A name in the legend, and what draws the symbol beside it at its left end.
-type Entry<'a> = (&'a str, Box<dyn Fn(i32, i32) + 'a>);
+
+/// What is beside a name in the legend.
+enum Symbol<'a> {
+    Series(&'a Series),
+    Bar(usize),
+    Mark(usize),
+    Cell([u8; 3]),
+    Section,
+    Nothing,
+}
 
 /// The figure as an SVG document.
 pub fn svg(figure: &Figure) -> String {
+    let legend_entries = entries(figure);
+    let names: Vec<&str> = legend_entries.iter().map(|(name, _)| *name).collect();
+    let [x, y] = figure.scales();
+    let (places, top) = legend(y.left(), &names);
+    let (height, right) = match figure.map {
+        Some(_) => size(&x, &y, top),
+        None => (figure.height, BESIDE[0]),
+    };
     let mut drawn = String::new();
-    let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, figure.height));
-    let notes = draw(figure, &backend.into_drawing_area());
+    let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, height));
+    let page = backend.into_drawing_area();
+    for ((name, of), at) in legend_entries.iter().zip(places) {
+        symbol(&page, at, of);
+        let beside = if matches!(of, Symbol::Nothing) { 0 } else { SYMBOL as i32 };
+        put(&page, &text(name, (at.0 + beside, at.1)));
+    }
+    if let Some(map) = &figure.map {
+        put(&page, &text(&map.caption, (y.left() as i32, height as i32 - CAPTION as i32 / 2)));
+    }
+    let above = chart_of_kind(figure, (&page, top, right), [x, y]);
+    drop(page);
     let (_, elements) = drawn.split_once('\n').expect("an element begins the document");
     let elements = elements.trim_end().strip_suffix("</svg>").expect("it ends the document");
     let elements = elements.replace("\"#000000\"", &format!("\"{INK}\""));
     // A text is on the line of its element.
     let elements = elements.replace(" opacity=\"1\"", "").replace("\n</text>", "</text>");
     let end = |line: &str| if line.starts_with("<text") { "" } else { "\n" };
-    let lines: String = elements.lines().flat_map(|line| [line, end(line)]).collect();
-    document(&figure.title, |canvas| {
-        canvas.add(lines.trim_end());
-        notes.iter().for_each(|note| canvas.add(note));
-        f64::from(figure.height)
-    })
+    let mut lines: String = elements.lines().flat_map(|line| [line, end(line)]).collect();
+    lines += &above.join("\n");
+    document(&figure.title, height, lines.trim_end())
 }
 
-/// Draws a figure, and returns the notes that are shown while the pointer is near a point.
-fn draw(figure: &Figure, page: &Page) -> Vec<String> {
-    let Figure { series, bars, .. } = figure;
-    let mut marks: Vec<&Mark> = Vec::new();
-    for mark in &figure.marks {
-        if !marks.iter().any(|other| other.name == mark.name) {
-            marks.push(mark);
+/// Names and symbols of the legend. Marks of one name have one entry.
+fn entries(figure: &Figure) -> Vec<(&str, Symbol<'_>)> {
+    let Figure { series, bars, marks, map, .. } = figure;
+    let mut all = Vec::new();
+    if let Some(map) = map {
+        all.push((map.title.as_str(), Symbol::Nothing));
+        all.extend(map.key.iter().map(|(name, fill)| (name.as_str(), Symbol::Cell(*fill))));
+        all.extend(map.section.iter().map(|_| ("geometry", Symbol::Section)));
+    }
+    all.extend(series.iter().map(|s| (s.name.as_str(), Symbol::Series(s))));
+    let segments = bars.iter().flat_map(|bars| &bars.segments).enumerate();
+    all.extend(segments.map(|(style, (name, _))| (name.as_str(), Symbol::Bar(style))));
+    let is_first = |i: usize| marks[..i].iter().all(|other| other.name != marks[i].name);
+    let firsts = marks.iter().enumerate().filter(|(i, _)| is_first(*i));
+    all.extend(firsts.map(|(_, mark)| (mark.name.as_str(), Symbol::Mark(mark.style))));
+    all
+}
+
+/// Draws a symbol of the legend at its left end.
+fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
+    let (right, middle) = (x + LENGTH, x + LENGTH / 2);
+    let corners = [(x, y - 16), (right, y + 16)];
+    match symbol {
+        Symbol::Series(s) => {
+            put(page, &path(vec![(x, y), (right, y)], s));
+            marker(page, (middle, y), s);
         }
-    }
-    let mut symbols: Vec<Entry> = Vec::new();
-    for s in series {
-        let symbol = |x, y| {
-            put(page, &path(vec![(x, y), (x + LENGTH, y)], s));
-            marker(page, (x + LENGTH / 2, y), s);
-        };
-        symbols.push((&s.name, Box::new(symbol)));
-    }
-    for (style, (name, _)) in bars.iter().flat_map(|bars| &bars.segments).enumerate() {
-        let symbol = move |x, y| {
-            let [fill, outline] = bar([(x, y - 16), (x + LENGTH, y + 16)], style);
-            put(page, &fill);
-            put(page, &outline);
-        };
-        symbols.push((name, Box::new(symbol)));
-    }
-    for mark in marks {
-        let symbol = |x, y| {
-            let x = x + LENGTH / 2;
-            put(page, &PathElement::new(vec![(x, y - 18), (x, y + 18)], line(mark.style)));
-        };
-        symbols.push((&mark.name, Box::new(symbol)));
-    }
-    let [x, y] = figure.scales();
-    let names: Vec<&str> = symbols.iter().map(|(name, _)| *name).collect();
-    let (places, top) = legend([y.left(); 2], &names);
-    for ((name, symbol), (x, y)) in symbols.iter().zip(places) {
-        symbol(x as i32, y as i32);
-        let font = font().pos(Pos::new(HPos::Left, VPos::Center));
-        put(page, &Text::new(name.to_string(), ((x + SYMBOL) as i32, y as i32), font));
-    }
-    let (of_x, of_y) = (x.ends.clone(), y.ends.clone());
-    let (at_x, at_y) = (x.ticks.clone(), y.ticks.clone());
-    // The axis is not partial, but what plotters makes of a linear one with key points has no labels.
-    let linear = |ends: Range<f64>, at| ends.clone().with_key_points(at).partial_axis(ends);
-    let log = |ends: Range<f64>, at| ends.log_scale().with_key_points(at);
-    let place = (page, top, [x, y]);
-    match (figure.x.log, figure.y.log) {
-        (false, false) => chart(figure, place, linear(of_x, at_x), linear(of_y, at_y)),
-        (false, true) => chart(figure, place, linear(of_x, at_x), log(of_y, at_y)),
-        (true, false) => chart(figure, place, log(of_x, at_x), linear(of_y, at_y)),
-        (true, true) => chart(figure, place, log(of_x, at_x), log(of_y, at_y)),
+        Symbol::Bar(style) => bar(corners, *style).iter().for_each(|part| put(page, part)),
+        Symbol::Mark(style) => {
+            put(page, &PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(*style)));
+        }
+        Symbol::Cell(fill) => {
+            put(page, &Rectangle::new(corners, rgb(*fill).filled()));
+            put(page, &Rectangle::new(corners, rgb(outline(*fill))));
+        }
+        Symbol::Section => {
+            put(page, &PathElement::new(vec![(x, y), (right, y)], BLACK.stroke_width(3)));
+        }
+        Symbol::Nothing => {}
     }
 }
 
-/// Draws the chart of a figure below the legend, and returns the notes.
+/// Draws the chart on axes of the figure's kind, and returns the elements that belong over it.
+fn chart_of_kind(figure: &Figure, place: (&Page, f64, f64), [x, y]: [Scale; 2]) -> Vec<String> {
+    // The axis is not partial, but what plotters makes of a linear one with key points has no labels.
+    let linear = |scale: &Scale| {
+        scale.ends.clone().with_key_points(scale.ticks.clone()).partial_axis(scale.ends.clone())
+    };
+    let log = |scale: &Scale| scale.ends.clone().log_scale().with_key_points(scale.ticks.clone());
+    match (figure.x.log, figure.y.log) {
+        (false, false) => chart(figure, place, linear(&x), linear(&y), [x, y]),
+        (false, true) => chart(figure, place, linear(&x), log(&y), [x, y]),
+        (true, false) => chart(figure, place, log(&x), linear(&y), [x, y]),
+        (true, true) => chart(figure, place, log(&x), log(&y), [x, y]),
+    }
+}
+
+/// Draws the chart of a figure below the legend, and returns the elements over it: cells of a map, and notes that are shown while the
+/// pointer is near a point.
 fn chart<X, Y>(
     figure: &Figure,
-    (page, top, [mut x, y]): (&Page, f64, [Scale; 2]),
+    (page, top, right): (&Page, f64, f64),
     of_x: X,
     of_y: Y,
+    [mut x, y]: [Scale; 2],
 ) -> Vec<String>
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
-    let [right, edge] = BESIDE;
+    let edge = BESIDE[1];
     let mut chart = ChartBuilder::on(page)
         .margin_top(top)
         .margin_right(right)
         .margin_left(edge)
+        .margin_bottom(if figure.map.is_some() { CAPTION } else { 0.0 })
         .x_label_area_size(BELOW)
         .y_label_area_size(y.left() - edge)
         .build_cartesian_2d(of_x, of_y)
@@ -146,6 +173,9 @@ where
     mesh.light_line_style(TRANSPARENT).bold_line_style(FAINT).axis_style(BLACK.stroke_width(2));
     mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(TICK);
     mesh.x_label_formatter(&label_x).y_label_formatter(&label_y);
+    if figure.map.is_some() {
+        mesh.disable_mesh();
+    }
     mesh.x_desc(&figure.x.label).y_desc(&figure.y.label).draw().expect(DRAWN);
     if let Some(bars) = &figure.bars {
         chart.draw_series(stacked(bars)).expect(DRAWN);
@@ -156,7 +186,10 @@ where
     let marks = figure.marks.iter().map(|m| vertical(m.x, y.ends.start, y.ends.end, m.style));
     chart.draw_series(marks).expect(DRAWN);
     let (least, most) = (y.ends.start.min(y.ends.end), y.ends.start.max(y.ends.end));
-    let mut notes = Vec::new();
+    let mut above = Vec::new();
+    if let Some(map) = &figure.map {
+        above = paint(map, [&x.ends, &y.ends], chart.plotting_area().get_pixel_range());
+    }
     for s in &figure.series {
         let at = |p: &super::Point| (p.x, p.y.clamp(least, most));
         let points: Vec<(f64, f64)> = s.points.iter().map(at).collect();
@@ -175,10 +208,10 @@ where
         for (note, (x, y)) in s.notes.iter().zip(places) {
             let circle =
                 html! { circle cx=(x) cy=(y) r="16" fill-opacity="0" { title { (note) } } };
-            notes.push(circle.into_string());
+            above.push(circle.into_string());
         }
     }
-    notes
+    above
 }
 
 fn put<'a, E>(page: &Page<'a>, element: &E)
@@ -189,9 +222,12 @@ where
     page.draw(element).expect(DRAWN);
 }
 
-fn colour(style: usize) -> RGBColor {
-    let [r, g, b] = COLOURS[style % COLOURS.len()];
+fn rgb([r, g, b]: [u8; 3]) -> RGBColor {
     RGBColor(r, g, b)
+}
+
+fn colour(style: usize) -> RGBColor {
+    rgb(COLOURS[style % COLOURS.len()])
 }
 
 fn line(style: usize) -> ShapeStyle {
@@ -202,6 +238,11 @@ fn line(style: usize) -> ShapeStyle {
 fn font() -> TextStyle<'static> {
     // plotters divides the size by this factor in SVG.
     (FONT, SIZE * 1.24).into_font().color(&BLACK)
+}
+
+/// A text whose left end is at a point.
+fn text(text: &str, at: (i32, i32)) -> Text<'static, (i32, i32), String> {
+    Text::new(text.to_owned(), at, font().pos(Pos::new(HPos::Left, VPos::Center)))
 }
 
 /// The line of a series through points.
@@ -264,6 +305,7 @@ fn stacked(bars: &Bars) -> Vec<Rectangle<(f64, f64)>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Mark;
     use super::super::samples::{bars, figure, series};
     use super::*;
 

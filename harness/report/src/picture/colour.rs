@@ -4,8 +4,8 @@
 //! are darker, so that levels can be read in grey too.
 
 use crate::figure::canvas::COLOURS;
+use contract::mesh::Leaf;
 use contract::word::Side;
-use export::leaf::Leaf;
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -89,11 +89,11 @@ impl Colour {
     }
 
     /// The legend of a key: names with colours, and its title.
-    pub fn legend(self, key: &[Entry]) -> (Vec<(&str, [u8; 3])>, String) {
+    pub fn legend(self, key: &[Entry]) -> (Vec<(String, [u8; 3])>, String) {
         if self == Self::Rank && key.len() > RANKS_NAMED {
             return (Vec::new(), format!("{} ranks, coloured in turn", key.len()));
         }
-        (key.iter().map(|e| (e.name.as_str(), e.fill)).collect(), self.to_string())
+        (key.iter().map(|e| (e.name.clone(), e.fill)).collect(), self.to_string())
     }
 }
 

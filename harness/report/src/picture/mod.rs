@@ -1,15 +1,12 @@
-//! Pictures of meshes: a slice, or a view of it in three dimensions with the surface of the body.
+//! Pictures of meshes: a slice with the section of the body.
 //!
 //! [`Picture`] is the data of a picture: the squares in which a plane cuts leaves, the body, and the window. Reading takes time in
 //! proportion to the slice, and no picture has more squares than can be shown.
 
 pub mod colour;
-mod draw;
-pub mod set;
 mod squares;
 #[cfg(test)]
 mod tests;
-mod view;
 
 use colour::{Colour, Entry};
 use contract::case::Facet;
@@ -17,18 +14,18 @@ use contract::failure::Failure;
 use contract::files::{named, write_atomically};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
+use contract::mesh::Mesh;
 use contract::octant::UNITS_PER_CELL;
-use export::mesh::Mesh;
 use export::selection::{Selection, Slice};
 use geometry::tree::{Aabb, Point};
 use run::engine::interrupt;
 use squares::{SQUARES_MAX, Square, Squares};
 use std::io::{self, Write};
 use std::path::Path;
-use view::{Face, Projection, surface};
 
 pub use crate::figure::format::Format;
-pub use draw::svg;
+use crate::figure::map::{Fill, Map};
+use crate::figure::{Axis, Figure, svg};
 
 /// A point in a plane: to the right, and upwards.
 type Planar = [f64; 2];
@@ -42,13 +39,8 @@ pub struct Request<'a> {
     pub body: Option<&'a [Facet]>,
     /// The quantity that colours show.
     pub colour: Colour,
-    /// Edge of the root in edges of the window, which is centred on the body; a view without magnification is close to the body. Without
-    /// effect on a clip box.
+    /// Edge of the root in edges of the window, which is centred on the body. Without effect on a clip box.
     pub zoom: f64,
-    /// Leaves deeper than this are merged into their ancestors: the base mesh of a partition, for example.
-    pub level_max: u8,
-    /// Whether it is a view in three dimensions.
-    pub view: bool,
 }
 
 impl Request<'_> {
@@ -76,22 +68,14 @@ pub struct Picture {
     squares: Squares,
     /// The colours of their values.
     key: Vec<Entry>,
-    body: Body,
-    projection: Projection,
+    /// The segments in which the plane cuts the body, if it is known, in the plane and in the user's units.
+    section: Option<Vec<[Planar; 2]>>,
 }
 
-/// What is drawn of the body, in the plane of the picture and in the user's units.
-#[derive(Clone, Debug, PartialEq)]
-enum Body {
-    Unknown,
-    /// The segments in which the plane cuts it.
-    Section(Vec<[Planar; 2]>),
-    /// Its surface in a view, from the farthest triangle to the nearest.
-    Surface(Vec<Face>),
-}
-
+/// Units of the page that a map may take: its width, but for labels, and its greatest height.
+const PAGE: [f64; 2] = [1360.0, 1650.0];
 /// Why a picture would be empty.
-pub const NO_LEAF: &str =
+const NO_LEAF: &str =
     "no leaf of the selection is in a slice: give another --slice or a larger --clip";
 
 /// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, normal to z through the root's
@@ -144,13 +128,6 @@ fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
     })
 }
 
-/// The magnification at which the window has as many longest extents of the body, or the root.
-fn zoom_to(root: &Root, body: Option<&[Facet]>, extents: f64) -> f64 {
-    let [low, high] = extent(root, body);
-    let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::MIN_POSITIVE, f64::max);
-    (root.edge / (extents * longest)).max(1.0)
-}
-
 /// The cube of the window, moved into the root, on the lattice.
 fn zoomed(root: &Root, body: Option<&[Facet]>, zoom: f64) -> [[i64; 3]; 2] {
     let [low, high] = extent(root, body);
@@ -175,44 +152,28 @@ impl Picture {
         request.check(mesh)?;
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let axes = plane_axes(slice.axis);
-        let zoom = match request.view && request.zoom == 1.0 {
-            true => zoom_to(&root, request.body, 1.5),
-            false => request.zoom,
-        };
-        let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, zoom));
+        let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
         let window = clip.map(|corner| root.to_user(corner));
         if axes.iter().any(|&a| window[0][a] >= window[1][a]) {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
             return Err(Failure::input(why.to_owned()));
         }
-        let projection = if request.view { Projection::OBLIQUE } else { Projection::along(axes) };
-        let body = match request.body {
-            None => Body::Unknown,
-            Some(facets) if request.view => {
-                let plane = (slice.axis, root.to_user([slice.at; 3])[slice.axis]);
-                Body::Surface(surface(facets, &window, plane, &projection))
-            }
-            Some(facets) => {
-                let corners = window.map(|corner| axes.map(|a| corner[a]));
-                Body::Section(section(&root, slice, &corners, facets))
-            }
-        };
-        let (colour, key) = (request.colour, Vec::new());
-        let squares = Squares::default();
-        let mut picture = Self { root, slice, colour, window, squares, key, body, projection };
+        let corners = window.map(|corner| axes.map(|a| corner[a]));
+        let section = request.body.map(|facets| section(&root, slice, &corners, facets));
+        let colour = request.colour;
         // The window may end within the root, but the plane need not be in the box.
         (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
-        let (slice, clip) = (Some(slice), Some(clip));
-        let selection = Selection { slice, clip, ..request.selection.clone() };
-        let edge = root.edge * draw::scale(&picture);
-        let levels = squares::deepest(edge).map(|level| level.min(request.level_max));
-        picture.squares = Squares::collect(mesh, &selection, request, levels, squares_max)?;
-        if picture.squares.squares.is_empty() {
+        let selection =
+            Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
+        let scales = [0, 1].map(|i| PAGE[i] / (corners[1][i] - corners[0][i]));
+        let levels = squares::deepest(root.edge * scales[0].min(scales[1]));
+        let squares = Squares::collect(mesh, &selection, colour, levels, squares_max)?;
+        if squares.squares.is_empty() {
             let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
-            return Err(Failure::input(why.to_owned()));
+            return Err(Failure::input(why));
         }
-        let values = picture.squares.squares.iter().map(|s| s.value).collect();
-        picture.key = colour.key(&values);
+        let key = colour.key(&squares.squares.iter().map(|s| s.value).collect());
+        let picture = Self { root, slice, colour, window, squares, key, section };
         picture.check_invariants();
         Ok(picture)
     }
@@ -227,22 +188,58 @@ impl Picture {
             assert!(is_inside, "the window {:?} is not within the root", self.window);
         }
         for square in &self.squares.squares {
-            let [from, _, to, _] = self.corners(square);
+            let [from, to] = self.corners(square);
             let is_shown = |a: usize| from[a] < high[a] + slack && to[a] > low[a] - slack;
             assert!(axes.into_iter().all(is_shown), "{square:?} is outside of {:?}", self.window);
             assert!(self.key.iter().any(|e| e.value == square.value), "{square:?} has no colour");
         }
-        if let Body::Section(segments) = &self.body {
-            let within = |p: &Planar, i: usize| {
-                (low[axes[i]] - slack..=high[axes[i]] + slack).contains(&p[i])
-            };
-            let beyond = segments.iter().flatten().find(|p| !(within(p, 0) && within(p, 1)));
-            assert!(beyond.is_none(), "the section leaves {:?} at {beyond:?}", self.window);
-        }
+        let within =
+            |p: &Planar, i: usize| (low[axes[i]] - slack..=high[axes[i]] + slack).contains(&p[i]);
+        let mut ends = self.section.iter().flatten().flatten();
+        let beyond = ends.find(|p| !(within(p, 0) && within(p, 1)));
+        assert!(beyond.is_none(), "the section leaves {:?} at {beyond:?}", self.window);
     }
 
-    fn is_view(&self) -> bool {
-        self.projection == Projection::OBLIQUE
+    /// The picture as an SVG document.
+    pub fn svg(&self) -> String {
+        let axes = plane_axes(self.slice.axis);
+        let axis = |i: usize| {
+            let [low, high] = self.window.map(|corner| corner[axes[i]]);
+            Axis { range: Some((low, high)), ..Axis::linear(["x", "y", "z"][axes[i]]) }
+        };
+        // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
+        let window = self.window.map(|corner| axes.map(|a| corner[a]));
+        let mut fills = vec![Fill { colour: [255; 3], is_outlined: false, cells: vec![window] }];
+        // Outlined squares are last, so that no fill covers half of an outline.
+        for is_outlined in [false, true] {
+            fills.extend(self.key.iter().map(|entry| self.fill(entry, is_outlined)));
+        }
+        fills.retain(|fill| !fill.cells.is_empty());
+        let (key, title) = self.colour.legend(&self.key);
+        let (section, caption) = (self.section.clone(), self.caption());
+        let map = Some(Map { title, key, fills, section, caption });
+        let axes = [axis(0), axis(1)];
+        svg::svg(&Figure {
+            map,
+            ..Figure::new(String::new(), self.title(), String::new(), axes, Vec::new())
+        })
+    }
+
+    /// The visible parts of the squares of one value, with or without outlines.
+    fn fill(&self, entry: &Entry, is_outlined: bool) -> Fill {
+        let axes = plane_axes(self.slice.axis);
+        let is_shown = |s: &&Square| {
+            s.value == entry.value && (s.level <= self.squares.level_outlined) == is_outlined
+        };
+        let visible = |square: &Square| {
+            let within = |corner: [f64; 3]| {
+                axes.map(|a| corner[a].clamp(self.window[0][a], self.window[1][a]))
+            };
+            let [low, high] = self.corners(square).map(within);
+            (low[0] < high[0] && low[1] < high[1]).then_some([low, high])
+        };
+        let cells = self.squares.squares.iter().filter(is_shown).filter_map(visible).collect();
+        Fill { colour: entry.fill, is_outlined, cells }
     }
 
     /// One sentence on what the picture shows.
@@ -258,14 +255,12 @@ impl Picture {
         format!("{plane}; cells in the plane: {leaves}{merged}")
     }
 
-    /// The corners of a square, in the user's units and in turn.
-    fn corners(&self, square: &Square) -> [[f64; 3]; 4] {
-        let [across, up] = plane_axes(self.slice.axis);
-        [[0, 0], [1, 0], [1, 1], [0, 1]].map(|side| {
+    /// The minimum and the maximum corner of a square, in the user's units.
+    fn corners(&self, square: &Square) -> [[f64; 3]; 2] {
+        [0, square.edge()].map(|beyond| {
             let mut at = [self.slice.at; 3];
-            for (axis, i) in [(across, 0), (up, 1)] {
-                let cells = square.corner[i] + side[i] * square.edge();
-                at[axis] = i64::from(cells) * UNITS_PER_CELL;
+            for (axis, cells) in plane_axes(self.slice.axis).into_iter().zip(square.corner) {
+                at[axis] = i64::from(cells + beyond) * UNITS_PER_CELL;
             }
             self.root.to_user(at)
         })

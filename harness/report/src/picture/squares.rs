@@ -4,11 +4,11 @@
 //! their values. The leaves of an octant that a plane cuts are consecutive in Morton order, so merging needs no search, and
 //! memory is bounded by the page, not by the mesh.
 
-use super::{Request, plane_axes};
+use super::colour::Colour;
+use super::plane_axes;
 use contract::failure::Failure;
+use contract::mesh::Mesh;
 use contract::octant::CELLS_PER_EDGE;
-use export::leaf::Leaf;
-use export::mesh::Mesh;
 use export::selection::Selection;
 use run::engine::interrupt;
 
@@ -28,7 +28,7 @@ pub struct Square {
     pub level: u8,
     /// Greatest value of its leaves.
     pub value: u32,
-    /// Number of its leaves that the plane cuts, where leaves below the deepest level of the request are one.
+    /// Number of its leaves that the plane cuts.
     pub leaves: u64,
 }
 
@@ -50,7 +50,7 @@ pub struct Squares {
     pub level_drawn: u8,
     /// Whether leaves that are too small for the page were merged.
     pub is_merged: bool,
-    /// Number of leaves that the plane cuts, where leaves below the deepest level of the request are one.
+    /// Number of leaves that the plane cuts.
     pub leaves: u64,
 }
 
@@ -60,8 +60,7 @@ pub fn deepest(root_edge: f64) -> [u8; 2] {
 }
 
 impl Squares {
-    /// The squares of the selected leaves in the selection's slice, as many as can be shown. Leaves are merged to the levels `deepest`, and those
-    /// below the deepest level of the request are one.
+    /// The squares of the selected leaves in the selection's slice, as many as can be shown. Leaves are merged to the levels `deepest`.
     ///
     /// # Errors
     /// If the mesh cannot be read.
@@ -71,21 +70,17 @@ impl Squares {
     pub fn collect(
         mesh: &Mesh,
         selection: &Selection,
-        request: &Request,
+        colour: Colour,
         [level_drawn, level_outlined]: [u8; 2],
         squares_max: usize,
     ) -> Result<Self, Failure> {
         let axes = plane_axes(selection.slice.expect("a picture has a slice").axis);
         let mut found = Self { level_outlined, level_drawn, ..Self::default() };
-        let mut last = None;
         let check = || if interrupt::requested() { Err(Failure::interrupted()) } else { Ok(()) };
-        mesh.visit(selection, &check, &mut |leaf| {
-            let octant = leaf.octant.ancestor(leaf.octant.level.min(request.level_max));
+        selection.visit(mesh, &check, &mut |leaf| {
+            let (octant, value) = (leaf.octant, colour.value(&leaf));
             let corner = axes.map(|a| octant.corner[a]);
-            let value = request.colour.value(&Leaf { octant, ..leaf });
-            // Leaves merged to the deepest level are one cell of the mesh that is shown.
-            let leaves = u64::from(last.replace(octant) != Some(octant));
-            found.add(Square { corner, level: octant.level, value, leaves });
+            found.add(Square { corner, level: octant.level, value, leaves: 1 });
             Ok(())
         })?;
         while found.squares.len() > squares_max && found.level_drawn > 0 {

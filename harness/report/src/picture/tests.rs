@@ -1,7 +1,7 @@
 //! Pictures of small meshes whose squares are known, and of random ones.
 
 use super::*;
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::Octant;
 use contract::testing::{leaf_set, random_words, words_of};
 use contract::word::{self, Leaf, Side, encode};
 use export::selection::Selection;
@@ -22,14 +22,7 @@ fn eight_and_seven() -> Vec<u64> {
 }
 
 fn request(colour: Colour) -> Request<'static> {
-    Request {
-        selection: Selection::default(),
-        body: None,
-        colour,
-        zoom: 1.0,
-        level_max: LEVEL_MAX,
-        view: false,
-    }
+    Request { selection: Selection::default(), body: None, colour, zoom: 1.0 }
 }
 
 fn at(axis: usize, coordinate: f64) -> Selection {
@@ -56,13 +49,13 @@ fn cube() -> Vec<Facet> {
 fn squares_are_where_the_leaves_are() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let shown = Request { selection: at(2, 1.0), ..request(Colour::Level) };
-    let svg = svg(&Picture::collect(&mesh, &shown).unwrap());
-    // The window is 1360 wide, from 200 to 1560, so a unit of the user is 170; the legend ends at 72.
+    let svg = Picture::collect(&mesh, &shown).unwrap().svg();
+    // The window is 1370 wide, from 190 to 1560, so a unit of the user is 171.25; the legend ends at 76.
     for path in [
-        "M200 1092L540 1092L540 752L200 752z",
-        "M540 1432L880 1432L880 1092L540 1092z",
-        "M880 1432L1560 1432L1560 752L880 752z",
-        "M200 752L880 752L880 72L200 72z",
+        "M190 1446H532.5V1103.5H190z",
+        "M532.5 1446H875V1103.5H532.5z",
+        "M875 1446H1560V761H875z",
+        "M190 761H875V76H190z",
     ] {
         assert!(svg.contains(path), "{path} is missing in {svg}");
     }
@@ -81,10 +74,7 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     let section = |axis: usize, coordinate: f64| {
         let selection = at(axis, coordinate);
         let shown = Request { selection, body: Some(&cube), ..request(Colour::Level) };
-        let Body::Section(segments) = Picture::collect(&mesh, &shown).unwrap().body else {
-            panic!("a slice has a section")
-        };
-        segments
+        Picture::collect(&mesh, &shown).unwrap().section.expect("the body is known")
     };
     for (axis, coordinate) in [(0, 4.0), (1, 3.3), (2, 4.0), (2, 2.0)] {
         let segments = section(axis, coordinate);
@@ -100,7 +90,7 @@ fn the_section_of_a_cube_is_a_square_also_in_the_plane_of_its_face() {
     let shown = Request { body: Some(&cube), ..request(Colour::Side) };
     let picture = Picture::collect(&mesh, &shown).unwrap();
     assert_eq!((picture.slice.axis, picture.slice.at), (2, UNITS_PER_EDGE / 2));
-    assert!(svg(&picture).contains(">geometry<"));
+    assert!(picture.svg().contains(">geometry<"));
 }
 
 proptest! {
@@ -147,12 +137,7 @@ fn small_leaves_are_merged_and_the_greatest_value_counts() {
     let picture = Picture::collect(&mesh, &shown).unwrap();
     let [square] = picture.squares.squares[..] else { panic!("{picture:?}") };
     assert_eq!((square.level, square.value, square.leaves), (10, Side::Crossing as u32, 3));
-    assert!(svg(&picture).contains("cells in the plane: 3, the smallest merged"));
-    // The base mesh shows its own levels.
-    let shown = Request { level_max: 6, colour: Colour::Level, ..shown };
-    let picture = Picture::collect(&mesh, &shown).unwrap();
-    assert_eq!((picture.squares.squares.len(), picture.key[0].value), (1, 6));
-    assert!(svg(&picture).contains("; cells in the plane: 1<"));
+    assert!(picture.svg().contains("cells in the plane: 3, the smallest merged"));
 }
 
 #[test]
@@ -197,7 +182,7 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 #[test]
 fn a_picture_is_written_in_the_format_of_its_name() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
-    let svg = svg(&Picture::collect(&mesh, &request(Colour::Level)).unwrap());
+    let svg = Picture::collect(&mesh, &request(Colour::Level)).unwrap().svg();
     let path = place.path().join("a.svg");
     write(&path, &Format::of(&path).unwrap().bytes(&svg).unwrap()).unwrap();
     assert_eq!(std::fs::read_to_string(path).unwrap(), svg);
@@ -214,73 +199,17 @@ fn a_picture_is_written_in_the_format_of_its_name() {
 }
 
 #[test]
-fn a_view_has_the_slice_and_the_visible_surface_from_the_farthest_to_the_nearest() {
-    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
-    let cube = cube();
-    let shown = Request { body: Some(&cube), view: true, ..request(Colour::Level) };
-    let picture = Picture::collect(&mesh, &shown).unwrap();
-    let Body::Surface(faces) = &picture.body else { panic!("a view has a surface") };
-    // The cube of edge 4 in a window of 1.5 edges, seen from a direction of which all components are alike.
-    let area = |[a, b, c]: [Planar; 3]| {
-        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2.0
-    };
-    let toward = [0.5f64, 0.69, 0.52];
-    let expected = 2.0 * 16.0 * toward.iter().sum::<f64>();
-    let sum: f64 = faces.iter().map(|f| area(f.corners)).sum();
-    assert!((sum / expected - 1.0).abs() < 0.02, "{sum} of {expected}");
-    assert!(faces.iter().all(|f| area(f.corners) > 0.0));
-    let before: f64 = faces.iter().filter(|f| f.is_before).map(|f| area(f.corners)).sum();
-    assert!((before / sum - 0.5).abs() < 0.02, "half of the surface is above z = 4: {before}");
-    // Light falls on the three sides that are seen in different ways, on the others too: facets need no orientation.
-    let lights: std::collections::BTreeSet<i64> =
-        faces.iter().map(|f| (f.light * 100.0) as i64).collect();
-    assert_eq!(lights.len(), 3, "{lights:?}");
-    // The last triangle is at the corner that is nearest.
-    let nearest = picture.projection.planar([2.0, 2.0, 6.0]);
-    let last = faces.last().unwrap().corners;
-    assert!(last.iter().any(|p| (p[0] - nearest[0]).hypot(p[1] - nearest[1]) < 0.01), "{last:?}");
-    let svg = svg(&picture);
-    assert!(svg.contains(">z = 4; cells in the plane: 4<") && !svg.contains(">x<"), "{svg:.900}");
-}
-
-#[test]
-fn facets_far_beyond_the_window_and_many_small_ones_are_drawn_fast() {
-    let window = [[0.0; 3], [1.0; 3]];
-    let large = [[[-1e6, -1e6, 0.5], [1e6, -1e6, 0.5], [0.0, 1e6, 0.5f32]]];
-    let faces = surface(&large, &window, (2, 0.2), &Projection::OBLIQUE);
-    assert!((1000..20_000).contains(&faces.len()), "{}", faces.len());
-    assert!(faces.iter().all(|f| f.is_before));
-    let small = |i: u32| {
-        let (x, y) = ((i % 250) as f32 / 250.0, (i / 250) as f32 / 250.0);
-        [[x, y, 0.1], [x + 0.004, y, 0.1], [x, y + 0.004, 0.1]]
-    };
-    let many: Vec<Facet> = (0..62_500).map(small).collect();
-    assert!(surface(&many, &window, (2, 0.2), &Projection::OBLIQUE).len() <= 40_000);
-    let again = || surface(&many, &window, (2, 0.05), &Projection::OBLIQUE);
-    assert_eq!(again(), again(), "the order does not depend on chance");
-    assert_eq!(surface(&[], &window, (2, 0.2), &Projection::OBLIQUE), []);
-}
-
-#[test]
-fn labels_of_the_vertical_axis_have_room_and_planes_far_from_the_origin_their_digits() {
+fn planes_far_from_the_origin_have_their_digits() {
     let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let picture = Picture::collect(&mesh, &request(Colour::Level)).unwrap();
-    let at = |v: f64, root: Root| Picture {
-        window: [[0.0, v, 0.0], [100.0, v + 100.0, 0.0]],
-        root,
-        ..picture.clone()
-    };
-    // Five digits and a sign are wider than the usual margin.
-    let root = picture.root;
-    assert!(draw::scale(&at(-12_050.0, root)) < 0.97 * draw::scale(&at(0.0, root)));
     let root = Root { origin: [22_191.242, -14_722.031, 689.93], edge: 5553.0 };
     for (z, name) in [(3410.4, "z = 3410.4"), (3410.0, "z = 3410"), (689.93, "z = 689.93")] {
         let slice = Slice::new(&root, 2, z).unwrap();
-        assert_eq!(Picture { slice, ..at(0.0, root) }.plane_name(), name);
+        assert_eq!(Picture { slice, root, ..picture.clone() }.plane_name(), name);
     }
 }
 
-/// Slices and views in every colour, of a root far from the origin too.
+/// Slices in every colour, of a root far from the origin too.
 #[cfg(feature = "figures")]
 #[test]
 fn no_text_of_a_picture_is_cut_or_lies_on_another() {
@@ -288,17 +217,14 @@ fn no_text_of_a_picture_is_cut_or_lies_on_another() {
     let words = eight_and_seven();
     let (_place, mesh) = on_disk(words.chunks(1).map(<[u64]>::to_vec).collect());
     let cube = cube();
-    for (view, colour) in [false, true]
-        .into_iter()
-        .flat_map(|view| [Colour::Level, Colour::Rank, Colour::Side].map(|colour| (view, colour)))
-    {
-        let shown = Request { body: Some(&cube), view, ..request(colour) };
+    for colour in [Colour::Level, Colour::Rank, Colour::Side] {
+        let shown = Request { body: Some(&cube), ..request(colour) };
         let picture = Picture::collect(&mesh, &shown).unwrap();
-        assert_legible(&svg(&picture));
+        assert_legible(&picture.svg());
         let far = |at: f64| at - 12_345_678.0;
         let window = picture.window.map(|corner| corner.map(far));
         let root = Root { origin: picture.root.origin.map(far), ..picture.root };
-        assert_legible(&svg(&Picture { window, root, body: Body::Unknown, ..picture }));
+        assert_legible(&Picture { window, root, section: None, ..picture }.svg());
     }
 }
 
@@ -325,8 +251,7 @@ fn planted_wrong_pictures_are_noticed() {
     assert_noticed("is outside of", |p| p.window = [[6.0; 3], [8.0; 3]]);
     assert_noticed("has no colour", |p| p.key.truncate(1));
     assert_noticed("leaves [", |p| {
-        let Body::Section(segments) = &mut p.body else { panic!("a slice has a section") };
-        segments[0][0][1] = -5.0;
+        p.section.as_mut().expect("the body is known")[0][0][1] = -5.0;
     });
     assert_noticed("not the square of an octant", |p| p.squares.squares[0].corner[0] += 1);
     assert_noticed("leaves of all squares", |p| p.squares.leaves += 1);

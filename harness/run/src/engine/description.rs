@@ -5,10 +5,12 @@
 //! unknown placeholders are errors when the file is read.
 
 use super::paths::Paths;
-use super::takes::{Limits, Takes};
 use super::templates::{Templates, Values};
-use check::promises::Promises;
-use contract::case::explain;
+use check::promises::{Independence, Promises, Touching};
+use contract::case::{Case, explain};
+use contract::manifest::{Enclosed, Keep};
+use contract::octant::LEVEL_MAX;
+use contract::plain::StlForm;
 use serde::Deserialize;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -86,6 +88,63 @@ pub struct Build {
     pub program: String,
 }
 
+/// What an engine lacks whose meshes depend on the number of ranks.
+pub const EQUAL_RANKS: &str = "equal meshes on any number of ranks";
+
+/// What an engine lacks that is not deterministic.
+pub const EQUAL_RUNS: &str = "equal meshes from equal runs";
+
+/// Features of a case file that an engine supports.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Takes {
+    /// `[generator]` and `root_scale`. If not, the engine is given an STL file and an explicit root.
+    pub generator: bool,
+    /// Extent boxes.
+    pub boxes: bool,
+    /// Values of `keep`.
+    pub keep: Vec<Keep>,
+    /// `keep_crossing = false`.
+    pub drop_crossing: bool,
+    /// `seeds`.
+    pub seeds: bool,
+    /// `enclosed = "keep"`. The default, `delete`, cannot be declined: whether anything is enclosed is known after
+    /// meshing only.
+    pub keep_enclosed: bool,
+    /// The form of its STL file.
+    pub stl: StlForm,
+}
+
+impl Default for Takes {
+    fn default() -> Self {
+        Self {
+            generator: false,
+            boxes: true,
+            keep: vec![Keep::Outside, Keep::Inside, Keep::All],
+            drop_crossing: true,
+            seeds: false,
+            keep_enclosed: false,
+            stl: StlForm::Any,
+        }
+    }
+}
+
+/// Limits: the engine is not run on a case beyond them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Deepest level.
+    pub level_max: u8,
+    /// Greatest number of facets.
+    pub facets_max: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { level_max: LEVEL_MAX, facets_max: u64::MAX }
+    }
+}
+
 impl Description {
     /// Reads the engine file with this name in the repository, or at this path if it ends in `.toml`.
     ///
@@ -148,6 +207,57 @@ impl Description {
             ("mpirun", text(&paths.mpirun)),
         ])
     }
+
+    /// Why the engine is not run on a case; `None` if it is.
+    pub fn declines(&self, case: &Case) -> Option<String> {
+        let (takes, limits) = (&self.takes, &self.limits);
+        let (level, facets) = (case.inputs().level_deepest(), case.facets.len() as u64);
+        let keep = format!("{:?}", case.keep).to_lowercase();
+        let is_enclosed_kept = case.enclosed == Enclosed::Keep;
+        let beyond = [
+            (level > limits.level_max, format!("level {level} (level_max in [limits])")),
+            (facets > limits.facets_max, format!("{facets} facets (facets_max in [limits])")),
+            (!case.boxes.is_empty() && !takes.boxes, "extent boxes (boxes in [takes])".to_owned()),
+            (
+                !case.keep_crossing && !takes.drop_crossing,
+                "keep_crossing = false (drop_crossing in [takes])".to_owned(),
+            ),
+            (!case.seeds.is_empty() && !takes.seeds, "seeds (seeds in [takes])".to_owned()),
+            (
+                is_enclosed_kept && !takes.keep_enclosed,
+                "enclosed = keep (keep_enclosed in [takes])".to_owned(),
+            ),
+            (!takes.keep.contains(&case.keep), format!("keep = {keep} (keep in [takes])")),
+        ];
+        let (_, what) = beyond.into_iter().find(|(is_beyond, _)| *is_beyond)?;
+        Some(format!("{} does not support {what}", self.name))
+    }
+
+    /// What the engine does not do or promise, in a few words each, for comparisons; empty if it keeps the whole definition on any
+    /// number of ranks.
+    pub fn lacks(&self) -> Vec<String> {
+        let (promises, takes) = (&self.promises, &self.takes);
+        let promised = |has: bool| has || promises.definition;
+        let parallel = !self.run.parallel.is_empty();
+        let of_ranks = promises.is_independent_of(Independence::Ranks);
+        let features = [
+            (promised(promises.complete), "meshes without holes"),
+            (promised(promises.surface.is_some()), "the asked level at the surface"),
+            (promised(promises.balance.is_some()), "2:1 balance over faces"),
+            (promised(promises.balance == Some(Touching::Corner)), "2:1 balance over corners"),
+            (promised(promises.layers), "layers"),
+            (takes.boxes && promised(promises.boxes), "extent boxes"),
+            (promised(promises.sides.is_some()), "inside and outside"),
+            (takes.keep.iter().any(|keep| *keep != Keep::All), "deletion of either side"),
+            (takes.seeds, "seeds"),
+            (promises.is_deterministic(), EQUAL_RUNS),
+            (parallel, "MPI"),
+            (!parallel || of_ranks, EQUAL_RANKS),
+        ];
+        let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
+        let level = self.limits.level_max;
+        missing.chain((level < LEVEL_MAX).then(|| format!("levels beyond {level}"))).collect()
+    }
 }
 
 #[cfg(test)]
@@ -163,7 +273,7 @@ mod tests {
     fn our_own_engine_files_are_valid() {
         for (name, text) in OWN {
             let own = Description::parse(text).unwrap();
-            assert!(own.run.json.is_some() && own.promises.definition, "{name}");
+            assert!(!own.run.json.is_empty() && own.promises.definition, "{name}");
         }
     }
 
@@ -173,7 +283,7 @@ mod tests {
         let least = Description::parse(text).unwrap();
         assert_eq!(least.program, "meshit");
         assert_eq!(least.run.serial, ["{program}", "{case}", "{out}"]);
-        assert_eq!(least.run.parallel.as_ref().unwrap()[1], "{program}");
+        assert_eq!(least.run.parallel[1], "{program}");
         assert!(least.run.always_writes_mesh() && least.promises.definition);
         let nowhere = Description::parse("[run]\nserial = ['meshit', '{case}']").unwrap_err();
         assert!(nowhere.contains("`serial` has no {out}"), "{nowhere}");
@@ -182,7 +292,9 @@ mod tests {
     #[test]
     fn a_missing_template_is_a_missing_capability() {
         let least = Description::parse(LEAST).unwrap();
-        assert!(least.run.parallel.is_none() && least.run.json.is_none() && !least.takes.generator);
+        assert!(
+            least.run.parallel.is_empty() && least.run.json.is_empty() && !least.takes.generator
+        );
         assert_eq!((least.limits.level_max, least.run.always_writes_mesh()), (19, true));
     }
 
@@ -209,5 +321,40 @@ mod tests {
         assert!(with("ranks", "parallel = ['{launcher}', '{case}', '{out}']\n").is_ok());
         let empty = Description::parse(&format!("{LEAST_FILE}[promises]\n")).unwrap_err();
         assert!(empty.contains("[promises] is empty"), "{empty}");
+    }
+
+    #[test]
+    fn our_mesher_lacks_nothing_and_a_simple_one_what_it_does_not_promise() {
+        let own = Description::parse(include_str!("../../../engines/mesher.toml")).unwrap();
+        assert_eq!(own.lacks(), [""; 0]);
+        let text = "[run]\nserial = ['m', '{case}', '{out}']\n[takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 14\n\
+                    [promises]\ncomplete = true\nsurface = { tolerance_cells = 0.0 }\nbalance = 'edge'\ndeterministic = true\n";
+        let lacks = Description::parse(text).unwrap().lacks().join("; ");
+        let expected = "2:1 balance over corners; layers; extent boxes; inside and outside; deletion of either side; \
+                        seeds; MPI; levels beyond 14";
+        assert_eq!(lacks, expected);
+    }
+
+    #[test]
+    fn a_case_beyond_the_capabilities_is_declined_with_the_reason() {
+        let text = "[run]\nserial = ['m', '{case}', '{out}']\n\
+                    [takes]\nboxes = false\nkeep = ['all']\n[limits]\nlevel_max = 3\n";
+        let engine = Description::parse(text).unwrap();
+        let root = "[root]\norigin = [0.0, 0.0, 0.0]\nedge = 8.0\n";
+        let declines = |case: &str| {
+            engine.declines(&Case::from_parts(&case.replace("ROOT", root), vec![]).unwrap())
+        };
+        assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
+        let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
+        assert!(deep.ends_with("does not support level 4 (level_max in [limits])"), "{deep}");
+        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
+        let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
+        assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
+        let enclosed =
+            declines("spacing_min = 1.0\nkeep = 'all'\nenclosed = 'keep'\nROOT").unwrap();
+        assert!(enclosed.ends_with("enclosed = keep (keep_enclosed in [takes])"), "{enclosed}");
+        let boxed = "spacing_min = 1.0\nkeep = 'all'\nROOT[[box]]\nmin = [0.0, 0.0, 0.0]\n\
+                     max = [1.0, 1.0, 1.0]\nspacing = 1.0";
+        assert!(declines(boxed).unwrap().contains("boxes"));
     }
 }

@@ -1,26 +1,30 @@
 //! Why a program gave no result, and the one sentence for it.
 
-use std::fmt;
 use std::time::Duration;
+use thiserror::Error;
 
 /// Exit code of mesher and reference for an error in the user's input.
 pub const CODE_INPUT: i32 = 2;
 
 /// How a program failed.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum End {
     /// It cannot be run; the reason, as in "cannot be started: ...".
+    #[error("{0}")]
     Missing(String),
-    /// It exited with a code other than 0, and this line of its standard error describes the error.
+    /// It exited with a code other than 0.
+    #[error("ended with code {code}: {error}")]
     Exited {
         /// The exit code.
         code: i32,
-        /// The line.
+        /// The line of its standard error that describes the error.
         error: String,
     },
     /// It was killed by a signal that the harness did not send.
+    #[error("was killed by signal {0}")]
     Signalled(i32),
     /// The harness killed it at its time limit.
+    #[error("did not end within {} s and was killed{}", limit.as_secs(), activity.as_ref().map_or(String::new(), |of| format!("; {of}")))]
     TimedOut {
         /// The limit.
         limit: Duration,
@@ -28,34 +32,21 @@ pub enum End {
         activity: Option<String>,
     },
     /// The user interrupted the harness.
+    #[error("was interrupted")]
     Interrupted,
     /// It exited with code 0, but its output cannot be used; the reason, as in "wrote no mesh".
+    #[error("{0}")]
     Unusable(String),
 }
 
 /// A program without a result.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{program} {end}")]
 pub struct Failure {
     /// The program's name.
     pub program: String,
     /// How it failed.
     pub end: End,
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{} ", self.program)?;
-        match &self.end {
-            End::Missing(why) | End::Unusable(why) => f.write_str(why),
-            End::Exited { code, error } => write!(f, "ended with code {code}: {error}"),
-            End::Signalled(signal) => write!(f, "was killed by signal {signal}"),
-            End::TimedOut { limit, activity } => {
-                write!(f, "did not end within {} s and was killed", limit.as_secs())?;
-                activity.iter().try_for_each(|activity| write!(f, "; {activity}"))
-            }
-            End::Interrupted => f.write_str("was interrupted"),
-        }
-    }
 }
 
 impl Failure {
@@ -67,6 +58,16 @@ impl Failure {
     /// Whether the user interrupted the harness; the failure is then not the program's.
     pub fn is_interrupt(&self) -> bool {
         self.end == End::Interrupted
+    }
+}
+
+impl From<Failure> for contract::failure::Failure {
+    fn from(failure: Failure) -> Self {
+        match failure.end {
+            End::Missing(_) => Self::missing(failure),
+            End::Interrupted => Self::interrupted(),
+            _ => Self::input(failure),
+        }
     }
 }
 

@@ -7,25 +7,22 @@
 //!   place ([`contract::files::Staging`]);
 //! - output that is about to get its final names gets all of them first.
 
-use super::session;
+use super::session::{PATIENCE, end_all};
 use files::OUT_OF_MEMORY;
 use files::interrupt::{self, INTERRUPTED};
-use rustix::process::{Signal, getpid, set_child_subreaper};
+use rustix::process::{getpid, set_child_subreaper};
 use signal_hook::low_level::{exit, pipe};
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{LazyLock, Mutex, MutexGuard, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
 /// Time for a command to return after a first signal.
-pub const GRACE: Duration = Duration::from_millis(550);
-/// Time for child processes to remove their files.
-pub const PATIENCE: Duration = Duration::from_millis(350);
+const GRACE: Duration = Duration::from_millis(550);
 /// How often a directory is removed to which other threads may still write.
 const ATTEMPTS: usize = 20;
 
@@ -39,8 +36,6 @@ static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
 /// What must not outlive the harness.
 #[derive(Default)]
 struct Leftovers {
-    /// Leaders of the sessions of child processes.
-    children: Vec<u32>,
     /// Directories; those that were removed already may remain in the list.
     directories: Vec<PathBuf>,
     /// The directory of all temporary files.
@@ -109,21 +104,6 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Starts a child process that leads a session.
-pub(super) fn spawn(command: &mut Command) -> io::Result<Child> {
-    let mut leftovers = leftovers();
-    let child = command.spawn()?;
-    leftovers.children.push(child.id());
-    Ok(child)
-}
-
-/// Forgets a child process that has ended, and ends its descendants that have left its session.
-pub(super) fn forget_child(id: u32) {
-    let mut leftovers = leftovers();
-    leftovers.children.retain(|&child| child != id);
-    session::end_adopted(&leftovers.children);
-}
-
 /// Notes a directory that must not outlive the harness.
 pub fn note_directory(path: &Path) {
     leftovers().directories.push(path.to_owned());
@@ -155,16 +135,7 @@ fn end() -> ! {
 
 /// Ends the child processes, and removes unfinished files and temporary directories. Then the process must end.
 pub fn clean() {
-    let children = leftovers().children.clone();
-    children.iter().for_each(|&child| session::signal(child, Signal::TERM));
-    let mut waited = Duration::ZERO;
-    let pause = Duration::from_millis(10);
-    while waited < PATIENCE && children.iter().any(|&c| !session::members(c).is_empty()) {
-        sleep(pause);
-        waited += pause;
-    }
-    children.iter().for_each(|&child| session::signal(child, Signal::KILL));
-    session::end_adopted(&[]);
+    let _ended = end_all();
     // Until the process ends, nothing else is staged or published.
     let staged = contract::files::publications();
     interrupt::abandon_unfinished();

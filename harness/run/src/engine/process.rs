@@ -7,8 +7,7 @@
 
 use super::failure::{End, Failure};
 use super::interrupt;
-use super::memory::MemorySampler;
-use super::session::Session;
+use super::session::{MemorySampler, Session};
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -64,13 +63,12 @@ impl<'a> Watch<'a> {
     /// Waits until `look` finds what it looks for. After an error the child may still run.
     pub(super) fn until<T>(
         &self,
-        session: &mut Session,
         start: Instant,
         outputs: &[&File],
-        mut look: impl FnMut(&mut Session) -> Result<Option<T>, End>,
+        mut look: impl FnMut() -> Result<Option<T>, End>,
     ) -> Result<T, End> {
         loop {
-            if let Some(found) = look(session)? {
+            if let Some(found) = look()? {
                 return Ok(found);
             }
             if interrupt::requested() {
@@ -114,16 +112,13 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     // Samples of memory are taken between pauses, often enough in a run of any length.
     let longest = Duration::from_millis(if sampler.is_some() { 5 } else { 20 });
     let outputs = outputs.each_ref();
-    let ended = watch.until(&mut session, start, &outputs, |session| {
-        if let Some(ended) = session.reap()? {
-            return Ok(Some(ended));
-        }
+    let ended = watch.until(start, &outputs, || {
         if let Some(sampler) = &mut sampler {
             sampler.sample(session.id());
         }
-        session.pause(pause);
+        let ended = session.wait(pause);
         pause = (pause * 2).min(longest);
-        Ok(None)
+        ended
     });
     let time_wall_s = start.elapsed().as_secs_f64();
     if ended.is_err() {
@@ -138,7 +133,7 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
         return Err(End::Interrupted);
     }
     judge(status, outputs[1])?;
-    let peak_rss_bytes = sampler.map(|sampler| sampler.peak_bytes());
+    let peak_rss_bytes = sampler.map(|sampler| sampler.peak_bytes);
     Ok(Finished { time_wall_s, time_cpu_s, stdout: watch.log("stdout"), peak_rss_bytes })
 }
 
@@ -148,7 +143,7 @@ pub(super) fn cannot_be_started(command: &Command, error: &io::Error) -> End {
 }
 
 /// An empty file that receives a child's output.
-pub(super) fn log(path: &Path) -> io::Result<File> {
+fn log(path: &Path) -> io::Result<File> {
     File::create(path)?;
     OpenOptions::new().read(true).append(true).open(path)
 }

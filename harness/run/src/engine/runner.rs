@@ -3,8 +3,7 @@
 use super::description::{self, Description};
 use super::failure::{End, Failure};
 use super::launcher::Launcher;
-use super::layout::{Layout, Ranks};
-use super::options::RunOptions;
+use super::layout::{Layout, Ranks, RunOptions};
 use super::paths::{Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
@@ -103,9 +102,10 @@ impl Engine {
 
     /// Why no run on MPI can be started; `None` if one can.
     pub fn lacks_mpi(&self) -> Option<String> {
-        let Some(parallel) = &self.description.run.parallel else {
+        let parallel = &self.description.run.parallel;
+        if parallel.is_empty() {
             return Some(format!("the engine file of {} has no command `parallel`", self.label()));
-        };
+        }
         let is_ours = parallel.iter().any(|word| [LAUNCHER, "{mpirun}"].contains(&word.as_str()));
         (is_ours && !self.launcher.is_found()).then(|| {
             format!(
@@ -184,23 +184,22 @@ impl Engine {
             written::complete(&self.description, self.label(), &command, case, mesh, options)
         });
         let written = written.transpose().map_err(|end| self.failure(end))?;
-        let report = self.report(written.as_ref(), options).map_err(|why| self.unusable(why))?;
-        let launched = layout.ranks.count();
-        if let Some(reported) = report.ranks.filter(|&ranks| ranks != launched) {
-            let launcher = self.launcher.program();
-            return Err(self.unusable(format!(
-                "was to run on {launched} ranks, but reports {reported}: if on MPI, it was built without it, or for another than that of {}",
-                launcher.display()
-            )));
-        }
-        let report = completed(report, &finished, launched);
+        let report = self.report(written.as_ref(), options, layout.ranks.count(), &finished);
+        let report = report.map_err(|why| self.unusable(why))?;
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
-    /// The report of a run, of which the mesh was written.
-    fn report(&self, written: Option<&Mesh>, options: &RunOptions) -> Result<RunReport, String> {
-        let is_written = options.report && self.description.run.json.is_some();
+    /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside where the program
+    /// reported none, or that of rank 0 alone.
+    fn report(
+        &self,
+        written: Option<&Mesh>,
+        options: &RunOptions,
+        ranks: usize,
+        finished: &Finished,
+    ) -> Result<RunReport, String> {
+        let is_written = options.report && !self.description.run.json.is_empty();
         let mut report = match written {
             Some(mesh) if !is_written => RunReport::of_mesh(&mesh.manifest),
             _ => RunReport::read(&options.report_path())
@@ -212,8 +211,26 @@ impl Engine {
                 let (stated, found) = (report.cells, mesh.len());
                 return Err(format!("states {stated} cells, and its mesh has {found}"));
             }
-            // A digest in the report is compared with that of the leaves by whoever reads them.
-            report.digest.get_or_insert_with(|| mesh.manifest.digest.to_string());
+            let digest = mesh.manifest.digest.to_string();
+            let reported = report.digest.get_or_insert_with(|| digest.clone());
+            if *reported != digest {
+                return Err(format!(
+                    "reports digest {reported}, but its mesh has, by its manifest, digest {digest}"
+                ));
+            }
+        }
+        if let Some(reported) = report.ranks.filter(|&reported| reported != ranks) {
+            let launcher = self.launcher.program();
+            return Err(format!(
+                "was to run on {ranks} ranks, but reports {reported}: if on MPI, it was built without it, or for another than that of {}",
+                launcher.display()
+            ));
+        }
+        let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
+        if let Some(peak) = finished.peak_rss_bytes
+            && (is_of_one || report.peak_rss_bytes.is_empty())
+        {
+            report.peak_rss_bytes = vec![peak];
         }
         Ok(report)
     }
@@ -246,12 +263,11 @@ impl Engine {
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
-        let serve = self.description.run.serve.as_deref();
-        if let (Some(services), Some(serve)) = (options.services, serve) {
+        if let Some(services) = options.services.filter(|_| self.serves()) {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
-            let (name, start) = (self.name_of_ranks(count), || self.ranks(count, serve));
+            let (name, start) = (self.name_of_ranks(count), || self.ranks(count));
             services.send(&name, start, &words)?;
             let time_wall_s = services.answer(&name, &watch)?;
             let stdout = watch.log("stdout");
@@ -266,18 +282,22 @@ impl Engine {
     /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none. What fails is found by
     /// the first run.
     pub fn start_ranks(&self, count: usize, services: &Services) {
-        if let Some(serve) = &self.description.run.serve {
-            let _ = services.start(&self.name_of_ranks(count), || self.ranks(count, serve));
+        if self.serves() {
+            let _ = services.start(&self.name_of_ranks(count), || self.ranks(count));
         }
+    }
+
+    fn serves(&self) -> bool {
+        !self.description.run.serve.is_empty()
     }
 
     fn name_of_ranks(&self, count: usize) -> String {
         format!("{} on {count} ranks", self.program.display())
     }
 
-    fn ranks(&self, count: usize, serve: &[String]) -> service::Start {
+    fn ranks(&self, count: usize) -> service::Start {
         let mut command = self.launcher.command(count, &self.program);
-        command.args(serve);
+        command.args(&self.description.run.serve);
         let shared = self.launcher.prepare(&mut command);
         (command, shared)
     }
@@ -300,18 +320,6 @@ impl Engine {
             false => stem.into_owned(),
         }
     }
-}
-
-/// The report, with the memory that was measured from outside where the program reported none, or that of rank 0 alone.
-fn completed(mut report: RunReport, finished: &Finished, ranks: usize) -> RunReport {
-    let is_of_one = report.ranks.is_none() && ranks > 1 && report.peak_rss_bytes.len() == 1;
-    if is_of_one && finished.peak_rss_bytes.is_some() {
-        report.peak_rss_bytes.clear();
-    }
-    if report.peak_rss_bytes.is_empty() {
-        report.peak_rss_bytes.extend(finished.peak_rss_bytes);
-    }
-    report
 }
 
 #[cfg(test)]

@@ -8,26 +8,25 @@
 use super::failure::{End, Failure};
 use super::interrupt;
 use super::process::{self, Watch};
-use super::session::{self, Session};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::Signal;
+use super::session::{Session, end_all};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, ChildStdout, Command, Stdio};
-use std::thread::sleep;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// Longest answer, in bytes.
-const ANSWER_MAX: usize = 100;
+const ANSWER_MAX: u64 = 100;
 /// Time for a program to end after its last request.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Longest time from an answer to its error.
 const LATE: Duration = Duration::from_millis(500);
 /// Longest time between two looks at the clock and at signals.
-const PAUSE: Timespec = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// How a service is started: its command, and the directory of its shared memory.
 pub type Start = (Command, Option<TempDir>);
@@ -41,7 +40,8 @@ struct Service {
     session: Session,
     /// Its end is the end of the service.
     requests: Option<ChildStdin>,
-    answers: ChildStdout,
+    /// Its lines; disconnected at the end of its output.
+    answers: Receiver<String>,
     /// What it has written to the standard error since the last request.
     errors: File,
     /// When it was sent.
@@ -61,7 +61,7 @@ impl Services {
     fn started(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), End> {
         let mut services = self.0.borrow_mut();
         if let Some(service) = services.get_mut(name) {
-            let Some((status, _)) = service.session.reap()? else { return Ok(()) };
+            let Some((status, _)) = service.session.wait(Duration::ZERO)? else { return Ok(()) };
             let end = process::judge(status, &service.errors);
             services.remove(name);
             // A program that has ended well between two requests is started again.
@@ -116,11 +116,9 @@ impl Services {
 impl Drop for Services {
     fn drop(&mut self) {
         // All end at the same time.
-        for service in self.0.get_mut().values_mut() {
-            drop(service.requests.take());
-            if interrupt::requested() {
-                session::signal(service.session.id(), Signal::TERM);
-            }
+        self.0.get_mut().values_mut().for_each(|service| drop(service.requests.take()));
+        if interrupt::requested() {
+            drop(end_all());
         }
     }
 }
@@ -130,7 +128,7 @@ impl Service {
         let errors = tempfile::Builder::new().append(true).tempfile()?.into_file();
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors.try_clone()?);
         let (session, mut child) = Session::start(command)?;
-        let answers = child.stdout.take().expect("it is a pipe");
+        let answers = lines_of(child.stdout.take().expect("it is a pipe"))?;
         let (requests, sent) = (child.stdin.take(), Instant::now());
         Ok(Self { session, requests, answers, errors, sent, _shared: shared })
     }
@@ -145,25 +143,24 @@ impl Service {
 
     /// The wall time from request to answer, in seconds.
     fn answer(&mut self, watch: &Watch) -> Result<f64, End> {
-        let (answers, errors) = (&mut self.answers, &self.errors);
-        let mut answer = Vec::new();
-        let code = watch.until(&mut self.session, self.sent, &[errors], |session| {
-            let unusable = |why: &str| End::Unusable(why.to_owned());
-            match next_byte(answers) {
-                Some(b'\n') => {
-                    let code = String::from_utf8_lossy(&answer).parse::<i32>();
-                    return code.map(Some).map_err(|_| unusable("gave no exit code"));
+        let Self { session, answers, errors, .. } = self;
+        let unusable = |why: &str| End::Unusable(why.to_owned());
+        let code = watch.until(self.sent, &[errors], || {
+            let ended = session.wait(Duration::ZERO)?;
+            // The last answer of a program that has ended may be on its way.
+            let answer = answers.recv_timeout(if ended.is_some() { LATE } else { PAUSE });
+            match (answer, ended) {
+                (Ok(answer), _) => {
+                    let code = answer.strip_suffix('\n').and_then(|code| code.parse().ok());
+                    code.map(Some).ok_or_else(|| unusable("gave no exit code"))
                 }
-                Some(_) if answer.len() == ANSWER_MAX => return Err(unusable("gave no exit code")),
-                Some(byte) => answer.push(byte),
-                None => {
-                    if let Some((status, _)) = session.reap()? {
-                        process::judge(status, errors)?;
-                        return Err(unusable("ended without an answer"));
-                    }
+                (Err(_), Some((status, _))) => {
+                    process::judge(status, errors)?;
+                    Err(unusable("ended without an answer"))
                 }
+                // The end of its output: its own end follows.
+                (Err(_), None) => session.wait(Duration::from_millis(1)).map(|_| None),
             }
-            Ok(None)
         });
         let time_s = self.sent.elapsed().as_secs_f64();
         // A launcher may pass on the error after the answer.
@@ -185,33 +182,32 @@ impl Service {
     }
 }
 
-/// The next byte of an answer, if there is one soon.
-fn next_byte(answers: &mut ChildStdout) -> Option<u8> {
-    let mut fds = [PollFd::new(answers, PollFlags::IN)];
-    if poll(&mut fds, Some(&PAUSE)).unwrap_or(0) == 0 {
-        return None;
-    }
-    let mut byte = [0];
-    match answers.read(&mut byte) {
-        Ok(1) => Some(byte[0]),
-        // The end of its output: its own end follows.
-        _ => {
-            sleep(Duration::from_millis(2));
-            None
+/// The lines of an output, which another thread reads, so that waiting for one can have a limit.
+fn lines_of(output: ChildStdout) -> io::Result<Receiver<String>> {
+    let (sender, lines) = sync_channel(1);
+    let read = move || {
+        let mut output = BufReader::new(output);
+        let mut line = Vec::new();
+        while output.by_ref().take(ANSWER_MAX).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+            if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
+                return;
+            }
+            line.clear();
         }
-    }
+    };
+    thread::Builder::new().name("answers".into()).stack_size(64 << 10).spawn(read)?;
+    Ok(lines)
 }
 
 impl Drop for Service {
     fn drop(&mut self) {
         drop(self.requests.take());
         let patience = Instant::now() + PATIENCE;
-        while self.session.runs() {
-            if interrupt::requested() || Instant::now() > patience {
-                self.session.end();
-            }
+        let is_waiting = || !interrupt::requested() && Instant::now() < patience;
+        while is_waiting() && self.session.runs() {
             sleep(Duration::from_millis(5));
         }
+        self.session.end();
     }
 }
 

@@ -1,24 +1,30 @@
-//! A child process that leads a session of its own, so that its descendants can be found even if they left its process group, as the
-//! ranks of OpenMPI's `mpirun` do.
+//! Child processes. Each leads a session of its own, so that its descendants can be found even if they left its process group, as the
+//! ranks of OpenMPI's `mpirun` do. Those that left the session as well become children of this process when their parents end.
 //!
-//! Invariant: when a [`Session`] is dropped, no process of it is left.
+//! Invariant: when a [`Session`] was dropped or [`end_all`] has returned, no process of it is left.
 
 use super::failure::End;
-use super::interrupt;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{
-    Pid, PidfdFlags, Signal, WaitOptions, kill_process, pidfd_open, setsid, waitpid,
-};
+use rustix::process::{Pid, Signal, WaitOptions, kill_process, setsid, waitpid};
 use std::fs;
 use std::io;
-use std::os::fd::OwnedFd;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus};
-use std::thread::sleep;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Mutex, MutexGuard};
+use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
 
+/// Time for child processes to remove their files.
+pub(super) const PATIENCE: Duration = Duration::from_millis(350);
 /// How often processes are ended that start others meanwhile.
 const ATTEMPTS: usize = 500;
+
+/// The leaders of all sessions.
+static RUNNING: Mutex<Vec<u32>> = Mutex::new(Vec::new());
+
+fn running() -> MutexGuard<'static, Vec<u32>> {
+    RUNNING.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
 
 /// How a child ended, and the CPU time, in seconds, of it and of all its descendants that were waited for.
 pub(super) type Ended = (ExitStatus, f64);
@@ -27,8 +33,8 @@ pub(super) type Ended = (ExitStatus, f64);
 #[derive(Debug)]
 pub(super) struct Session {
     leader: u32,
-    /// Becomes readable when the child ends; `None` on a kernel without such descriptors (before Linux 5.3).
-    ending: Option<OwnedFd>,
+    /// What the thread sends that waits for the leader. A pause of fixed length would round the leader's wall time up to a multiple of it.
+    waited: Receiver<Ended>,
     ended: Option<Ended>,
 }
 
@@ -37,9 +43,17 @@ impl Session {
     pub(super) fn start(command: &mut Command) -> io::Result<(Self, Child)> {
         // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
         unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
-        let child = interrupt::spawn(command)?;
-        let ending = pid_of(child.id()).and_then(|id| pidfd_open(id, PidfdFlags::empty()).ok());
-        Ok((Self { leader: child.id(), ending, ended: None }, child))
+        let (sender, waited) = sync_channel(1);
+        // Either `end_all` finds the child, or it was started after that.
+        let mut running = running();
+        let child = command.spawn()?;
+        let leader = child.id();
+        running.push(leader);
+        drop(running);
+        let session = Self { leader, waited, ended: None };
+        let wait = move || wait_for(leader).and_then(|ended| sender.send(ended).ok());
+        thread::Builder::new().name("wait".into()).stack_size(64 << 10).spawn(wait)?;
+        Ok((session, child))
     }
 
     /// The leader's process.
@@ -47,90 +61,104 @@ impl Session {
         self.leader
     }
 
-    /// How the leader ended; `None` while it runs. `Child::try_wait` gives no CPU time.
-    pub(super) fn reap(&mut self) -> Result<Option<Ended>, End> {
-        if self.ended.is_some() {
-            return Ok(self.ended);
-        }
-        let id = self.leader as libc::pid_t;
-        let mut status = 0;
-        // SAFETY: all bits zero are a valid `rusage`, which contains only integers.
-        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
-        // SAFETY: both pointers are to live local variables.
-        match unsafe { libc::wait4(id, &raw mut status, libc::WNOHANG, &raw mut usage) } {
-            0 => {}
-            reaped if reaped == id => {
-                let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
-                let time_cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-                self.ended = Some((ExitStatus::from_raw(status), time_cpu_s));
-            }
-            _ => {
-                let error = io::Error::last_os_error();
-                return Err(End::Unusable(format!("could not be waited for: {error}")));
-            }
+    /// How the leader ended; `None` if it runs for longer than this.
+    pub(super) fn wait(&mut self, limit: Duration) -> Result<Option<Ended>, End> {
+        if self.ended.is_none() {
+            self.ended = match self.waited.recv_timeout(limit) {
+                Ok(ended) => Some(ended),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(End::Unusable("could not be waited for".to_owned()));
+                }
+            };
         }
         Ok(self.ended)
     }
 
     /// Whether the leader runs.
     pub(super) fn runs(&mut self) -> bool {
-        matches!(self.reap(), Ok(None))
-    }
-
-    /// Returns when the leader has ended, a signal has arrived, or the pause is over. A pause of fixed length would round the leader's
-    /// wall time up to a multiple of it.
-    pub(super) fn pause(&self, pause: Duration) {
-        let Some(ending) = &self.ending else { return sleep(pause) };
-        let limit = Timespec::try_from(pause).expect("pauses are short");
-        let waited = poll(&mut [PollFd::new(ending, PollFlags::IN)], Some(&limit));
-        if waited.is_err_and(|error| error != rustix::io::Errno::INTR) {
-            sleep(pause);
-        }
+        matches!(self.wait(Duration::ZERO), Ok(None))
     }
 
     /// Sends SIGTERM to the leader and all its descendants, ranks included, and kills those that do not end in time.
-    pub(super) fn end(&mut self) {
-        signal(self.leader, Signal::TERM);
-        let patience = Instant::now() + interrupt::PATIENCE;
-        while self.runs() && Instant::now() < patience {
-            sleep(Duration::from_millis(10));
-        }
-        self.kill();
-        while self.runs() {
-            sleep(Duration::from_millis(10));
-        }
-    }
-
-    /// Kills every process of the session. Processes may be started while it is being killed, so this repeats until none is found.
-    fn kill(&self) {
-        for _ in 0..100 {
-            if members(self.leader).is_empty() {
-                return;
-            }
-            signal(self.leader, Signal::KILL);
-            sleep(Duration::from_millis(5));
-        }
+    pub(super) fn end(&self) {
+        end(&[self.leader], &running());
     }
 }
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.kill();
-        let _ = self.reap();
-        interrupt::forget_child(self.leader);
+        let mut running = running();
+        running.retain(|&other| other != self.leader);
+        kill(&[self.leader], &running);
     }
 }
 
-fn pid_of(id: u32) -> Option<Pid> {
-    i32::try_from(id).ok().and_then(Pid::from_raw)
+/// Waits for a child. `Child::wait` gives no CPU time.
+fn wait_for(child: u32) -> Option<Ended> {
+    let id = libc::pid_t::try_from(child).ok()?;
+    let mut status = 0;
+    // SAFETY: all bits zero are a valid `rusage`, which contains only integers.
+    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+    loop {
+        // SAFETY: both pointers are to live local variables.
+        match unsafe { libc::wait4(id, &raw mut status, 0, &raw mut usage) } {
+            reaped if reaped == id => break,
+            _ if io::Error::last_os_error().kind() == io::ErrorKind::Interrupted => {}
+            _ => return None,
+        }
+    }
+    let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
+    Some((ExitStatus::from_raw(status), seconds(usage.ru_utime) + seconds(usage.ru_stime)))
+}
+
+/// Ends all sessions, at the same time, and what they left behind. None is started as long as the result exists.
+pub(super) fn end_all() -> MutexGuard<'static, Vec<u32>> {
+    let running = running();
+    end(&running, &running);
+    kill(&running, &[]);
+    running
+}
+
+fn end(leaders: &[u32], running: &[u32]) {
+    signal(leaders, Signal::TERM);
+    let patience = Instant::now() + PATIENCE;
+    while leaders.iter().any(|&leader| !members(leader).is_empty()) && Instant::now() < patience {
+        sleep(Duration::from_millis(10));
+    }
+    kill(leaders, running);
+}
+
+/// Kills every process of these sessions, and those that this process has adopted: its children in other sessions than those that are
+/// `kept`. Processes may be started meanwhile, and the children of adopted ones are adopted in turn, so this repeats until none is found.
+fn kill(leaders: &[u32], kept: &[u32]) {
+    for _ in 0..ATTEMPTS {
+        let adopted = adopted(kept);
+        for &process in &adopted {
+            let _ = kill_process(process, Signal::KILL);
+            let _ = waitpid(Some(process), WaitOptions::NOHANG);
+        }
+        if !signal(leaders, Signal::KILL) && adopted.is_empty() {
+            return;
+        }
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// Sends a signal to every process of these sessions. Returns whether there are any.
+fn signal(leaders: &[u32], signal: Signal) -> bool {
+    let members: Vec<Pid> = leaders.iter().flat_map(|&leader| members(leader)).collect();
+    for &member in &members {
+        // It may have ended since then.
+        let _ = kill_process(member, signal);
+    }
+    !members.is_empty()
 }
 
 /// The live processes of a session. The leader is no longer among them after it was waited for.
-pub(super) fn members(leader: u32) -> Vec<Pid> {
-    let Ok(entries) = fs::read_dir("/proc") else {
-        return Vec::new();
-    };
-    let ids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+fn members(leader: u32) -> Vec<Pid> {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let ids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
     let of_session = ids.filter(|&id| session(id) == Some(leader)).filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
@@ -139,46 +167,26 @@ pub(super) fn members(leader: u32) -> Vec<Pid> {
     of_session.filter_map(pid_of).collect()
 }
 
-/// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container.
-fn session(id: u32) -> Option<u32> {
-    let id = libc::pid_t::try_from(id).ok()?;
-    // SAFETY: getsid touches no memory. That of rustix panics where the session is 0.
-    u32::try_from(unsafe { libc::getsid(id) }).ok()
-}
-
-/// Sends a signal to every process of a session.
-pub(super) fn signal(leader: u32, signal: Signal) {
-    for member in members(leader) {
-        // It may have ended since then.
-        let _ = kill_process(member, signal);
-    }
-}
-
-/// Ends the processes that this one has adopted, and waits for them: children of other sessions `except` those that it has started
-/// itself. Their descendants are adopted in turn, so this repeats until none is found.
-pub(super) fn end_adopted(except: &[u32]) {
-    for _ in 0..ATTEMPTS {
-        let adopted = adopted(except);
-        if adopted.is_empty() {
-            return;
-        }
-        for process in adopted {
-            let _ = kill_process(process, Signal::KILL);
-            let _ = waitpid(Some(process), WaitOptions::NOHANG);
-        }
-        sleep(Duration::from_millis(2));
-    }
-}
-
-fn adopted(except: &[u32]) -> Vec<Pid> {
+fn adopted(kept: &[u32]) -> Vec<Pid> {
     let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let children = threads.flat_map(|thread| {
         let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
         text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>()
     });
     let own = session(0);
-    let adopted = children.filter(|&child| session(child) != own && !except.contains(&child));
+    let adopted = children.filter(|&child| session(child) != own && !kept.contains(&child));
     adopted.filter_map(pid_of).collect()
+}
+
+fn pid_of(id: u32) -> Option<Pid> {
+    i32::try_from(id).ok().and_then(Pid::from_raw)
+}
+
+/// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container.
+fn session(id: u32) -> Option<u32> {
+    let id = libc::pid_t::try_from(id).ok()?;
+    // SAFETY: getsid touches no memory. That of rustix panics where the session is 0.
+    u32::try_from(unsafe { libc::getsid(id) }).ok()
 }
 
 /// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.
@@ -189,21 +197,62 @@ fn session_and_liveness(stat: &str) -> Option<(u32, bool)> {
     Some((fields.get(3)?.parse().ok()?, !matches!(*fields.first()?, "Z" | "X")))
 }
 
+/// Samples the memory of all processes of a session, for programs that do not report it.
+#[derive(Debug)]
+pub(super) struct MemorySampler {
+    start: Instant,
+    last: Instant,
+    /// The greatest sum, over all samples, of the peaks of the processes alive at that time. 0 if the system does not report them.
+    pub peak_bytes: u64,
+}
+
+impl MemorySampler {
+    /// A sampler without samples.
+    pub(super) fn new() -> Self {
+        let now = Instant::now();
+        Self { start: now, last: now, peak_bytes: 0 }
+    }
+
+    /// Takes a sample of the session, unless one was taken a short time ago. The system keeps the peak of each
+    /// process, so only memory that is first used after the last sample is missed.
+    pub(super) fn sample(&mut self, leader: u32) {
+        /// Longest time between samples.
+        const PERIOD: Duration = Duration::from_millis(100);
+        /// Samples of a program of any age, at least, up to that period: what a short run uses last is missed as seldom as in a long one.
+        const SAMPLES: u32 = 16;
+        if self.last.elapsed() < PERIOD.min(self.start.elapsed() / SAMPLES) {
+            return;
+        }
+        self.last = Instant::now();
+        let peaks = members(leader).into_iter().filter_map(|id| {
+            let path = format!("/proc/{}/status", id.as_raw_nonzero());
+            peak_bytes(&fs::read_to_string(path).ok()?)
+        });
+        self.peak_bytes = self.peak_bytes.max(peaks.sum());
+    }
+}
+
+/// The peak resident memory in the text of `/proc/ID/status`.
+fn peak_bytes(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
     use std::process::Stdio;
 
     #[test]
     fn a_pause_ends_with_the_child() {
         let mut command = Command::new("cat");
         let (mut session, mut child) = Session::start(command.stdin(Stdio::piped())).unwrap();
-        assert!(session.ending.is_some() && session.runs());
+        assert!(session.wait(Duration::ZERO).unwrap().is_none());
         drop(child.stdin.take());
         let start = Instant::now();
-        session.pause(Duration::from_secs(600));
+        assert!(session.wait(Duration::from_secs(600)).unwrap().unwrap().0.success());
         assert!(start.elapsed() < Duration::from_secs(300));
-        assert!(session.reap().unwrap().unwrap().0.success());
     }
 
     #[test]
@@ -211,5 +260,33 @@ mod tests {
         assert_eq!(session_and_liveness("12 (a) b) S 1 12 77 0 -1"), Some((77, true)));
         assert_eq!(session_and_liveness("12 (x) Z 1 12 77 0 -1"), Some((77, false)));
         assert_eq!(session_and_liveness(""), None);
+    }
+
+    #[test]
+    fn the_memory_of_a_grandchild_is_sampled() {
+        let mut command = Command::new("setsid");
+        // `tail` keeps the last line, which is all 30 MB of it, until its input ends, and then waits to print it.
+        command.args([
+            "sh",
+            "-c",
+            "(head -c 30000000 /dev/zero; echo ready >&2; cat) | tail -n 1 > /dev/null",
+        ]);
+        command.stdin(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut line = [0; 6];
+        child.stderr.take().unwrap().read_exact(&mut line).unwrap();
+        let mut sampler = MemorySampler::new();
+        // The last bytes may still be in the pipe.
+        while sampler.peak_bytes < 29_000_000 {
+            sampler.sample(child.id());
+        }
+        drop(child.stdin.take());
+        assert!(child.wait().unwrap().success());
+    }
+
+    #[test]
+    fn the_peak_is_parsed() {
+        assert_eq!(peak_bytes("Name:\ta\nVmHWM:\t    12 kB\nVmRSS:\t 3 kB\n"), Some(12 * 1024));
+        assert_eq!(peak_bytes("Name:\ta\n"), None);
     }
 }

@@ -2,14 +2,12 @@
 
 use super::failure::End;
 use super::launcher::Launcher;
-use super::layout::{Layout, Ranks};
-use super::options::RunOptions;
+use super::layout::{Layout, Ranks, RunOptions};
 use check::promises::{Independence, Promises};
 use contract::import::{Format, Position};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::{iter, slice};
 
 /// Values of placeholders, which are names between braces.
 pub type Values<'a> = BTreeMap<&'a str, String>;
@@ -21,54 +19,51 @@ pub(super) const LAUNCHER: &str = "{launcher}";
 const COMMON: [&str; 8] =
     ["program", "case", "ranks", "here", "root", "python", "mpirun", "target"];
 
-/// Those that have one in the template of the same name.
-const OWN: [&str; 6] = ["out", "json", "status", "partitioner", "level_base", "weights"];
-
-/// Command templates, as lists of words. A missing template is a capability that the engine does not have.
+/// Command templates, as lists of words. An empty template is a capability that the engine does not have.
 #[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Templates {
     /// A serial run.
-    #[serde(default)]
     pub serial: Vec<String>,
     /// A run on `{ranks}` processes, started by `{launcher}`.
-    pub parallel: Option<Vec<String>>,
+    pub parallel: Vec<String>,
     /// Appended to `{launcher} {program}` in place of a run's arguments, so that the ranks stay and run the command lines of their
     /// standard input (`harness/engines/README.md`).
-    pub serve: Option<Vec<String>>,
+    pub serve: Vec<String>,
     /// A run on `{ranks}` ranks within one process, scheduled by `{seed}`.
-    pub simulated: Option<Vec<String>>,
+    pub simulated: Vec<String>,
     /// Appended to write the leaf-set directory `{out}`. Without it, the commands themselves contain `{out}`, and every
     /// run writes its mesh.
-    pub out: Option<Vec<String>>,
+    pub out: Vec<String>,
     /// What the engine writes, if not leaf words: `{out}` then begins the path of that file or directory.
     pub format: Option<Format>,
     /// The cell array or column with the sides, in that format.
     pub sides: Option<String>,
     /// What x, y and z are in a table.
-    #[serde(default)]
     pub position: Position,
     /// Appended to write the run report `{json}`.
-    pub json: Option<Vec<String>>,
+    pub json: Vec<String>,
     /// Appended to keep the current activity of each rank in the directory `{status}`.
-    pub status: Option<Vec<String>>,
+    pub status: Vec<String>,
     /// Appended to stop at the base tree.
-    pub ungraded: Option<Vec<String>>,
+    pub ungraded: Vec<String>,
     /// Appended to choose the `{partitioner}`.
-    pub partitioner: Option<Vec<String>>,
+    pub partitioner: Vec<String>,
     /// Appended to choose the level of the partition, `{level_base}`.
-    pub level_base: Option<Vec<String>>,
+    pub level_base: Vec<String>,
     /// Appended to choose the `{weights}` of the partition.
-    pub weights: Option<Vec<String>>,
+    pub weights: Vec<String>,
 }
 
 impl Templates {
-    /// The templates of the file, by key.
-    fn all(&self) -> impl Iterator<Item = (&'static str, &Vec<String>)> {
-        let optional = [
-            ("parallel", &self.parallel),
-            ("serve", &self.serve),
-            ("simulated", &self.simulated),
+    /// The commands that start a run, by key.
+    fn commands(&self) -> [(&'static str, &[String]); 3] {
+        [("serial", &self.serial), ("parallel", &self.parallel), ("simulated", &self.simulated)]
+    }
+
+    /// What is appended to a command, by key, which is also the placeholder that has a value there.
+    fn appended(&self) -> [(&'static str, &[String]); 7] {
+        [
             ("out", &self.out),
             ("json", &self.json),
             ("status", &self.status),
@@ -76,22 +71,20 @@ impl Templates {
             ("partitioner", &self.partitioner),
             ("level_base", &self.level_base),
             ("weights", &self.weights),
-        ];
-        let optional = optional.into_iter().filter_map(|(key, of)| Some((key, of.as_ref()?)));
-        iter::once(("serial", &self.serial)).chain(optional)
+        ]
     }
 
     /// Replaces the program in all commands by its placeholder, so that another one can be run.
     pub(super) fn name_program(&mut self, program: &str) {
-        let commands = [Some(&mut self.serial), self.parallel.as_mut(), self.simulated.as_mut()];
-        for word in commands.into_iter().flatten().flatten().filter(|word| *word == program) {
+        let commands = [&mut self.serial, &mut self.parallel, &mut self.simulated];
+        for word in commands.into_iter().flatten().filter(|word| *word == program) {
             *word = "{program}".to_owned();
         }
     }
 
     /// Whether every run writes a mesh, because the engine cannot describe it in another way.
     pub fn always_writes_mesh(&self) -> bool {
-        self.json.is_none() || self.out.is_none()
+        self.json.is_empty() || self.out.is_empty()
     }
 
     /// Refuses promises that no command could show to be kept.
@@ -104,8 +97,8 @@ impl Templates {
                     .to_owned(),
             );
         }
-        let ranks = self.parallel.is_some() || self.simulated.is_some();
-        let choices = self.partitioner.is_some() || self.level_base.is_some();
+        let ranks = !self.parallel.is_empty() || !self.simulated.is_empty();
+        let choices = !self.partitioner.is_empty() || !self.level_base.is_empty();
         for (of, has, what) in [
             (Independence::Ranks, ranks, "ranks, but [run] has neither `parallel` nor `simulated`"),
             (
@@ -123,37 +116,26 @@ impl Templates {
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
     pub(super) fn check_placeholders(&self) -> Result<(), String> {
-        for (key, template) in self.all() {
-            let has = |text: &str| template.iter().any(|word| word.contains(text));
-            let starts = ["serial", "parallel", "simulated"].contains(&key);
-            // A command that contains {out} needs no template that appends it.
-            let contains_out = starts && self.out.is_none();
-            let own: &[&str] = match key {
-                "simulated" => &["seed"],
-                _ if OWN.contains(&key) => slice::from_ref(&key),
-                _ => &[],
-            };
-            let out: &[&str] = if contains_out { &["out"] } else { &[] };
-            let known = [&COMMON, own, out].concat();
+        // A command that contains {out} needs no template that appends it.
+        let needs_out = self.out.is_empty();
+        for (key, template) in self.commands().into_iter().filter(|(_, of)| !of.is_empty()) {
+            let seed = (key == "simulated").then_some("seed");
+            let own: Vec<&str> = seed.into_iter().chain(needs_out.then_some("out")).collect();
             let words = template.iter().filter(|word| key != "parallel" || *word != LAUNCHER);
-            let mut names = words.flat_map(|word| placeholders(word));
-            if let Some(name) = names.find(|name| !known.contains(name)) {
-                return Err(format!(
-                    "`{key}` has the unknown placeholder {{{name}}}; known there are {}",
-                    known.join(" ")
-                ));
-            }
-            if key == "parallel" && self.serve.is_some() && !has("{program}") {
+            check_known(key, words, &own)?;
+            let has = |text: &str| template.iter().any(|word| word.contains(text));
+            if key == "parallel" && !self.serve.is_empty() && !has("{program}") {
                 return Err("`serve` needs the word {program} in `parallel`".to_owned());
             }
-            if contains_out && !has("{out}") {
+            if needs_out && !has("{out}") {
                 return Err(format!(
                     "`{key}` has no {{out}}, the place of the mesh: add it, as in [\"my-mesher\", \"{{case}}\", \"{{out}}\"], or the \
                      key `out`, as in out = [\"--out\", \"{{out}}\"]"
                 ));
             }
         }
-        Ok(())
+        check_known("serve", self.serve.iter(), &[])?;
+        self.appended().into_iter().try_for_each(|(key, of)| check_known(key, of.iter(), &[key]))
     }
 
     /// The words of a run's command line, of which `out` is the place of the mesh, if it is written, and `values` are those of the
@@ -170,21 +152,23 @@ impl Templates {
         mut values: Values,
     ) -> Result<Vec<String>, End> {
         let lacks = |what: &str, key: &str| {
-            End::Missing(format!("cannot be {what}: its engine file has no `{key}` in [run]"))
+            let why = format!("cannot be {what}: its engine file has no `{key}` in [run]");
+            Err(End::Missing(why))
         };
         let template = match layout.ranks {
+            Ranks::Simulated { .. } if self.simulated.is_empty() => {
+                return lacks("run on simulated ranks", "simulated");
+            }
+            Ranks::Mpi(_) if self.parallel.is_empty() => return lacks("run on MPI", "parallel"),
             Ranks::Serial => &self.serial,
             Ranks::Simulated { seed, .. } => {
                 values.insert("seed", seed.to_string());
-                let command = self.simulated.as_ref();
-                command.ok_or_else(|| lacks("run on simulated ranks", "simulated"))?
+                &self.simulated
             }
-            Ranks::Mpi(_) => {
-                self.parallel.as_ref().ok_or_else(|| lacks("run on MPI", "parallel"))?
-            }
+            Ranks::Mpi(_) => &self.parallel,
         };
-        if options.ungraded && self.ungraded.is_none() {
-            return Err(lacks("stopped at the base tree", "ungraded"));
+        if options.ungraded && self.ungraded.is_empty() {
+            return lacks("stopped at the base tree", "ungraded");
         }
         let ranks = layout.ranks.count();
         values.insert("ranks", ranks.to_string());
@@ -194,22 +178,37 @@ impl Templates {
         };
         let mut words: Vec<String> = template.iter().flat_map(expand).collect();
         let text = |path: PathBuf| path.to_string_lossy().into_owned();
-        for (key, value, template) in [
-            ("out", out, &self.out),
-            ("json", options.report.then(|| text(options.report_path())), &self.json),
-            ("status", options.status.then(|| text(options.status_path())), &self.status),
-            ("ungraded", options.ungraded.then(String::new), &self.ungraded),
-            ("partitioner", layout.partitioner.clone(), &self.partitioner),
-            ("level_base", layout.level_base.clone(), &self.level_base),
-            ("weights", layout.weights.clone(), &self.weights),
-        ] {
+        let chosen = [
+            out,
+            options.report.then(|| text(options.report_path())),
+            options.status.then(|| text(options.status_path())),
+            options.ungraded.then(String::new),
+            layout.partitioner.clone(),
+            layout.level_base.clone(),
+            layout.weights.clone(),
+        ];
+        for ((key, template), value) in self.appended().into_iter().zip(chosen) {
             if let Some(value) = value {
                 values.insert(key, value);
-                words.extend(template.iter().flatten().cloned());
+                words.extend_from_slice(template);
             }
         }
         Ok(words.iter().map(|word| fill(word, &values)).collect())
     }
+}
+
+/// Refuses placeholders of a template that have no value in it.
+fn check_known<'a>(
+    key: &str,
+    words: impl Iterator<Item = &'a String>,
+    own: &[&str],
+) -> Result<(), String> {
+    let known = [&COMMON, own].concat();
+    let unknown = words.flat_map(|word| placeholders(word)).find(|name| !known.contains(name));
+    unknown.map_or(Ok(()), |name| {
+        let known = known.join(" ");
+        Err(format!("`{key}` has the unknown placeholder {{{name}}}; known there are {known}"))
+    })
 }
 
 /// The placeholders of a word, without their braces.

@@ -2,7 +2,7 @@
 
 use super::description::{self, Description};
 use super::failure::End;
-use super::options::RunOptions;
+use super::layout::RunOptions;
 use super::paths::Paths;
 use crate::import::{Imported, import};
 use contract::case::Case;

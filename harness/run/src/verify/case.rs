@@ -1,7 +1,7 @@
 //! The verification of one case: its steps in order, and the state that they share.
 
 use super::Verification;
-use super::options::TIMEOUT_S;
+use super::options::{Need, TIMEOUT_S};
 pub use super::report::RUNS;
 use super::report::{CaseReport, Check, Outcome};
 use crate::engine::description::Description;
@@ -40,8 +40,8 @@ impl<'a> CaseRun<'a> {
         Self { all, selected, file, place, report }
     }
 
-    /// Performs all steps: serial meshes and their checks, ranks, oracles, p4est. Without serial meshes the later steps are left out.
-    /// An engine that promises less than the definition is not compared with T0, oracles and p4est.
+    /// Performs all steps: serial meshes and their checks, ranks, other programs. Without serial meshes the later steps are left out.
+    /// An engine that promises less than the definition is not compared with T0, the proof, oracles and p4est.
     pub fn verify(&mut self) {
         self.verify_steps();
         self.leave_out_rest();
@@ -51,13 +51,12 @@ impl<'a> CaseRun<'a> {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
         if let Some(why) = self.engine().declines(&case) {
-            return self.add(Check::new("case", "engine", Outcome::left_out(why)), None);
+            return self.leave_out(("case", "engine"), why);
         }
-        let Some(meshes) = self.verify_serial(&case) else { return };
-        self.verify_ranks(&case, &meshes.mesh);
-        if let Some(base) = &meshes.base {
-            self.verify_oracles(&case, base);
-            self.verify_balance(base);
+        let Some((serial, base)) = self.verify_serial(&case) else { return };
+        self.verify_ranks(&case, &serial.mesh);
+        if let Some(base) = base {
+            self.verify_by_others(&case, &serial, &base);
         }
     }
 
@@ -71,11 +70,16 @@ impl<'a> CaseRun<'a> {
             _ => "there is no serial mesh to compare with".to_owned(),
         };
         self.leave_out_ranks(&why);
-        for (subject, name) in steps(self.engine()) {
-            if !self.report.has(subject) {
-                self.add(Check::new(*subject, *name, Outcome::left_out(&why)), None);
+        for &(step, _) in steps(self.engine()) {
+            if !self.report.has(step.0) {
+                self.leave_out(step, &why);
             }
         }
+    }
+
+    /// Adds a check that was not run.
+    pub fn leave_out(&mut self, (subject, name): Step, why: impl Into<String>) {
+        self.add(Check::new(subject, name, Outcome::left_out(why)), None);
     }
 
     /// The description of the engine under test.
@@ -119,11 +123,9 @@ impl<'a> CaseRun<'a> {
         results: Vec<CheckResult>,
     ) {
         for result in results {
-            let check = Check::new(subject, result.name, result.outcome());
-            let notes =
-                Some(result.note).filter(|_| layout.is_none()).filter(|note| !note.is_empty());
             let ranks = layout.and_then(Layout::rank_count);
-            let check = Check { ranks, figures: notes, findings: result.findings_total, ..check };
+            let mut check = Check { ranks, ..Check::of_result(subject, result) };
+            check.figures.take_if(|_| layout.is_some());
             self.add(check, layout);
         }
     }
@@ -177,17 +179,18 @@ impl<'a> CaseRun<'a> {
     }
 }
 
-/// Subject and name of the check of sides by the oracles.
-pub(super) const SIDES: (&str, &str) = ("sides", "oracles");
-/// Subject and name of the check of the balance by p4est.
-pub(super) const BALANCE: (&str, &str) = ("p4est", "balance");
-/// Subject and name of the check by the proven checker.
-pub const PROOF: (&str, &str) = ("proof", "accepted");
-
-/// Subject and name of the checks by other programs, which need the definition.
-pub(super) fn steps(engine: &Description) -> &'static [(&'static str, &'static str)] {
+/// Subject and name of a check.
+pub(super) type Step = (&'static str, &'static str);
+/// The check by the proven checker.
+pub const PROOF: Step = ("proof", "accepted");
+/// The checks of the meshes of an engine by other programs, and what they need besides the definition.
+pub(super) fn steps(engine: &Description) -> &'static [(Step, Need)] {
     match engine.promises.definition {
-        true => &[PROOF, SIDES, BALANCE],
+        true => &[
+            (PROOF, Need::Proof),
+            (("sides", "oracles"), Need::Oracles),
+            (("p4est", "balance"), Need::P4est),
+        ],
         false => &[],
     }
 }

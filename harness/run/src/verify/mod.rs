@@ -1,17 +1,14 @@
 //! `harness verify`: meshes every case with the reference and with the mesher on every layout, and checks the meshes.
 //!
-//! [`options`] are the user's choices, [`needs`] records what is missing on this machine, [`case`] verifies one case
+//! [`options`] are the user's choices and what is missing on this machine, [`case`] verifies one case
 //! with a module per family of checks, and [`report`] is the result.
 
-mod balance;
 pub mod case;
-mod needs;
+mod meshes;
 pub mod options;
-mod oracles;
+mod others;
 mod ranks;
 pub mod report;
-mod run;
-mod serial;
 mod workplace;
 
 use crate::engine::description;
@@ -21,9 +18,8 @@ use crate::progress::Progress;
 use case::CaseRun;
 use contract::catalogue::Selected;
 use contract::failure::Failure;
-use needs::Needs;
-use options::Options;
-use report::{Asked, CaseReport, Check, Outcome, Report};
+use options::{Needs, Options};
+use report::{Asked, CaseReport, Report};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Instant;
@@ -65,7 +61,10 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
             cases: selected.iter().map(|case| case.name.clone()).collect(),
             named: !options.cases.is_empty(),
             ranks: options.rank_counts(engine),
-            subjects: case::steps(engine).iter().map(|(subject, _)| (*subject).into()).collect(),
+            subjects: case::steps(engine)
+                .iter()
+                .map(|((subject, _), _)| (*subject).into())
+                .collect(),
         },
         missing: needs.missing(options, engine, &cases, interrupted),
         cases,
@@ -110,7 +109,7 @@ impl Verification<'_> {
         let start = Instant::now();
         if let Some(why) = &selected.absent {
             let mut run = CaseRun::new(self, selected, PathBuf::new(), Path::new(""));
-            run.add(Check::new("case", needs::GEOMETRY, Outcome::left_out(why)), None);
+            run.leave_out(("case", options::GEOMETRY), why);
             run.leave_out_rest();
             return Ok(run.report);
         }

@@ -1,11 +1,18 @@
-//! The options of a verification.
+//! The options of a verification, and the prerequisites, each tried once before the first case.
 
+use super::report::{CaseReport, Missing};
 use crate::engine::description::Description;
+use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
+use crate::engine::programs::Programs;
+use crate::engine::service::Services;
+use crate::proof;
+use crate::python::{ORACLES, start};
 use check::promises::Independence;
 use clap::{Args, Parser};
 use contract::catalogue::Size;
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -117,7 +124,7 @@ impl Options {
     /// Rank counts of the runs on MPI, each once: a run has one directory. They are those that were asked for, or all of which the
     /// engine is capable.
     pub(super) fn rank_counts(&self, engine: &Description) -> Vec<usize> {
-        if self.no_mpi || (self.ranks.is_none() && engine.run.parallel.is_none()) {
+        if self.no_mpi || (self.ranks.is_none() && engine.run.parallel.is_empty()) {
             return Vec::new();
         }
         let counts: BTreeSet<usize> =
@@ -134,8 +141,8 @@ impl Options {
             true => values.iter().cloned().map(Some).collect(),
             false => vec![None],
         };
-        let partitioners = varied(templates.partitioner.is_some(), &self.partitioners);
-        let level_bases = varied(templates.level_base.is_some(), &self.level_bases);
+        let partitioners = varied(!templates.partitioner.is_empty(), &self.partitioners);
+        let level_bases = varied(!templates.level_base.is_empty(), &self.level_bases);
         let mut layouts = Vec::new();
         for ranks in self.rank_counts(engine).into_iter().map(Ranks::Mpi) {
             for partitioner in &partitioners {
@@ -147,5 +154,114 @@ impl Options {
             }
         }
         layouts
+    }
+}
+
+/// Name of the check of a case whose geometry is absent.
+pub(super) const GEOMETRY: &str = "geometry";
+
+/// The programs that stay for the whole verification, and why others are not used.
+#[derive(Debug, Default)]
+pub(super) struct Needs {
+    pub services: Services,
+    /// Why something is not used.
+    absent: BTreeMap<Need, String>,
+    /// Oracles that gave no answer.
+    silent: RefCell<Vec<Failure>>,
+}
+
+impl Needs {
+    /// Tries the prerequisites of these options, and starts what stays while the first case is meshed serially.
+    pub fn probe(options: &Options, programs: &Programs) -> Self {
+        let (engine, paths) = (programs.engine.description(), &programs.paths);
+        let unused = (!engine.promises.definition)
+            .then(|| format!("{} does not promise the definition", engine.name));
+        let p4est = (!paths.p4est.is_file())
+            .then(|| format!("{} is missing (ci/setup compiles it)", paths.p4est.display()));
+        let all = [
+            (Need::Mpi, options.no_mpi, None, programs.engine.lacks_mpi()),
+            (Need::Oracles, options.no_oracles, unused.clone(), None),
+            (Need::P4est, options.no_p4est, unused.clone(), p4est),
+            (Need::Proof, options.no_proof, unused, proof::lacks(&paths.proven_checker)),
+        ];
+        let why = |(need, is_declined, unused, missing): (Need, bool, Option<_>, Option<_>)| {
+            let declined = is_declined.then(|| format!("--no-{need} was given"));
+            Some((need, unused.or(declined).or(missing)?))
+        };
+        let absent = all.into_iter().filter_map(why).collect();
+        let needs = Self { absent, ..Self::default() };
+        if needs.lacks(Need::Mpi).is_none() {
+            let counts = options.rank_counts(engine).into_iter();
+            counts.for_each(|ranks| programs.engine.start_ranks(ranks, &needs.services));
+        }
+        if needs.lacks(Need::Oracles).is_none() {
+            // Their packages take seconds to import. Those that cannot be started are found when they are asked.
+            ORACLES.iter().for_each(|of| drop(start(of, &needs.services, paths)));
+        }
+        needs
+    }
+
+    /// Why something is not used, if it is not.
+    pub fn lacks(&self, need: Need) -> Option<&str> {
+        self.absent.get(&need).map(String::as_str)
+    }
+
+    /// Notes that an oracle gave no answer.
+    pub fn note_silent(&self, failure: &Failure) {
+        self.silent.borrow_mut().push(failure.clone());
+    }
+
+    /// Why an oracle cannot be asked: it is missing, or has hung, which costs the whole time limit.
+    pub fn lacks_oracle(&self, oracle: &str) -> Option<Failure> {
+        let is_gone = |failure: &&Failure| {
+            failure.program == oracle
+                && matches!(failure.end, End::Missing(_) | End::TimedOut { .. })
+        };
+        self.silent.borrow().iter().find(is_gone).cloned()
+    }
+
+    /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.
+    pub fn missing(
+        self,
+        options: &Options,
+        engine: &Description,
+        cases: &[CaseReport],
+        interrupted: bool,
+    ) -> Vec<Missing> {
+        let Self { mut absent, silent, .. } = self;
+        // The vote needs all oracles, so one that is missing, or gave no answer on a case, counts as all.
+        if let Some(failure) = silent.into_inner().first() {
+            absent.entry(Need::Oracles).or_insert(failure.to_string());
+        }
+        let lacks_geometry = |case: &&CaseReport| case.checks.iter().any(|c| c.name == GEOMETRY);
+        let geometries = cases.iter().filter(lacks_geometry).count();
+        if geometries > 0 {
+            let fix = "ci/setup --geometries fetches those that can be fetched";
+            absent.insert(Need::Geometries, format!("{geometries} geometries are missing ({fix})"));
+        }
+        // That an interrupt left the last ones without checks is no news.
+        let unchecked =
+            |case: &&CaseReport| !interrupted && !case.is_checked() && case.input_error.is_none();
+        let unchecked: Vec<&str> = cases.iter().filter(unchecked).map(|case| &*case.name).collect();
+        if !unchecked.is_empty() {
+            absent.insert(Need::Checks, format!("no check was run on {}", unchecked.join(", ")));
+        }
+        let of_definition = engine.promises.definition.then_some(false);
+        let (ranks, parallel) = (options.ranks.is_some(), !engine.run.parallel.is_empty());
+        let of_ranks = engine.promises.is_independent_of(Independence::Ranks) && parallel;
+        let of_ranks = (ranks || parallel).then_some(!options.no_mpi && (ranks || of_ranks));
+        let nothing = unchecked.len() == cases.len() || !options.cases.is_empty();
+        // Without `--require`, whether it is required; `None` if the engine has no use of it.
+        let required = |need| match need {
+            Need::Mpi => of_ranks,
+            Need::Oracles | Need::P4est | Need::Proof => of_definition,
+            Need::Geometries => Some(false),
+            Need::Checks => Some(nothing),
+        };
+        let missing = absent.into_iter().filter_map(|(need, why)| {
+            let required = if options.require.contains(&need) { true } else { required(need)? };
+            Some(Missing { what: need.to_string(), why, required })
+        });
+        missing.collect()
     }
 }

@@ -2,14 +2,16 @@
 //! that keeps the engine's other promises.
 
 use super::case::CaseRun;
+use super::meshes::MESHER;
+use super::options::Need;
 use super::report::{Check, Outcome, RUNS};
-use super::run::{MESHER, Makes};
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::Layout;
 use check::checks::{self, CheckResult, Subject, identical, manifest};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::leafset::LeafSet;
+use contract::manifest::Tree;
 use std::fs;
 
 /// What remains unknown about the ranks of an engine that does not report their number.
@@ -21,9 +23,9 @@ const HANGS_MAX: usize = 3;
 impl CaseRun<'_> {
     /// Runs every layout on MPI and checks its mesh.
     pub(super) fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
-        match &self.all.needs.mpi {
+        match self.all.needs.lacks(Need::Mpi) {
             Some(why) if self.all.options.no_mpi => {
-                self.add(Check::new("ranks", RUNS, Outcome::left_out(why)), None);
+                self.leave_out(("ranks", RUNS), why);
             }
             Some(why) => self.leave_out_ranks(why),
             None => self.verify_layouts(case, serial),
@@ -69,15 +71,15 @@ impl CaseRun<'_> {
         let choices = [&layout.partitioner, &layout.level_base].into_iter().flatten();
         let name = choices
             .fold(format!("ranks-{}", layout.ranks.count()), |name, of| format!("{name}-{of}"));
-        let meshed = self.run(&self.file, &name, MESHER, Makes::Mesh, layout)?;
+        let meshed = self.mesh(&self.file, &name, MESHER, Tree::Final, layout)?;
         self.report.runs.push(meshed.run);
         let mut check = Check::of_layout(layout, RUNS, Outcome::held(2));
         let is_first = self.report.checks.iter().all(|check| check.ranks.is_none());
-        if is_first && meshed.report.ranks.is_none() {
+        if is_first && meshed.ranks.is_none() {
             check.notes.push(DOUBT.to_owned());
         }
         self.add(check, Some(layout));
-        let Some(mesh) = meshed.mesh else { return Ok(()) };
+        let mesh = meshed.mesh;
         let results = match self.promises().is_independent_of(Independence::Ranks) {
             false => self.promised(case, &mesh),
             true => {
@@ -89,7 +91,7 @@ impl CaseRun<'_> {
         self.add_results(&subject, Some(layout), results);
         if holds && !self.all.options.keep {
             // The mesh of the serial run remains.
-            let _ = fs::remove_dir_all(meshed.place);
+            let _ = fs::remove_dir_all(self.place.join(name));
         }
         Ok(())
     }

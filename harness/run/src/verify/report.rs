@@ -11,7 +11,7 @@
 
 use crate::engine::layout::Layout;
 pub use check::checks::Outcome;
-use check::checks::{identical, manifest};
+use check::checks::{CheckResult, identical, manifest};
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INPUT, EXIT_INTERRUPTED, EXIT_MISSING};
 use serde::{Deserialize, Serialize};
 
@@ -93,6 +93,15 @@ impl Check {
             notes: Vec::new(),
             figures: None,
             findings: 0,
+        }
+    }
+
+    /// The result of a check of the crate `check`.
+    pub(super) fn of_result(subject: &str, result: CheckResult) -> Self {
+        Self {
+            findings: result.findings_total,
+            figures: Some(result.note.clone()).filter(|note| !note.is_empty()),
+            ..Self::new(subject, result.name, result.outcome())
         }
     }
 

@@ -106,7 +106,7 @@ proptest! {
 }
 
 #[test]
-#[should_panic(expected = "brick 0x1 must precede brick 0x3")]
+#[should_panic(expected = "brick 0x1 must follow brick 0x3")]
 fn keys_out_of_order_are_found() {
     let mut s = set(&[64, 3 * 64]);
     s.low.swap(0, 1);
@@ -122,7 +122,7 @@ fn an_empty_brick_is_found() {
 }
 
 #[test]
-#[should_panic(expected = "run 0x0 must have a brick")]
+#[should_panic(expected = "each run must have a brick")]
 fn an_empty_run_is_found() {
     let mut s = set(&[64, 64 << LOW_BITS]);
     s.runs[1].start = 0;

@@ -38,8 +38,29 @@ fn span(bits: u32) -> Range<usize> {
 }
 
 impl Tile {
+    /// Adds the octants within `radius` of a source to `out`, or their parents if `to_parents`, tile by tile. Returns the work done.
+    pub fn pass(
+        &mut self,
+        sources: impl Iterator<Item = Brick>,
+        radius: u32,
+        to_parents: bool,
+        out: &mut Gathered,
+    ) -> Words {
+        self.set_radius(radius as usize);
+        let (mut words, mut now) = (0, None);
+        for b in sources {
+            let key = b.key >> (3 * TILE_BRICKS_LOG2);
+            if let Some(done) = now.filter(|n| *n != key) {
+                words += self.dilate(done, to_parents, out);
+            }
+            now = Some(key);
+            self.put(b);
+        }
+        words + now.map_or(0, |done| self.dilate(done, to_parents, out))
+    }
+
     /// Sets the radius of an empty tile.
-    pub fn set_radius(&mut self, radius: usize) {
+    fn set_radius(&mut self, radius: usize) {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
         self.radius = radius;
         self.margin = radius.next_multiple_of(8);
@@ -68,7 +89,7 @@ impl Tile {
     }
 
     /// Adds a source brick, which must not be empty.
-    pub fn put(&mut self, b: Brick) {
+    fn put(&mut self, b: Brick) {
         let [x, y, z] =
             position(b.key & ((1 << (3 * TILE_BRICKS_LOG2)) - 1)).map(|p| 4 * p as usize);
         let rows = brick::to_rows(b.bits);
@@ -88,12 +109,19 @@ impl Tile {
         }
     }
 
-    /// Dilates the sources along x, then y, then z.
-    pub fn dilate(&mut self, words: &mut Words) {
-        *words += self.along_y().map(|(_, y)| y.len() as u64).sum::<u64>();
+    /// Dilates the sources along x, then y, then z, adds the result, or its parents, to `out`, and empties the tile.
+    fn dilate(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) -> Words {
+        let words = self.along_y().map(|(_, y)| y.len() as u64).sum();
         if self.radius > 0 {
             dilate_rows(self);
         }
+        flush_blocks(self, tile, to_parents, out);
+        let [along_y, along_z] = self.reached();
+        for z in along_z {
+            self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
+        }
+        (self.layers, self.columns, self.columns_at) = (0, 0, [0; TILE]);
+        words
     }
 
     #[inline(always)]
@@ -119,16 +147,6 @@ impl Tile {
             }
         }
         (self.rows, self.spread) = (rows, spread);
-    }
-
-    /// Adds the result, or its parents, to `out` and empties the tile.
-    pub fn flush(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) {
-        flush_blocks(self, tile, to_parents, out);
-        let [along_y, along_z] = self.reached();
-        for z in along_z {
-            self.rows[z * self.side..(z + 1) * self.side][along_y.clone()].fill(0);
-        }
-        (self.layers, self.columns, self.columns_at) = (0, 0, [0; TILE]);
     }
 
     #[inline(always)]

@@ -5,6 +5,7 @@
 
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, Source};
+use serde_json::json;
 use std::time::Instant;
 
 /// Message sizes, in bytes.
@@ -17,37 +18,32 @@ fn main() {
         eprintln!("pingpong: start it on two ranks");
         std::process::exit(2);
     }
-    let times: Vec<(usize, f64)> =
-        SIZES.iter().map(|&bytes| (bytes, one_way_s(&world, bytes))).collect();
+    if world.rank() > 1 {
+        return;
+    }
+    let points = SIZES.map(|bytes| json!({"bytes": bytes, "time_s": one_way_s(&world, bytes)}));
     if world.rank() == 0 {
-        let points: Vec<String> = times
-            .iter()
-            .map(|(bytes, time_s)| format!(r#"{{"bytes": {bytes}, "time_s": {time_s:e}}}"#))
-            .collect();
-        println!(r#"{{"schema": "octree-pingpong/1", "points": [{}]}}"#, points.join(", "));
+        println!("{}", json!({"schema": "octree-pingpong/1", "points": points}));
     }
 }
 
-/// Half the time of a round trip between ranks 0 and 1, in seconds: the median over many. Other ranks return 0.
+/// Half the time of a round trip between ranks 0 and 1, in seconds: the median over many.
 fn one_way_s(world: &SimpleCommunicator, bytes: usize) -> f64 {
     let rounds = if bytes > 1 << 18 { 30 } else { 1000 };
     let mut buffer = vec![1u8; bytes];
-    let mut times = Vec::with_capacity(rounds);
-    for _ in 0..rounds {
+    let other = world.process_at_rank(1 - world.rank());
+    let round = |_| {
         let start = Instant::now();
-        match world.rank() {
-            0 => {
-                world.process_at_rank(1).send(&buffer[..]);
-                world.process_at_rank(1).receive_into(&mut buffer[..]);
-            }
-            1 => {
-                world.process_at_rank(0).receive_into(&mut buffer[..]);
-                world.process_at_rank(0).send(&buffer[..]);
-            }
-            _ => {}
+        if world.rank() == 0 {
+            other.send(&buffer[..]);
         }
-        times.push(start.elapsed().as_secs_f64() * 0.5);
-    }
+        other.receive_into(&mut buffer[..]);
+        if world.rank() == 1 {
+            other.send(&buffer[..]);
+        }
+        start.elapsed().as_secs_f64() * 0.5
+    };
+    let mut times: Vec<f64> = (0..rounds).map(round).collect();
     times.sort_by(f64::total_cmp);
     times[rounds / 2]
 }

@@ -205,7 +205,18 @@ fn a_rank_that_keeps_the_others_waiting_is_named() {
                 assert!(is_named && finished.stderr.contains("in phase "), "{point}: {finished:?}");
             }
         }
-        assert_all_or_nothing(&workspace, &["case.toml"], &finished);
+        if workspace.path().join("mesh/mesh.json").exists() {
+            assert_all_or_nothing(&workspace, &["case.toml"], &finished);
+            continue;
+        }
+        // The rank that ends the job removes the claim and the files of rank 0, and its own; which one it is, the launcher does not always
+        // print. The launcher kills others that have not ended within a second, which a busy disk can take to remove a file: what is left
+        // of them is no mesh without its manifest.
+        let left = left(&workspace, &["case.toml", "mesh"]);
+        let of_others = ["mesh/leaves-00001.npy", "mesh/leaves-00002.npy"];
+        let is_of_others =
+            |name: &String| of_others.contains(&name.strip_suffix(".draft").unwrap_or(name));
+        assert!(left.iter().all(is_of_others), "{left:?} of {point}: {finished:?}");
     }
 }
 

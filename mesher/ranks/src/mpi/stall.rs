@@ -61,18 +61,14 @@ impl Watch {
 
     /// Answers questions, and asks when the limit is exceeded. Again and again during a call.
     pub fn poll(&self) {
-        while let Some((message, status)) =
-            self.side.any_process().immediate_matched_probe_with_tag(QUESTION)
-        {
-            let _ = message.matched_receive::<u64>();
-            self.side.process_at_rank(status.source_rank()).send_with_tag(&0u64, ANSWER);
-        }
         let mut answered = self.answered.borrow_mut();
-        while let Some((message, status)) =
-            self.side.any_process().immediate_matched_probe_with_tag(ANSWER)
-        {
+        while let Some((message, status)) = self.side.any_process().immediate_matched_probe() {
             let _ = message.matched_receive::<u64>();
-            answered.iter_mut().for_each(|ranks| _ = ranks.insert(status.source_rank()));
+            let from = status.source_rank();
+            match status.tag() {
+                QUESTION => self.side.process_at_rank(from).send_with_tag(&0u64, ANSWER),
+                _ => answered.iter_mut().for_each(|ranks| _ = ranks.insert(from)),
+            }
         }
         let waited = self.since.get().elapsed();
         // A rank that waits answers when the machine runs it.

@@ -1,6 +1,6 @@
 //! The state that simulated ranks share: who may run, and the messages of the current call.
 
-use super::schedule::Schedule;
+use super::schedule::{Arrival, Schedule};
 use crate::{Gathered, MessageBuffer};
 use std::sync::{Mutex, MutexGuard};
 
@@ -21,25 +21,22 @@ pub enum Next {
     Stop,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum RankState {
-    Ready,
-    Waiting,
+/// What a rank does.
+enum Rank {
+    /// It can run, with the result of its last call unless it has taken it.
+    Ready(Option<Gathered>),
+    /// It waits for the others to make the same call.
+    Waiting(Post),
     Done,
 }
 
 struct State {
-    ranks: Vec<RankState>,
-    /// The contribution of each rank to the current call.
-    posted: Vec<Option<Post>>,
-    /// The result of the current call for each rank.
-    results: Vec<Option<Gathered>>,
+    ranks: Vec<Rank>,
     schedule: Box<dyn Schedule>,
-    /// Scratch: the ranks that can run.
-    ready: Vec<usize>,
     broken: bool,
 }
 
+/// The contribution of a rank to a call.
 struct Post {
     /// The number of the call.
     number: u64,
@@ -67,14 +64,8 @@ impl World {
     /// If there are no ranks.
     pub fn new(size: usize, schedule: impl Schedule + 'static) -> Self {
         assert!(size > 0, "a group has at least one rank");
-        let state = Mutex::new(State {
-            ranks: vec![RankState::Ready; size],
-            posted: (0..size).map(|_| None).collect(),
-            results: (0..size).map(|_| None).collect(),
-            schedule: Box::new(schedule),
-            ready: Vec::with_capacity(size),
-            broken: false,
-        });
+        let ranks = (0..size).map(|_| Rank::Ready(None)).collect();
+        let state = Mutex::new(State { ranks, schedule: Box::new(schedule), broken: false });
         Self { size, state }
     }
 
@@ -86,13 +77,13 @@ impl World {
     /// Chooses the next rank to run.
     pub fn next(&self) -> Next {
         let state = &mut *self.lock();
-        state.ready.clear();
-        state.ready.extend((0..self.size).filter(|&r| state.ranks[r] == RankState::Ready));
+        let is_ready = |rank: &usize| matches!(state.ranks[*rank], Rank::Ready(_));
+        let ready: Vec<usize> = (0..self.size).filter(is_ready).collect();
         if state.broken {
             Next::Stop
-        } else if !state.ready.is_empty() {
-            Next::Run(state.ready[state.schedule.next(&state.ready)])
-        } else if state.ranks.contains(&RankState::Waiting) {
+        } else if !ready.is_empty() {
+            Next::Run(ready[state.schedule.next(&ready)])
+        } else if state.ranks.iter().any(|rank| matches!(rank, Rank::Waiting(_))) {
             state.broken = true;
             Next::Stop
         } else {
@@ -103,21 +94,24 @@ impl World {
     /// Notes that a rank has ended, normally or by a panic.
     pub fn end(&self, rank: usize, has_panicked: bool) {
         let mut state = self.lock();
-        state.ranks[rank] = RankState::Done;
+        state.ranks[rank] = Rank::Done;
         state.broken |= has_panicked;
     }
 
     /// A rank's contribution to its next call, which completes the call if it is the last one.
     pub(super) fn post(&self, rank: usize, number: u64, call: Call, words: MessageBuffer) {
         let mut state = self.lock();
-        state.posted[rank] = Some(Post { number, call, words });
-        state.ranks[rank] = RankState::Waiting;
+        state.ranks[rank] = Rank::Waiting(Post { number, call, words });
         state.deliver();
     }
 
     /// The result of a completed call for a rank.
     pub(super) fn result(&self, rank: usize) -> Gathered {
-        self.lock().results[rank].take().expect("a completed call has a result for every rank")
+        let result = match &mut self.lock().ranks[rank] {
+            Rank::Ready(result) => result.take(),
+            _ => None,
+        };
+        result.expect("a completed call has a result for every rank")
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -129,51 +123,46 @@ impl World {
 impl State {
     /// Completes the current call once all ranks have contributed.
     fn deliver(&mut self) {
-        if !self.posted.iter().all(Option::is_some) {
+        let posts = self.ranks.iter().map(|rank| match rank {
+            Rank::Waiting(post) => Some(post),
+            _ => None,
+        });
+        let Some(posts) = posts.collect::<Option<Vec<&Post>>>() else {
             return;
-        }
-        let posts: Vec<Post> = self.posted.iter_mut().filter_map(Option::take).collect();
+        };
         let call = posts[0].call;
         assert!(posts.iter().all(|p| (p.number, p.call) == (posts[0].number, call)), "{UNEQUAL}");
         let words = || posts.iter().map(|post| post.words.words());
-        let by_all = |words: MessageBuffer| vec![Some(Gathered::new(words)); posts.len()];
-        self.results = match call {
+        let by_all = |words: MessageBuffer| vec![Gathered::new(words); posts.len()];
+        let results = match call {
             Call::Gather => by_all(
                 words().enumerate().map(|(rank, words)| (rank, words.iter().copied())).collect(),
             ),
             Call::Sum => by_all([(0, sums(words()))].into_iter().collect()),
-            Call::Send => {
-                self.delivered(&posts).into_iter().map(|m| Some(Gathered::new(m))).collect()
-            }
+            Call::Send => delivered(&posts, &mut *self.schedule),
         };
-        self.ranks.iter_mut().for_each(|d| *d = RankState::Ready);
+        self.ranks = results.into_iter().map(|result| Rank::Ready(Some(result))).collect();
     }
+}
 
-    /// Messages by receiver, in an order that the schedule chooses, from those by sender.
-    fn delivered(&mut self, sent: &[Post]) -> Vec<MessageBuffer> {
-        let mut by_receiver: Vec<Vec<(usize, &[u64])>> = vec![Vec::new(); sent.len()];
-        for (from, post) in sent.iter().enumerate() {
-            for (to, words) in post.words.messages() {
-                assert!(
-                    by_receiver[to].last().is_none_or(|l| l.0 != from),
-                    "at most one message to a receiver"
-                );
-                by_receiver[to].push((from, words));
-            }
+/// Messages by receiver, in an order that the schedule chooses, from those by sender.
+fn delivered(sent: &[&Post], schedule: &mut dyn Schedule) -> Vec<Gathered> {
+    let mut by_receiver: Vec<Vec<Arrival>> = vec![Vec::new(); sent.len()];
+    for (from, post) in sent.iter().enumerate() {
+        for (to, words) in post.words.messages() {
+            let is_first = by_receiver[to].last().is_none_or(|l| l.0 != from);
+            assert!(is_first, "at most one message to a receiver");
+            by_receiver[to].push((from, words));
         }
-        for (receiver, messages) in by_receiver.iter_mut().enumerate() {
-            self.schedule.arrange(receiver, messages);
-        }
-        let copied = |messages: Vec<(usize, &[u64])>| {
-            let mut message_buffer =
-                MessageBuffer::with_capacity(messages.iter().map(|l| l.1.len()).sum());
-            messages
-                .iter()
-                .for_each(|(from, words)| message_buffer.write(*from, words.iter().copied()));
-            message_buffer
-        };
-        by_receiver.into_iter().map(copied).collect()
     }
+    let arrived = |(receiver, mut messages): (usize, Vec<Arrival>)| {
+        schedule.arrange(receiver, &mut messages);
+        let words = messages.iter().map(|message| message.1.len()).sum();
+        let mut buffer = MessageBuffer::with_capacity(words);
+        messages.iter().for_each(|(from, words)| buffer.write(*from, words.iter().copied()));
+        Gathered::new(buffer)
+    };
+    by_receiver.into_iter().enumerate().map(arrived).collect()
 }
 
 /// The sums of equally many words of each rank.

@@ -112,7 +112,8 @@ fn places_within_the_band_are_not_judged() {
 
 #[test]
 fn a_leaf_coarser_than_the_surface_level_is_judged_by_its_parts_beyond_the_band() {
-    let case = Case { level_surface: 5, ..tetrahedron(4, "[]") };
+    let mut case = tetrahedron(4, "[]");
+    case.rules.level_surface = 5;
     let (geometry, none) = (Geometry::of(&case), Tree::default());
     let Geometry { facets, .. } = &geometry;
     let survey = geometry.survey(&none, 1.0);
@@ -195,7 +196,8 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
 #[test]
 fn crossed_leaves_are_kept_or_deleted_as_the_case_says_unless_the_band_hides_them() {
     for keep_crossing in [true, false] {
-        let case = Case { keep_crossing, ..tetrahedron(4, "[]") };
+        let mut case = tetrahedron(4, "[]");
+        case.rules.keep_crossing = keep_crossing;
         let (geometry, none) = (Geometry::of(&case), Tree::default());
         let is_crossing = |w: &u64| w & 3 == Side::Crossing as u64;
         let kept = |w: &u64| is_crossing(w) && keep_crossing || w & 3 == Side::Inside as u64;

@@ -73,7 +73,7 @@ fn regions_that_no_face_connects_can_be_left_out() {
     let words: Vec<u64> = words.into_iter().filter(|&w| word::octant(w).corner != [0; 3]).collect();
     let (dir, mesh) = on_disk(&leaf_set(vec![words]));
     let mut options = options();
-    for (regions, cells) in [(options::Regions::All, 64), (options::Regions::Largest, 1)] {
+    for (regions, cells) in [(Regions::All, 64), (Regions::Largest, 1)] {
         options.regions = regions;
         let target = dir.path().join(format!("{cells}/constant/polyMesh"));
         let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();

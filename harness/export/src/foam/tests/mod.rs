@@ -8,20 +8,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use contract::case::Case;
-use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use contract::octant::{LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_with_sides};
-use contract::word::{self, Side};
 use proptest::prelude::*;
 
 use super::*;
-use crate::leaves::CUT;
-use crate::leaves::{Around, Point};
-use crate::mesh::Mesh as OnDisk;
+use crate::leaves::{Around, CUT, Square};
 use crate::options::Label;
-use crate::squares::{Square, squares};
 pub use crate::testing::options;
+use contract::mesh::Mesh as OnDisk;
 
 /// Faces with their points, and the cells on both sides of each.
 #[derive(Debug, Default)]
@@ -86,15 +82,8 @@ pub fn mesh_of<'a>(
     is_cut: impl Fn(u64) -> bool,
     options: &'a Options<'a>,
 ) -> Mesh<'a> {
-    let root = Root { origin: [0.0; 3], edge: 1.0 };
     let patches = Patches::new(None, true).unwrap();
-    build(leaves_of(words, is_cut), Mesh::empty(patches, None, root, options)).unwrap()
-}
-
-impl Mesh<'_> {
-    fn all_points(&self) -> Vec<Point> {
-        (0..self.points.count()).map(|number| self.points.at(number)).collect()
-    }
+    Mesh::new(leaves_of(words, is_cut), None, patches, options).unwrap()
 }
 
 impl Leaves {
@@ -116,7 +105,7 @@ fn complex_of(words: &[u64]) -> Complex {
     let vertices = |face| mesh.faces.vertices(face).iter().map(|&v| v as usize).collect();
     let indices = |cells: &[u32]| cells.iter().map(|&cell| cell as usize).collect();
     Complex {
-        points: mesh.all_points().into_iter().map(|p| p.map(f64::from)).collect(),
+        points: mesh.points.all.iter().map(|p| p.map(f64::from)).collect(),
         faces: (0..mesh.faces.count()).map(vertices).collect(),
         owner: indices(&mesh.faces.owner),
         neighbour: indices(&mesh.faces.neighbour),

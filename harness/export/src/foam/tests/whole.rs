@@ -27,9 +27,9 @@ proptest! {
             let edge = around.octant.edge();
             let corner = |digit: u32| std::array::from_fn(|a| around.octant.corner[a] + edge * (digit >> a & 1));
             expected.extend((0..8).map(corner));
-            expected.extend(squares.iter().flat_map(Square::corners));
+            expected.extend(squares.iter().flat_map(|square| square.corners(true)));
         });
-        let points = mesh.all_points();
+        let points = mesh.points.all;
         assert_sorted(&points);
         prop_assert_eq!(points.into_iter().collect::<BTreeSet<_>>(), expected);
     }
@@ -59,11 +59,9 @@ proptest! {
         let Some(&largest) = expected.values().max() else { return Ok(()) };
         // The one that has the first cell, of several that are as large.
         let region = sets[(0..cells).find(|&cell| size_of(cell) == largest).unwrap()];
-        options.regions = options::Regions::Largest;
-        let root = Root { origin: [0.0; 3], edge: 1.0 };
+        options.regions = Regions::Largest;
         let ranks = Some((0..cells as u32).map(|cell| cell % 7).collect());
-        let whole = Mesh::empty(Patches::new(None, true).unwrap(), ranks, root, &options);
-        let mesh = build(leaves, whole).unwrap();
+        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true).unwrap(), &options).unwrap();
         prop_assert_eq!(mesh.regions, expected.len());
         prop_assert_eq!(u64::from(mesh.leaves.count()), largest.1);
         // Its cells keep their ranks.

@@ -1,0 +1,158 @@
+//! Spheres, and the torus. A geodesic sphere is an icosahedron with evenly divided edges, projected
+//! onto the sphere.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use super::pitch_finest;
+use crate::{Generator, GeneratorError, Mesh};
+
+/// A sphere about the origin.
+pub(super) fn sphere(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let radius = of.dimension("radius", of.radius, 0.5)?;
+    Ok(geodesic(radius, of.facets))
+}
+
+/// A shell. The normals of the inner sphere point to the centre, because the core is outside the
+/// shell.
+pub(super) fn nested_spheres(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let radius = of.dimension("radius", of.radius, 0.5)?;
+    let radius_inner = of.dimension("radius_inner", of.radius_inner, radius * 0.5)?;
+    if radius_inner >= radius {
+        let (value, requirement) = (radius_inner, format!("must be less than radius = {radius}"));
+        return Err(GeneratorError::InvalidDimension { key: "radius_inner", value, requirement });
+    }
+    // Facets have about the same size on both spheres.
+    let (outer, inner) = (radius * radius, radius_inner * radius_inner);
+    let facets_inner = ((of.facets as f64 * (inner / (outer + inner))) as usize).max(20);
+    let mut inside = geodesic(radius_inner, facets_inner);
+    inside.flip();
+    let mut mesh = geodesic(radius, of.facets - inside.triangles.len());
+    mesh.append(&inside);
+    Ok(mesh)
+}
+
+/// A torus about the origin: a ring around the z axis.
+pub(super) fn torus(of: &Generator) -> Result<Mesh, GeneratorError> {
+    let radius = of.dimension("radius", of.radius, 0.5)?;
+    let radius_tube = of.dimension("radius_tube", of.radius_tube, radius * 0.2)?;
+    if radius_tube >= radius {
+        let (value, requirement) = (radius_tube, format!("must be less than radius = {radius}"));
+        return Err(GeneratorError::InvalidDimension { key: "radius_tube", value, requirement });
+    }
+    let around = |radius: f64, pitch: f64| ((TAU * radius / pitch) as usize).max(3);
+    let divisions = |pitch| (around(radius, pitch), around(radius_tube, pitch));
+    let pitch = pitch_finest(TAU * radius, of.facets, |pitch| {
+        let (ring, tube) = divisions(pitch);
+        2 * ring * tube
+    });
+    let (ring, tube) = divisions(pitch);
+    let mut mesh = Mesh::default();
+    for i in 0..ring {
+        let (sin, cos) = libm::sincos(TAU * i as f64 / ring as f64);
+        for j in 0..tube {
+            let (up, out) = libm::sincos(TAU * j as f64 / tube as f64);
+            let reach = radius + radius_tube * out;
+            mesh.add_vertex([reach * cos, reach * sin, radius_tube * up]);
+        }
+    }
+    let index = |i: usize, j: usize| ((i % ring) * tube + j % tube) as u32;
+    for i in 0..ring {
+        for j in 0..tube {
+            mesh.add_quad([index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)]);
+        }
+    }
+    Ok(mesh)
+}
+
+/// The finest geodesic sphere of at most `facets` facets. A sphere of frequency f has 20 f^2
+/// facets.
+pub(super) fn geodesic(radius: f64, facets: usize) -> Mesh {
+    let frequency = (facets / 20).isqrt().max(1);
+    let mut drawing = Drawing { radius, frequency, mesh: Mesh::default(), indices: HashMap::new() };
+    for corners in ICOSAHEDRON {
+        drawing.face(corners);
+    }
+    drawing.mesh
+}
+
+/// Facets of the icosahedron, counter-clockwise as seen from outside.
+const ICOSAHEDRON: [[usize; 3]; 20] = [
+    [0, 11, 5],
+    [0, 5, 1],
+    [0, 1, 7],
+    [0, 7, 10],
+    [0, 10, 11],
+    [1, 5, 9],
+    [5, 11, 4],
+    [11, 10, 2],
+    [10, 7, 6],
+    [7, 1, 8],
+    [3, 9, 4],
+    [3, 4, 2],
+    [3, 2, 6],
+    [3, 6, 8],
+    [3, 8, 9],
+    [4, 9, 5],
+    [2, 4, 11],
+    [6, 2, 10],
+    [8, 6, 7],
+    [9, 8, 1],
+];
+
+/// Corner `i` of the icosahedron, not normalised: the cyclic permutations of (0, 1, golden ratio).
+fn corner(i: usize) -> [f64; 3] {
+    let golden = (1.0 + 5.0_f64.sqrt()) * 0.5;
+    let first = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
+    let second = if i % 4 < 2 { golden } else { -golden };
+    match i / 4 {
+        0 => [first, second, 0.0],
+        1 => [0.0, first, second],
+        _ => [second, 0.0, first],
+    }
+}
+
+struct Drawing {
+    radius: f64,
+    frequency: usize,
+    mesh: Mesh,
+    /// Vertex indices by barycentric coordinates (corner, weight), which are the same for all
+    /// facets.
+    indices: HashMap<[(usize, usize); 3], u32>,
+}
+
+impl Drawing {
+    fn face(&mut self, corners: [usize; 3]) {
+        let f = self.frequency;
+        for j in 0..f {
+            for i in 0..f - j {
+                let mut vertex = |i: usize, j: usize| self.vertex(corners, [f - i - j, i, j]);
+                let (p, q, r) = (vertex(i, j), vertex(i + 1, j), vertex(i, j + 1));
+                let opposite = (i + j + 1 < f).then(|| vertex(i + 1, j + 1));
+                self.mesh.triangles.push([p, q, r]);
+                if let Some(s) = opposite {
+                    self.mesh.triangles.push([q, s, r]);
+                }
+            }
+        }
+    }
+
+    fn vertex(&mut self, corners: [usize; 3], weights: [usize; 3]) -> u32 {
+        let mut key =
+            [0, 1, 2].map(|c| if weights[c] == 0 { (0, 0) } else { (corners[c], weights[c]) });
+        key.sort_unstable();
+        if let Some(&index) = self.indices.get(&key) {
+            return index;
+        }
+        // The sum follows the order of the key, so the position does not depend on the facet.
+        let mut p = [0.0; 3];
+        for (c, weight) in key {
+            let q = corner(c);
+            p = std::array::from_fn(|a| p[a] + q[a] * weight as f64);
+        }
+        let scale = self.radius / (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        let index = self.mesh.add_vertex(p.map(|x| x * scale));
+        self.indices.insert(key, index);
+        index
+    }
+}

@@ -1,0 +1,281 @@
+//! Variants of a case with a different spacing or n, and the spacing that gives a requested number of cells. Their geometry is a
+//! binary STL file, so that all programs and ranks read the same bytes.
+//!
+//! Each level halves the edge length, so a given root offers only spacings that differ by factors of two. A variant therefore
+//! has its own root, between one and two times as large as the case's, whose edge at the surface level is
+//! exactly the requested spacing. Cell counts then follow the spacing smoothly, as weak scaling requires.
+//!
+//! The number of cells follows a power of the spacing, close to -2 if cells fill layers around a surface. Meshes become finer until one
+//! has at least half of the requested cells; an overshooting mesh would cost more than the requested one. A large mesh is then
+//! extrapolated. Small ones grow unevenly, as levels begin, so that one is searched between its neighbours.
+
+use contract::case::Case;
+use contract::failure::Failure;
+use contract::plain::PlainCase;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// A case to vary; its geometry is written once.
+#[derive(Clone, Debug)]
+pub struct Base {
+    /// The case's name.
+    pub name: String,
+    /// Edge length of the finest cell at the surface in the unchanged case.
+    pub spacing_min: f64,
+    /// n of the unchanged case.
+    pub layer_cells_min: u32,
+    table: Table,
+    origin: [f64; 3],
+    edge: f64,
+    directory: PathBuf,
+}
+
+impl Base {
+    /// Reads a case file; writes its geometry into `directory`.
+    ///
+    /// # Errors
+    /// If the case is invalid or the directory cannot be written.
+    pub fn read(path: &Path, directory: &Path) -> Result<Self, Failure> {
+        let case = Case::read(path)?;
+        let mut table = PlainCase::read(path)?.table;
+        let stl = directory.join(format!("{}.stl", case.name));
+        File::create(&stl)
+            .and_then(|file| geometries::write_stl_binary(&case.facets, BufWriter::new(file)))
+            .map_err(|error| Failure::at(&stl, error))?;
+        table.insert("geometry".into(), stl.to_string_lossy().into_owned().into());
+        Ok(Self {
+            name: case.name.clone(),
+            spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
+            layer_cells_min: case.layer_cells_min,
+            table,
+            origin: case.root.origin,
+            edge: case.root.edge,
+            directory: directory.to_owned(),
+        })
+    }
+
+    /// Returns an initial spacing that gives at most some thousand cells.
+    pub fn coarse(&self) -> f64 {
+        self.spacing_min.max(self.edge / 512.0)
+    }
+
+    /// Writes the case with this spacing and n; returns the path. In its own root, the finest cells are between once and twice as fine
+    /// as the spacing; else the root fits the spacing.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(
+        &self,
+        spacing_min: f64,
+        layer_cells_min: u32,
+        in_own_root: bool,
+    ) -> Result<PathBuf, Failure> {
+        let (origin, edge) = match in_own_root {
+            true => (self.origin, self.edge),
+            false => root(self.origin, self.edge, spacing_min),
+        };
+        let of_root = [("origin", Value::from(origin.to_vec())), ("edge", edge.into())];
+        let of_root: Table =
+            of_root.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
+        let mut table = self.table.clone();
+        table.insert("spacing_min".into(), spacing_min.into());
+        table.insert("layer_cells_min".into(), i64::from(layer_cells_min).into());
+        table.insert("root".into(), of_root.into());
+        let name = format!("{}-{spacing_min:e}-{layer_cells_min}-{edge:e}.toml", self.name);
+        let path = self.directory.join(name);
+        fs::write(&path, table.to_string()).map_err(|error| Failure::at(&path, error))?;
+        Ok(path)
+    }
+}
+
+/// Returns the smallest concentric root that is not smaller and has `spacing` as the edge of a level.
+fn root(origin: [f64; 3], edge: f64, spacing: f64) -> ([f64; 3], f64) {
+    let mut wider = spacing;
+    // Doubling is exact, so the edge equals the spacing bit by bit.
+    while wider < edge {
+        wider *= 2.0;
+    }
+    (origin.map(|o| o + edge * 0.5 - wider * 0.5), wider)
+}
+
+/// Tolerated relative deviation of the number of cells.
+const TOLERANCE: f64 = 0.02;
+/// Up to this number of cells, the answer is the spacing of a mesh that was made.
+const MADE_MAX: f64 = 1e7;
+/// Maximum number of meshes for one answer.
+const MESHES_MAX: usize = 16;
+/// Maximum growth of cells from mesh to mesh: a distant extrapolation may be far off.
+const STEP: f64 = 40.0;
+
+/// Known sizes of one case at one n.
+#[derive(Clone, Debug, Default)]
+pub struct Sizes {
+    /// Spacing and cells of the meshes so far.
+    meshes: Vec<(f64, f64)>,
+    /// Requested cells and the spacing returned, so that a repeated request returns the same spacing.
+    answers: Vec<(f64, f64)>,
+}
+
+impl Sizes {
+    /// Returns the spacing for about `cells`. `mesh` returns the number of cells at a spacing; `coarse` is the first spacing.
+    ///
+    /// # Errors
+    /// Those of `mesh`.
+    pub fn spacing<E>(
+        &mut self,
+        cells: f64,
+        coarse: f64,
+        mut mesh: impl FnMut(f64) -> Result<u64, E>,
+    ) -> Result<f64, E> {
+        if let Some(answer) = self.answers.iter().find(|answer| answer.0 == cells) {
+            return Ok(answer.1);
+        }
+        let mut answer = None;
+        for count in 0..MESHES_MAX {
+            let next = match self.nearest(cells, |_| true) {
+                None => coarse,
+                Some(made) if (made.1 / cells).ln().abs() < TOLERANCE => break,
+                Some(made) if made.1 < cells / 2.0 => {
+                    let more = (cells / 2.0 / made.1).clamp(1.5, STEP);
+                    // The exponent grows with refinement up to about 2; a smaller one would overshoot.
+                    made.0 / more.powf(1.0 / self.power(cells).max(2.0))
+                }
+                Some(_) if cells > MADE_MAX => {
+                    answer = Some(self.guess(cells));
+                    break;
+                }
+                Some(_) => self.between(cells, count),
+            };
+            let made = mesh(next)?.max(1) as f64;
+            self.meshes.push((next, made));
+        }
+        let nearest = self.nearest(cells, |_| true);
+        let answer = answer.or(nearest.map(|made| made.0)).unwrap_or(coarse);
+        self.answers.push((cells, answer));
+        Ok(answer)
+    }
+
+    /// Returns the mesh whose size is nearest, of those with such a number of cells.
+    fn nearest(&self, cells: f64, is_wanted: impl Fn(f64) -> bool) -> Option<(f64, f64)> {
+        let off = |made: &(f64, f64)| (made.1 / cells).ln().abs();
+        let made = self.meshes.iter().filter(|made| is_wanted(made.1)).copied();
+        made.min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
+
+    /// The spacing to try next. The number of cells jumps, so extrapolation alone may return to the same meshes: every second time, the middle
+    /// between the nearest meshes with fewer and with more cells.
+    fn between(&self, cells: f64, count: usize) -> f64 {
+        let below = self.nearest(cells, |count| count < cells);
+        let ends = below.zip(self.nearest(cells, |count| count > cells));
+        match ends.filter(|_| count % 2 == 1) {
+            Some((below, above)) => (below.0 * above.0).sqrt(),
+            None => self.guess(cells),
+        }
+    }
+
+    /// The extrapolated spacing; there is a mesh.
+    fn guess(&self, cells: f64) -> f64 {
+        let near = self.nearest(cells, |_| true);
+        near.map_or(1.0, |made| made.0 * (made.1 / cells).powf(1.0 / self.power(cells)))
+    }
+
+    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
+    fn power(&self, cells: f64) -> f64 {
+        let ends = self.nearest(cells, |_| true);
+        let other = ends.and_then(|one| self.nearest(cells, |count| count != one.1));
+        let power = |(a, b): ((f64, f64), (f64, f64))| (a.1 / b.1).ln() / (b.0 / a.0).ln();
+        ends.zip(other).map_or(2.0, |both| power(both).clamp(1.0, 3.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_edge_of_a_level_equals_the_spacing() {
+        let (origin, edge) = root([-5.0; 3], 10.0, 0.3);
+        assert_eq!(edge, 0.3 * 64.0);
+        assert_eq!(edge / 64.0, 0.3);
+        assert!((origin[0] + edge * 0.5).abs() < 1e-12);
+        assert_eq!(root([0.0; 3], 8.0, 0.5), ([0.0; 3], 8.0));
+    }
+
+    #[test]
+    fn a_variant_is_a_complete_case() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("ball.toml");
+        let text = "spacing_min = 0.1\nroot_scale = 3.0\nkeep = \"all\"\n[generator]\nshape = \"sphere\"\nfacets = 80\n\
+                    [[box]]\nmin = [0.0, 0.0, 0.0]\nmax = [1.0, 1.0, 1.0]\nspacing = 0.2\n";
+        fs::write(&path, text).unwrap();
+        let base = Base::read(&path, place.path()).unwrap();
+        let original = Case::read(&path).unwrap();
+        let made = Case::read(&base.write(0.07, 3, false).unwrap()).unwrap();
+        assert_eq!((made.layer_cells_min, made.boxes.len(), made.keep), (3, 1, original.keep));
+        assert_eq!(made.facets, original.facets);
+        assert_eq!(made.root.edge / f64::from(1u32 << made.level_surface), 0.07);
+        // With its own spacing, the case keeps its root.
+        let same = Case::read(&base.write(base.spacing_min, 4, false).unwrap()).unwrap();
+        assert_eq!((same.root, same.level_surface), (original.root, original.level_surface));
+        let kept = Case::read(&base.write(0.07, 3, true).unwrap()).unwrap();
+        assert_eq!((kept.root, kept.layer_cells_min), (original.root, 3));
+    }
+
+    #[test]
+    fn a_spacing_is_found_from_coarser_meshes() {
+        let truth = |s: f64| (3.0 / (s * s) + 50.0 / s + 700.0) as u64;
+        for target in [5e4, 3e6, 1e9] {
+            let mut sizes = Sizes::default();
+            let mut most = 0;
+            let mesh = |s: f64| {
+                most = most.max(truth(s));
+                Ok::<u64, ()>(truth(s))
+            };
+            let spacing = sizes.spacing(target, 0.2, mesh).unwrap();
+            let error = truth(spacing) as f64 / target - 1.0;
+            assert!(error.abs() < 0.08, "{target}: {error}");
+            // Overshooting would be expensive.
+            assert!(most as f64 <= target.max(1e5) * 1.1, "{most}");
+        }
+    }
+
+    #[test]
+    fn a_small_mesh_that_grows_unevenly_is_within_five_percent() {
+        // Layers of every level begin at another spacing.
+        let truth = |s: f64| {
+            let level = (1.0 / s).log2();
+            (40.0 / (s * s) * (1.0 + 0.3 * (level * 3.0).sin())) as u64
+        };
+        for target in [2e4, 8e4, 3.2e5, 5e6] {
+            let spacing = Sizes::default().spacing(target, 0.2, |s| Ok::<u64, ()>(truth(s)));
+            let error = truth(spacing.unwrap()) as f64 / target - 1.0;
+            assert!(error.abs() < 0.05, "{target}: {error}");
+        }
+    }
+
+    #[test]
+    fn known_sizes_are_not_meshed_again() {
+        let mut sizes = Sizes::default();
+        let mut count = 0;
+        let mut request = |cells| {
+            let mesh = |s: f64| {
+                count += 1;
+                Ok::<u64, ()>((1.0 / (s * s)) as u64)
+            };
+            sizes.spacing(cells, 0.1, mesh).unwrap();
+            count
+        };
+        let first = request(1e6);
+        assert_eq!(request(1e6), first);
+        assert!(request(9e5) <= first + 1);
+        let second = request(9e5);
+        assert_eq!(request(9e5), second);
+    }
+
+    #[test]
+    fn errors_are_passed_on() {
+        assert_eq!(Sizes::default().spacing(1e6, 0.1, |_| Err("no")), Err("no"));
+    }
+}

@@ -1,0 +1,195 @@
+//! An octant together with its 26 neighbours of the same level, and the search for the coarsest leaf near it.
+
+use crate::octant::{CELLS_PER_EDGE, Octant};
+use crate::tree::{Handle, NO_LEAF, Tree};
+
+/// Index of the octant itself among the 27 octants.
+const SELF: usize = 13;
+
+/// Offsets of the 27 octants from the one in the middle, in edges.
+pub const OFFSETS: [[i32; 3]; 27] = offsets();
+
+/// For each child and each of its 27 neighbours: the index of the neighbour's parent in the parent's
+/// neighbourhood, and the neighbour's digit.
+const DESCENT: [[(u8, u8); 27]; 8] = descent();
+
+const fn offsets() -> [[i32; 3]; 27] {
+    let mut all = [[0; 3]; 27];
+    let mut i = 0;
+    while i < 27 {
+        all[i] = [i as i32 % 3 - 1, i as i32 / 3 % 3 - 1, i as i32 / 9 - 1];
+        i += 1;
+    }
+    all
+}
+
+const fn descent() -> [[(u8, u8); 27]; 8] {
+    let mut all = [[(0, 0); 27]; 8];
+    let mut child = 0;
+    while child < 8 {
+        let mut i = 0;
+        while i < 27 {
+            let (mut index, mut digit, mut a, mut stride) = (0, 0, 0, 1);
+            while a < 3 {
+                // In child edges from the parent's minimum corner: -1, 0, 1 or 2.
+                let position = (child >> a & 1) + OFFSETS[i][a];
+                index += (position.div_euclid(2) + 1) * stride;
+                digit |= position.rem_euclid(2) << a;
+                stride *= 3;
+                a += 1;
+            }
+            all[child as usize][i] = (index as u8, digit as u8);
+            i += 1;
+        }
+        child += 1;
+    }
+    all
+}
+
+/// The contents of an octant and of its neighbours.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbourhood {
+    /// The octant in the middle.
+    pub octant: Octant,
+    /// The contents, in the order of [`OFFSETS`].
+    pub handles: [Handle; 27],
+}
+
+impl Neighbourhood {
+    /// The neighbourhood of the root.
+    pub fn root(tree: &Tree) -> Self {
+        let mut handles = [Handle::OUTSIDE_ROOT; 27];
+        handles[SELF] = tree.root();
+        Self { octant: Octant::ROOT, handles }
+    }
+
+    /// The neighbourhood of a child.
+    pub fn child(&self, tree: &Tree, digit: u8) -> Self {
+        let level = self.octant.level;
+        let handles = DESCENT[usize::from(digit)]
+            .map(|(index, digit)| tree.child(self.handles[usize::from(index)], digit, level));
+        Self { octant: self.octant.child(digit), handles }
+    }
+
+    /// The content across a face of a child, on the low (-1) or high (1) side of an axis.
+    pub fn across(&self, tree: &Tree, digit: u8, axis: usize, side: i32) -> Handle {
+        let neighbour = (SELF as i32 + side * [1, 3, 9][axis]) as usize;
+        let (index, digit) = DESCENT[usize::from(digit)][neighbour];
+        tree.child(self.handles[usize::from(index)], digit, self.octant.level)
+    }
+
+    /// The neighbourhood of any octant, found by descent from the root.
+    pub fn of(tree: &Tree, octant: Octant) -> Self {
+        let mut neighbourhood = Self::root(tree);
+        for level in 1..=octant.level {
+            neighbourhood = neighbourhood.child(tree, octant.ancestor(level).digit());
+        }
+        neighbourhood
+    }
+
+    /// The content of the octant itself.
+    pub fn centre(&self) -> Handle {
+        self.handles[SELF]
+    }
+
+    /// The content of the neighbour at an offset in edges.
+    pub fn at_offset(&self, [x, y, z]: [i32; 3]) -> Handle {
+        self.handles[(SELF as i32 + x + 3 * y + 9 * z) as usize]
+    }
+
+    /// Level of the coarsest leaf in all 27 octants, deleted leaves excluded.
+    pub fn coarsest_level(&self, tree: &Tree) -> u8 {
+        let level = self.octant.level;
+        self.handles.iter().fold(NO_LEAF, |c, &h| c.min(tree.coarsest_level(h, level)))
+    }
+
+    /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves
+    /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
+    /// of the root.
+    pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Coarsest {
+        let mut found = Coarsest { level: bound, cell: None };
+        let edge = i64::from(self.octant.edge());
+        for (&handle, offset) in self.handles.iter().zip(&OFFSETS) {
+            let corner: [i64; 3] = std::array::from_fn(|a| {
+                i64::from(self.octant.corner[a]) + i64::from(offset[a]) * edge
+            });
+            search(tree, handle, corner, self.octant.level, region, &mut found);
+        }
+        found
+    }
+}
+
+/// An open box, in level-19 cells.
+#[derive(Clone, Copy, Debug)]
+pub struct Region {
+    low: [i64; 3],
+    high: [i64; 3],
+}
+
+impl Region {
+    /// An octant enlarged by `margin` on every side.
+    pub fn around(octant: &Octant, margin: i64) -> Self {
+        Self::along(octant, [margin; 3])
+    }
+
+    /// An octant enlarged on both sides of each axis by the margin for that axis.
+    pub fn along(octant: &Octant, margins: [i64; 3]) -> Self {
+        let edge = i64::from(octant.edge());
+        let low = std::array::from_fn(|a| i64::from(octant.corner[a]) - margins[a]);
+        Self { low, high: std::array::from_fn(|a| low[a] + edge + 2 * margins[a]) }
+    }
+
+    /// The smallest box that contains two.
+    pub fn hull(self, other: Self) -> Self {
+        Self {
+            low: std::array::from_fn(|a| self.low[a].min(other.low[a])),
+            high: std::array::from_fn(|a| self.high[a].max(other.high[a])),
+        }
+    }
+
+    /// Whether the interior of an octant meets the box.
+    fn meets(&self, corner: [i64; 3], edge: i64) -> bool {
+        (0..3).all(|a| corner[a] < self.high[a] && self.low[a] < corner[a] + edge)
+    }
+}
+
+/// Result of a search for the coarsest leaf.
+#[derive(Clone, Copy, Debug)]
+pub struct Coarsest {
+    /// Level of the leaf, or the bound of the search if there is no coarser leaf.
+    pub level: u8,
+    /// A level-19 cell of the leaf.
+    cell: Option<[i64; 3]>,
+}
+
+impl Coarsest {
+    /// The leaf; `None` if no leaf is coarser than the bound of the search.
+    pub fn leaf(&self, tree: &Tree) -> Option<Octant> {
+        let cell = self.cell?.map(|c| u32::try_from(c).expect("a leaf lies in the root"));
+        tree.locate(cell).map(|(octant, _)| octant)
+    }
+}
+
+/// Searches an octant for a leaf that is coarser than the one found so far.
+fn search(
+    tree: &Tree,
+    handle: Handle,
+    corner: [i64; 3],
+    level: u8,
+    region: &Region,
+    found: &mut Coarsest,
+) {
+    let coarsest = tree.coarsest_level(handle, level);
+    let edge = i64::from(CELLS_PER_EDGE >> level);
+    if coarsest >= found.level || !region.meets(corner, edge) {
+        return;
+    }
+    if !handle.is_node() {
+        *found = Coarsest { level: coarsest, cell: Some(corner) };
+        return;
+    }
+    for digit in 0..8u8 {
+        let corner = std::array::from_fn(|a| corner[a] + edge / 2 * i64::from(digit >> a & 1));
+        search(tree, tree.child(handle, digit, level), corner, level + 1, region, found);
+    }
+}

@@ -1,0 +1,373 @@
+//! The leaves of a mesh as a tree that stores equal subtrees once.
+//!
+//! The tree is built in one pass over sorted words. A node consists of its eight children only and has neither
+//! a position nor a level. Most leaves around a smooth surface lie in uniform runs, so a billion of them need a
+//! small fraction of the memory of one node per octant. A walk that carries a [`Neighbourhood`](crate::neighbourhood::Neighbourhood) (an octant and
+//! its 26 neighbours) finds the neighbours of every leaf without a search.
+//!
+//! Invariants: a node has at least one child that is not a hole; children are stored before their parents.
+
+#[cfg(test)]
+mod tests;
+
+use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use crate::word;
+use hashbrown::HashTable;
+use hashbrown::hash_table::Entry;
+use rustc_hash::FxBuildHasher;
+use std::hash::BuildHasher;
+
+/// The content of an octant: a hole, a leaf, part of a coarser leaf, a node, or outside the root.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub struct Handle(u32);
+
+/// Kind of a leaf: the code of its side, or [`DELETED`].
+pub type Kind = u8;
+/// A deleted crossing leaf whose level is a lower bound, because it may have been refined before it was deleted.
+pub const DELETED: Kind = 3;
+/// Set of kinds, one bit each, and [`HOLES`].
+pub type Kinds = u8;
+/// Bit of [`Kinds`] that represents holes.
+pub const HOLES: Kinds = 1 << 4;
+
+const FIRST_LEAF: u32 = 4;
+const FIRST_COARSER: u32 = 16;
+const FIRST_NODE: u32 = 128;
+
+impl Handle {
+    /// No leaf.
+    pub const HOLE: Self = Self(0);
+    /// Outside the root.
+    pub const OUTSIDE_ROOT: Self = Self(1);
+
+    /// A leaf that coincides with the octant.
+    pub fn leaf(kind: Kind) -> Self {
+        Self(FIRST_LEAF + u32::from(kind))
+    }
+
+    /// Part of a leaf of a coarser level.
+    fn coarser_leaf(kind: Kind, level: u8) -> Self {
+        Self(FIRST_COARSER + 4 * u32::from(level) + u32::from(kind))
+    }
+
+    fn node(index: usize) -> Self {
+        Self(FIRST_NODE + u32::try_from(index).expect("fewer than 2^32 distinct nodes"))
+    }
+
+    /// The kind, if a leaf coincides with the octant.
+    pub fn as_leaf(self) -> Option<Kind> {
+        (FIRST_LEAF..FIRST_COARSER).contains(&self.0).then(|| (self.0 - FIRST_LEAF) as Kind)
+    }
+
+    /// Kind and level of the leaf, if the octant is part of a coarser leaf.
+    pub fn as_coarser_leaf(self) -> Option<(Kind, u8)> {
+        let code = self.0.wrapping_sub(FIRST_COARSER);
+        (code < FIRST_NODE - FIRST_COARSER).then_some(((code & 3) as Kind, (code >> 2) as u8))
+    }
+
+    /// Whether the octant is split.
+    pub fn is_node(self) -> bool {
+        self.0 >= FIRST_NODE
+    }
+
+    fn index(self) -> usize {
+        (self.0 - FIRST_NODE) as usize
+    }
+
+    /// The leaf that an octant of this level is, or is part of: its kind and its own level.
+    #[inline]
+    fn leaf_of(self, level: u8) -> Option<(Kind, u8)> {
+        self.as_leaf().map(|kind| (kind, level)).or(self.as_coarser_leaf())
+    }
+}
+
+/// Summary of the leaves below a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Summary {
+    /// Largest number of levels from the node down to a leaf.
+    finest: u8,
+    /// Smallest number of levels from the node down to a leaf that is not deleted; `NO_LEAF` if there is none.
+    coarsest: u8,
+    kinds: Kinds,
+}
+
+/// A level, or number of levels, greater than that of any leaf.
+pub const NO_LEAF: u8 = 100;
+
+/// The leaves of a mesh as a tree. Walks in other crates ask for content and levels a dozen times per leaf: these functions are
+/// `#[inline]`.
+#[derive(Debug, Default)]
+pub struct Tree {
+    store: Store,
+    root: Handle,
+}
+
+impl Tree {
+    /// The tree of sorted words. Words that are not leaves or that overlap an earlier leaf are omitted; the
+    /// check `linear` reports them.
+    pub fn of_words(words: &[u64]) -> Self {
+        let mut builder = Builder::default();
+        for &w in words {
+            let _ = builder.push(w);
+        }
+        builder.finish()
+    }
+
+    /// The content of the root.
+    pub fn root(&self) -> Handle {
+        self.root
+    }
+
+    /// Number of distinct nodes.
+    pub fn nodes(&self) -> usize {
+        self.store.len()
+    }
+
+    /// The content of a child of an octant with content `of` at this level.
+    #[inline]
+    pub fn child(&self, of: Handle, digit: u8, level: u8) -> Handle {
+        if of.is_node() {
+            return self.store.children(of)[usize::from(digit)];
+        }
+        of.leaf_of(level).map_or(of, |(kind, level)| Handle::coarser_leaf(kind, level))
+    }
+
+    /// Level of the finest leaf in an octant with content `of` at this level; 0 if there is none.
+    #[inline]
+    pub fn finest_level(&self, of: Handle, level: u8) -> u8 {
+        if of.is_node() {
+            return level + self.store.summary(of).finest;
+        }
+        of.leaf_of(level).map_or(0, |(_, level)| level)
+    }
+
+    /// Level of the coarsest leaf in an octant with content `of` at this level, deleted leaves excluded; at
+    /// least [`NO_LEAF`] if there is none.
+    #[inline]
+    pub fn coarsest_level(&self, of: Handle, level: u8) -> u8 {
+        if of.is_node() {
+            return level + self.store.summary(of).coarsest;
+        }
+        let leaf = of.leaf_of(level).filter(|(kind, _)| *kind != DELETED);
+        leaf.map_or(NO_LEAF, |(_, level)| level)
+    }
+
+    /// The kinds of leaves in `of`, and [`HOLES`] if it has holes; the empty set outside the root.
+    #[inline]
+    pub fn kinds(&self, of: Handle) -> Kinds {
+        if of.is_node() {
+            return self.store.summary(of).kinds;
+        }
+        let without_leaf = if of == Handle::HOLE { HOLES } else { 0 };
+        of.leaf_of(0).map_or(without_leaf, |(kind, _)| 1 << kind)
+    }
+
+    /// Visits octants in Morton order, parents first: the root, and the children of nodes for which `enter` returns true.
+    pub fn walk(&self, enter: &mut impl FnMut(Octant, Handle) -> bool) {
+        self.walk_below(Octant::ROOT, self.root, enter);
+    }
+
+    /// The same from an octant with content `of` on.
+    pub fn walk_below(
+        &self,
+        octant: Octant,
+        of: Handle,
+        enter: &mut impl FnMut(Octant, Handle) -> bool,
+    ) {
+        if enter(octant, of) && of.is_node() {
+            for digit in 0..8 {
+                let child = self.child(of, digit, octant.level);
+                self.walk_below(octant.child(digit), child, enter);
+            }
+        }
+    }
+
+    /// What the tree has at an octant: a node, a leaf, or a hole. Within a leaf it is the leaf's handle.
+    pub fn at(&self, octant: &Octant) -> Handle {
+        let mut handle = self.root;
+        for level in 1..=octant.level {
+            if !handle.is_node() {
+                break;
+            }
+            handle = self.child(handle, octant.ancestor(level).digit(), level - 1);
+        }
+        handle
+    }
+
+    /// The leaf that contains a level-19 cell, and its kind.
+    pub fn locate(&self, cell: [u32; 3]) -> Option<(Octant, Kind)> {
+        debug_assert!(cell.iter().all(|&c| c < CELLS_PER_EDGE));
+        let key = word::key_of(cell);
+        let (mut handle, mut octant) = (self.root, Octant::ROOT);
+        while handle.is_node() {
+            let digit = ((key / word::span(octant.level + 1)) & 7) as u8;
+            handle = self.store.children(handle)[usize::from(digit)];
+            octant = octant.child(digit);
+        }
+        handle.as_leaf().map(|kind| (octant, kind))
+    }
+}
+
+/// Builds a tree from leaves in ascending order of their keys.
+///
+/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and
+/// its node is stored, as soon as a leaf follows that lies outside it.
+#[derive(Debug, Default)]
+pub struct Builder {
+    store: Store,
+    path: [[Handle; 8]; LEVEL_MAX as usize],
+    /// Number of open octants: `path[..open]` is in use.
+    open: usize,
+    /// Key of the last leaf, which determines the open octants.
+    key: u64,
+    /// End of the key range of the last leaf.
+    end: u64,
+    root: Handle,
+}
+
+/// Why a leaf was rejected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The word is not a leaf.
+    Fault(String),
+    /// The leaf overlaps an earlier leaf, or is not in ascending order.
+    Overlap,
+}
+
+impl Builder {
+    /// Adds a leaf word.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
+    pub fn push(&mut self, word: u64) -> Result<(), Refusal> {
+        match word::fault(word) {
+            Some(why) => Err(Refusal::Fault(why)),
+            None => self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind),
+        }
+    }
+
+    /// Adds a leaf of any kind, [`DELETED`] included.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
+    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), Refusal> {
+        if key < self.end {
+            return Err(Refusal::Overlap);
+        }
+        self.end = key + word::span(level);
+        let leaf = Handle::leaf(kind);
+        if level == 0 {
+            self.root = leaf;
+            return Ok(());
+        }
+        let parent = usize::from(level) - 1;
+        self.close_down_to(shared_levels(self.key, key));
+        self.key = key;
+        while self.open <= parent {
+            self.path[self.open] = [Handle::HOLE; 8];
+            self.open += 1;
+        }
+        self.path[parent][digit(key, parent)] = leaf;
+        Ok(())
+    }
+
+    /// Closes open octants until at most `levels` are open.
+    fn close_down_to(&mut self, levels: usize) {
+        while self.open > levels {
+            self.open -= 1;
+            let node = self.store.intern(self.path[self.open]);
+            match self.open.checked_sub(1) {
+                Some(parent) => self.path[parent][digit(self.key, parent)] = node,
+                None => self.root = node,
+            }
+        }
+    }
+
+    /// Number of distinct nodes so far.
+    pub fn nodes(&self) -> usize {
+        self.store.len()
+    }
+
+    /// The tree of all leaves added.
+    pub fn finish(mut self) -> Tree {
+        self.close_down_to(0);
+        Tree { store: self.store, root: self.root }
+    }
+}
+
+/// Number of common ancestors of two level-19 cells, themselves excluded.
+fn shared_levels(a: u64, b: u64) -> usize {
+    match (a ^ b).checked_ilog2() {
+        Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
+        None => usize::from(LEVEL_MAX),
+    }
+}
+
+/// The digit of the child that contains this cell, among the children of its ancestor at `level`.
+fn digit(key: u64, level: usize) -> usize {
+    (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
+}
+
+/// All nodes of a tree.
+#[derive(Debug, Default)]
+struct Store {
+    children: Vec<[Handle; 8]>,
+    summaries: Vec<Summary>,
+    /// The indices of all nodes, by the hash of their children.
+    indices: HashTable<u32>,
+}
+
+impl Store {
+    fn len(&self) -> usize {
+        self.children.len()
+    }
+
+    fn children(&self, of: Handle) -> &[Handle; 8] {
+        &self.children[of.index()]
+    }
+
+    fn summary(&self, of: Handle) -> Summary {
+        self.summaries[of.index()]
+    }
+
+    /// The node with these children, which is stored if it is new.
+    fn intern(&mut self, children: [Handle; 8]) -> Handle {
+        let (all, hash) = (&self.children, |node: &[Handle; 8]| FxBuildHasher.hash_one(node));
+        let is_same = |&index: &u32| all[index as usize] == children;
+        match self.indices.entry(hash(&children), is_same, |&index| hash(&all[index as usize])) {
+            Entry::Occupied(known) => Handle::node(*known.get() as usize),
+            Entry::Vacant(vacant) => {
+                let index = all.len();
+                vacant.insert(u32::try_from(index).expect("fewer than 2^32 nodes"));
+                self.summaries.push(self.summarise(&children));
+                self.children.push(children);
+                Handle::node(index)
+            }
+        }
+    }
+
+    fn summarise(&self, children: &[Handle; 8]) -> Summary {
+        let mut all = Summary { finest: 0, coarsest: NO_LEAF, kinds: 0 };
+        for &child in children {
+            let below = self.summary_of_child(child);
+            all.finest = all.finest.max(below.finest);
+            all.coarsest = all.coarsest.min(below.coarsest);
+            all.kinds |= below.kinds;
+        }
+        all
+    }
+
+    /// The contribution of a child to its parent's summary, one level deeper.
+    fn summary_of_child(&self, child: Handle) -> Summary {
+        if child.is_node() {
+            let Summary { finest, coarsest, kinds } = self.summary(child);
+            let coarsest = if coarsest == NO_LEAF { NO_LEAF } else { coarsest + 1 };
+            return Summary { finest: finest + 1, coarsest, kinds };
+        }
+        match child.as_leaf() {
+            Some(DELETED) => Summary { finest: 1, coarsest: NO_LEAF, kinds: 1 << DELETED },
+            Some(kind) => Summary { finest: 1, coarsest: 1, kinds: 1 << kind },
+            None => Summary { finest: 0, coarsest: NO_LEAF, kinds: HOLES },
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Points without duplicates, numbered in the order in which they were added, and the polygons that join them.
+
+use rustc_hash::FxHashMap;
+
+/// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
+pub type Point = [u32; 3];
+
+/// The points.
+#[derive(Debug, Default)]
+pub struct Points {
+    /// The points in the order of their numbers.
+    pub all: Vec<Point>,
+    numbers: FxHashMap<Point, u32>,
+}
+
+impl Points {
+    /// Returns the number of a point, which is added if it is new. There are fewer than 2^32.
+    pub fn add(&mut self, point: Point) -> u32 {
+        let number = *self.numbers.entry(point).or_insert(self.all.len() as u32);
+        if number as usize == self.all.len() {
+            self.all.push(point);
+        }
+        number
+    }
+
+    /// Removes all points. Their memory remains.
+    pub fn clear(&mut self) {
+        self.all.clear();
+        self.numbers.clear();
+    }
+
+    /// Numbers the points anew, in the order of a key.
+    pub fn sort_by<K: Ord>(&mut self, key: impl Fn(&Point) -> K) {
+        self.all.sort_by_cached_key(key);
+        self.numbers.extend(self.all.iter().copied().zip(0..));
+    }
+
+    /// Appends the numbers of the points on the edges of a square with these corners, the first corner first.
+    pub fn polygon(&self, corners: [Point; 4], polygon: &mut Vec<u32>) {
+        for (i, corner) in corners.iter().enumerate() {
+            polygon.push(self.numbers[corner]);
+            self.hanging(*corner, corners[(i + 1) % 4], polygon);
+        }
+    }
+
+    /// Appends the points within an edge, in order: those that bisect it, or bisect a half of it, and so on. Squares are aligned with the
+    /// oct-tree, so where there are any, one is the middle.
+    fn hanging(&self, from: Point, to: Point, polygon: &mut Vec<u32>) {
+        let middle = std::array::from_fn(|a| u32::midpoint(from[a], to[a]));
+        match self.numbers.get(&middle) {
+            Some(&number) if middle != from && middle != to => {
+                self.hanging(from, middle, polygon);
+                polygon.push(number);
+                self.hanging(middle, to, polygon);
+            }
+            _ => {}
+        }
+    }
+}

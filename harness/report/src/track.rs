@@ -1,0 +1,292 @@
+//! The history as a page, with the steps as a table and a figure per metric, as text and as JUnit XML.
+
+use crate::figure::svg::svg;
+use crate::figure::{
+    Axis, Figure, Mark, Point, Provenance, Series as Plotted, file_name, tick_label,
+};
+use crate::junit::{suite, test, to_text, unsuccessful};
+use crate::page::{figure, page as whole_page, table};
+use bench::track::history::Record;
+use bench::track::{Change, Series};
+use maud::{Markup, html};
+use quick_junit::NonSuccessKind::Failure;
+use quick_junit::TestCaseStatus;
+use std::cmp::Reverse;
+
+/// Placeholder for the hash of a commit in its address.
+pub const COMMIT: &str = "{commit}";
+
+/// The page. Metrics with changes come first. `link` is the address of a commit, with [`COMMIT`] for its hash.
+pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
+    let (changed, constant): (Vec<&Series>, Vec<&Series>) =
+        all.iter().partition(|series| !series.changes.is_empty());
+    let sections = [("Metrics with changes", changed), ("Metrics without changes", constant)];
+    let dated = |record: &Record| {
+        let date = record.time.get(..10).unwrap_or("no date");
+        html! { (linked(&record.commit, link)) " (" (date) ")" }
+    };
+    let content = html! {
+        p {
+            @match records {
+                [] => "No records.",
+                [one] => { "One commit, " (dated(one)) "." }
+                [first, .., last] => { (records.len()) " commits, " (dated(first)) " to " (dated(last)) "." }
+            }
+        }
+        (changes(records, all, link))
+        @for (title, series) in sections.iter().filter(|(_, series)| !series.is_empty()) {
+            h2 { (title) }
+            @for one in series {
+                @let f = of_metric(records, one);
+                (figure(&f.id, &f.title, &svg(&f), &html! {}))
+            }
+        }
+    };
+    whole_page("Trend", &content)
+}
+
+/// The beginning of a commit's hash, with a link if there is an address.
+fn linked(commit: &str, link: Option<&str>) -> Markup {
+    let short = html! { code { (short_commit(commit)) } };
+    match link {
+        Some(link) => html! { a href=(link.replace(COMMIT, commit)) { (short) } },
+        None => short,
+    }
+}
+
+/// All steps, the latest first. The class of a change is that of its cell in the style sheet.
+fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
+    let of_series = |series| -> Vec<(&Series, &Change)> {
+        let series: &Series = series;
+        series.changes.iter().map(|change| (series, change)).collect()
+    };
+    let mut found: Vec<(&Series, &Change)> = all.iter().flat_map(of_series).collect();
+    if found.is_empty() {
+        return html! { p { "No change points." } };
+    }
+    let first_new = |(series, change): &(&Series, &Change)| series.points[change.at].0;
+    found.sort_by_key(|change| Reverse(first_new(change)));
+    let row = |both: &(&Series, &Change)| {
+        let (series, change) = *both;
+        let [before, after, by] = values(series, change);
+        let sign = series.is_worse(change).map(|worse| if worse { "worse" } else { "better" });
+        vec![
+            html! { (series.name) },
+            html! { (before) },
+            html! { (after) },
+            html! { span class=[sign] { (by) } },
+            html! { (linked(&change.last_old, link)) ".." (linked(&change.first_new, link)) },
+            html! { @if change.accepted { "accepted" } },
+            html! { (records[first_new(both)].subject) },
+        ]
+    };
+    let columns = ["metric", "before", "after", "change", "commits", "", "first commit after"];
+    let rows: Vec<Vec<Markup>> = found.iter().map(row).collect();
+    html! { h2 { "Change points" } (table(&columns, &rows)) }
+}
+
+/// Both values of a step with their unit, and the change.
+fn values(series: &Series, change: &Change) -> [String; 3] {
+    let value = |value: f64| match series.unit {
+        // Counts are exact.
+        "count" => value.to_string(),
+        unit => format!("{} {unit}", tick_label(value)),
+    };
+    let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
+    [value(change.before), value(change.after), by]
+}
+
+/// A step per line.
+pub fn summary(all: &[Series]) -> String {
+    let line = |series: &Series, change: &Change| {
+        let [before, after, by] = values(series, change);
+        let commits = [&change.last_old, &change.first_new].map(|commit| short_commit(commit));
+        let accepted = if change.accepted { ", accepted" } else { "" };
+        format!(
+            "{}: {before} -> {after} ({by}) in {}, p = {:.2e}{accepted}\n",
+            series.name,
+            commits.join(".."),
+            change.p
+        )
+    };
+    let lines = |series| -> Vec<String> {
+        let series: &Series = series;
+        series.changes.iter().map(|change| line(series, change)).collect()
+    };
+    let text: String = all.iter().flat_map(lines).collect();
+    if text.is_empty() { "no change points\n".to_owned() } else { text }
+}
+
+/// A test per metric. It fails if the last change point is one for the worse among the last `recent` values.
+pub fn junit(all: &[Series], recent: usize) -> String {
+    let mut xml = quick_junit::Report::new("harness track");
+    let of_series = |series: &Series| {
+        let text = summary(std::slice::from_ref(series));
+        let ended = match series.worse_recently(recent) {
+            Some(_) => unsuccessful(Failure, text.trim_end()),
+            None => TestCaseStatus::success(),
+        };
+        test(&series.name, ended, if series.changes.is_empty() { "" } else { &text })
+    };
+    xml.add_test_suite(suite("track", 0.0, all.iter().map(of_series)));
+    to_text(&xml)
+}
+
+/// Height of the figure of a metric.
+const HEIGHT: u32 = 560;
+
+fn case_and_metric(series: &Series) -> (&str, &str) {
+    series.name.rsplit_once('/').unwrap_or(("", &series.name))
+}
+
+/// The figure of one metric, with its steps as vertical lines. Outliers do not widen the
+/// axis: they are drawn at its ends.
+fn of_metric(records: &[Record], series: &Series) -> Figure {
+    let note = |&(commit, value): &(usize, f64)| {
+        let record = &records[commit];
+        format!("{} {value} {}\n{}", short_commit(&record.commit), series.unit, record.subject)
+    };
+    let x = |at: usize| series.points[at].0 as f64;
+    let mark = |change: &Change| {
+        let (name, style) = match (series.is_worse(change), change.accepted) {
+            (None, _) => ("change", 3),
+            (Some(_), true) => ("accepted", 3),
+            (Some(true), false) => ("worse", 1),
+            (Some(false), false) => ("better", 2),
+        };
+        // Between the last commit with the old value and the first with the new one.
+        Mark { name: name.to_owned(), x: x(change.at - 1).midpoint(x(change.at)), style }
+    };
+    let (low, high) = range(series);
+    let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
+    let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
+    let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
+        let point =
+            |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
+        let notes = shown.iter().map(|point| note(point)).collect();
+        let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
+        Plotted { notes, ..plotted.not_joined() }
+    };
+    let mut lines = vec![plotted(case_and_metric(series).1, Provenance::Measured, 0, &inside)];
+    if !outside.is_empty() {
+        let name = "beyond the axis, drawn at its end";
+        lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
+    }
+    let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
+    Figure {
+        height: HEIGHT,
+        marks: series.changes.iter().map(mark).collect(),
+        ..Figure::new(
+            file_name(&format!("metric-{}", series.name)),
+            series.name.clone(),
+            String::new(),
+            [commits(records.len()), y],
+            lines,
+        )
+    }
+}
+
+/// The first ten characters of a commit's hash.
+fn short_commit(commit: &str) -> String {
+    commit.chars().take(10).collect()
+}
+
+/// Fraction of the values at either end that may be outliers.
+const OUTLIERS: f64 = 0.05;
+
+/// The range shown: that of the values without outliers, with a margin, so that a constant is in the middle and noise looks
+/// small. The levels between steps are never outliers.
+fn range(series: &Series) -> (f64, f64) {
+    let mut sorted: Vec<f64> = series.points.iter().map(|p| p.1).collect();
+    sorted.sort_by(f64::total_cmp);
+    let cut = (sorted.len() as f64 * OUTLIERS).ceil() as usize;
+    let kept = match sorted.len() > 2 * cut {
+        true => &sorted[cut..sorted.len() - cut],
+        false => &sorted[..],
+    };
+    let levels = series.changes.iter().flat_map(|change| [change.before, change.after]);
+    let shown = || kept.iter().copied().chain(levels.clone());
+    let low = shown().fold(f64::INFINITY, f64::min);
+    let high = shown().fold(f64::NEG_INFINITY, f64::max);
+    let middle = (low + high) / 2.0;
+    let half = ((high - low) * 0.8).max(middle.abs() * 0.02).max(1e-9);
+    (middle - half, middle + half)
+}
+
+/// An axis of indices into the history.
+fn commits(count: usize) -> Axis {
+    let last = count.saturating_sub(1).max(1);
+    let ticks = (0..=last).step_by(last.div_ceil(8)).map(|t| t as f64).collect();
+    let margin = last as f64 * 0.03;
+    let range = Some((-margin, last as f64 + margin));
+    Axis { range, ..Axis::linear("commit (index in the history)").with_ticks(ticks) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::testing::history as sample;
+    use bench::track::analyse;
+    use statistics::change_points::Rules;
+
+    #[test]
+    fn the_page_is_self_contained_and_has_every_change_point() {
+        let records = sample();
+        let page = page(&records, &analyse(&records, &Rules::default()), None);
+        assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));
+        assert!(!page.contains("<script"));
+        assert_eq!(page.matches("<figure").count(), 2);
+        assert_eq!(page.matches("class=\"worse\"").count(), 1);
+        assert!(!page.contains("<b>") && page.contains("&lt;b&gt;"));
+    }
+
+    #[test]
+    fn commits_are_linked_if_there_is_an_address() {
+        let records = sample();
+        let all = analyse(&records, &Rules::default());
+        let page = page(&records, &all, Some("https://host.org/a/b/commit/{commit}"));
+        let address = format!("href=\"https://host.org/a/b/commit/{:040x}\"", 20);
+        assert_eq!(page.matches(&address).count(), 1, "{page}");
+    }
+
+    #[test]
+    fn histories_of_zero_and_one_commits_have_a_page() {
+        assert!(page(&[], &[], None).contains("No records"));
+        let one = &sample()[..1];
+        assert!(page(one, &analyse(one, &Rules::default()), None).contains("One commit"));
+    }
+
+    #[test]
+    fn a_recent_increase_of_a_cost_is_a_failed_test() {
+        let all = analyse(&sample(), &Rules::default());
+        let failures = |recent| {
+            quick_junit::Report::deserialize_from_str(&junit(&all, recent)).unwrap().failures
+        };
+        assert_eq!((failures(10), failures(5)), (1, 0));
+    }
+
+    #[test]
+    fn an_outlier_does_not_squash_the_plot() {
+        let mut records = bench::testing::history();
+        records[5].metrics.insert("uav/words".into(), 1e9);
+        let all = analyse(&records, &Rules::default());
+        let words = all.iter().find(|s| s.name == "uav/words").unwrap();
+        let figure = of_metric(&records, words);
+        let (low, high) = figure.y.range.unwrap();
+        assert!((500.0..1000.0).contains(&low) && (1110.0..1500.0).contains(&high), "{low} {high}");
+        let series = figure.series;
+        assert_eq!((series[0].points.len(), series[1].points.len()), (29, 1));
+        assert_eq!(series[1].points[0].y, high);
+        assert!(series[1].notes[0].contains("1000000000"), "{:?}", series[1].notes);
+    }
+
+    #[test]
+    fn a_change_point_lies_between_its_commits() {
+        let records = bench::testing::history();
+        let all = analyse(&records, &Rules::default());
+        let words = all.iter().find(|s| s.name == "uav/words").unwrap();
+        let Figure { series, marks, .. } = of_metric(&records, words);
+        assert_eq!(marks, [Mark { name: "worse".into(), x: 19.5, style: 1 }]);
+        assert!(series[0].notes[20].ends_with("\n<b>"), "{:?}", series[0].notes[20]);
+    }
+}

@@ -1,0 +1,232 @@
+//! Runs of the programs, each with its mesh, which is compared with its run report; and the serial meshes, with which all others are
+//! compared: base tree and final mesh, of mesher and reference.
+
+use super::case::CaseRun;
+use super::report::{Check, DETERMINISTIC, Outcome, RUNS, Run};
+use crate::engine::failure::{CODE_INPUT, End, Failure};
+use crate::engine::layout::{Layout, RunOptions, SERIAL};
+use crate::engine::runner::{Completed, Engine};
+use check::checks::{self, CheckResult, Subject, identical};
+use contract::case::Case;
+use contract::leafset::LeafSet;
+use contract::manifest::Tree;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The engine under test, in reports.
+pub(super) const MESHER: &str = "mesher";
+/// The reference, in reports.
+pub(super) const REFERENCE: &str = "reference";
+
+/// Most cells of a mesh that is checked in memory. `harness audit` checks larger ones.
+const CELLS_MAX: u64 = 100_000_000;
+/// Most cells of a mesh that the reference makes, too.
+const REFERENCE_CELLS_MAX: usize = 3_000_000;
+
+/// A run that ended well, and its mesh.
+#[derive(Debug)]
+pub(super) struct Meshed {
+    /// Its measurements.
+    pub run: Run,
+    /// The number of ranks that it reports.
+    pub ranks: Option<usize>,
+    /// The mesh.
+    pub mesh: LeafSet,
+    /// Its leaf-set directory.
+    pub place: PathBuf,
+}
+
+impl CaseRun<'_> {
+    /// Runs [`MESHER`] or [`REFERENCE`] on a case, with its files in the directory `name` below that of the case, and reads its final mesh
+    /// or its base tree.
+    ///
+    /// # Errors
+    /// If the run fails, or its mesh cannot be read.
+    pub(super) fn mesh(
+        &self,
+        case: &Path,
+        name: &str,
+        program: &str,
+        tree: Tree,
+        layout: &Layout,
+    ) -> Result<Meshed, Failure> {
+        let (run, completed) = self.run(case, name, program, Some(tree), layout)?;
+        let mesh = self.program(program).read_mesh(&completed)?;
+        let Completed { report, mesh: place, .. } = completed;
+        Ok(Meshed { run, ranks: report.ranks, mesh, place: place.unwrap_or_default() })
+    }
+
+    /// A run that writes a mesh only if `tree` is one, or the engine cannot do without.
+    pub(super) fn run(
+        &self,
+        case: &Path,
+        name: &str,
+        program: &str,
+        tree: Option<Tree>,
+        layout: &Layout,
+    ) -> Result<(Run, Completed), Failure> {
+        let (engine, place) = (self.program(program), self.place.join(name));
+        fs::create_dir_all(&place).map_err(|error| {
+            engine.unusable(format!("has no directory {}: {error}", place.display()))
+        })?;
+        let mesh = tree.map(|_| place.join("mesh"));
+        let options = RunOptions {
+            mesh: mesh.as_deref(),
+            status: true,
+            ungraded: tree == Some(Tree::Base),
+            sample_memory: true,
+            services: Some(&self.all.needs.services),
+            ..RunOptions::new(&place, self.all.options.limit())
+        };
+        let completed = engine.run(case, layout, &options)?;
+        let report = &completed.report;
+        let run = Run {
+            program: program.to_owned(),
+            layout: layout.rank_count().map(|_| layout.clone()),
+            cells: report.cells,
+            digest: report.digest.clone().unwrap_or_default(),
+            time_wall_s: report.time_wall_s.unwrap_or(completed.time_process_s),
+            is_time_reported: report.time_wall_s.is_some(),
+            time_process_s: completed.time_process_s,
+            peak_rss_bytes: report.peak_rss_bytes_total(),
+        };
+        Ok((run, completed))
+    }
+
+    fn program(&self, program: &str) -> &Engine {
+        match program {
+            REFERENCE => &self.all.programs.reference,
+            _ => &self.all.programs.engine,
+        }
+    }
+}
+
+impl CaseRun<'_> {
+    /// Makes the serial mesh, which later steps use, and checks it; of an engine that promises the definition, also its base tree. `None`
+    /// if the mesher made none, or they are too large to check.
+    pub(super) fn verify_serial(&mut self, case: &Case) -> Option<(Meshed, Option<Meshed>)> {
+        let timed = self.measure()?;
+        let cells = timed.cells;
+        if cells > CELLS_MAX {
+            let why = format!(
+                "{cells} cells exceed the {CELLS_MAX} that are checked in memory: `harness audit` checks larger meshes"
+            );
+            self.leave_out(("serial", "checks"), why);
+            return None;
+        }
+        let serial = self.make("serial", "serial", MESHER, Tree::Final)?;
+        self.verify_repetition(&timed, &serial.mesh);
+        let base = match self.promises().definition {
+            true => Some(self.verify_definition(case, &serial.mesh)?),
+            false => {
+                self.step("checks");
+                self.add_results("serial", None, self.promised(case, &serial.mesh));
+                None
+            }
+        };
+        Some((serial, base))
+    }
+
+    /// Compares a mesh with its base tree, which is returned, and with the reference.
+    fn verify_definition(&mut self, case: &Case, mesh: &LeafSet) -> Option<Meshed> {
+        // The mesh of an engine that cannot stop at the base tree is checked against the reference's base tree.
+        let stops = !self.engine().run.ungraded.is_empty();
+        let program = if stops { MESHER } else { REFERENCE };
+        let base = self.make("base tree", "base", program, Tree::Base)?;
+        self.report.leaves_base = base.mesh.words.len() as u64;
+        let reference = self.reference(case, mesh, &base.mesh);
+        self.step("checks");
+        let mut subject = Subject::new(case, mesh).with_base(&base.mesh);
+        if let Some(reference) = &reference {
+            subject = subject.with_reference(reference);
+        }
+        self.add_results("serial", None, checks::all(&subject));
+        Some(base)
+    }
+
+    /// The checks of what the engine promises about any of its meshes, and of the files.
+    pub(super) fn promised(&self, case: &Case, mesh: &LeafSet) -> Vec<CheckResult> {
+        checks::all(&Subject::new(case, mesh).promising(self.promises()))
+    }
+
+    /// Compares the digest of the timed run with that of the mesh that was written, if the engine is deterministic.
+    fn verify_repetition(&mut self, timed: &Run, mesh: &LeafSet) {
+        if !self.promises().is_deterministic() {
+            return;
+        }
+        let (first, second) = (&timed.digest, mesh.manifest.digest.to_string());
+        let outcome = match *first == second {
+            true => Outcome::held(mesh.words.len() as u64),
+            false => Outcome::fail(format!(
+                "two serial runs differ: {} cells, digest {first}; {} cells, digest {second}",
+                timed.cells,
+                mesh.words.len()
+            )),
+        };
+        self.add(Check::new("serial", DETERMINISTIC, outcome), None);
+    }
+
+    /// One mesh; without it the case ends.
+    fn make(&mut self, subject: &str, name: &str, program: &str, tree: Tree) -> Option<Meshed> {
+        self.step(subject);
+        let meshed = self.mesh(&self.file, name, program, tree, &SERIAL);
+        let meshed = self.ended(subject, meshed)?;
+        self.add(Check::new(subject, RUNS, Outcome::held(2)), None);
+        Some(meshed)
+    }
+
+    /// A run that ended well. The harness has read the case without an error, so an input error is the program's opinion only.
+    fn ended<T>(&mut self, subject: &str, run: Result<T, Failure>) -> Option<T> {
+        run.map_err(|failure| self.add_failure(subject, None, &failure)).ok()
+    }
+
+    /// A run for time and memory, which writes no mesh if the engine can do without.
+    fn measure(&mut self) -> Option<Run> {
+        self.step("serial, timed");
+        let timed =
+            self.run(&self.file, "timed", MESHER, None, &SERIAL).and_then(|(mut run, _)| {
+                if run.digest.is_empty() {
+                    // Only the mesh of another run can show what such a run makes.
+                    run.digest =
+                        self.mesh(&self.file, "timed", MESHER, Tree::Final, &SERIAL)?.run.digest;
+                }
+                Ok(run)
+            });
+        let timed = self.ended("serial", timed)?;
+        self.report.cells = timed.cells;
+        self.report.runs.push(timed.clone());
+        Some(timed)
+    }
+
+    /// The reference's final mesh; its base tree is compared with the mesher's.
+    fn reference(&mut self, case: &Case, mesh: &LeafSet, base: &LeafSet) -> Option<LeafSet> {
+        let cells = mesh.words.len();
+        if cells > REFERENCE_CELLS_MAX {
+            let why = format!(
+                "{cells} cells exceed the {REFERENCE_CELLS_MAX} up to which the reference is run"
+            );
+            self.leave_out(("reference", "identical"), why);
+            return None;
+        }
+        let meshed = self.make("reference", "reference", REFERENCE, Tree::Final)?;
+        self.report.runs.push(meshed.run);
+        let own = self.make("reference base tree", "reference-base", REFERENCE, Tree::Base)?.mesh;
+        let compared = identical::compare(&base.words, &own.words, &case.root);
+        self.add_results("base tree", None, vec![compared]);
+        Some(meshed.mesh)
+    }
+
+    /// A case that the harness refuses: it is an input error if the mesher refuses it too, else a failed check.
+    pub(super) fn verify_refusal(&mut self, why: &str) {
+        match self.mesh(&self.file, "serial", MESHER, Tree::Final, &SERIAL) {
+            Ok(_) => {
+                let why = format!("the mesher accepts an invalid case: {why}");
+                self.add(Check::new("serial", RUNS, Outcome::fail(why)), None);
+            }
+            Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. }) => {
+                self.report.input_error = Some(error);
+            }
+            Err(failure) => self.add_failure("serial", None, &failure),
+        }
+    }
+}

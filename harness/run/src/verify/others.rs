@@ -1,0 +1,256 @@
+//! The checks by other programs: the proven checker judges the serial mesh, the oracles classify leaves of the base tree, and p4est balances
+//! it.
+
+use super::case::{CaseRun, Step, steps};
+use super::meshes::{MESHER, Meshed};
+use super::options::Need;
+use super::report::{Check, Outcome};
+use crate::engine::failure::{CODE_INPUT, End, Failure};
+use crate::engine::launcher;
+use crate::engine::layout::SERIAL;
+use crate::engine::process::{self, Watch};
+use crate::proof;
+use crate::python::{ORACLES, ask};
+use check::checks::{CheckResult, identical};
+use check::oracle::vote::{Answer, Ballot};
+use check::oracle::{self, Sample, is_doubled, is_watertight};
+use contract::case::Case;
+use contract::catalogue::Size;
+use contract::leafset::LeafSet;
+use contract::manifest::Tree;
+use contract::npy::PartFile;
+use contract::parity::Parity;
+use contract::plain::{PlainCase, StlForm};
+use contract::word::{self, Side};
+use std::fmt::Display;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+use toml::Value;
+
+/// On a small case the oracles classify every leaf, up to this many.
+const POINTS_OF_SMALL: usize = 400_000;
+/// Most points of other cases.
+const POINTS: usize = 20_000;
+/// Seed of the choice of points.
+const SEED: u64 = 1;
+/// p4est's exit code for a tree that is deeper than it supports.
+const EXIT_TOO_DEEP: i32 = 3;
+
+impl CaseRun<'_> {
+    /// Has the other programs judge a serial mesh of the definition and its base tree.
+    pub(super) fn verify_by_others(&mut self, case: &Case, serial: &Meshed, base: &Meshed) {
+        for &(step, need) in steps(self.engine()) {
+            match self.all.needs.lacks(need) {
+                Some(why) => self.leave_out(step, why),
+                None => self.judge(step, |run| match need {
+                    Need::Proof => run.prove(step, serial, base),
+                    Need::Oracles => run.vote(step, case, &base.mesh),
+                    _ => run.balance(step, base),
+                }),
+            }
+        }
+    }
+
+    /// Adds the check of a program.
+    fn judge(&mut self, step: Step, check: impl FnOnce(&Self) -> Result<Check, Failure>) {
+        self.step(step.0);
+        let start = Instant::now();
+        let mut check = match check(self) {
+            Ok(check) => check,
+            Err(failure) if failure.is_interrupt() => return,
+            // Without an answer nothing is shown about the mesh, and that must not count as agreement.
+            Err(failure) => Check::new(step.0, step.1, Outcome::fail(failure.to_string())),
+        };
+        check.time_s = start.elapsed().as_secs_f64();
+        self.add(check, None);
+    }
+
+    /// Has the proven checker judge the mesh, given its base tree.
+    fn prove(
+        &self,
+        (subject, name): Step,
+        serial: &Meshed,
+        base: &Meshed,
+    ) -> Result<Check, Failure> {
+        let options = self.all.options;
+        let checker = &self.all.programs.paths.proven_checker;
+        let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
+        match proof::check(checker, places, leaves, options.limit()) {
+            Ok(proof) => Ok(Check::of_result(subject, CheckResult { name, ..proof })),
+            // The files of another program may lack what the proof needs.
+            Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
+                if !options.require.contains(&Need::Proof) =>
+            {
+                Ok(Check::new(subject, name, Outcome::left_out(error)))
+            }
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// Chooses points, has the oracles classify them, and counts the votes.
+    fn vote(&self, step: Step, case: &Case, base: &LeafSet) -> Result<Check, Failure> {
+        let needs = &self.all.needs;
+        let most = match self.selected.size {
+            Some(Size::Small) => POINTS_OF_SMALL,
+            _ => POINTS,
+        };
+        let sample = oracle::choose(case, &base.words, most, SEED);
+        let (gone, asked): (Vec<&str>, Vec<&str>) =
+            ORACLES.into_iter().partition(|of| needs.lacks_oracle(of).is_some());
+        let (mut answers, mut failures) = (Vec::new(), Vec::new());
+        for answer in self.ask(case, &sample, &asked) {
+            match answer {
+                Ok(answer) => answers.push(answer),
+                Err(failure) if failure.is_interrupt() => return Err(failure),
+                Err(failure) => {
+                    needs.note_silent(&failure);
+                    failures.push(failure);
+                }
+            }
+        }
+        let mut check = match answers.is_empty() {
+            false => count(step, case, &sample, &answers),
+            true => {
+                let first = gone.first().and_then(|of| needs.lacks_oracle(of));
+                let why = first.as_ref().or(failures.first()).map(Failure::to_string);
+                Check::new(step.0, step.1, Outcome::left_out(why.unwrap_or_default()))
+            }
+        };
+        check.notes.extend(failures.iter().map(|failure| format!("no answer: {failure}")));
+        Ok(check)
+    }
+
+    fn ask(&self, case: &Case, sample: &Sample, oracles: &[&str]) -> Vec<Result<Answer, Failure>> {
+        let place = self.place.join("oracles");
+        let (services, paths) = (&self.all.needs.services, &self.all.programs.paths);
+        let (question, limit) = ((&*sample.points, &*case.facets), self.all.options.limit());
+        let answers = fs::create_dir_all(&place)
+            .and_then(|()| ask(oracles, question, &place, services, paths, limit));
+        answers.unwrap_or_else(|error| {
+            let end = End::Unusable(format!("have no input files: {error}"));
+            vec![Err(Failure::new("the oracles", end))]
+        })
+    }
+
+    /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
+    /// without their sides.
+    fn balance(&self, (subject, name): Step, base: &Meshed) -> Result<Check, Failure> {
+        let plain = self.mesh_plainly()?;
+        match self.balance_by_p4est(&base.place) {
+            Ok(words) => {
+                let root = &base.mesh.manifest.root;
+                let compared = identical::compare(&sideless(&plain), &words, root);
+                Ok(Check::of_result(subject, CheckResult { name, ..compared }))
+            }
+            Err(Failure { end: End::Exited { code: EXIT_TOO_DEEP, .. }, .. }) => {
+                let why = "the base tree has leaves of level 19, p4est stops at 18";
+                Ok(Check::new(subject, name, Outcome::left_out(why)))
+            }
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// The leaf words of the same case with n = 1 and all leaves kept.
+    fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
+        let place = self.place.join("plain-case");
+        let unusable = |why: String| Failure::new("the harness", End::Unusable(why));
+        let case = PlainCase::read(&self.file).map_err(unusable)?;
+        let written = fs::create_dir_all(&place)
+            .and_then(|()| plain(case).write(&place, StlForm::Any))
+            .map_err(|error| unusable(format!("cannot write a case with n = 1: {error}")))?;
+        Ok(self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh.words)
+    }
+
+    fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
+        let unusable = |error: &dyn Display| {
+            Failure::new("p4est", End::Unusable(format!("wrote no leaves: {error}")))
+        };
+        let out = self.place.join("p4est");
+        fs::create_dir_all(&out).map_err(|error| unusable(&error))?;
+        let mut command = Command::new(&self.all.programs.paths.p4est);
+        command.arg(base).arg(&out);
+        launcher::set_environment(&mut command);
+        let _files = launcher::own_directory(&mut command);
+        process::run(&mut command, &Watch::new("p4est", self.all.options.limit(), &out))?;
+        let part = PartFile::open(&out.join("leaves-00000.npy"));
+        part.map_err(|error| unusable(&error))?.read_all().map_err(|error| unusable(&error))
+    }
+}
+
+/// Counts the votes.
+fn count(step: Step, case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
+    let parity = Parity::new(&case.facets_lattice);
+    let mesh: Vec<bool> =
+        sample.words.iter().map(|&leaf| word::side(leaf) == Side::Inside).collect();
+    let exact: Vec<Option<bool>> =
+        sample.words.iter().map(|&leaf| unanimous(&parity, leaf)).collect();
+    let ballot = Ballot {
+        mesh: &mesh,
+        exact: &exact,
+        oracles: answers,
+        watertight: is_watertight(&case.facets_lattice),
+        doubled: is_doubled(&case.facets_lattice),
+        seeds: !case.seeds.is_empty(),
+    };
+    let outcome = match (ballot.failure(&sample.points), ballot.advisory()) {
+        (Some(why), _) => Outcome::fail(why),
+        // Agreement would show nothing where no vote could fail the mesh.
+        (None, Some(why)) => Outcome::left_out(format!(
+            "{why}, so the oracles' votes are reported but decide nothing"
+        )),
+        (None, None) => Outcome::held(ballot.decisive()),
+    };
+    let mut notes = ballot.notes();
+    if sample.in_band > 0 {
+        let (leaves, band) = (sample.in_band, sample.band);
+        let note = format!(
+            "{leaves} leaves within {band:.3e} of the surface were not given to the oracles"
+        );
+        notes.insert(0, note);
+    }
+    Check { notes, ..Check::new(step.0, step.1, outcome) }
+}
+
+/// Whether a leaf's centroid is inside by all exact rays; `None` if the rays disagree.
+fn unanimous(parity: &Parity, leaf: u64) -> Option<bool> {
+    let rays = parity.inside(word::octant(leaf).centre());
+    rays.iter().all(|ray| *ray == rays[0]).then_some(rays[0])
+}
+
+/// The case with n = 1 and all leaves kept.
+fn plain(mut case: PlainCase) -> PlainCase {
+    case.table.insert("layer_cells_min".into(), Value::Integer(1));
+    case.table.insert("keep".into(), Value::String("all".into()));
+    case.table.insert("keep_crossing".into(), Value::Boolean(true));
+    case
+}
+
+/// Leaf words with side bits 0. They stay sorted, because no two leaves have the same octant.
+fn sideless(words: &[u64]) -> Vec<u64> {
+    words.iter().map(|word| word & !3).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plain_case_differs_only_in_layer_and_keep() {
+        let table = toml::toml! { spacing_min = 0.1 keep = "inside" keep_crossing = false };
+        let facets = vec![[[0.5; 3]; 3]];
+        let case = plain(PlainCase { table, facets: facets.clone() });
+        let expected =
+            toml::toml! { spacing_min = 0.1 keep = "all" keep_crossing = true layer_cells_min = 1 };
+        assert_eq!((case.table, case.facets), (expected, facets));
+    }
+
+    #[test]
+    fn sides_are_cleared_and_octants_kept() {
+        assert_eq!(
+            sideless(&[0b0100, 1 << 7 | 0b1001, 2 << 7 | 0b1010]),
+            [4, 1 << 7 | 8, 2 << 7 | 8]
+        );
+    }
+}
