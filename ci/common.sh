@@ -1,5 +1,14 @@
 # shellcheck shell=bash disable=SC2034  # the scripts that source this file use the variables
-# Sourced by the scripts of ci/: paths, environment and messages. Sourcing it runs no program.
+# Sourced by the scripts of ci/: paths, environment and messages. With --help among the arguments, it prints the head of the script and
+# ends; otherwise sourcing it runs no program.
+
+# usage: prints the comment at the head of the script.
+usage() { sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"; }
+case " $* " in *" --help "* | *" -h "*)
+    usage
+    exit 0
+    ;;
+esac
 
 repo="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 target="${CARGO_TARGET_DIR:-$repo/target}"
