@@ -14,10 +14,11 @@ use mesher::input::ingest::{Slice, Source, read};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
 use mesher::input::stl;
 use mesher::output::stream::Leaves;
+use mesher::partition::curve;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::refine::voxelise::{BinnedFacets, refine};
-use mesher::sides::{Sides, decide};
+use mesher::sides::{Base, Sides, decide};
 use mesher::{Options, grade};
 use ranks::Solo;
 use std::convert::Infallible;
@@ -80,7 +81,7 @@ impl Phases {
             .expect("near the root");
         let ownership = Ownership::solo();
         let binned = BinnedFacets::new(&facets);
-        let (tree, _) = refine(&binned, &rules, &[(0, 0)]);
+        let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(sides.deleted());
         let (graded, _) =
@@ -129,7 +130,7 @@ pub fn kernels() -> Vec<Kernel> {
         kernel(
             "refine",
             facets,
-            Box::new(|| refine(&p.binned, &p.rules, &[(0, 0)]).1.facet_brick_tests),
+            Box::new(|| refine(&p.binned, &p.rules, &[curve::ALL]).1.facet_brick_tests),
         ),
         kernel("flood", bricks, Box::new(move || floods(p.surface(), surface))),
         kernel(
@@ -224,7 +225,7 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, &options(), true, &Solo)
+    decide(&Base { tree, ownership, facets, rules, comm: &Solo }, &options(), true)
         .expect("a case without seeds")
         .sides
 }
