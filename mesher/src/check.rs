@@ -248,7 +248,7 @@ fn volume_of(l: Level, octants: u64) -> u64 {
 /// The leaves of each rank are linear, and equal in number to the counts. With the deleted ones, those of all ranks tile the root.
 pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
     let (mut end, mut number, mut volume) = (0, 0, 0);
-    let Ok(_) = mesh.leaves().emit(|words| {
+    let Ok(_) = mesh.emit(|words| {
         end = is_linear(end, words);
         number += words.len() as u64;
         volume += words.iter().map(|w| volume_of(level_of(*w), 1)).sum::<u64>();
@@ -259,11 +259,10 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         let owned = bricks_of(sets).filter(|(l, b)| mesh.ownership.owns(*l, b.key));
         volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
     };
-    if !mesh.is_base {
-        add(mesh.sides.deleted());
-        if !mesh.rules.keep_crossing {
-            add(&mesh.crossing);
-        }
+    // T0 has no deleted leaves.
+    add(mesh.sides.deleted());
+    if mesh.drops_crossing() {
+        add(&mesh.crossing);
     }
     assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
 }

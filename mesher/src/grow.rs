@@ -7,7 +7,7 @@ use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
 use crate::mesh::Mesh;
 use crate::output::warnings;
-use crate::partition::initial::{self, Partition};
+use crate::partition::initial::{self, Estimate, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner};
@@ -43,7 +43,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         false => Partition::solo(),
         true => job.phase("base tree", |comm| match division.partitioner {
             Partitioner::Paper => of_base_mesh((facets.borrow(), counts), &rules, division, comm),
-            _ => initial::partition(facets.borrow(), &rules, division, comm),
+            _ => Estimate { facets: facets.borrow(), rules: &rules, comm }.partition(division),
         })?,
     };
     job.check(|comm| check::ownership(&ownership, comm));
@@ -194,7 +194,7 @@ fn of_base_mesh(
             leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
             Ok::<(), Infallible>(())
         };
-        let Ok(_) = mesh.leaves().emit(kept);
+        let Ok(_) = mesh.emit(kept);
         leaves
     });
     initial::of_base_mesh(leaves, depth, comm)

@@ -6,7 +6,7 @@
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
 use super::Base;
-use super::components::{self, FacedOctants, MergedComponents, UnionFind};
+use super::components::{self, FacedOctants, UnionFind};
 use super::nodes::{Component, Nodes};
 use bricks::octant::Level;
 use ranks::{Comm, MessageBuffer, gather};
@@ -15,15 +15,11 @@ use ranks::{Comm, MessageBuffer, gather};
 pub type Label = u64;
 
 /// Labels of this rank's merged components: equal labels mean one component of the whole tree. Collective.
-pub fn labels(
-    base: &Base,
-    nodes: &Nodes,
-    faces: Vec<FacedOctants>,
-    merged: &MergedComponents,
-) -> Vec<Label> {
+pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u32]) -> Vec<Label> {
     let comm = base.comm;
     let own = |component: u32| (comm.rank() as u64 + 1) << 40 | u64::from(component);
-    let mut labels: Vec<Label> = (0..merged.count).map(own).collect();
+    let count = merged.iter().max().map_or(0, |last| last + 1);
+    let mut labels: Vec<Label> = (0..count).map(own).collect();
     if comm.size() == 1 {
         return labels;
     }
@@ -53,11 +49,11 @@ fn label_replicated(
     labels: &mut [Label],
     base: &Base,
     nodes: &Nodes,
-    merged: &MergedComponents,
+    merged: &[u32],
 ) -> Vec<[Label; 2]> {
     let non_owning_view = base.ownership.non_owning_view();
     let replicated = Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
-    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered().of;
+    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered();
     let of_nodes = nodes.replicated_components();
     assert_eq!(
         of_nodes.len(),
@@ -67,7 +63,7 @@ fn label_replicated(
     let mut pairs = Vec::new();
     let mut labelled = vec![false; labels.len()];
     for (c, replicated) in of_nodes.into_iter().zip(of_replicated) {
-        let component = merged.of[c as usize] as usize;
+        let component = merged[c as usize] as usize;
         let (label, replicated) = (&mut labels[component], Label::from(replicated));
         if !std::mem::replace(&mut labelled[component], true) {
             *label = replicated;
@@ -82,11 +78,11 @@ fn label_replicated(
 fn across_ranks(
     nodes: &Nodes,
     mut faces: Vec<FacedOctants>,
-    merged: &MergedComponents,
+    merged: &[u32],
     labels: &[Label],
     comm: &dyn Comm,
 ) -> Vec<[Label; 2]> {
-    let label = |c: Component| labels[merged.of[c as usize] as usize];
+    let label = |c: Component| labels[merged[c as usize] as usize];
     let target = |f: &FacedOctants| (f.rank, f.level, f.key, label(f.component));
     faces.sort_unstable_by_key(target);
     let mut out = MessageBuffer::default();

@@ -139,9 +139,9 @@ impl Components {
         let at_boundary = std::mem::take(&mut local.at_boundary);
         let merged = local.merged.numbered();
         let labels = global::labels(base, &nodes, faces, &merged);
-        let candidates = vote::candidates(base, &nodes, &merged.of, &labels);
+        let candidates = vote::candidates(base, &nodes, &merged, &labels);
         let all = vote::all_components(&candidates, base.comm);
-        Self { nodes, merged: merged.of, labels, candidates, all, at_boundary }
+        Self { nodes, merged, labels, candidates, all, at_boundary }
     }
 
     /// The label of a local component.

@@ -31,7 +31,7 @@ fn by_mesher(case: &Small) -> Firsts {
     let faces = std::mem::take(&mut local.faces);
     let merged = local.merged.numbered();
     let labels = global::labels(&base, &nodes, faces, &merged);
-    let found = vote::candidates(&base, &nodes, &merged.of, &labels);
+    let found = vote::candidates(&base, &nodes, &merged, &labels);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 
