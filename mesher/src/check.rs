@@ -18,12 +18,11 @@ use crate::mesh::Mesh;
 use crate::output::stream::Counts;
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::record::Options;
-use crate::sides::Sides;
+use crate::sides::{Base, Sides};
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
-use bricks::tree::{PerLevel, Tree, check_existing, check_split};
+use bricks::tree::{PerLevel, check_existing, check_split};
 use ranks::{Comm, MessageBuffer, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -114,25 +113,19 @@ pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised) 
     }
 }
 
-/// T0 is what the facets of all ranks and the boxes ask for; replicas agree.
-pub fn base_tree(
-    tree: &Tree,
-    facets: &[Facet],
-    rules: &Rules,
-    ownership: &Ownership,
-    comm: &dyn Comm,
-) {
-    tree.check_structure();
-    replicas(&[&tree.split, &tree.crossing], ownership, comm);
-    base::tree(tree, facets, rules, ownership);
+/// T0 is what the facets, here those of all ranks, and the boxes ask for; replicas agree.
+pub fn base_tree(base: &Base) {
+    base.tree.check_structure();
+    replicas(&[&base.tree.split, &base.tree.crossing], base.ownership, base.comm);
+    base::tree(base);
 }
 
 /// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` and seeds ask for them; results are the same on all ranks.
-pub fn sides(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership, comm: &dyn Comm) {
-    sides.check_invariants(tree);
-    replicas(&[&sides.stored], ownership, comm);
-    same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", comm);
-    sides::seeds(sides, tree, rules, ownership);
+pub fn sides(sides: &Sides, base: &Base) {
+    sides.check_invariants(base.tree);
+    replicas(&[&sides.stored], base.ownership, base.comm);
+    same(&format!("{:?}", (sides.rays, sides.summary)), "results of sides", base.comm);
+    sides::seeds(sides, base);
 }
 
 /// The tree is linear, replicas agree, and no deleted leaf is split.
@@ -255,7 +248,7 @@ fn volume_of(l: Level, octants: u64) -> u64 {
 /// The leaves of each rank are linear, and equal in number to the counts. With the deleted ones, those of all ranks tile the root.
 pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
     let (mut end, mut number, mut volume) = (0, 0, 0);
-    let Ok(_) = mesh.leaves().emit(|words| {
+    let Ok(_) = mesh.emit(|words| {
         end = is_linear(end, words);
         number += words.len() as u64;
         volume += words.iter().map(|w| volume_of(level_of(*w), 1)).sum::<u64>();
@@ -266,11 +259,10 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         let owned = bricks_of(sets).filter(|(l, b)| mesh.ownership.owns(*l, b.key));
         volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
     };
-    if !mesh.is_base {
-        add(mesh.sides.deleted());
-        if !mesh.rules.keep_crossing {
-            add(&mesh.crossing);
-        }
+    // T0 has no deleted leaves.
+    add(mesh.sides.deleted());
+    if mesh.drops_crossing() {
+        add(&mesh.crossing);
     }
     assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
 }

@@ -7,14 +7,14 @@ use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
 use crate::mesh::Mesh;
 use crate::output::warnings;
-use crate::partition::initial::{self, Partition};
+use crate::partition::initial::{self, Estimate, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::repartition;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner};
 use crate::record::{Job, Options, Recorder};
 use crate::refine;
 use crate::refine::voxelise::{self, BinnedFacets};
-use crate::sides::{self, Decided, leaks, openness};
+use crate::sides::{self, Base, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
@@ -43,7 +43,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         false => Partition::solo(),
         true => job.phase("base tree", |comm| match division.partitioner {
             Partitioner::Paper => of_base_mesh((facets.borrow(), counts), &rules, division, comm),
-            _ => initial::partition(facets.borrow(), &rules, division, comm),
+            _ => Estimate { facets: facets.borrow(), rules: &rules, comm }.partition(division),
         })?,
     };
     job.check(|comm| check::ownership(&ownership, comm));
@@ -60,7 +60,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         if options.checks() {
             binned.check_invariants();
         }
-        voxelise::refine(&binned, &rules, &ownership.octants())
+        voxelise::refine(&binned, &rules, &ownership.intervals().collect::<Vec<_>>())
     });
     job.counters = work;
 
@@ -76,7 +76,8 @@ pub fn grow<F: Borrow<[Facet]>>(
     }
     job.check(|comm| {
         check::ownership(&ownership, comm);
-        check::base_tree(&tree, &all_facets, &rules, &ownership, comm);
+        let (tree, ownership, rules) = (&tree, &ownership, &rules);
+        check::base_tree(&Base { tree, ownership, facets: &all_facets, rules, comm });
     });
     drop(all_facets);
     let is_whole = check::is_whole(options, &tree.split, comm);
@@ -84,26 +85,24 @@ pub fn grow<F: Borrow<[Facet]>>(
     count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let is_closed = job.phase("leaks", |comm| openness::is_closed(facets.borrow(), comm));
-    let decided = job.phase("sides", |comm| {
-        sides::decide(&tree, &ownership, facets.borrow(), &rules, options, is_closed, comm)
-    })?;
-    job.check(|comm| {
-        check::sides::components(&decided, (&rules, facets.borrow()), &ownership, comm);
-        check::sides(&decided.sides, &tree, &rules, &ownership, comm);
+    let slice = facets.borrow();
+    let base = Base { tree: &tree, ownership: &ownership, facets: slice, rules: &rules, comm };
+    let is_closed = job.phase("leaks", |comm| openness::is_closed(slice, comm));
+    let decided = job.phase("sides", |_| sides::decide(&base, options, is_closed))?;
+    job.check(|_| {
+        check::sides::components(&decided, &base);
+        check::sides(&decided.sides, &base);
         if is_whole {
-            check::sides::agree_over_faces(&decided.sides, &tree, &ownership, comm);
+            check::sides::agree_over_faces(&decided.sides, &base);
         }
     });
     let Decided { sides, regions, .. } = decided;
     let (leaks, bounds_nothing) = job.phase("leaks", |comm| {
-        let facets = facets.borrow();
-        let leaks =
-            leaks::find(regions, sides.summary.inside > 0, &tree, &ownership, facets, &rules, comm);
+        let leaks = leaks::find(&base, regions, sides.summary.inside > 0);
         let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
             && match is_closed {
-                true => openness::is_doubled(facets, comm),
-                false => !openness::is_sheet(facets, comm),
+                true => openness::is_doubled(slice, comm),
+                false => !openness::is_sheet(slice, comm),
             };
         (leaks, bounds_nothing)
     });
@@ -195,7 +194,7 @@ fn of_base_mesh(
             leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
             Ok::<(), Infallible>(())
         };
-        let Ok(_) = mesh.leaves().emit(kept);
+        let Ok(_) = mesh.emit(kept);
         leaves
     });
     initial::of_base_mesh(leaves, depth, comm)

@@ -2,7 +2,6 @@
 
 use crate::input::lattice::Rules;
 use crate::input::quantise::FacetCounts;
-use crate::output::stream::Leaves;
 use crate::partition::Partitioner;
 use crate::partition::ownership::Ownership;
 use crate::sides::Sides;
@@ -39,14 +38,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The leaves that this rank owns.
-    pub fn leaves(&self) -> Leaves<'_> {
-        Leaves {
-            split: &self.split,
-            crossing: &self.crossing,
-            sides: &self.sides,
-            ownership: &self.ownership,
-            drops_crossing: !self.is_base && !self.rules.keep_crossing,
-        }
+    /// Whether crossing leaves of the base tree are no leaves of the mesh.
+    pub fn drops_crossing(&self) -> bool {
+        !self.is_base && !self.rules.keep_crossing
     }
 }

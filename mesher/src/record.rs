@@ -147,7 +147,7 @@ impl Recorder {
 /// Work done by one rank, in numbers that repeat exactly.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Counters {
-    /// Tests of a facet against the 64 octants of a brick.
+    /// Tests of a facet against the 64 octants of a brick, those above the rank's part included.
     pub facet_brick_tests: u64,
     /// Bricks visited by voxelisation.
     pub bricks_voxelised: u64,

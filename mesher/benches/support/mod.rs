@@ -8,17 +8,19 @@ use bricks::dilate::{Reach, Tile};
 use bricks::facet::{Facet, crossed};
 use bricks::kept::Kept;
 use bricks::octant::ROOT_BITS;
-use bricks::tree::{PerLevel, Tree};
+use bricks::tree::Tree;
 use mesher::input::case::{Case, RootSpec};
 use mesher::input::ingest::{Slice, Source, read};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
+use mesher::input::quantise::FacetCounts;
 use mesher::input::stl;
-use mesher::output::stream::Leaves;
+use mesher::partition::curve;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::refine::voxelise::{BinnedFacets, refine};
-use mesher::sides::{Sides, decide};
-use mesher::{Options, grade};
+use mesher::sides::leaks::Leaks;
+use mesher::sides::{Base, Sides, decide};
+use mesher::{Mesh, Options, grade};
 use ranks::Solo;
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -65,8 +67,7 @@ struct Phases {
     ownership: Ownership,
     binned: BinnedFacets,
     tree: Tree,
-    sides: Sides,
-    graded: PerLevel,
+    mesh: Mesh,
 }
 
 impl Phases {
@@ -80,22 +81,26 @@ impl Phases {
             .expect("near the root");
         let ownership = Ownership::solo();
         let binned = BinnedFacets::new(&facets);
-        let (tree, _) = refine(&binned, &rules, &[(0, 0)]);
+        let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(sides.deleted());
         let (graded, _) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
-        Self { given, facets, rules, ownership, binned, tree, sides, graded }
-    }
-
-    fn leaves(&self) -> Leaves<'_> {
-        Leaves {
-            split: &self.graded,
-            crossing: &self.tree.crossing,
-            sides: &self.sides,
-            ownership: &self.ownership,
-            drops_crossing: !self.rules.keep_crossing,
-        }
+        let mesh = Mesh {
+            facets: FacetCounts { total: given.total, beyond_root: false, digest: 0 },
+            rules: rules.clone(),
+            ownership: Ownership::solo(),
+            level_base: 0,
+            partitioner: None,
+            split: graded,
+            crossing: tree.crossing.clone(),
+            sides,
+            leaks: Leaks::default(),
+            bounds_nothing: false,
+            case_name: String::new(),
+            is_base: false,
+        };
+        Self { given, facets, rules, ownership, binned, tree, mesh }
     }
 
     /// Crossing leaves of the surface level.
@@ -105,7 +110,7 @@ impl Phases {
 
     fn words(&self) -> Vec<u64> {
         let mut words = Vec::new();
-        let Ok(_) = self.leaves().emit(|w| {
+        let Ok(_) = self.mesh.emit(|w| {
             words.extend_from_slice(w);
             Ok::<(), Infallible>(())
         });
@@ -129,7 +134,7 @@ pub fn kernels() -> Vec<Kernel> {
         kernel(
             "refine",
             facets,
-            Box::new(|| refine(&p.binned, &p.rules, &[(0, 0)]).1.facet_brick_tests),
+            Box::new(|| refine(&p.binned, &p.rules, &[curve::ALL]).1.facet_brick_tests),
         ),
         kernel("flood", bricks, Box::new(move || floods(p.surface(), surface))),
         kernel(
@@ -143,7 +148,7 @@ pub fn kernels() -> Vec<Kernel> {
             "grade",
             leaves,
             Box::new(|| {
-                let kept = Kept::new(p.sides.deleted());
+                let kept = Kept::new(p.mesh.sides.deleted());
                 grade::grade(
                     p.tree.split.clone(),
                     &p.tree.crossing,
@@ -160,7 +165,7 @@ pub fn kernels() -> Vec<Kernel> {
             "leaves",
             leaves,
             Box::new(|| {
-                let Ok(counts) = p.leaves().emit(|w| {
+                let Ok(counts) = p.mesh.emit(|w| {
                     black_box(w);
                     Ok::<(), Infallible>(())
                 });
@@ -224,7 +229,7 @@ fn leaves_of(tree: &Tree) -> u64 {
 }
 
 fn sides(tree: &Tree, ownership: &Ownership, facets: &[Facet], rules: &Rules) -> Sides {
-    decide(tree, ownership, facets, rules, &options(), true, &Solo)
+    decide(&Base { tree, ownership, facets, rules, comm: &Solo }, &options(), true)
         .expect("a case without seeds")
         .sides
 }

@@ -1,11 +1,10 @@
 //! T0 by its definition, octant by octant from the root. The test of facets against octants and the descent share no code with
 //! refinement, routing and extent boxes.
 
-use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
+use crate::sides::Base;
 use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge, path, start57};
-use bricks::tree::Tree;
 use bytemuck::allocation::pod_collect_to_vec;
 use ranks::Comm;
 use std::ops::Range;
@@ -44,46 +43,35 @@ pub fn routed(facets: &[Facet], all: &[Facet], ownership: &Ownership) {
 }
 
 /// The tree is T0 wherever this rank owns a part of it.
-pub fn tree(tree: &Tree, facets: &[Facet], rules: &Rules, ownership: &Ownership) {
-    let intervals: Vec<Range<u64>> = ownership.intervals().collect();
-    let numbers: Vec<u32> = (0..facets.len() as u32).collect();
-    Definition { tree, facets, rules, intervals }.octant(0, 0, &numbers);
+pub fn tree(base: &Base) {
+    let own: Vec<Range<u64>> = base.ownership.intervals().collect();
+    octant(base, &own, (0, 0), &(0..base.facets.len() as u32).collect::<Vec<u32>>());
 }
 
-struct Definition<'a> {
-    tree: &'a Tree,
-    facets: &'a [Facet],
-    rules: &'a Rules,
-    /// This rank's part of the curve.
-    intervals: Vec<Range<u64>>,
-}
-
-impl Definition<'_> {
-    /// Compares an octant of T0 and its descendants, given the facets that cross its parent.
-    fn octant(&self, l: Level, code: u64, near: &[u32]) {
-        let (start, end) = (start57(l, code), start57(l, code + 1));
-        if !self.intervals.iter().any(|own| own.start < end && start < own.end) {
-            return;
-        }
-        let (min, h) = (corner(l, code), edge(l));
-        let crosses = |i: &u32| touches(&self.facets[*i as usize], min, h);
-        let facets: Vec<u32> = near.iter().copied().filter(crosses).collect();
-        let is_boxed = self.rules.boxes.iter().any(|b| {
-            b.level > l
-                && (0..3).all(|a| b.min[a] < b.max[a] && b.min[a] < min[a] + h && b.max[a] > min[a])
-        });
-        let is_split = is_boxed || l < self.rules.level_surface && !facets.is_empty();
-        let is_crossing = !is_split && !facets.is_empty();
-        let of = |set: &[bricks::brickset::BrickSet]| set[l as usize].contains(code);
-        assert_eq!(
-            (of(&self.tree.split), of(&self.tree.crossing)),
-            (is_split, is_crossing),
-            "octant {} of level {l}: split and crossing by the definition",
-            path(l, code)
-        );
-        if is_split {
-            (0..8).for_each(|child| self.octant(l + 1, code << 3 | child, &facets));
-        }
+/// Compares an octant of T0 and its descendants, given the facets that cross its parent and this rank's part of the curve.
+fn octant(base: &Base, own: &[Range<u64>], (l, code): (Level, u64), near: &[u32]) {
+    let (start, end) = (start57(l, code), start57(l, code + 1));
+    if !own.iter().any(|own| own.start < end && start < own.end) {
+        return;
+    }
+    let (min, h) = (corner(l, code), edge(l));
+    let crosses = |i: &u32| touches(&base.facets[*i as usize], min, h);
+    let facets: Vec<u32> = near.iter().copied().filter(crosses).collect();
+    let is_boxed = base.rules.boxes.iter().any(|b| {
+        b.level > l
+            && (0..3).all(|a| b.min[a] < b.max[a] && b.min[a] < min[a] + h && b.max[a] > min[a])
+    });
+    let is_split = is_boxed || l < base.rules.level_surface && !facets.is_empty();
+    let is_crossing = !is_split && !facets.is_empty();
+    let of = |set: &[bricks::brickset::BrickSet]| set[l as usize].contains(code);
+    assert_eq!(
+        (of(&base.tree.split), of(&base.tree.crossing)),
+        (is_split, is_crossing),
+        "octant {} of level {l}: split and crossing by the definition",
+        path(l, code)
+    );
+    if is_split {
+        (0..8).for_each(|child| octant(base, own, (l + 1, code << 3 | child), &facets));
     }
 }
 

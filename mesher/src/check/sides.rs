@@ -2,22 +2,21 @@
 //! with the phase.
 
 use super::{face_neighbours, is_in_leaf, to_owners};
-use crate::input::lattice::{Keep, Rules};
-use crate::partition::ownership::Ownership;
+use crate::input::lattice::Keep;
 use crate::sides::nodes::open_bricks;
-use crate::sides::{Decided, Sides};
+use crate::sides::{Base, Decided, Sides};
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge, path};
-use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
-use ranks::Comm;
+use bricks::tree::{LEVELS, PerLevel, per_level};
 
 /// Components whose rays are cast: enough to find a fault, on any geometry.
 const COMPONENTS_MAX: usize = 64;
 
 /// Leaves that share part of a face are on one side, whichever ranks own them. Collective.
-pub fn agree_over_faces(sides: &Sides, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) {
+pub fn agree_over_faces(sides: &Sides, base: &Base) {
+    let &Base { tree, ownership, comm, .. } = base;
     let stored = &sides.stored;
     let mut others: PerLevel = per_level();
     for l in 0..LEVELS as Level {
@@ -44,12 +43,9 @@ pub fn agree_over_faces(sides: &Sides, tree: &Tree, ownership: &Ownership, comm:
 
 /// The first leaf of each component is stored as its verdict asks; without seeds, the verdict is that of its rays if all six agree.
 /// Collective.
-pub fn components(
-    Decided { sides, components, verdict, .. }: &Decided,
-    (rules, facets): (&Rules, &[Facet]),
-    ownership: &Ownership,
-    comm: &dyn Comm,
-) {
+pub fn components(decided: &Decided, base: &Base) {
+    let Decided { sides, components, verdict, .. } = decided;
+    let &Base { ownership, facets, rules, comm, .. } = base;
     for &(label, first) in components {
         let (l, code) = first.leaf();
         let is_inside = verdict.inside.contains(&label);
@@ -86,7 +82,8 @@ pub fn components(
 }
 
 /// The leaves that contain seeds are flow.
-pub fn seeds(sides: &Sides, tree: &Tree, rules: &Rules, ownership: &Ownership) {
+pub fn seeds(sides: &Sides, base: &Base) {
+    let &Base { tree, ownership, rules, .. } = base;
     for seed in &rules.seeds {
         let (mut l, mut code) = (0, 0);
         while tree.split[l as usize].contains(code) {

@@ -6,7 +6,9 @@ use crate::output::leaves as finished;
 use crate::partition::ownership::Placement;
 use crate::record::Recorder;
 use crate::refine;
+use bricks::facet::Facet;
 use bricks::octant::Side;
+use bricks::tree::Tree;
 use geometries::{Generator, Shape};
 use ranks::{Solo, sim};
 
@@ -52,14 +54,18 @@ fn run(ungraded: bool, corrupt: impl Fn(&mut Mesh) + Sync, check: impl Fn(Mesh, 
 fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
     let facets = base::all_facets(&local_facets(&mesh, comm), comm);
     let Mesh { split, crossing, ownership, rules, .. } = mesh;
-    base_tree(&Tree { split, crossing }, &facets, &rules, &ownership, comm);
+    let tree = Tree { split, crossing };
+    let (tree, ownership, rules) = (&tree, &ownership, &rules);
+    base_tree(&Base { tree, ownership, facets: &facets, rules, comm });
 }
 
 fn check_sides(mesh: Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides: s, ownership, rules, .. } = mesh;
     let tree = Tree { split, crossing };
-    sides(&s, &tree, &rules, &ownership, comm);
-    sides::agree_over_faces(&s, &tree, &ownership, comm);
+    let (tree, ownership, rules) = (&tree, &ownership, &rules);
+    let base = Base { tree, ownership, facets: &[], rules, comm };
+    sides(&s, &base);
+    sides::agree_over_faces(&s, &base);
 }
 
 fn check_graded(mesh: Mesh, comm: &dyn Comm) {
@@ -201,7 +207,8 @@ fn a_crossing_leaf_that_no_facet_crosses_is_found() {
         let facets = base::all_facets(&local_facets(&m, comm), comm);
         let tree = Tree { split: m.split, crossing: m.crossing };
         tree.check_structure();
-        base::tree(&tree, &facets, &m.rules, &m.ownership);
+        let (tree, ownership, rules) = (&tree, &m.ownership, &m.rules);
+        base::tree(&Base { tree, ownership, facets: &facets, rules, comm });
     };
     run(true, corrupt, check);
 }
@@ -215,7 +222,8 @@ fn an_octant_that_an_extent_box_does_not_split_is_found() {
     let extent = ExtentBox { min: [far - 5; 3], max: [far; 3], level: 4 };
     let rules = Rules { boxes: vec![extent], ..mesh.rules };
     let tree = Tree { split: mesh.split, crossing: mesh.crossing };
-    base::tree(&tree, &facets, &rules, &mesh.ownership);
+    let (tree, ownership, rules) = (&tree, &mesh.ownership, &rules);
+    base::tree(&Base { tree, ownership, facets: &facets, rules, comm: &Solo });
 }
 
 #[test]
@@ -423,9 +431,13 @@ fn a_seed_that_is_no_flow_is_found() {
     let at_corner = Seed { given: [0.0; 3], lattice: [1; 3] };
     mesh.rules.seeds = vec![at_corner];
     let tree = Tree { split: mesh.split, crossing: mesh.crossing };
-    sides::seeds(&mesh.sides, &tree, &mesh.rules, &Ownership::solo());
-    mesh.rules.keep = Keep::Inside;
-    sides::seeds(&mesh.sides, &tree, &mesh.rules, &Ownership::solo());
+    let seeds = |rules: &Rules| {
+        let (tree, ownership) = (&tree, &Ownership::solo());
+        let base = Base { tree, ownership, facets: &[], rules, comm: &Solo };
+        sides::seeds(&mesh.sides, &base);
+    };
+    seeds(&mesh.rules);
+    seeds(&Rules { keep: Keep::Inside, ..mesh.rules.clone() });
 }
 
 #[test]

@@ -256,7 +256,7 @@ impl<'a> Path<'a> {
     /// A path to bricks of level `deepest`.
     fn new(mesh: &'a Mesh, deepest: Level) -> Self {
         let level = |l: usize| {
-            let cursors = LevelCursors::new(&mesh.leaves(), l);
+            let cursors = LevelCursors::new(mesh, l);
             PathLevel { cursors, key: None, brick: Octants::default() }
         };
         Self((0..=deepest as usize).map(level).collect())

@@ -26,7 +26,7 @@ pub fn emit(
         let begin = |out: &OutDir| Part::new(out.file(&name)?);
         let mut part = out.filter(|out| out.output.words).map(begin).transpose()?;
         let mut digests = Digests::default();
-        let counts = mesh.leaves().emit(|words| {
+        let counts = mesh.emit(|words| {
             heaviest.add(words);
             digests.add(words);
             part.as_mut().map_or(Ok(()), |part| part.add(words))

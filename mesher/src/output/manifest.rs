@@ -11,6 +11,10 @@ use bricks::octant::{LEVEL_MAX, Level};
 use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// The sides of leaves, in the order of their numbers.
+pub const SIDES: [&str; 3] = ["outside", "inside", "crossing"];
 
 /// A mesh in numbers: its rules, its leaves and its components. Boxes and seeds are in lattice units, everything else is in the
 /// geometry's unit.
@@ -28,14 +32,12 @@ pub struct MeshEntry {
     pub leaves: u64,
     /// Leaves by level, 0 to 19.
     pub leaves_by_level: Vec<u64>,
-    leaves_by_side: Value,
+    /// Leaves by side.
+    pub leaves_by_side: BTreeMap<&'static str, u64>,
     components: Value,
     components_ambiguous: Value,
     /// The mesh's digest.
     pub digest: String,
-    /// Leaves by side: outside, inside, crossing.
-    #[serde(skip)]
-    pub by_side: [u64; 3],
     /// The components of the base tree.
     #[serde(skip)]
     pub summary: Summary,
@@ -74,7 +76,7 @@ impl MeshEntry {
     pub fn new(mesh: &Mesh, counts: &Counts, digests: &Digests) -> Self {
         let Mesh { rules, sides, .. } = mesh;
         let by_level = &counts.by_level[..=LEVEL_MAX as usize];
-        let by_side: [u64; 3] = [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum());
+        let by_side = [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum());
         let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
         let place = |q| rules.root.locate(q);
         Self {
@@ -85,11 +87,7 @@ impl MeshEntry {
             leaks: LeakEntry::of(mesh),
             leaves: counts.total(),
             leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
-            leaves_by_side: json!({
-                "outside": by_side[0],
-                "inside": by_side[1],
-                "crossing": by_side[2],
-            }),
+            leaves_by_side: SIDES.into_iter().zip(by_side).collect(),
             components: json!({
                 "outside": outside,
                 "inside": inside,
@@ -104,7 +102,6 @@ impl MeshEntry {
                 "example": ambiguous.map(|a| place(a.example)),
             }),
             digest: hex(digests.whole()),
-            by_side,
             summary: sides.summary,
         }
     }

@@ -7,7 +7,7 @@
 //! - the wall time is that of the slowest rank.
 
 use crate::mesh::Mesh;
-use crate::output::manifest::MeshEntry;
+use crate::output::manifest::{MeshEntry, SIDES};
 use crate::output::warnings;
 use crate::partition::Partitioner;
 use crate::record::{Job, Phase, peak_rss_bytes};
@@ -124,7 +124,7 @@ impl Report {
         let (all, mesh) = (self.cells, &self.mesh);
         let sums = [
             ("level", mesh.leaves_by_level.iter().sum::<u64>()),
-            ("side", mesh.by_side.iter().sum()),
+            ("side", mesh.leaves_by_side.values().sum()),
             ("rank", self.counters["leaves"].iter().sum()),
         ];
         for (by, sum) in sums {
@@ -175,7 +175,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { mesh, level_base, ranks, .. } = self;
         let (edge, level_surface) = (mesh.rules.root.edge, mesh.rules.level_surface);
-        let [outside, inside, crossing] = mesh.by_side.map(grouped);
+        let [outside, inside, crossing] = SIDES.map(|side| grouped(mesh.leaves_by_side[side]));
         writeln!(f, "facets         {}", grouped(self.facets))?;
         writeln!(f, "root edge      {edge} (level 0), surface level {level_surface}")?;
         writeln!(f, "cells          {}", grouped(self.cells))?;
@@ -256,7 +256,7 @@ mod tests {
         let corruptions: [&dyn Fn(&mut Report); 12] = [
             &|r| r.cells += 1,
             &|r| r.mesh.leaves_by_level[3] += 1,
-            &|r| r.mesh.by_side[1] += 1,
+            &|r| *r.mesh.leaves_by_side.get_mut("inside").expect("a side") += 1,
             &|r| r.counters.get_mut("leaves").expect("a counter")[1] += 1,
             &|r| r.counters.get_mut("base_leaf_cells_max").expect("a counter")[0] = r.cells,
             &|r| r.mesh.summary.enclosed = enclosed(2, 9),
@@ -302,7 +302,8 @@ mod tests {
         };
         let mut report = report();
         (report.facets, report.cells, report.phases) = (1280, 3_000_000, vec![phase]);
-        (report.mesh.leaves_by_level, report.mesh.by_side) = (vec![0, 0, 1234], [1000, 2000, 3]);
+        report.mesh.leaves_by_level = vec![0, 0, 1234];
+        report.mesh.leaves_by_side = SIDES.into_iter().zip([1000, 2000, 3]).collect();
         (report.mesh.rules.root.edge, report.mesh.rules.level_surface) = (8.0, 2);
         report.mesh.digest = "abc".into();
         let example = [0; 3];

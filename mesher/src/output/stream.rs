@@ -9,10 +9,10 @@
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
 use crate::input::lattice::Keep;
+use crate::mesh::Mesh;
 use crate::partition::ownership::{Ownership, Placement};
-use crate::sides::Sides;
 use bricks::brick;
-use bricks::brickset::{BrickSet, Cursor, ones};
+use bricks::brickset::{Cursor, ones};
 use bricks::octant::{Level, Side, start57};
 use bricks::tree::LEVELS;
 
@@ -41,21 +41,7 @@ impl Counts {
     }
 }
 
-/// The leaves to emit: those of `split`, with the sides of the base leaves that contain them.
-pub struct Leaves<'a> {
-    /// Split octants of the tree to emit: of the graded tree or of the base tree.
-    pub split: &'a [BrickSet],
-    /// Crossing leaves of the base tree.
-    pub crossing: &'a [BrickSet],
-    /// Sides of the base tree's leaves.
-    pub sides: &'a Sides,
-    /// Ownership of the bricks.
-    pub ownership: &'a Ownership,
-    /// Whether crossing leaves are left out.
-    pub drops_crossing: bool,
-}
-
-impl Leaves<'_> {
+impl Mesh {
     /// Calls `sink` with the words of the leaves that this rank owns, in order, some thousands at a time.
     /// Returns the numbers of leaves.
     ///
@@ -64,7 +50,7 @@ impl Leaves<'_> {
     pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
         let mut walk = Walk {
             levels: (0..LEVELS).map(|l| LevelCursors::new(self, l)).collect(),
-            of: self,
+            ownership: &self.ownership,
             buffer: Vec::with_capacity(CHUNK + 512),
             counts: Counts::default(),
             sink,
@@ -100,13 +86,13 @@ pub struct Octants {
 
 impl<'a> LevelCursors<'a> {
     /// The cursors of level `l`.
-    pub fn new(of: &Leaves<'a>, l: usize) -> Self {
+    pub fn new(mesh: &'a Mesh, l: usize) -> Self {
         Self {
-            keep: of.sides.keep,
-            drops_crossing: of.drops_crossing,
-            split: of.split[l].cursor(),
-            crossing: of.crossing[l].cursor(),
-            stored: of.sides.stored[l].cursor(),
+            keep: mesh.sides.keep,
+            drops_crossing: mesh.drops_crossing(),
+            split: mesh.split[l].cursor(),
+            crossing: mesh.crossing[l].cursor(),
+            stored: mesh.sides.stored[l].cursor(),
         }
     }
 
@@ -139,7 +125,7 @@ struct Loaded {
 
 struct Walk<'a, S> {
     levels: Vec<LevelCursors<'a>>,
-    of: &'a Leaves<'a>,
+    ownership: &'a Ownership,
     buffer: Vec<u64>,
     counts: Counts,
     sink: S,
@@ -149,12 +135,9 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     /// Reads a brick whose octants `exists` exist; `crossing` and `inside` are inherited from base leaves.
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
-        let (of, cursors) = (self.of, &mut self.levels[l as usize]);
-        let placement = if of.ownership.owns(l, key) {
-            Placement::Local
-        } else {
-            of.ownership.placement(l, key)
-        };
+        let (ownership, cursors) = (self.ownership, &mut self.levels[l as usize]);
+        let placement =
+            if ownership.owns(l, key) { Placement::Local } else { ownership.placement(l, key) };
         let Octants { split, crossing, inside, deleted } = cursors.read(key, crossing, inside);
         let split = split & exists;
         let is_local = placement == Placement::Local;

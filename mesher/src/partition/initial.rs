@@ -40,72 +40,122 @@ impl Partition {
     }
 }
 
-/// Partitions T0. `facets` are this rank's slice. Collective.
-pub fn partition(
-    facets: &[Facet],
-    rules: &Rules,
-    division: &Division,
-    comm: &dyn Comm,
-) -> Result<Partition, Error> {
-    let auto = || levels(facets, rules, comm);
-    let (ownership, level_base, partitioner) = if division.is_of_curve() {
-        let levels = auto();
-        (by_area(facets, rules, levels, comm), levels[1], Partitioner::Morton)
-    } else {
-        let level = division.level_base.unwrap_or_else(|| auto()[1]).min(level_last(rules));
-        let (ownership, partitioner) = by_base_leaves(facets, rules, division, level, comm)?;
-        (ownership, level, partitioner)
-    };
-    Ok(Partition { ownership, level_base, partitioner: Some(partitioner) })
+/// The estimate of the leaves.
+#[derive(Clone, Copy)]
+pub struct Estimate<'a> {
+    /// This rank's slice of the geometry.
+    pub facets: &'a [Facet],
+    /// The rules on the lattice.
+    pub rules: &'a Rules,
+    /// All ranks.
+    pub comm: &'a dyn Comm,
+}
+
+impl Estimate<'_> {
+    /// Partitions T0. Collective.
+    pub fn partition(&self, division: &Division) -> Result<Partition, Error> {
+        let (ownership, level_base, partitioner) = if division.is_of_curve() {
+            let levels = self.levels();
+            (self.by_area(levels), levels[1], Partitioner::Morton)
+        } else {
+            let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
+            let level = level.min(level_last(self.rules));
+            let (ownership, partitioner) = self.by_base_leaves(division, level)?;
+            (ownership, level, partitioner)
+        };
+        Ok(Partition { ownership, level_base, partitioner: Some(partitioner) })
+    }
+
+    /// The coarse and the fine level, of which octants near facets and in boxes number about [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] on
+    /// each rank, where the facets are densest. Collective.
+    fn levels(&self) -> [Level; 2] {
+        let &Self { facets, rules, comm } = self;
+        // Whole faces of finest cells: a sum of integers does not depend on its order.
+        let face = (edge(rules.level_surface) as f64).powi(2);
+        let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
+        let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
+        let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
+        let volume = volumes.fold(0.0, f64::max);
+        [COARSE_PER_RANK, FINE_PER_RANK as f64].map(|per_rank| {
+            // Four sheets of facets in one octant are not unusual: wings, fins.
+            let octants = comm.size() as f64 * per_rank * 4.0;
+            let small = |l: &Level| {
+                let h = edge(*l) as f64;
+                h * h <= area / octants && (volume == 0.0 || h.powi(3) <= volume / octants)
+            };
+            (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
+        })
+    }
+
+    /// The base leaves of a level with their owners, and the partitioner that chose them: METIS is not used where there are too few base
+    /// leaves for it. Collective.
+    fn by_base_leaves(
+        &self,
+        division: &Division,
+        level: Level,
+    ) -> Result<(Ownership, Partitioner), Error> {
+        let comm = self.comm;
+        let (mut leaves, _) = self.all_bins(&self.bins(level), level, FINE_PER_RANK);
+        if division.weights == Weights::Unit {
+            leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
+        }
+        let by_metis = match division.partitioner {
+            Partitioner::Metis => metis::assign(&leaves, level, comm)?,
+            Partitioner::Morton | Partitioner::Paper => None,
+        };
+        let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
+        let along_curve = || curve::partition_known(&leaves, comm.size());
+        let boundaries = by_metis.or_else(along_curve).unwrap_or_else(all_to_rank_0);
+        Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
+    }
+
+    /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
+    fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
+        let (comm, local) = (self.comm, self.bins(fine));
+        let (bins, light) = self.all_bins(&local, coarse, 1);
+        let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
+        let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
+        let entry = |(start, weight)| (rough.owner_at(start), [start, weight]);
+        let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
+        let received = comm.sparse_all_to_all(messages);
+        let mut bins: Vec<Bin> =
+            received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
+        for interval in rough.intervals() {
+            area::add_boxes(&mut bins, self.rules, fine, light, FRACTIONS, &interval);
+        }
+        curve::merge(&mut bins);
+        let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
+        Ownership::along(comm.rank(), comm.size(), boundaries)
+    }
+
+    /// Estimated leaves of the mesh near this rank's facets, in [`FRACTIONS`], by octants of a level.
+    fn bins(&self, level: Level) -> Vec<Bin> {
+        let mut bins = area::of(self.facets, self.rules, level);
+        let each = area::leaves_per_surface_cell(self.rules);
+        bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
+        bins
+    }
+
+    /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
+    /// that need not be resolved further. Collective.
+    fn all_bins(&self, local: &[Bin], level: Level, per_rank: u64) -> (Vec<Bin>, u64) {
+        let comm = self.comm;
+        let shift = 3 * (LEVEL_MAX - level);
+        let coarse = local.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
+        let all = all_gather_reduced(coarse, |a, b| a + b, comm);
+        let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
+        let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
+        let light = leaves(&bins) / (comm.size() as u64 * per_rank);
+        area::add_boxes(&mut bins, self.rules, level, light, FRACTIONS, &curve::ALL);
+        curve::merge(&mut bins);
+        let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
+        (bins, light)
+    }
 }
 
 /// Deepest level that base leaves may have.
 pub fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
-}
-
-/// The coarse and the fine level, of which octants near facets and in boxes number about [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] on
-/// each rank, where the facets are densest. Collective.
-fn levels(facets: &[Facet], rules: &Rules, comm: &dyn Comm) -> [Level; 2] {
-    // Whole faces of finest cells: a sum of integers does not depend on its order.
-    let face = (edge(rules.level_surface) as f64).powi(2);
-    let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
-    let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
-    let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
-    let volume = volumes.fold(0.0, f64::max);
-    [COARSE_PER_RANK, FINE_PER_RANK as f64].map(|per_rank| {
-        // Four sheets of facets in one octant are not unusual: wings, fins.
-        let octants = comm.size() as f64 * per_rank * 4.0;
-        let small = |l: &Level| {
-            let h = edge(*l) as f64;
-            h * h <= area / octants && (volume == 0.0 || h.powi(3) <= volume / octants)
-        };
-        (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
-    })
-}
-
-/// The base leaves of a level with their owners, and the partitioner that chose them: METIS is not used where there are too few base
-/// leaves for it. Collective.
-fn by_base_leaves(
-    facets: &[Facet],
-    rules: &Rules,
-    division: &Division,
-    level: Level,
-    comm: &dyn Comm,
-) -> Result<(Ownership, Partitioner), Error> {
-    let local = estimated(facets, rules, level);
-    let (mut leaves, _) = all_bins(&local, rules, level, FINE_PER_RANK, comm);
-    if division.weights == Weights::Unit {
-        leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
-    }
-    let by_metis = match division.partitioner {
-        Partitioner::Metis => metis::assign(&leaves, level, comm)?,
-        Partitioner::Morton | Partitioner::Paper => None,
-    };
-    let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
-    let along_curve = || curve::partition_known(&leaves, comm.size());
-    let boundaries = by_metis.or_else(along_curve).unwrap_or_else(all_to_rank_0);
-    Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
 }
 
 /// The partition of base leaves in their order along the curve, given by code and level, by METIS on every rank. Collective.
@@ -123,65 +173,12 @@ fn all_to_rank_0() -> Vec<Boundary> {
     vec![(0, 0)]
 }
 
-/// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
-fn by_area(
-    facets: &[Facet],
-    rules: &Rules,
-    [coarse, fine]: [Level; 2],
-    comm: &dyn Comm,
-) -> Ownership {
-    let local = estimated(facets, rules, fine);
-    let (bins, light) = all_bins(&local, rules, coarse, 1, comm);
-    let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
-    let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
-    let entry = |(start, weight)| (rough.owner_at(start), [start, weight]);
-    let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
-    let received = comm.sparse_all_to_all(messages);
-    let mut bins: Vec<Bin> =
-        received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
-    for interval in rough.intervals() {
-        area::add_boxes(&mut bins, rules, fine, light, FRACTIONS, &interval);
-    }
-    curve::merge(&mut bins);
-    let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
-    Ownership::along(comm.rank(), comm.size(), boundaries)
-}
-
-/// Estimated leaves of the mesh near some facets, in [`FRACTIONS`], by octants of a level.
-fn estimated(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
-    let mut bins = area::of(facets, rules, level);
-    let each = area::leaves_per_surface_cell(rules);
-    bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
-    bins
-}
-
-/// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
-/// that need not be resolved further. Collective.
-fn all_bins(
-    local: &[Bin],
-    rules: &Rules,
-    level: Level,
-    per_rank: u64,
-    comm: &dyn Comm,
-) -> (Vec<Bin>, u64) {
-    let shift = 3 * (LEVEL_MAX - level);
-    let coarse = local.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
-    let all = all_gather_reduced(coarse, |a, b| a + b, comm);
-    let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
-    let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
-    let light = leaves(&bins) / (comm.size() as u64 * per_rank);
-    area::add_boxes(&mut bins, rules, level, light, FRACTIONS, &curve::ALL);
-    curve::merge(&mut bins);
-    let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
-    (bins, light)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tests::rules as plain_rules;
     use bricks::octant::{ROOT_EDGE, start57};
-    use ranks::sim;
+    use ranks::{Solo, sim};
 
     const RANKS: usize = 9;
     const FINE: Level = 7;
@@ -209,7 +206,8 @@ mod tests {
         let known = sim::run(RANKS, 5, |comm| {
             let on_this = |(i, f): (usize, &Facet)| (rank_of(i) == comm.rank()).then_some(*f);
             let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
-            let ownership = by_area(&mine, rules, [4, FINE], comm);
+            let estimate = Estimate { facets: &mine, rules, comm };
+            let ownership = estimate.by_area([4, FINE]);
             (0..1 << (3 * FINE))
                 .map(|code| ownership.owner_at(start57(FINE, code)))
                 .collect::<Vec<_>>()
@@ -220,7 +218,7 @@ mod tests {
 
     /// Estimated leaves on each rank.
     fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
-        let mut bins = estimated(&sheet(), rules, FINE);
+        let mut bins = Estimate { facets: &sheet(), rules, comm: &Solo }.bins(FINE);
         area::add_boxes(&mut bins, rules, FINE, 0, FRACTIONS, &curve::ALL);
         let mut sums = vec![0; RANKS];
         for (start, weight) in bins {
@@ -256,7 +254,8 @@ mod tests {
             let known = sim::run(RANKS, 5, |comm| {
                 let mine: Vec<Facet> =
                     sheet().into_iter().skip(comm.rank()).step_by(RANKS).collect();
-                partition(&mine, &rules, &division, comm).expect("no METIS")
+                let estimate = Estimate { facets: &mine, rules: &rules, comm };
+                estimate.partition(&division).expect("no METIS")
             });
             let same = |p: &Partition| p.ownership.boundaries().eq(known[0].ownership.boundaries());
             assert!(known.iter().all(same), "all ranks have the same partition");
@@ -281,7 +280,7 @@ mod tests {
     #[test]
     fn without_any_facet_one_rank_owns_everything() {
         let owners = sim::run(3, 1, |comm| {
-            let ownership = by_area(&[], &rules(vec![]), [2, 3], comm);
+            let ownership = Estimate { facets: &[], rules: &rules(vec![]), comm }.by_area([2, 3]);
             ownership.octants().len()
         });
         assert_eq!(owners, [1, 0, 0]);

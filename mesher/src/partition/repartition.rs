@@ -8,7 +8,7 @@
 use crate::partition::cost::{WEIGHT_OF_NEIGHBOUR, weight_of_brick};
 use crate::partition::curve::{self, Bin};
 use crate::partition::ownership::{Ownership, brick_start};
-use bricks::brick::{self, Brick};
+use bricks::brick;
 use bricks::brickset::{BrickSet, ones};
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree};
@@ -108,24 +108,13 @@ impl<'a> Loads<'a> {
 
     /// Adds `each` for every octant of a set in bricks that this rank owns.
     fn add_octants(&mut self, l: Level, set: &BrickSet, each: i64) {
-        let owns = |key| self.ownership.owns(l, key);
-        if let Some(up) = l.checked_sub(self.level + 2) {
-            let mut bricks = set.bricks().peekable();
-            while let Some(first) = bricks.next() {
-                let bin = |b: &Brick| b.key >> (3 * up);
-                let mut octants = i64::from(first.bits.count_ones());
-                while let Some(b) = bricks.next_if(|b| bin(b) == bin(&first)) {
-                    octants += i64::from(b.bits.count_ones());
-                }
-                // The bricks of one bin have one owner.
-                if owns(first.key) {
-                    self.add(brick_start(l, first.key), each * octants);
-                }
+        let ownership = self.ownership;
+        for b in set.bricks().filter(|b| ownership.owns(l, b.key)) {
+            if l >= self.level + 2 {
+                self.add(brick_start(l, b.key), each * i64::from(b.bits.count_ones()));
+                continue;
             }
-            return;
-        }
-        // A brick spans several bins.
-        for b in set.bricks().filter(|b| owns(b.key)) {
+            // A brick spans several bins.
             for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
                 let octants = brick::byte(b.bits, j).count_ones();
                 self.add(brick_start(l + 1, b.key << 3 | j), each * i64::from(octants));

@@ -1,6 +1,6 @@
 //! Refinement around facets and extent boxes: from facets to the base tree T0 (the paper's section II.B).
 //!
-//! Depth first from the root of a subtree, two levels at a time. The facets of a brick are tested against
+//! Depth first from the root, two levels at a time, where the rank owns a part. The facets of a brick are tested against
 //! its 64 octants at once, and each crossed octant receives the list of the facets that cross it. The
 //! level between follows by coarsening: as octants are closed, an octant is crossed if and only if one of
 //! its children is.
@@ -14,11 +14,12 @@
 //! Invariant of [`BinnedFacets`]: facets are sorted by containing octant, and each one meets the root.
 
 use crate::input::lattice::{ExtentBox, Rules, box_mask};
+use crate::partition::ownership::brick_start;
 use crate::record::Counters;
 use bricks::brick;
 use bricks::brickset::ones;
 use bricks::facet::{Facet, crossed};
-use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
+use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton, start57};
 use bricks::tree::Tree;
 use std::ops::Range;
 
@@ -94,17 +95,6 @@ impl BinnedFacets {
         }
     }
 
-    /// Positions of the facets whose containing octant is the octant `code` of level `l` or below it.
-    fn contained(&self, l: Level, code: u64) -> Range<usize> {
-        let position =
-            |start| self.containing.partition_point(|h| *h < ContainingOctant::first_in(start));
-        let range = position(start57(l, code))..position(start57(l, code + 1));
-        // Ancestors with the same minimum corner sort first.
-        let skip = self.containing[range.clone()]
-            .partition_point(|h| h.start() == start57(l, code) && h.level() < l);
-        range.start + skip..range.end
-    }
-
     /// Checks the invariant.
     ///
     /// # Panics
@@ -120,33 +110,29 @@ impl BinnedFacets {
     }
 }
 
-/// An octant below which a rank refines: its level and Morton code.
-type Root = (Level, u64);
-
-/// Refines the subtrees below `roots`, which are ascending and disjoint octants. Returns the splits and the
-/// crossing leaves of T0 in these subtrees, and those splits of their ancestors that the subtrees alone
-/// ask for. The union over roots that tile the root cube, and over all facets, is T0.
-pub fn refine(binned: &BinnedFacets, rules: &Rules, roots: &[Root]) -> (Tree, Counters) {
+/// Refines where a rank owns `own`: intervals of level-19 codes, ascending and disjoint. Returns those splits and crossing leaves of T0
+/// in which the rank owns a part, as far as the rank's facets and the boxes ask for them. The union over intervals that tile the curve,
+/// and over all facets, is T0.
+pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree, Counters) {
     let mut v = Voxeliser {
         binned,
         surface: rules.level_surface,
-        boxes: &rules.boxes,
+        own,
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
         counters: Counters::default(),
     };
-    let straddling = v.straddling(roots);
-    for (&root, list) in roots.iter().zip(straddling) {
-        v.subtree(root, list);
-    }
+    let all = BrickFacets { contained: 0..binned.facets.len(), straddling: 0..0 };
+    // The tested levels have the parity of the surface level, so that one of them is that level.
+    v.brick(rules.level_surface & 1, 0, all, &rules.boxes);
     (v.tree, v.counters)
 }
 
 struct Voxeliser<'a> {
     binned: &'a BinnedFacets,
     surface: Level,
-    boxes: &'a [ExtentBox],
+    own: &'a [Range<u64>],
     tree: Tree,
     /// Straddling facets of the bricks on the path from the root, concatenated.
     lists: Vec<u32>,
@@ -162,80 +148,24 @@ struct BrickFacets {
 }
 
 impl Voxeliser<'_> {
-    /// For each subtree root the facets that are contained in an ancestor and whose extent meets it.
-    fn straddling(&self, roots: &[Root]) -> Vec<Vec<u32>> {
-        let mut lists = vec![Vec::new(); roots.len()];
-        let begins: Vec<u64> = roots.iter().map(|&(level, code)| start57(level, code)).collect();
-        for (i, octant) in (0..).zip(&self.binned.containing) {
-            // The roots inside the octant; none if it lies inside a root, or in another rank's part.
-            let end = octant.start() + (1 << (3 * (LEVEL_MAX - octant.level())));
-            let from = begins.partition_point(|&b| b < octant.start());
-            let inside = begins[from..].partition_point(|&b| b < end);
-            for s in from..from + inside {
-                if roots[s].0 > octant.level() && reaches(&self.binned.facets[i as usize], roots[s])
-                {
-                    lists[s].push(i);
-                }
-            }
+    /// The octants of level `l` in a brick in which the rank owns a part.
+    #[inline]
+    fn allowed(&self, l: Level, key: u64) -> u64 {
+        let owns_from = |start: u64| &self.own[self.own.partition_point(|i| i.end <= start)..];
+        let (start, end) = (brick_start(l, key), brick_start(l, key + 1));
+        if l >= 2 && owns_from(start).first().is_some_and(|i| i.start <= start && end <= i.end) {
+            return u64::MAX;
         }
-        lists
-    }
-
-    fn subtree(&mut self, (m, code): Root, straddling: Vec<u32>) {
-        let contained = self.binned.contained(m, code);
-        // For the root cube itself, the brick of level 0 or 1 decides whether it is split.
-        if m > 0 && !self.path_to((m, code), &contained, &straddling) {
-            return;
-        }
-        let begin = self.lists.len();
-        self.lists.extend(straddling);
-        let facets = BrickFacets { contained, straddling: begin..self.lists.len() };
-        // The tested levels have the parity of the surface level, so that one of them is that level.
-        let (l, key, allowed) = match (m, (self.surface ^ m) & 1) {
-            (0, odd) => (odd, 0, brick::valid(odd)),
-            (m, 0) => (m + 2, code, u64::MAX),
-            (m, _) => (m + 1, code >> 3, 0xff << (8 * (code & 7))),
+        let meets = |code: u64| {
+            owns_from(start57(l, code)).first().is_some_and(|i| i.start < start57(l, code + 1))
         };
-        self.brick(l, key, facets, self.boxes, allowed);
-        self.lists.truncate(begin);
-    }
-
-    /// Records the splits that a subtree root asks for, from the root cube down to itself. Returns whether
-    /// it is split.
-    fn path_to(&mut self, (m, code): Root, contained: &Range<usize>, straddling: &[u32]) -> bool {
-        let min_corner = corner(m, code);
-        let crosses = |i: &u32| crossed(&self.binned.facets[*i as usize], min_corner, m) & 1 == 1;
-        let crossing = !contained.is_empty() || straddling.iter().any(crosses);
-        for l in 0..=m {
-            let above = code >> (3 * (m - l));
-            let (key, bit) = (above >> 6, 1 << (above & 63));
-            let asked = |b: &ExtentBox| b.level > l && b.meets(corner(l, above), edge(l));
-            let asked = self.boxes.iter().any(asked);
-            if l < self.surface && crossing || asked {
-                self.tree.split[l as usize].push(key, bit);
-                continue;
-            }
-            // A leaf of T0: the subtree root or an ancestor.
-            if crossing {
-                self.tree.crossing[l as usize].push(key, bit);
-            }
-            return false;
-        }
-        true
+        (0..64).fold(0, |all, bit| all | u64::from(meets(key << 6 | bit)) << bit)
     }
 
     /// Decides the octants of level `l` in a brick and their parents, and continues with their descendants.
-    /// Only octants in the mask `allowed` belong to the subtree.
-    fn brick(
-        &mut self,
-        l: Level,
-        key: u64,
-        facets: BrickFacets,
-        boxes: &[ExtentBox],
-        allowed: u64,
-    ) {
+    fn brick(&mut self, l: Level, key: u64, facets: BrickFacets, boxes: &[ExtentBox]) {
         self.counters.bricks_voxelised += 1;
-        let min_corner = brick::min_corner(l, key);
+        let (min_corner, allowed) = (brick::min_corner(l, key), self.allowed(l, key));
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
         let crossing = (self.test(&facets, l, min_corner)
@@ -251,10 +181,15 @@ impl Voxeliser<'_> {
                 .filter(|b| b.level > least)
                 .map(|b| box_mask(b, min_corner, l))
                 .fold(0, |m, b| m | b)
-                & allowed
         };
-        let split = if l < self.surface { crossing } else { 0 } | asked(l);
-        let exists = if l == 0 { 1 } else { self.level_above(l, key, crossing, asked(l - 1)) };
+        let split = if l < self.surface { crossing } else { 0 } | asked(l) & allowed;
+        let exists = if l == 0 {
+            1
+        } else {
+            // A box asks for a parent also where it meets only children that other ranks own.
+            let asked = brick::parents(asked(l - 1)) & brick::parents(allowed);
+            self.level_above(l, key, crossing, asked)
+        };
         self.tree.split[l as usize].push(key, split);
         if l >= self.surface {
             self.tree.crossing[l as usize].push(key, crossing & exists & !split);
@@ -269,7 +204,7 @@ impl Voxeliser<'_> {
                 contained: from as usize..to as usize,
                 straddling: begin..self.lists.len(),
             };
-            self.brick(l + 2, key << 6 | u64::from(bit), facets, &near, u64::MAX);
+            self.brick(l + 2, key << 6 | u64::from(bit), facets, &near);
             self.lists.truncate(begin);
         }
         self.pairs.truncate(first_pair);
@@ -277,9 +212,9 @@ impl Voxeliser<'_> {
 
     /// Records the parents, of level `l - 1`, of a brick's octants; returns the octants of level `l` that
     /// exist.
-    fn level_above(&mut self, l: Level, key: u64, crossing: u64, asked: u64) -> u64 {
+    fn level_above(&mut self, l: Level, key: u64, crossing: u64, asked: u8) -> u64 {
         let crossed = brick::parents(crossing);
-        let split = if l - 1 < self.surface { crossed } else { 0 } | brick::parents(asked);
+        let split = if l - 1 < self.surface { crossed } else { 0 } | asked;
         let put = |byte: u8| u64::from(byte) << (8 * (key & 7));
         self.tree.split[l as usize - 1].push(key >> 3, put(split));
         if l > self.surface {
@@ -343,15 +278,6 @@ fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
     }
     let near = &containing[step / 2..containing.len().min(step)];
     step / 2 + near.partition_point(|h| *h < end)
-}
-
-/// Whether the facet's extent meets the closed octant.
-fn reaches(f: &Facet, (level, code): Root) -> bool {
-    let (min_corner, h) = (corner(level, code), edge(level));
-    (0..3).all(|a| {
-        let (lo, hi) = f.range(a);
-        lo <= min_corner[a] + h && hi >= min_corner[a]
-    })
 }
 
 #[cfg(test)]

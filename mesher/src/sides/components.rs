@@ -22,14 +22,6 @@ pub struct LocalMerge {
     pub at_boundary: Vec<Component>,
 }
 
-/// Merged components, numbered from 0 on this rank.
-pub struct MergedComponents {
-    /// The merged component of each local component.
-    pub of: Vec<u32>,
-    /// Number of merged components.
-    pub count: u32,
-}
-
 /// Octants of a brick that belong to a component or share a face with it. They are leaves, or lie in
 /// coarser leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,8 +58,8 @@ impl UnionFind {
         c
     }
 
-    /// Numbers the sets.
-    pub fn numbered(self) -> MergedComponents {
+    /// The set of each number; the sets are numbered from 0.
+    pub fn numbered(self) -> Vec<u32> {
         let mut merged = self.0;
         let mut count = 0;
         for c in 0..merged.len() {
@@ -76,7 +68,7 @@ impl UnionFind {
             merged[c] = if up == c { count } else { merged[up] };
             count += u32::from(up == c);
         }
-        MergedComponents { of: merged, count }
+        merged
     }
 
     /// Unites the sets of two numbers.
@@ -114,15 +106,6 @@ struct Frame {
     across: [[Across; 2]; 3],
 }
 
-/// The other side of a brick's face, as its children need it.
-#[derive(Clone, Copy)]
-enum Beyond {
-    /// Without bricks of the children's level.
-    Never(Across),
-    /// The children of the brick across the face.
-    Here(Family),
-}
-
 /// Merges all components that share part of a face, in the bricks that this rank holds.
 pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
     let mut w = Walk {
@@ -157,16 +140,9 @@ impl Walk<'_> {
         if family.bricks == 0 {
             return;
         }
-        // Looked up once for all children; each of them crosses three of the faces.
-        let beyond = frame.across.map(|sides| {
-            sides.map(|across| match across {
-                Across::Here(n, _) => Beyond::Here(nodes.family(l, n)),
-                other => Beyond::Never(other),
-            })
-        });
         self.path.push(*frame);
         for j in ones(u64::from(family.bricks)) {
-            if let Some(child) = step_down(nodes, l, frame, &family, &beyond, u64::from(j)) {
+            if let Some(child) = step_down(nodes, l, frame, &family, u64::from(j)) {
                 self.visit(l + 1, &child);
             }
         }
@@ -215,13 +191,9 @@ impl Walk<'_> {
             Across::Nothing => self.local.at_boundary.push(c),
             Across::Coarser => self.merge_coarser(l, c, frame.key, faced, Some((axis, up))),
             Across::Remote => {
-                let sends = match nodes.placement(l, frame.node) {
-                    Placement::Local => true,
-                    Placement::PartiallyReplicated => self.ownership.owns(l, frame.key),
-                    // The other rank holds the fully replicated brick as well.
-                    Placement::FullyReplicated | Placement::Remote(_) => false,
-                };
-                if sends {
+                // The other rank holds a fully replicated brick as well.
+                let is_everywhere = nodes.placement(l, frame.node) == Placement::FullyReplicated;
+                if !is_everywhere && self.ownership.owns(l, frame.key) {
                     let across = neighbour(l - 2, frame.key, axis, up == 1);
                     self.record_face(l, across.expect("the neighbour lies in the root"), c, faced);
                 }
@@ -294,14 +266,7 @@ impl Walk<'_> {
 
 /// The frame of child brick `j`; none if this rank does not hold it.
 #[inline]
-fn step_down(
-    nodes: &Nodes,
-    l: Level,
-    frame: &Frame,
-    family: &Family,
-    beyond: &[[Beyond; 2]; 3],
-    j: u64,
-) -> Option<Frame> {
+fn step_down(nodes: &Nodes, l: Level, frame: &Frame, family: &Family, j: u64) -> Option<Frame> {
     let (node, exists) = family.child(j)?;
     if let Placement::Remote(_) = nodes.placement(l + 1, node) {
         return None;
@@ -310,22 +275,21 @@ fn step_down(
     if l >= 2 {
         for axis in 0..3 {
             for up in 0..2 {
-                let stays = j >> axis & 1 != up as u64;
-                let beyond = if stays { &Beyond::Here(*family) } else { &beyond[axis][up] };
-                across[axis][up] = step_across(nodes, l, beyond, j ^ 1 << axis);
+                let beside = j ^ 1 << axis;
+                across[axis][up] = match frame.across[axis][up] {
+                    _ if j >> axis & 1 != up as u64 => step_across(nodes, l, family, beside),
+                    Across::Here(n, _) => step_across(nodes, l, &nodes.family(l, n), beside),
+                    other => other,
+                };
             }
         }
     }
     Some(Frame { key: frame.key << 3 | j, node, exists, across })
 }
 
-/// The other side of a face of a child brick: octant group `j` of the brick across.
+/// The other side of a face of a child brick: octant group `j` of the brick across, whose children are `family`.
 #[inline]
-fn step_across(nodes: &Nodes, l: Level, beyond: &Beyond, j: u64) -> Across {
-    let family = match beyond {
-        Beyond::Never(across) => return *across,
-        Beyond::Here(family) => family,
-    };
+fn step_across(nodes: &Nodes, l: Level, family: &Family, j: u64) -> Across {
     match family.child(j) {
         None => Across::Coarser,
         Some((n, exists)) => match nodes.placement(l + 1, n) {

@@ -6,12 +6,11 @@
 //! rays.
 
 use super::global::Label;
-use super::nodes::{Component, Nodes, open_bricks};
+use super::nodes::open_bricks;
 use super::vote::{Candidate, FirstLeaf};
-use super::{EnclosedComponents, Verdict};
+use super::{Base, Components, EnclosedComponents, Verdict};
 use crate::error::Error;
-use crate::input::lattice::{Enclosed, Keep, Rules, Seed};
-use crate::partition::ownership::Ownership;
+use crate::input::lattice::{Enclosed, Keep, Seed};
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use bricks::tree::{LEVELS, Tree};
@@ -21,28 +20,20 @@ use std::collections::{HashMap, HashSet};
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
 const CROSSING: Label = Label::MAX;
 
-/// Those of some seeds that lie in the root, by number, each with the component that it lies in; none in a crossing leaf. `label`
-/// returns the label of a local component. Collective; the same on all ranks.
-pub fn find(
-    seeds: &[Seed],
-    tree: &Tree,
-    nodes: &Nodes,
-    ownership: &Ownership,
-    label: impl Fn(Component) -> Label,
-    comm: &dyn Comm,
-) -> HashMap<u64, Option<Label>> {
+/// The seeds that lie in the root, by number, each with the component that it lies in; none in a crossing leaf. Collective; the same
+/// on all ranks.
+pub(super) fn find(base: &Base, components: &Components) -> HashMap<u64, Option<Label>> {
     let mut mine = Vec::new();
-    for (number, seed) in (0..).zip(seeds).filter(|(_, seed)| seed.is_in_root()) {
-        let (l, code) = leaf_at(tree, seed);
+    for (number, seed) in (0..).zip(&base.rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
+        let (l, code) = leaf_at(base.tree, seed);
         let (key, bit) = (code >> 6, code & 63);
-        if !ownership.owns(l, key) {
-            continue;
+        if base.ownership.owns(l, key) {
+            let mut found = CROSSING;
+            components.nodes.find(l, key, 1 << bit, |c| found = components.label(c));
+            mine.push([number, found]);
         }
-        let mut found = CROSSING;
-        nodes.finder().find(l, key, 1 << bit, |c| found = label(c));
-        mine.push([number, found]);
     }
-    let found = gather(comm, &mine).into_iter();
+    let found = gather(base.comm, &mine).into_iter();
     found.map(|[number, label]| (number, (label != CROSSING).then_some(label))).collect()
 }
 
@@ -60,24 +51,18 @@ fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
-pub fn of_seeds(
-    found: &HashMap<u64, Option<Label>>,
-    rules: &Rules,
-    tree: &Tree,
-    ownership: &Ownership,
-    comm: &dyn Comm,
-) -> Result<HashSet<Label>, Error> {
-    for (number, seed) in (0..).zip(&rules.seeds) {
+pub fn of_seeds(found: &HashMap<u64, Option<Label>>, base: &Base) -> Result<HashSet<Label>, Error> {
+    for (number, seed) in (0..).zip(&base.rules.seeds) {
         let problem = match found.get(&number) {
             None => "lies outside the root",
             Some(None) => "lies in a leaf that the geometry crosses",
             Some(Some(_)) => continue,
         };
         let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
-        let nearest = gather(comm, nearest(tree, ownership, near).as_slice()).into_iter().min();
+        let nearest = gather(base.comm, nearest(base, near).as_slice()).into_iter().min();
         let advice = match nearest {
             Some([_, leaf]) => {
-                let [x, y, z] = rules.root.locate(Candidate(leaf).centroid());
+                let [x, y, z] = base.rules.root.locate(Candidate(leaf).centroid());
                 format!("the nearest centroid of a leaf that it does not cross is ({x}, {y}, {z})")
             }
             None => "the geometry crosses all leaves: decrease spacing_min".to_owned(),
@@ -90,10 +75,10 @@ pub fn of_seeds(
 
 /// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance
 /// and its [`Candidate`]. Of leaves at the same distance the first, by level and Morton code.
-fn nearest(tree: &Tree, ownership: &Ownership, point: [i64; 3]) -> Option<[u64; 2]> {
+fn nearest(base: &Base, point: [i64; 3]) -> Option<[u64; 2]> {
     let mut best = None;
     for l in 0..LEVELS as Level {
-        for b in open_bricks(tree, ownership, l) {
+        for b in open_bricks(base.tree, base.ownership, l) {
             for bit in ones(b.open) {
                 let leaf = Candidate::new(l, b.key << 6 | u64::from(bit));
                 let centroid = leaf.centroid();
@@ -122,11 +107,11 @@ impl Verdict {
     /// than once. Collective.
     pub fn compare_with_boundary(
         &mut self,
-        rules: &Rules,
+        base: &Base,
         components: &[FirstLeaf],
         at_boundary: impl Iterator<Item = Label>,
-        comm: &dyn Comm,
     ) {
+        let rules = base.rules;
         let outside = components.iter().map(|c| c.0).filter(|label| !self.inside.contains(label));
         let outside: HashSet<Label> = outside.collect();
         let by_rays = rules.seeds.is_empty();
@@ -142,7 +127,7 @@ impl Verdict {
         }
         let mine = at_boundary.map(|label| [label, 0]).collect();
         let far_field =
-            all_gather_reduced(mine, u64::min, comm).into_iter().map(|[label, _]| label);
+            all_gather_reduced(mine, u64::min, base.comm).into_iter().map(|[label, _]| label);
         let far_field: HashSet<Label> = far_field.collect();
         match rules.keep {
             Keep::Inside => {

@@ -5,31 +5,25 @@
 //! with the components' labels. Where labels differ across a face, the pair is an edge of a graph; only
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
-use super::components::{self, FacedOctants, MergedComponents, UnionFind};
+use super::Base;
+use super::components::{self, FacedOctants, UnionFind};
 use super::nodes::{Component, Nodes};
-use crate::partition::ownership::{Ownership, Placement};
 use bricks::octant::Level;
-use bricks::tree::{LEVELS, Tree};
 use ranks::{Comm, MessageBuffer, gather};
 
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
 
 /// Labels of this rank's merged components: equal labels mean one component of the whole tree. Collective.
-pub fn labels(
-    nodes: &Nodes,
-    tree: &Tree,
-    ownership: &Ownership,
-    faces: Vec<FacedOctants>,
-    merged: &MergedComponents,
-    comm: &dyn Comm,
-) -> Vec<Label> {
+pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u32]) -> Vec<Label> {
+    let comm = base.comm;
     let own = |component: u32| (comm.rank() as u64 + 1) << 40 | u64::from(component);
-    let mut labels: Vec<Label> = (0..merged.count).map(own).collect();
+    let count = merged.iter().max().map_or(0, |last| last + 1);
+    let mut labels: Vec<Label> = (0..count).map(own).collect();
     if comm.size() == 1 {
         return labels;
     }
-    let mut pairs = label_replicated(&mut labels, nodes, tree, ownership, merged);
+    let mut pairs = label_replicated(&mut labels, base, nodes, merged);
     pairs.extend(across_ranks(nodes, faces, merged, &labels, comm));
     let mut unions = Unions::of(&gather(comm, &group_forest(pairs, comm)));
     labels.iter().map(|&n| unions.find(n)).collect()
@@ -53,15 +47,14 @@ fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
 /// component of this rank.
 fn label_replicated(
     labels: &mut [Label],
+    base: &Base,
     nodes: &Nodes,
-    tree: &Tree,
-    ownership: &Ownership,
-    merged: &MergedComponents,
+    merged: &[u32],
 ) -> Vec<[Label; 2]> {
-    let non_owning_view = ownership.non_owning_view();
-    let replicated = Nodes::new(&ownership.fully_replicated(tree), &non_owning_view);
-    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered().of;
-    let of_nodes = replicated_components(nodes);
+    let non_owning_view = base.ownership.non_owning_view();
+    let replicated = Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
+    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered();
+    let of_nodes = nodes.replicated_components();
     assert_eq!(
         of_nodes.len(),
         of_replicated.len(),
@@ -70,7 +63,7 @@ fn label_replicated(
     let mut pairs = Vec::new();
     let mut labelled = vec![false; labels.len()];
     for (c, replicated) in of_nodes.into_iter().zip(of_replicated) {
-        let component = merged.of[c as usize] as usize;
+        let component = merged[c as usize] as usize;
         let (label, replicated) = (&mut labels[component], Label::from(replicated));
         if !std::mem::replace(&mut labelled[component], true) {
             *label = replicated;
@@ -85,11 +78,11 @@ fn label_replicated(
 fn across_ranks(
     nodes: &Nodes,
     mut faces: Vec<FacedOctants>,
-    merged: &MergedComponents,
+    merged: &[u32],
     labels: &[Label],
     comm: &dyn Comm,
 ) -> Vec<[Label; 2]> {
-    let label = |c: Component| labels[merged.of[c as usize] as usize];
+    let label = |c: Component| labels[merged[c as usize] as usize];
     let target = |f: &FacedOctants| (f.rank, f.level, f.key, label(f.component));
     faces.sort_unstable_by_key(target);
     let mut out = MessageBuffer::default();
@@ -99,9 +92,9 @@ fn across_ranks(
         out.write(rank, [u64::from(level), key, label, bits]);
     }
     drop(faces);
-    let (mut pairs, mut finder) = (Vec::new(), nodes.finder());
+    let mut pairs = Vec::new();
     for &[level, key, remote, bits] in comm.sparse_all_to_all(out).words().as_chunks().0 {
-        finder.find(level as Level, key, bits, |c| {
+        nodes.find(level as Level, key, bits, |c| {
             let mine = label(c);
             // Most components on both sides have the label of a fully replicated brick already.
             if remote != mine && pairs.last() != Some(&[remote, mine]) {
@@ -110,19 +103,6 @@ fn across_ranks(
         });
     }
     pairs
-}
-
-/// The components of fully replicated bricks, in an order that is the same on all ranks.
-fn replicated_components(nodes: &Nodes) -> Vec<Component> {
-    let mut out = Vec::new();
-    for l in 0..LEVELS as Level {
-        for n in
-            nodes.with_placement(l).filter(|&n| nodes.placement(l, n) == Placement::FullyReplicated)
-        {
-            out.extend(nodes.components(l, n).map(|c| c.0));
-        }
-    }
-    out
 }
 
 /// The sets into which pairs unite labels. The least label represents a set.

@@ -14,15 +14,13 @@
 
 use super::global::Label;
 use super::vote::{self, Candidate};
-use super::{Components, flow};
+use super::{Base, Components, flow};
 use crate::input::lattice::{Keep, Rules};
-use crate::partition::ownership::Ownership;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
-use ranks::{Comm, all_gather_reduced, uncounted};
+use ranks::{all_gather_reduced, uncounted};
 use std::collections::HashSet;
 use std::mem::take;
 
@@ -88,7 +86,7 @@ impl Region {
     }
 
     /// T0 cut at a level at or above that of the walls. Collective.
-    fn tree(&self, tree: &Tree, level: Level, ownership: &Ownership, comm: &dyn Comm) -> Tree {
+    fn tree(&self, base: &Base, level: Level) -> Tree {
         let cut = level as usize;
         let mut walls = self.walls.clone();
         for l in (cut + 1..LEVELS).rev() {
@@ -97,36 +95,28 @@ impl Region {
             walls[l - 1] = take(&mut walls[l - 1]).union(finer);
         }
         // A rank knows the walls in its own part of a brick that others have part of, too.
-        ownership.synchronise_replicas(&mut [&mut walls], comm);
-        let mut split = tree.split[..cut].to_vec();
+        base.ownership.synchronise_replicas(&mut [&mut walls], base.comm);
+        let mut split = base.tree.split[..cut].to_vec();
         split.resize(LEVELS, BrickSet::default());
         Tree { split, crossing: walls }
     }
 }
 
-/// The leaks in all regions of T0, which `has_inside`. `facets` are this rank's slice of the geometry. Messages are not counted: the mesh
-/// does not depend on them. Collective; the same on all ranks.
-pub fn find(
-    regions: Vec<Region>,
-    has_inside: bool,
-    tree: &Tree,
-    ownership: &Ownership,
-    facets: &[Facet],
-    rules: &Rules,
-    comm: &dyn Comm,
-) -> Leaks {
-    let mut leaks = Vec::new();
-    uncounted(comm, || {
-        let is_large = || crossing_leaves(tree, ownership, rules, comm) > MOST_FOR_T0_1;
+/// The leaks in all regions of T0, which `has_inside`. Messages are not counted: the mesh does not depend on them. Collective; the same
+/// on all ranks.
+pub fn find(base: &Base, regions: Vec<Region>, has_inside: bool) -> Leaks {
+    let (rules, mut leaks) = (base.rules, Vec::new());
+    uncounted(base.comm, || {
+        let is_large = || crossing_leaves(base) > MOST_FOR_T0_1;
         let skips = has_inside && !regions.is_empty() && is_large();
         for region in regions {
             let before = leaks.len();
             for k in (1..=COARSER.min(rules.level_surface)).rev() {
                 if k > 1 || !skips || leaks.len() > before {
                     let level = rules.level_surface - k;
-                    let coarse = region.tree(tree, level, ownership, comm);
-                    let side = (level, region.is_inside);
-                    leaks.extend(of_tree(&coarse, side, ownership, facets, rules, comm));
+                    let coarse = region.tree(base, level);
+                    let coarse = Base { tree: &coarse, ..*base };
+                    leaks.extend(of_tree(&coarse, level, region.is_inside));
                 }
             }
         }
@@ -138,31 +128,23 @@ pub fn find(
 }
 
 /// Number of crossing leaves of the surface level. Collective; the same on all ranks.
-fn crossing_leaves(tree: &Tree, ownership: &Ownership, rules: &Rules, comm: &dyn Comm) -> u64 {
-    let level = rules.level_surface;
-    let owned = tree.crossing[level as usize].bricks().filter(|b| ownership.owns(level, b.key));
-    let mine: u64 = owned.map(|b| u64::from(b.bits.count_ones())).sum();
-    comm.sum(mine)
+fn crossing_leaves(base: &Base) -> u64 {
+    let level = base.rules.level_surface;
+    let crossing = base.tree.crossing[level as usize].bricks();
+    let owned = crossing.filter(|b| base.ownership.owns(level, b.key));
+    base.comm.sum(owned.map(|b| u64::from(b.bits.count_ones())).sum())
 }
 
 /// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not.
-fn of_tree(
-    tree: &Tree,
-    (level, is_inside): (Level, bool),
-    ownership: &Ownership,
-    facets: &[Facet],
-    rules: &Rules,
-    comm: &dyn Comm,
-) -> Vec<Leak> {
-    let components = Components::new(tree, ownership, comm);
-    let label = |c| components.label(c);
-    let found = flow::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
+fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
+    let components = Components::new(base);
+    let found = flow::find(base, &components);
     let seeded: HashSet<Label> = found.values().copied().flatten().collect();
     // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
     let verdict = if found.is_empty() || found.values().any(Option::is_none) {
-        vote::decide(&components.all, &components.candidates, facets, comm)
+        vote::decide(&components.all, &components.candidates, base)
     } else {
-        flow::decide(&components.all, seeded.clone(), rules.keep)
+        flow::decide(&components.all, seeded.clone(), base.rules.keep)
     };
     let has_leaked =
         |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);
@@ -170,7 +152,7 @@ fn of_tree(
     if leaked.is_empty() {
         return Vec::new();
     }
-    let volumes = components.volumes(tree, ownership, comm);
+    let volumes = components.volumes(base);
     let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
     let leak = |&&(label, first): &&_| Leak { level, volume: volume(label), first, is_inside };
     leaked.iter().map(leak).collect()
@@ -178,18 +160,21 @@ fn of_tree(
 
 impl Components {
     /// Each component's label and volume, in octants of level 19. Collective; the same on all ranks.
-    fn volumes(&self, tree: &Tree, ownership: &Ownership, comm: &dyn Comm) -> Vec<[u64; 2]> {
+    fn volumes(&self, base: &Base) -> Vec<[u64; 2]> {
         let mut mine = vec![0; self.labels.len()];
         for l in 0..=LEVEL_MAX {
-            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
-                for (c, bits) in self.nodes.components(l, n).filter(|_| ownership.owns(l, key)) {
+            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
+                if !base.ownership.owns(l, key) {
+                    continue;
+                }
+                for (c, bits) in self.nodes.components(l, n) {
                     mine[self.merged[c as usize] as usize] +=
                         u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));
                 }
             }
         }
         let mine = self.labels.iter().zip(mine).map(|(&label, volume)| [label, volume]).collect();
-        all_gather_reduced(mine, |a, b| a + b, comm)
+        all_gather_reduced(mine, |a, b| a + b, base.comm)
     }
 }
 

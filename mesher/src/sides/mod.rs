@@ -37,6 +37,21 @@ use std::collections::HashSet;
 use std::sync::LazyLock;
 use vote::{FirstLeaf, FirstLeaves};
 
+/// The base tree as one rank holds it, and what its sides depend on.
+#[derive(Clone, Copy)]
+pub struct Base<'a> {
+    /// The bricks that the rank holds.
+    pub tree: &'a Tree,
+    /// The ranks that own and hold them.
+    pub ownership: &'a Ownership,
+    /// This rank's slice of the geometry: each facet is on exactly one rank.
+    pub facets: &'a [Facet],
+    /// The rules on the lattice.
+    pub rules: &'a Rules,
+    /// All ranks.
+    pub comm: &'a dyn Comm,
+}
+
 /// Sides of the base tree's leaves.
 #[derive(Clone, Debug)]
 pub struct Sides {
@@ -117,16 +132,16 @@ struct Components {
 
 impl Components {
     /// Finds the components of a tree's leaves that do not cross. Collective.
-    fn new(tree: &Tree, ownership: &Ownership, comm: &dyn Comm) -> Self {
-        let nodes = Nodes::new(tree, ownership);
-        let mut local = components::merge(&nodes, ownership);
+    fn new(base: &Base) -> Self {
+        let nodes = Nodes::new(base.tree, base.ownership);
+        let mut local = components::merge(&nodes, base.ownership);
         let faces = std::mem::take(&mut local.faces);
         let at_boundary = std::mem::take(&mut local.at_boundary);
         let merged = local.merged.numbered();
-        let labels = global::labels(&nodes, tree, ownership, faces, &merged, comm);
-        let candidates = vote::candidates(&nodes, tree, &merged.of, &labels, ownership);
-        let all = vote::all_components(&candidates, comm);
-        Self { nodes, merged: merged.of, labels, candidates, all, at_boundary }
+        let labels = global::labels(base, &nodes, faces, &merged);
+        let candidates = vote::candidates(base, &nodes, &merged, &labels);
+        let all = vote::all_components(&candidates, base.comm);
+        Self { nodes, merged, labels, candidates, all, at_boundary }
     }
 
     /// The label of a local component.
@@ -156,36 +171,27 @@ pub struct Decided {
     pub verdict: Verdict,
 }
 
-/// Decides the sides of all leaves. `facets` are this rank's slice of the geometry: each facet is on exactly
-/// one rank. Nothing is deleted if the options ask for T0. There are no regions to look for leaks in if the surface `is_closed`. Collective.
+/// Decides the sides of all leaves. Nothing is deleted if the options ask for T0. There are no regions to look for leaks in if the surface
+/// `is_closed`. Collective.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf; the same on all ranks.
-pub fn decide(
-    tree: &Tree,
-    ownership: &Ownership,
-    facets: &[Facet],
-    rules: &Rules,
-    options: &Options,
-    is_closed: bool,
-    comm: &dyn Comm,
-) -> Result<Decided, Error> {
-    let mut components = Components::new(tree, ownership, comm);
+pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided, Error> {
+    let rules = base.rules;
+    let mut components = Components::new(base);
     if options.checks() {
         components.nodes.check_invariants();
     }
     let mut verdict = if rules.seeds.is_empty() {
-        vote::decide(&components.all, &components.candidates, facets, comm)
+        vote::decide(&components.all, &components.candidates, base)
     } else {
-        let label = |c| components.label(c);
-        let found = flow::find(&rules.seeds, tree, &components.nodes, ownership, label, comm);
-        let flow = flow::of_seeds(&found, rules, tree, ownership, comm)?;
+        let flow = flow::of_seeds(&flow::find(base, &components), base)?;
         flow::decide(&components.all, flow, rules.keep)
     };
     components.nodes.drop_links();
 
     let at_boundary = components.at_boundary.iter().map(|&c| components.label(c));
-    verdict.compare_with_boundary(rules, &components.all, at_boundary, comm);
+    verdict.compare_with_boundary(base, &components.all, at_boundary);
     let class = |label| match () {
         () if verdict.inside.contains(label) => Class::Inside,
         () if verdict.enclosed.contains(label) => Class::Enclosed,
@@ -200,10 +206,10 @@ pub fn decide(
     let mut sides =
         Sides { keep, stored: per_level(), summary: verdict.summary, rays: verdict.rays };
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
-    let leaves_enclosed = sides.store(tree, &nodes, &of_local, ownership, &mut regions);
+    let leaves_enclosed = sides.store(base, &nodes, &of_local, &mut regions);
     let inside = verdict.inside.len() as u64;
     (sides.summary.inside, sides.summary.outside) = (inside, all.len() as u64 - inside);
-    sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, comm);
+    sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, base.comm);
     Ok(Decided { sides, regions, components: all, verdict })
 }
 
@@ -212,16 +218,15 @@ impl Sides {
     /// leaves that this rank owns. Fills the regions in which leaks are looked for.
     fn store(
         &mut self,
-        tree: &Tree,
+        base: &Base,
         nodes: &Nodes,
         of_local: &[Class],
-        ownership: &Ownership,
         regions: &mut [leaks::Region],
     ) -> u64 {
         let mut leaves_enclosed = 0;
         for l in 0..LEVELS as Level {
-            let mut crossing = tree.crossing[l as usize].cursor();
-            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
+            let mut crossing = base.tree.crossing[l as usize].cursor();
+            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
                 let (mut open, mut within, mut enclosed) = (0, 0, 0);
                 for (c, part) in nodes.components(l, n) {
                     open |= part;
@@ -240,7 +245,7 @@ impl Sides {
                 for region in &mut *regions {
                     region.push(l, key, crossing.get(key), open, within);
                 }
-                if enclosed != 0 && ownership.owns(l, key) {
+                if enclosed != 0 && base.ownership.owns(l, key) {
                     leaves_enclosed += u64::from(enclosed.count_ones());
                 }
             }
@@ -277,8 +282,9 @@ mod tests {
         let tree = small();
         let rules = Rules { keep, ..rules() };
         let options = crate::tests::options();
-        let decided = decide(&tree, &Ownership::solo(), &[], &rules, &options, true, &Solo);
-        let sides = decided.unwrap().sides;
+        let (ownership, rules) = (&Ownership::solo(), &rules);
+        let base = Base { tree: &tree, ownership, facets: &[], rules, comm: &Solo };
+        let sides = decide(&base, &options, true).unwrap().sides;
         sides.check_invariants(&tree);
         (tree, sides)
     }
@@ -296,6 +302,8 @@ mod tests {
     fn a_component_with_two_sides_is_found() {
         let (tree, mut sides) = decided(Keep::All);
         sides.stored[1] = set(&[1]);
-        check::sides::agree_over_faces(&sides, &tree, &Ownership::solo(), &Solo);
+        let (ownership, rules) = (&Ownership::solo(), &rules());
+        let base = Base { tree: &tree, ownership, facets: &[], rules, comm: &Solo };
+        check::sides::agree_over_faces(&sides, &base);
     }
 }

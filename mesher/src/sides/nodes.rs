@@ -10,7 +10,6 @@ use crate::partition::ownership::{Ownership, Placement};
 use bricks::brick;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
-use std::ops::Range;
 
 /// Number of a local component: leaves of one brick that are connected over faces.
 pub type Component = u32;
@@ -173,9 +172,14 @@ impl Nodes {
         range.clone().zip(self.masks[range.start as usize..range.end as usize].iter().copied())
     }
 
-    /// The nodes of a level that other ranks may hold: all others are local.
-    pub fn with_placement(&self, l: Level) -> Range<Node> {
-        0..self.levels[l as usize].placements.len() as Node
+    /// The components of fully replicated bricks, in an order that is the same on all ranks.
+    pub fn replicated_components(&self) -> Vec<Component> {
+        let of_level = |(l, level): (Level, &LevelNodes)| {
+            let nodes = (0..).zip(level.placements.clone());
+            let replicated = nodes.filter(|node| node.1 == Placement::FullyReplicated);
+            replicated.flat_map(move |(n, _)| self.components(l, n).map(|c| c.0))
+        };
+        (0..).zip(&self.levels).flat_map(of_level).collect()
     }
 
     /// Checks the invariants, with the links.
@@ -204,30 +208,11 @@ impl Nodes {
         assert_eq!(component, self.component_count(), "each component must belong to a node");
     }
 
-    /// A finder of components by octants.
-    pub fn finder(&self) -> Finder<'_> {
-        Finder { nodes: self, path: vec![(0, 0)] }
-    }
-}
-
-/// Finds components by octants. Fast if consecutive queries are close to each other in the tree.
-pub struct Finder<'a> {
-    nodes: &'a Nodes,
-    /// The bricks on the path of the previous query, by level: key and node.
-    path: Vec<(u64, Node)>,
-}
-
-impl Finder<'_> {
     /// Calls `found` with the components of the octants `bits` of brick `key` of level `l`: of the leaves of that
     /// level, or of the coarser leaves that contain them. Octants that are split have no component.
-    pub fn find(&mut self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
-        let nodes = self.nodes;
-        let on_path = |(m, path): (Level, &(u64, Node))| m <= l && path.0 == brick_above(l, key, m);
-        let known = (0..).zip(&self.path).take_while(|&path| on_path(path)).count();
-        self.path.truncate(known);
-        // If a brick exists, the octant that it fills is split: the search may start two levels higher.
-        for m in (known as Level).saturating_sub(2)..=l {
-            let node = self.path[m as usize].1;
+    pub fn find(&self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
+        let mut node = 0;
+        for m in 0..=l {
             // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
             // one sibling group do.
             let octants = match l - m {
@@ -235,25 +220,18 @@ impl Finder<'_> {
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
-            let family = nodes.family(m, node);
+            let family = self.family(m, node);
             let leaves = octants & !family.split;
-            nodes.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
-            if octants & family.split == 0 || m == l {
+            if leaves != 0 {
+                self.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
+            }
+            if leaves == octants || m == l {
                 return;
             }
-            if self.path.len() == m as usize + 1 {
-                let below = brick_above(l, key, m + 1);
-                let Some((node, _)) = family.child(below & 7) else { return };
-                self.path.push((below, node));
-            }
+            let Some((child, _)) = family.child(key >> (3 * (l - m - 1)) & 7) else { return };
+            node = child;
         }
     }
-}
-
-/// The key of the brick of level `m` that contains brick `key` of level `l`.
-#[inline]
-fn brick_above(l: Level, key: u64, m: Level) -> u64 {
-    key >> (3 * (l - m))
 }
 
 #[cfg(test)]
@@ -298,7 +276,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn components_are_found_whatever_the_previous_query(
+        fn components_are_found_by_their_octants(
             deepest in prop::collection::vec(any::<u64>(), 1..20),
             queries in prop::collection::vec((2..=DEEPEST, any::<prop::sample::Index>(), 0u64..80, any::<u64>()), 1..40),
         ) {
@@ -306,13 +284,12 @@ mod tests {
             tree.check_structure();
             let nodes = Nodes::new(&tree, &Ownership::solo());
             nodes.check_invariants();
-            let mut finder = nodes.finder();
             for (l, near, offset, bits) in queries {
                 // Near a region where the tree is deep, as queries by neighbouring ranks are.
                 let place = (near.get(&deepest) % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
                 let key = (place ^ offset) >> 6;
                 let mut found = BTreeSet::new();
-                finder.find(l, key, bits, |c| _ = found.insert(c));
+                nodes.find(l, key, bits, |c| _ = found.insert(c));
                 let codes = ones(bits).map(|bit| key << 6 | u64::from(bit));
                 let want: BTreeSet<Component> =
                     codes.filter_map(|code| component_of(&nodes, &tree, l, code)).collect();

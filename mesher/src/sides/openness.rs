@@ -12,6 +12,7 @@
 
 use bricks::digest::{chained, mix};
 use bricks::facet::Facet;
+use bytemuck::Pod;
 use ranks::{Comm, MessageBuffer, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,8 +37,13 @@ fn boundary(facets: &[Facet]) -> u128 {
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a closed surface. Collective.
 pub fn is_closed(mine: &[Facet], comm: &dyn Comm) -> bool {
-    let all = uncounted(comm, || gather(comm, &[boundary(mine)]));
-    all.into_iter().fold(0, |all, of| all ^ of) == 0
+    over_ranks(boundary(mine), |all, of| all ^ of, comm) == 0
+}
+
+/// The value that `merge` makes of those of all ranks. Collective.
+fn over_ranks<T: Pod>(mine: T, merge: impl Fn(T, T) -> T, comm: &dyn Comm) -> T {
+    let all = uncounted(comm, || gather(comm, &[mine]));
+    all.into_iter().reduce(merge).expect("a rank")
 }
 
 /// Whether the facets of all ranks, of which `mine` are this rank's, form a sheet. Collective.
@@ -50,9 +56,8 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
         (0..3).for_each(|a| sums[a] += i128::from(normal[a]));
         sums[3] += length as i128;
     }
-    let all = uncounted(comm, || gather(comm, &[sums]));
     let add = |sum: [i128; 4], of: [i128; 4]| std::array::from_fn(|i| sum[i] + of[i]);
-    let [x, y, z, area] = all.into_iter().fold([0; 4], add);
+    let [x, y, z, area] = over_ranks(sums, add, comm);
     let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
     closing.min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
 }
@@ -130,9 +135,8 @@ pub fn is_doubled(mine: &[Facet], comm: &dyn Comm) -> bool {
         v.as_flattened().iter().fold(0, |sum, &c| mix(sum ^ u64::from(c as u32)) as u64)
     };
     let words = [mine.len() as u64, mine.iter().map(hash).fold(0, |all, of| all ^ of)];
-    let all = uncounted(comm, || gather(comm, &[words]));
     let add = |[count, xor]: [u64; 2], [n, of]: [u64; 2]| [count + n, xor ^ of];
-    let [count, xor] = all.into_iter().fold([0; 2], add);
+    let [count, xor] = over_ranks(words, add, comm);
     count > 0 && xor == 0
 }
 

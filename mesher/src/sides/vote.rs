@@ -4,13 +4,12 @@
 use super::global::Label;
 use super::nodes::Nodes;
 use super::rays::parities;
-use super::{Ambiguous, Verdict};
-use crate::partition::ownership::Ownership;
+use super::{Ambiguous, Base, Verdict};
 use bricks::brick::Brick;
 use bricks::brickset::ones;
-use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge};
 use bricks::tree::{LEVELS, Tree};
+use bytemuck::allocation::pod_collect_to_vec;
 use ranks::{Comm, all_gather_reduced, gather};
 use std::collections::BTreeMap;
 use std::mem::take;
@@ -43,17 +42,11 @@ impl Candidate {
 /// The first leaves, by level and Morton code, of the components that this rank has part of, among the leaves
 /// that it owns: at most [`CANDIDATES`] each. `merged` are the merged components of the local ones, `labels`
 /// their labels.
-pub fn candidates(
-    nodes: &Nodes,
-    tree: &Tree,
-    merged: &[u32],
-    labels: &[Label],
-    ownership: &Ownership,
-) -> FirstLeaves {
+pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) -> FirstLeaves {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
     for l in 0..LEVELS as Level {
-        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&tree.split, l)) {
-            if !ownership.owns(l, key) {
+        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
+            if !base.ownership.owns(l, key) {
                 continue;
             }
             for (c, bits) in nodes.components(l, n) {
@@ -97,12 +90,7 @@ fn first_of_all(lists: impl Iterator<Item = (Label, Vec<Candidate>)>) -> FirstLe
 /// Decides all `components`. Nearly always the rays of a component's first leaf agree, so the other candidates are
 /// gathered only for those whose rays do not. Each rank tests the rays against its own
 /// facets; `mine` are this rank's [`candidates`]. Collective; the result is the same on all ranks.
-pub fn decide(
-    components: &[FirstLeaf],
-    mine: &FirstLeaves,
-    facets: &[Facet],
-    comm: &dyn Comm,
-) -> Verdict {
+pub fn decide(components: &[FirstLeaf], mine: &FirstLeaves, base: &Base) -> Verdict {
     let mut verdict = Verdict::default();
     let mut lists: FirstLeaves =
         components.iter().map(|&(label, first)| (label, vec![first])).collect();
@@ -112,7 +100,7 @@ pub fn decide(
     let mut exhausted = Vec::new();
     for round in 0..CANDIDATES {
         if round == 1 && !open.is_empty() {
-            lists = gather_candidates(mine, &open, comm);
+            lists = gather_candidates(mine, &open, base.comm);
         }
         let (next, done): (Vec<_>, Vec<_>) =
             take(&mut open).into_iter().partition(|(label, _)| lists[label].len() > round);
@@ -122,7 +110,7 @@ pub fn decide(
         }
         let points: Vec<_> = next.iter().map(|(label, _)| lists[label][round].centroid()).collect();
         verdict.rays += 6 * points.len() as u64;
-        let odd = xor_over_ranks(parities(facets, &points), comm);
+        let odd = xor_over_ranks(parities(base.facets, &points), base.comm);
         let undecided = next.into_iter().zip(odd).filter_map(|((label, votes), rays)| {
             if rays == 63 {
                 verdict.inside.insert(label);
@@ -151,14 +139,13 @@ fn gather_candidates(mine: &FirstLeaves, open: &[(Label, usize)], comm: &dyn Com
 }
 
 /// Parities over the facets of all ranks, from those over each rank's facets. Collective.
-fn xor_over_ranks(mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
-    let pack = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |w, &b| w << 8 | u64::from(b));
-    let words: Vec<u64> = mine.chunks(8).map(pack).collect();
-    let mut total = vec![0u64; words.len()];
-    for (_, theirs) in comm.all_gather(&words).messages() {
-        total.iter_mut().zip(theirs).for_each(|(t, w)| *t ^= w);
+fn xor_over_ranks(mut mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
+    mine.resize(mine.len().next_multiple_of(8), 0);
+    let mut total = vec![0; mine.len()];
+    for (_, theirs) in comm.all_gather(&pod_collect_to_vec(&mine)).messages() {
+        total.iter_mut().zip(bytemuck::cast_slice(theirs)).for_each(|(t, b): (_, &u8)| *t ^= b);
     }
-    (0..mine.len()).map(|i| (total[i / 8] >> (8 * (i % 8))) as u8).collect()
+    total
 }
 
 #[cfg(test)]

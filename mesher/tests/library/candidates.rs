@@ -4,9 +4,10 @@
 use crate::support::{Small, config, cuboid, leaky_on_rays, small, soup, thin};
 use bricks::octant::{LEVEL_MAX, corner, edge, neighbour};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Root};
+use mesher::partition::curve;
 use mesher::partition::ownership::Ownership;
 use mesher::refine::voxelise::{BinnedFacets, refine};
-use mesher::sides::{components, global, nodes::Nodes, vote};
+use mesher::sides::{Base, components, global, nodes::Nodes, vote};
 use proptest::prelude::*;
 use ranks::Solo;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,15 +21,17 @@ fn by_mesher(case: &Small) -> Firsts {
         .root
         .facets(case.facets.clone(), &Bounds::of(&case.facets), 0)
         .expect("near the root");
-    let (tree, _) = refine(&BinnedFacets::new(&facets), &rules, &[(0, 0)]);
+    let (tree, _) = refine(&BinnedFacets::new(&facets), &rules, &[curve::ALL]);
     tree.check_structure();
     let ownership = Ownership::solo();
+    let base =
+        Base { tree: &tree, ownership: &ownership, facets: &facets, rules: &rules, comm: &Solo };
     let nodes = Nodes::new(&tree, &ownership);
     let mut local = components::merge(&nodes, &ownership);
     let faces = std::mem::take(&mut local.faces);
     let merged = local.merged.numbered();
-    let labels = global::labels(&nodes, &tree, &ownership, faces, &merged, &Solo);
-    let found = vote::candidates(&nodes, &tree, &merged.of, &labels, &ownership);
+    let labels = global::labels(&base, &nodes, faces, &merged);
+    let found = vote::candidates(&base, &nodes, &merged, &labels);
     found.into_values().map(|list| list.into_iter().map(|c| c.centroid()).collect()).collect()
 }
 

@@ -20,7 +20,7 @@ pub fn words(
     let job = &mut Job::new(options, comm, &mut record);
     let mesh = grow(quantised(case, job)?, job, |_, _| {})?;
     let mut words = Vec::new();
-    mesh.leaves().emit(|w| {
+    mesh.emit(|w| {
         words.extend_from_slice(w);
         Ok::<(), Error>(())
     })?;
