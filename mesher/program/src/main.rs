@@ -134,7 +134,7 @@ fn abort_on_panic(end: fn() -> !) {
         NOTICE.call_once(|| {
             complain(&"this is a bug in the mesher: please report it with the case");
         });
-        interrupt::abandon();
+        interrupt::abandon(true);
         end();
     }));
 }

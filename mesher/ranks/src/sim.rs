@@ -13,7 +13,6 @@ pub use world::{Next, World};
 
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
-use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard};
 use world::Call;
@@ -23,8 +22,6 @@ pub struct Sim<'a> {
     rank: usize,
     world: &'a World,
     token: &'a dyn Token,
-    /// Number of collective calls so far, to detect ranks that do not make the same calls.
-    calls: Cell<u64>,
 }
 
 /// The right to run, as a rank sees it.
@@ -112,12 +109,11 @@ impl Token for Threads {
 impl<'a> Sim<'a> {
     /// A rank of a world, which has been chosen to run.
     pub fn new(rank: usize, world: &'a World, token: &'a dyn Token) -> Self {
-        Self { rank, world, token, calls: Cell::new(0) }
+        Self { rank, world, token }
     }
 
     fn call(&self, call: Call, words: MessageBuffer) -> Gathered {
-        let number = self.calls.replace(self.calls.get() + 1);
-        self.world.post(self.rank, number, call, words);
+        self.world.post(self.rank, call, words);
         self.token.pass(self.rank);
         self.world.result(self.rank)
     }
