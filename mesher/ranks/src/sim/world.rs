@@ -99,11 +99,10 @@ impl World {
 
     /// The result of a completed call for a rank.
     pub(super) fn result(&self, rank: usize) -> Gathered {
-        let result = match &mut self.lock().ranks[rank] {
-            Rank::Ready(result) => result.take(),
-            _ => None,
-        };
-        result.expect("a completed call has a result for every rank")
+        match std::mem::replace(&mut self.lock().ranks[rank], Rank::Ready(None)) {
+            Rank::Ready(Some(result)) => result,
+            _ => unreachable!("a completed call has a result for every rank"),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
