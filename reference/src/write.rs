@@ -132,11 +132,13 @@ impl Manifest {
 pub fn claim(directory: &Path) -> Result<Claim, Error> {
     let write = |source| Error::Write { path: directory.to_owned(), source };
     directory.parent().map_or(Ok(()), fs::create_dir_all).map_err(write)?;
-    Claim::create(directory, MANIFEST_FILE, [LEAF_FILE.to_owned()]).map_err(|e| match e.kind() {
-        io::ErrorKind::DirectoryNotEmpty => {
-            Error::OutputTaken { path: directory.to_owned(), source: e }
+    Claim::create(directory, MANIFEST_FILE, vec![LEAF_FILE.to_owned()]).map_err(|e| {
+        match e.kind() {
+            io::ErrorKind::DirectoryNotEmpty => {
+                Error::OutputTaken { path: directory.to_owned(), source: e }
+            }
+            _ => write(e),
         }
-        _ => write(e),
     })
 }
 

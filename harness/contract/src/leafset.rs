@@ -64,7 +64,7 @@ pub(crate) fn create(
 ) -> io::Result<()> {
     let parents = dir.parent().map_or(Ok(()), fs::create_dir_all);
     let write = || {
-        let names = manifest.parts.iter().map(|part| part.file.clone());
+        let names = manifest.parts.iter().map(|part| part.file.clone()).collect();
         let claim = Claim::create(dir, manifest::FILE, names)?;
         for (i, part) in manifest.parts.iter().enumerate() {
             let mut out = BufWriter::new(claim.draft(&part.file)?);

@@ -13,7 +13,7 @@ mod read;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use read::{Bricks, Cursor};
+pub use read::Cursor;
 
 use crate::brick::{self, Brick};
 
@@ -100,8 +100,8 @@ impl BrickSet {
 
     /// The bricks in order.
     #[inline]
-    pub fn bricks(&self) -> Bricks<'_> {
-        Bricks::new(self)
+    pub fn bricks(&self) -> Cursor<'_> {
+        Cursor::new(self)
     }
 
     /// Number of bricks.

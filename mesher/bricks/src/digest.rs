@@ -110,16 +110,10 @@ impl Digests {
     /// Adds sorted words.
     pub fn add(&mut self, mut words: &[u64]) {
         const SHIFT: u32 = 64 - 3 * OCTANT_LEVEL;
-        while let (Some(first), Some(last)) = (words.first(), words.last()) {
-            let octant = first >> SHIFT;
-            let run = if last >> SHIFT == octant {
-                words.len()
-            } else {
-                words.partition_point(|w| w >> SHIFT == octant)
-            };
-            let sum = &mut self.octants[octant as usize];
-            *sum = sum.wrapping_add(digest(&words[..run]));
-            words = &words[run..];
+        while let Some(octant) = words.first().map(|w| w >> SHIFT) {
+            let (run, rest) = words.split_at(words.partition_point(|w| w >> SHIFT == octant));
+            self.merge([(octant as usize, digest(run))]);
+            words = rest;
         }
     }
 

@@ -7,8 +7,8 @@
 //! - a run removes files only in the directory that it opened, and only under the names that it gave when it claimed.
 
 use crate::draft::Draft;
-use crate::unfinished::{Output, Unfinished, open_file, rename_to_new};
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, unlinkat};
+use crate::unfinished::{Output, Unfinished, open_file};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, renameat, unlinkat};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
 use std::fs::File;
@@ -40,11 +40,7 @@ impl Claim {
     ///
     /// # Errors
     /// If another run has claimed it or it is not empty, of the kind `DirectoryNotEmpty`; or if it cannot be created or written to.
-    pub fn create(
-        path: &Path,
-        last: &str,
-        others: impl IntoIterator<Item = String>,
-    ) -> io::Result<Self> {
+    pub fn create(path: &Path, last: &str, others: Vec<String>) -> io::Result<Self> {
         let taken = |why: &str| Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, why));
         match Self::begin(path, last, others, Self::make) {
             Err(Errno::EXIST) => {
@@ -59,12 +55,7 @@ impl Claim {
     ///
     /// # Errors
     /// If the directory cannot be opened.
-    pub fn join(
-        path: &Path,
-        last: &str,
-        others: impl IntoIterator<Item = String>,
-        is_new: bool,
-    ) -> io::Result<Self> {
+    pub fn join(path: &Path, last: &str, others: Vec<String>, is_new: bool) -> io::Result<Self> {
         let open = |path: &CStr, claim: &CStr| Ok((open(path, claim, OFlags::empty())?, is_new));
         Ok(Self::begin(path, last, others, open)?)
     }
@@ -72,19 +63,17 @@ impl Claim {
     fn begin(
         path: &Path,
         last: &str,
-        others: impl IntoIterator<Item = String>,
+        others: Vec<String>,
         open: impl FnOnce(&CStr, &CStr) -> Result<(Opened, bool), Errno>,
     ) -> Result<Self, Errno> {
         let path = CString::new(path.as_os_str().as_bytes()).map_err(|_| Errno::INVAL)?;
         let names = names_of(last);
-        let others: Vec<CString> = others.into_iter().flat_map(|name| names_of(&name)).collect();
-        let mut opened = None;
-        let unfinished = Unfinished::begin(|| {
+        let others: Vec<CString> = others.iter().flat_map(|name| names_of(name)).collect();
+        let (unfinished, (last, is_new)) = Unfinished::begin(|| {
             let ((dir, last, id), is_new) = open(&path, &names[0])?;
-            opened = Some((last, is_new));
-            Ok(Output { dir, names, id, others, created: is_new.then_some(path) })
+            let created = is_new.then_some(path);
+            Ok((Output { dir, names, id, others, created }, (last, is_new)))
         })?;
-        let (last, is_new) = opened.expect("the claim was opened");
         Ok(Self { unfinished, last: last.into(), is_new })
     }
 
@@ -128,7 +117,7 @@ impl Claim {
         fill(&mut out)?;
         out.into_inner()?.sync_all()?;
         self.unfinished.publish(|Output { dir, names, .. }| {
-            rename_to_new(dir, names)?;
+            renameat(dir, &names[0], dir, &names[1])?;
             match fsync(dir) {
                 // Some network file systems cannot.
                 Err(Errno::INVAL) => Ok(()),

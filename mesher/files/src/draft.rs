@@ -1,6 +1,6 @@
 //! Single files.
 
-use crate::unfinished::{Output, Unfinished, locked, open_file, rename_to_new};
+use crate::unfinished::{Output, Unfinished, locked, open_file};
 use crate::uses::register_output;
 use rustix::fs::{CWD, Mode, OFlags, openat, renameat};
 use std::ffi::CString;
@@ -52,14 +52,11 @@ impl Draft {
         let random = RandomState::new().hash_one(0);
         let name = path.file_name().unwrap_or_default().as_bytes();
         let names = [CString::new(format!(".{random:016x}.draft"))?, CString::new(name)?];
-        let mut created = None;
-        let unfinished = Unfinished::begin(|| {
+        let (unfinished, file) = Unfinished::begin(|| {
             let (file, id) = open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL)?;
-            created = Some(file);
-            Ok(Output { dir, names, id, others: Vec::new(), created: None })
+            Ok((Output { dir, names, id, others: Vec::new(), created: None }, file))
         })?;
-        let file = created.expect("the file was created").into();
-        Ok(Self { file, place: Place::Beside(unfinished) })
+        Ok(Self { file: file.into(), place: Place::Beside(unfinished) })
     }
 
     /// A file of a claimed directory with a temporary and a final name.
@@ -92,7 +89,9 @@ impl Draft {
         self.synchronise()?;
         match self.place {
             Place::Through => {}
-            Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
+            Place::Claimed { dir, names: [from, to] } => {
+                locked(|| renameat(&dir, &from, &dir, &to))?
+            }
             Place::Beside(unfinished) => {
                 unfinished.publish(|Output { dir, names: [from, to], .. }| {
                     renameat(dir, from, dir, to)

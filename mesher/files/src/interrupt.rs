@@ -2,14 +2,14 @@
 //!
 //! Signals wake a thread of their own, which removes what is unfinished. In a signal handler, that would have to do without locks.
 
-use crate::unfinished::{abandon_all, complete};
+use crate::unfinished::complete;
 use crate::uses::forget;
 use libc::{SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGPWR, SIGQUIT, SIGSTKFLT};
 use libc::{SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
-use signal_hook::low_level::{self, pipe};
+use signal_hook::low_level::{pipe, register};
 use std::io::{self, Read};
 use std::mem::MaybeUninit;
 use std::os::unix::net::UnixStream;
@@ -18,6 +18,10 @@ use std::sync::{Arc, Barrier};
 use std::thread::{self, sleep};
 use std::time::Duration;
 use std::{env, fmt};
+
+pub use crate::unfinished::abandon;
+/// Ends the process without what it would run at its exit.
+pub use signal_hook::low_level::exit as exit_at_once;
 
 /// Exit code of an interrupted program.
 pub const INTERRUPTED: i32 = 130;
@@ -45,7 +49,7 @@ pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
         started.wait();
         let mut is_first = true;
         while received.read_exact(&mut [0]).is_ok() {
-            if !(abandon_all(true) && is_first) {
+            if !(abandon(true) && is_first) {
                 print(message);
                 sleep(linger);
                 exit_at_once(INTERRUPTED);
@@ -69,7 +73,7 @@ pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
 pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
     // A handler, unlike an ignored signal, is not inherited by the programs that this one starts.
     // SAFETY: the action does nothing.
-    unsafe { low_level::register(SIGXFSZ, || ())? };
+    unsafe { register(SIGXFSZ, || ())? };
     Ok(SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)))
 }
 
@@ -82,22 +86,6 @@ pub fn decided() {
 pub fn begin() {
     forget();
     complete(false);
-}
-
-/// Removes all unfinished files: before the process ends because of a bug.
-pub fn abandon() {
-    abandon_all(true);
-}
-
-/// Removes all files that are unfinished, also if others are complete, and lets no other thread begin one: for a program with several
-/// outputs, whose process then ends.
-pub fn abandon_unfinished() {
-    abandon_all(false);
-}
-
-/// Ends the process without what it would run at its exit.
-pub fn exit_at_once(code: i32) -> ! {
-    low_level::exit(code)
 }
 
 /// Stops the process, as SIGSTOP does, if the environment variable `STOP_AT` is this point. Tests then send signals, and let it

@@ -66,7 +66,7 @@ impl Heap {
             // The thread that came first ends the process.
             sleep(Duration::from_secs(1));
         }
-        interrupt::abandon();
+        interrupt::abandon(true);
         // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
         let mut line = Cursor::new([0; 256]);
         let _ = writeln!(

@@ -7,8 +7,7 @@
 //! - output is complete once its final name belongs to the file that was begun. Of several processes of a run, the file system decides
 //!   between a rename to the final name and a removal, of which one succeeds.
 
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, RenameFlags, fstat, openat, statat, unlinkat};
-use rustix::fs::{renameat, renameat_with};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, fstat, openat, statat, unlinkat};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
 use std::io;
@@ -71,15 +70,18 @@ pub fn locked<T>(body: impl FnOnce() -> T) -> T {
 }
 
 impl Unfinished {
-    /// Begins output.
+    /// Begins output. Also returns what `begin` does beside it.
     ///
     /// # Errors
     /// With whatever `begin` returns; then it leaves nothing.
-    pub fn begin(begin: impl FnOnce() -> Result<Output, Errno>) -> Result<Self, Errno> {
+    pub fn begin<T>(
+        begin: impl FnOnce() -> Result<(Output, T), Errno>,
+    ) -> Result<(Self, T), Errno> {
         let outputs = &mut lock_to_work().outputs;
         let free = outputs.iter().position(Option::is_none).ok_or(Errno::MFILE)?;
-        outputs[free] = Some(begin()?);
-        Ok(Self(free))
+        let (output, beside) = begin()?;
+        outputs[free] = Some(output);
+        Ok((Self(free), beside))
     }
 
     /// Gives the output its final name with `publish`.
@@ -115,9 +117,9 @@ pub fn complete(is_complete: bool) {
     lock_to_work().is_complete = is_complete;
 }
 
-/// Removes all unfinished output before the process ends. Removes none if some is complete and the process therefore `ends_well`; returns
-/// whether that is so.
-pub fn abandon_all(ends_well: bool) -> bool {
+/// Removes all unfinished output before the process ends, and lets no other thread begin any. Removes none if some is complete and the process
+/// therefore `ends_well`, which one with several outputs does not; returns whether that is so.
+pub fn abandon(ends_well: bool) -> bool {
     let mut state = lock();
     let outputs = || state.outputs.iter().flatten();
     if ends_well && (state.is_complete || outputs().any(|output| output.is_at(1))) {
@@ -162,13 +164,4 @@ pub fn open_file(
     let file = openat(dir, name, always | flags, Mode::from(0o666))?;
     let found = fstat(&file)?;
     Ok((file, (found.st_dev, found.st_ino)))
-}
-
-/// Gives a file its final name, which no other file has.
-pub fn rename_to_new(dir: &OwnedFd, [from, to]: &[CString; 2]) -> Result<(), Errno> {
-    match renameat_with(dir, from, dir, to, RenameFlags::NOREPLACE) {
-        // Some network file systems cannot. The claim excludes other runs.
-        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => renameat(dir, from, dir, to),
-        result => result,
-    }
 }

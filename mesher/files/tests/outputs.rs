@@ -29,7 +29,7 @@ fn names(directory: &Path) -> Vec<String> {
 fn nothing_is_begun_once_another_thread_ends_the_process() {
     const FILE: &str = "FILE_AFTER_THE_END";
     if let Some(path) = env::var_os(FILE) {
-        interrupt::abandon_unfinished();
+        interrupt::abandon(false);
         // If it returned, the draft would remain, as `exit` drops nothing.
         let begun = thread::spawn(move || Draft::create(Path::new(&path)).map(std::mem::forget));
         thread::sleep(Duration::from_millis(100));
@@ -135,7 +135,7 @@ fn a_draft_that_is_dropped_leaves_nothing() {
 const LAST: &str = "last";
 
 fn claim(path: &Path) -> io::Result<Claim> {
-    Claim::create(path, LAST, ["part".to_owned()])
+    Claim::create(path, LAST, vec!["part".to_owned()])
 }
 
 fn fill(claim: &Claim, text: &str) -> io::Result<()> {
@@ -190,7 +190,7 @@ fn a_run_that_fails_removes_its_files_and_no_others() {
     let refused = claim(&path).unwrap_err();
     assert_eq!(refused.kind(), ErrorKind::DirectoryNotEmpty);
     assert!(refused.to_string().contains("another run"), "{refused}");
-    let other = Claim::join(&path, LAST, ["other".to_owned()], first.is_new()).unwrap();
+    let other = Claim::join(&path, LAST, vec!["other".to_owned()], first.is_new()).unwrap();
     fill_part(&first, "part");
     fill_part(&other, "other");
     // One process of the run gives up: the other cannot complete the directory.
@@ -202,7 +202,7 @@ fn a_run_that_fails_removes_its_files_and_no_others() {
 
     // The directory belongs to another run now, whose files have the same names.
     let late = claim(&path).unwrap();
-    let straggler = Claim::join(&path, LAST, ["part".to_owned()], true).unwrap();
+    let straggler = Claim::join(&path, LAST, vec!["part".to_owned()], true).unwrap();
     fs::remove_dir_all(&path).unwrap();
     let next = claim(&path).unwrap();
     fill_part(&next, "part");

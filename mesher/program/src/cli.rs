@@ -119,17 +119,6 @@ pub enum CommChoice {
     },
 }
 
-impl CommChoice {
-    /// Whether it is the communication of a job with so many ranks.
-    pub fn is_of(self, ranks: usize) -> bool {
-        match self {
-            Self::Auto | Self::Mpi => true,
-            Self::Solo => ranks == 1,
-            Self::Sim { .. } => false,
-        }
-    }
-}
-
 fn level_base(s: &str) -> Result<LevelBase, String> {
     let level = || s.parse().ok().filter(|l| *l <= LEVEL_MAX);
     match s {
@@ -206,11 +195,9 @@ pub fn options(args: &Args) -> Result<Options, Error> {
         out: args.out.clone().map(|directory| Output { directory, words, tree }),
         check: args.check,
         strict: args.strict,
-        // Only case files have a name.
-        case_name: if is_case_file(args) {
-            args.input().display().to_string()
-        } else {
-            "CASE".to_owned()
+        case_name: match is_case_file(args) {
+            true => args.input().display().to_string(),
+            false => "CASE".to_owned(),
         },
     })
 }

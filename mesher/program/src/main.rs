@@ -13,7 +13,7 @@ use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
 use std::env::args_os;
 use std::fmt::Display;
-use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::iter::once;
 use std::path::Path;
 use std::process::exit;
@@ -45,19 +45,13 @@ fn main() {
     // Without handlers, signals end the process the default way.
     let is_parallel = launch::ranks().is_some_and(|ranks| ranks > 1);
     let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
-    match choose(asked.as_ref().map_or(CommChoice::Auto, |args| args.comm)) {
+    abort_on_panic();
+    exit(match choose(asked.as_ref().map_or(CommChoice::Auto, |args| args.comm)) {
         Ok(CommChoice::Mpi) => run_mpi(&asked),
-        Ok(CommChoice::Sim { ranks, seed }) => {
-            abort_on_panic(|| exit(BUG));
-            let codes = sim::run(ranks, seed, |comm| obey(&asked, comm));
-            exit(codes.into_iter().max().unwrap_or(0));
-        }
-        Ok(_) => {
-            abort_on_panic(|| exit(BUG));
-            exit(obey(&asked, &Solo));
-        }
-        Err(e) => exit(fail(&e, launch::is_first())),
-    }
+        Ok(CommChoice::Sim { ranks, seed }) => sim::run(ranks, seed, |comm| obey(&asked, comm))[0],
+        Ok(_) => obey(&asked, &Solo),
+        Err(e) => fail(&e, launch::is_first()),
+    })
 }
 
 /// Fixes parameters of the C library's heap, which glibc otherwise adapts to the blocks that are freed. Blocks above the first get mappings of
@@ -100,7 +94,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
 const ADDRESS_SPACE_MPI: f64 = 384e6;
 
-fn run_mpi(asked: &Result<Args, Error>) {
+fn run_mpi(asked: &Result<Args, Error>) -> i32 {
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(
@@ -112,21 +106,18 @@ fn run_mpi(asked: &Result<Args, Error>) {
         if !launch::is_first() {
             sleep(PATIENCE);
         }
-        exit(fail(&e, true));
+        return fail(&e, true);
     }
     let comm = launch::join();
-    // A panic that unwinds would leave the other ranks waiting forever.
-    abort_on_panic(|| launch::abort(BUG));
-    let code = match launch::check_size(&*comm) {
+    match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
         Err(e) => fail(&Error::input(e), launch::is_first()),
-    };
-    drop(comm);
-    exit(code);
+    }
 }
 
-/// Makes a panic on any thread end the whole job, with one notice per process. Every rank that panics prints where.
-fn abort_on_panic(end: fn() -> !) {
+/// Makes a panic on any thread end the whole job, with one notice per process: one that unwinds would leave the other ranks waiting forever.
+/// Every rank that panics prints where.
+fn abort_on_panic() {
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         report(info);
@@ -134,8 +125,8 @@ fn abort_on_panic(end: fn() -> !) {
         NOTICE.call_once(|| {
             complain(&"this is a bug in the mesher: please report it with the case");
         });
-        interrupt::abandon();
-        end();
+        interrupt::abandon(true);
+        launch::abort(BUG);
     }));
 }
 
@@ -219,7 +210,7 @@ fn serve(comm: &dyn Comm) -> i32 {
         let Some(line) = line.strip_suffix('\n') else { return 0 };
         // The peak of this run alone; where that is impossible, it includes those before it.
         let _ = std::fs::write("/proc/self/clear_refs", "5");
-        let code = match served(line, comm) {
+        let code = match served(line) {
             Ok(args) => run(&args, comm),
             Err(e) => fail(&e, comm.rank() == 0),
         };
@@ -231,24 +222,22 @@ fn serve(comm: &dyn Comm) -> i32 {
 }
 
 /// The run that a line of a service asks for.
-fn served(line: &str, comm: &dyn Comm) -> Result<Args, Error> {
+fn served(line: &str) -> Result<Args, Error> {
     let words: Vec<String> = serde_json::from_str(line)
         .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
     // These would end the service.
     let prints = |w: &String| ["-h", "--help", "-V", "--version"].contains(&w.as_str());
-    let args = match words.iter().any(prints) {
-        true => None,
-        false => Some(parse(once("mesher".to_owned()).chain(words))?),
-    };
-    match args.filter(|a| !a.serve && a.stall_limit.is_none() && a.comm.is_of(comm.size())) {
-        Some(mut args) => {
-            args.quiet = true;
-            Ok(args)
+    if !words.iter().any(prints) {
+        let mut args = parse(once("mesher".to_owned()).chain(words))?;
+        args.quiet = true;
+        let is_of_job = matches!(args.comm, CommChoice::Auto | CommChoice::Mpi);
+        if is_of_job && !args.serve && args.stall_limit.is_none() {
+            return Ok(args);
         }
-        None => Err(Error::input(
-            "a run of a service has no --help, --version, --serve or --stall-limit, and no --comm but that of the job",
-        )),
     }
+    Err(Error::input(
+        "a run of a service has no --help, --version, --serve or --stall-limit, and no --comm but that of the job",
+    ))
 }
 
 /// One rank's run; returns the exit code, the same on all ranks. Collective.
@@ -311,6 +300,8 @@ fn named_apart(args: &Args) -> Result<(), Error> {
     })
 }
 
+const WRITABLE: &str = "a report is JSON";
+
 fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Error> {
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
@@ -336,24 +327,22 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         )?;
     }
     let options = options(args)?;
-    let finish = |done: Done, advice: &str, json: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
-        interrupt::stop_at(format_args!("report:{}", comm.rank()));
-        agree(comm, on_json(advice, &|path| write_atomically(path, json))).map(|()| done)
-    };
-    let advice = "choose another --json or free disk space";
-    if args.plan {
+    let mut bytes = Vec::new();
+    let done = if args.plan {
         let plan = planner::plan(&case, &options, comm, record)?;
         let refusal = (!plan.fits && !args.force).then(|| plan.refusal());
-        let done = Done { text: plan.to_string(), warnings: Vec::new(), refusal };
-        return finish(done, advice, &|to| write_json(to, &plan));
-    }
-    let report = planner::mesh(&case, &options, args.force, comm, record)?;
-    let advice = match options.out {
-        Some(_) => {
-            "the mesh is complete, only its report is missing; choose another --json or free disk space"
-        }
-        None => advice,
+        json.map_or(Ok(()), |_| write_json(&mut bytes, &plan)).expect(WRITABLE);
+        Done { text: plan.to_string(), warnings: Vec::new(), refusal }
+    } else {
+        let report = planner::mesh(&case, &options, args.force, comm, record)?;
+        json.map_or(Ok(()), |_| write_json(&mut bytes, &report)).expect(WRITABLE);
+        Done { text: report.to_string(), warnings: report.warnings, refusal: None }
     };
-    let done = Done { text: report.to_string(), warnings: report.warnings.clone(), refusal: None };
-    finish(done, advice, &|to| write_json(to, &report))
+    let mut advice = "choose another --json or free disk space".to_owned();
+    if options.out.is_some() && !args.plan {
+        advice = format!("the mesh is complete, only its report is missing; {advice}");
+    }
+    interrupt::stop_at(format_args!("report:{}", comm.rank()));
+    let write = |path: &Path| write_atomically(path, |out| out.write_all(&bytes));
+    agree(comm, on_json(&advice, &write)).map(|()| done)
 }

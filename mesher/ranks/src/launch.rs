@@ -36,8 +36,10 @@ pub const HAS_MPI: bool = cfg!(feature = "mpi");
 /// If MPI was initialised before, or is not built in.
 #[cfg(feature = "mpi")]
 pub fn join() -> Box<dyn Comm> {
+    // A launcher that is interrupted twice ends at once and leaves its ranks running: its end interrupts them. Where that is impossible, they end
+    // when they next communicate.
     #[cfg(target_os = "linux")]
-    end_with_launcher();
+    let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM));
     Box::new(Metered::new(mpi::Mpi::start()))
 }
 
@@ -95,15 +97,6 @@ pub fn is_first() -> bool {
         .iter()
         .find_map(|v| var(v).ok()?.parse::<usize>().ok())
         .is_none_or(|rank| rank == 0)
-}
-
-/// Makes the end of the launcher an interrupt of this rank: a launcher that is interrupted twice ends at once and leaves its ranks
-/// running.
-#[cfg(all(feature = "mpi", target_os = "linux"))]
-fn end_with_launcher() {
-    use rustix::process::{Signal, set_parent_process_death_signal};
-    // Without it, the ranks end when they next communicate.
-    let _ = set_parent_process_death_signal(Some(Signal::TERM));
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! longer than writing and reading the message.
 
 use bytemuck::Pod;
-use std::ops::Range;
 
 /// Words by rank: at most one message for each receiver, or from each sender. No message is empty.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,9 +28,7 @@ impl MessageBuffer {
     /// One message for each receiver, with its entries in the order given.
     pub fn of_entries<const N: usize>(mut entries: Vec<(usize, [u64; N])>) -> Self {
         entries.sort_by_key(|e| e.0);
-        let mut message_buffer = Self::with_capacity(N * entries.len());
-        entries.into_iter().for_each(|(rank, words)| message_buffer.write(rank, words));
-        message_buffer
+        entries.into_iter().collect()
     }
 
     /// A message of each given length, zero at first, to be written in place; the lengths are by rank.
@@ -55,15 +52,23 @@ impl MessageBuffer {
     pub fn append(&mut self, rank: usize, write: impl FnOnce(&mut Vec<u64>)) {
         let start = self.words.len();
         write(&mut self.words);
-        self.lengthen(rank, start);
+        let end = self.words.len();
+        match self.messages.last_mut() {
+            Some(last) if last.rank == rank => last.end = end,
+            _ if end > start => self.messages.push(Message { rank, end }),
+            _ => {}
+        }
     }
 
     /// The same for values, as their bytes, padded to whole words: one call writes all values of a message. A value takes 8 bytes
     /// or more.
     pub fn write_values<T: Pod>(&mut self, rank: usize, values: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(values);
-        let words = self.room(rank, bytes.len().div_ceil(size_of::<u64>()));
-        bytemuck::cast_slice_mut(words)[..bytes.len()].copy_from_slice(bytes);
+        self.append(rank, |words| {
+            let start = words.len();
+            words.resize(start + bytes.len().div_ceil(size_of::<u64>()), 0);
+            bytemuck::cast_slice_mut(&mut words[start..])[..bytes.len()].copy_from_slice(bytes);
+        });
     }
 
     /// The values of all messages.
@@ -73,33 +78,12 @@ impl MessageBuffer {
         bytes.flat_map(|b| b.chunks_exact(size_of::<T>())).map(bytemuck::pod_read_unaligned)
     }
 
-    /// The same for a number of words that are to be written in place; they are zero at first.
-    pub fn room(&mut self, rank: usize, words: usize) -> &mut [u64] {
-        let start = self.words.len();
-        self.words.resize(start + words, 0);
-        self.lengthen(rank, start);
-        &mut self.words[start..]
-    }
-
-    /// Makes the words from `start` on part of the message for `rank`.
-    fn lengthen(&mut self, rank: usize, start: usize) {
-        let end = self.words.len();
-        match self.messages.last_mut() {
-            Some(last) if last.rank == rank => last.end = end,
-            _ if end > start => self.messages.push(Message { rank, end }),
-            _ => {}
-        }
-    }
-
     /// The messages, each with its rank, in the order in which they were written.
     pub fn messages(&self) -> impl Iterator<Item = (usize, &[u64])> {
-        (0..self.messages.len()).map(|at| (self.messages[at].rank, &self.words[self.range(at)]))
-    }
-
-    /// The range of a message in the words.
-    fn range(&self, message: usize) -> Range<usize> {
-        let start = message.checked_sub(1).map_or(0, |before| self.messages[before].end);
-        start..self.messages[message].end
+        let words = |start: &mut usize, &Message { rank, end }: &Message| {
+            Some((rank, &self.words[std::mem::replace(start, end)..end]))
+        };
+        self.messages.iter().scan(0, words)
     }
 
     /// The words of all messages, contiguous.
@@ -138,9 +122,9 @@ mod tests {
         message_buffer.write(3, []);
         message_buffer.write(7, [1, 2]);
         message_buffer.write(7, []);
-        message_buffer.room(7, 2)[1] = 5;
-        assert!(message_buffer.room(0, 0).is_empty());
-        message_buffer.room(4, 1)[0] = 9;
+        message_buffer.append(7, |words| words.extend([0, 5]));
+        message_buffer.append(0, |_| ());
+        message_buffer.write_values(4, &[9u64]);
         assert_eq!(contents(&message_buffer), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
         assert_eq!(message_buffer.words(), [1, 2, 0, 5, 9]);
         assert_eq!(message_buffer, contents(&message_buffer).into_iter().collect());

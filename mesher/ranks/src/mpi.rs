@@ -144,18 +144,20 @@ impl Comm for Mpi {
                     self.world.any_process().immediate_matched_probe_with_tag(tag)
                 {
                     let words = status.count(u64::equivalent_datatype()) as usize;
-                    let from = status.source_rank() as usize;
-                    message.matched_receive_into(received.room(from, words));
+                    received.append(status.source_rank() as usize, |all| {
+                        let start = all.len();
+                        all.resize(start + words, 0);
+                        message.matched_receive_into(&mut all[start..]);
+                    });
                 }
                 sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
-                barrier = match barrier {
-                    None if sends.is_empty() => Some(self.world.immediate_barrier()),
-                    None => None,
-                    Some(barrier) => match barrier.test() {
+                if sends.is_empty() {
+                    let entered = barrier.take().unwrap_or_else(|| self.world.immediate_barrier());
+                    match entered.test() {
                         Ok(_) => break,
-                        Err(barrier) => Some(barrier),
-                    },
-                };
+                        Err(pending) => barrier = Some(pending),
+                    }
+                }
             }
         });
         received

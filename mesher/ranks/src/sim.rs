@@ -2,8 +2,8 @@
 //!
 //! Only one rank runs at a time. It passes the token on when it has to wait for others. The next rank and the order in which messages
 //! arrive are a [`Schedule`]'s choices; [`run`] draws one from a seed, so a failure can be replayed from its seed. In [`run`] each rank is a
-//! thread, so that the CPU time of a rank is not disturbed by the others. Other executors implement [`Token`]: tests of
-//! many schedules run ranks as coroutines, which takes a fifth of the time.
+//! thread, so that the CPU time of a rank is not disturbed by the others. Tests of many schedules run ranks as coroutines, which takes a
+//! fifth of the time.
 
 mod schedule;
 mod world;
@@ -13,7 +13,6 @@ pub use world::{Next, World};
 
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
-use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard};
 use world::Call;
@@ -22,15 +21,7 @@ use world::Call;
 pub struct Sim<'a> {
     rank: usize,
     world: &'a World,
-    token: &'a dyn Token,
-    /// Number of collective calls so far, to detect ranks that do not make the same calls.
-    calls: Cell<u64>,
-}
-
-/// The right to run, as a rank sees it.
-pub trait Token {
-    /// Passes the token on; returns when the world has chosen this rank again.
-    fn pass(&self, rank: usize);
+    pass: &'a dyn Fn(),
 }
 
 /// Runs `body` on `size` ranks under the schedule of `seed`; returns what each rank returned.
@@ -46,7 +37,11 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
             let (threads, body) = (&threads, &body);
             let run = move || {
                 threads.wait(rank);
-                let sim = Metered::new(Sim::new(rank, &threads.world, threads));
+                let pass = || {
+                    threads.pass_on();
+                    threads.wait(rank);
+                };
+                let sim = Metered::new(Sim::new(rank, &threads.world, &pass));
                 let result = catch_unwind(AssertUnwindSafe(|| body(&sim)));
                 threads.world.end(rank, result.is_err());
                 threads.pass_on();
@@ -102,23 +97,15 @@ impl Threads {
     }
 }
 
-impl Token for Threads {
-    fn pass(&self, rank: usize) {
-        self.pass_on();
-        self.wait(rank);
-    }
-}
-
 impl<'a> Sim<'a> {
-    /// A rank of a world, which has been chosen to run.
-    pub fn new(rank: usize, world: &'a World, token: &'a dyn Token) -> Self {
-        Self { rank, world, token, calls: Cell::new(0) }
+    /// A rank of a world, which has been chosen to run. `pass` passes the token on, and returns when the world has chosen this rank again.
+    pub fn new(rank: usize, world: &'a World, pass: &'a dyn Fn()) -> Self {
+        Self { rank, world, pass }
     }
 
     fn call(&self, call: Call, words: MessageBuffer) -> Gathered {
-        let number = self.calls.replace(self.calls.get() + 1);
-        self.world.post(self.rank, number, call, words);
-        self.token.pass(self.rank);
+        self.world.post(self.rank, call, words);
+        (self.pass)();
         self.world.result(self.rank)
     }
 

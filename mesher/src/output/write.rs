@@ -73,7 +73,7 @@ impl OutDir {
     /// If the directory cannot be created or written to, is not empty, or another run has claimed it.
     pub fn claim(files: &Output, comm: &dyn Comm) -> Result<Self, Error> {
         let path = &files.directory;
-        let all = || (0..comm.size()).flat_map(names);
+        let all = || (0..comm.size()).flat_map(names).collect();
         let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
         let created = agree(
             comm,
@@ -87,7 +87,7 @@ impl OutDir {
         let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
         comm.uncounted(&mut || is_new = comm.max(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
-        let mine = [0, comm.rank()].into_iter().flat_map(names);
+        let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
         let claim = match created {
             Some(claim) => Ok(claim),
             None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| match e.kind() {

@@ -3,7 +3,7 @@
 
 use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
-use ranks::sim::{Next, Schedule, Sim, Token, World};
+use ranks::sim::{Next, Schedule, Sim, World};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -13,15 +13,6 @@ const STACK: usize = 4 << 20;
 thread_local! {
     /// Kept, because mapping and releasing them takes longer than a small mesh.
     static STACKS: RefCell<Vec<DefaultStack>> = const { RefCell::new(Vec::new()) };
-}
-
-/// A rank's coroutine, seen from inside.
-struct Fibre<'a>(&'a Yielder<(), ()>);
-
-impl Token for Fibre<'_> {
-    fn pass(&self, _: usize) {
-        self.0.suspend(());
-    }
 }
 
 /// Runs `body` on `size` ranks; returns what each rank returned.
@@ -41,7 +32,7 @@ pub fn run<T: 'static>(
             let kept = STACKS.with_borrow_mut(Vec::pop);
             let stack = kept.unwrap_or_else(|| DefaultStack::new(STACK).expect("address space"));
             Coroutine::with_stack(stack, move |yielder: &Yielder<(), ()>, ()| {
-                body(&Sim::new(rank, &world, &Fibre(yielder)))
+                body(&Sim::new(rank, &world, &|| yielder.suspend(())))
             })
         })
         .collect();

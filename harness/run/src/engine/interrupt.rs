@@ -138,7 +138,7 @@ pub fn clean() {
     let _ended = end_all();
     // Until the process ends, nothing else is staged or published.
     let staged = contract::files::publications();
-    interrupt::abandon_unfinished();
+    interrupt::abandon(false);
     let kept = leftovers();
     kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
     std::mem::forget(staged);

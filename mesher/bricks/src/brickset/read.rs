@@ -1,41 +1,33 @@
-//! Readers of a set: bricks, and lookups by ascending keys.
+//! Reading a set: bricks in order, and lookups by ascending keys.
 
 use super::{BrickSet, Run, high_of};
 use crate::brick::Brick;
 
-/// The bricks of a set in order.
+/// The bricks of a set in order; also finds bricks by ascending keys, see [`BrickSet::cursor`].
 #[derive(Clone)]
-pub struct Bricks<'a> {
+pub struct Cursor<'a> {
     set: &'a BrickSet,
-    at: usize,
-    /// End of the current run, and its keys' upper half.
-    run_end: usize,
+    /// The rest of the current run.
+    low: &'a [u32],
+    /// The run's end, and its keys' upper half: after the last run, higher than that of any key.
+    end: usize,
     high: u64,
     /// Runs after the current one.
     runs: &'a [Run],
 }
 
-impl<'a> Bricks<'a> {
-    #[inline]
-    pub(super) fn new(set: &'a BrickSet) -> Self {
-        Self { set, at: 0, run_end: 0, high: 0, runs: &set.runs }
-    }
-}
-
-impl Iterator for Bricks<'_> {
+impl Iterator for Cursor<'_> {
     type Item = Brick;
 
     #[inline]
     fn next(&mut self) -> Option<Brick> {
-        if self.at == self.run_end {
-            let (run, after) = self.runs.split_first()?;
-            self.high = run.high;
-            self.run_end = after.first().map_or(self.set.len(), |r| r.start);
-            self.runs = after;
+        if self.low.is_empty() {
+            self.next_run();
         }
-        let at = self.at;
-        self.at += 1;
-        Some(Brick { key: self.high | u64::from(self.set.low[at]), bits: self.set.bits[at] })
+        let (&low, rest) = self.low.split_first()?;
+        let bits = self.set.bits[self.end - self.low.len()];
+        self.low = rest;
+        Some(Brick { key: self.high | u64::from(low), bits })
     }
 }
 
@@ -51,19 +43,8 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
     step / 2 + near.partition_point(|&low| leads(low))
 }
 
-/// Reads a set in ascending order of keys; see [`BrickSet::cursor`].
-pub struct Cursor<'a> {
-    set: &'a BrickSet,
-    /// The rest of the current run.
-    low: &'a [u32],
-    /// The run's end, and its keys' upper half: after the last run, higher than that of any key.
-    end: usize,
-    high: u64,
-    /// Runs after the current one.
-    runs: &'a [Run],
-}
-
 impl<'a> Cursor<'a> {
+    #[inline]
     pub(super) fn new(set: &'a BrickSet) -> Self {
         let mut cursor = Self { set, low: &[], end: 0, high: u64::MAX, runs: &set.runs };
         cursor.next_run();

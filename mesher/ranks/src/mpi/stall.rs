@@ -109,7 +109,7 @@ impl Watch {
         );
         // A launcher puts lines of its own between two writes.
         let _ = stderr().write_all(line.as_bytes());
-        interrupt::abandon();
+        interrupt::abandon(true);
         self.side.abort(STALLED)
     }
 }

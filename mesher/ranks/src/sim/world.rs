@@ -25,8 +25,8 @@ pub enum Next {
 enum Rank {
     /// It can run, with the result of its last call unless it has taken it.
     Ready(Option<Gathered>),
-    /// It waits for the others to make the same call.
-    Waiting(Post),
+    /// It waits for the others to make the same call, to which it contributes words.
+    Waiting(Call, MessageBuffer),
     Done,
 }
 
@@ -34,14 +34,6 @@ struct State {
     ranks: Vec<Rank>,
     schedule: Box<dyn Schedule>,
     broken: bool,
-}
-
-/// The contribution of a rank to a call.
-struct Post {
-    /// The number of the call.
-    number: u64,
-    call: Call,
-    words: MessageBuffer,
 }
 
 /// A collective call.
@@ -83,7 +75,7 @@ impl World {
             Next::Stop
         } else if !ready.is_empty() {
             Next::Run(ready[state.schedule.next(&ready)])
-        } else if state.ranks.iter().any(|rank| matches!(rank, Rank::Waiting(_))) {
+        } else if state.ranks.iter().any(|rank| matches!(rank, Rank::Waiting(..))) {
             state.broken = true;
             Next::Stop
         } else {
@@ -99,19 +91,18 @@ impl World {
     }
 
     /// A rank's contribution to its next call, which completes the call if it is the last one.
-    pub(super) fn post(&self, rank: usize, number: u64, call: Call, words: MessageBuffer) {
+    pub(super) fn post(&self, rank: usize, call: Call, words: MessageBuffer) {
         let mut state = self.lock();
-        state.ranks[rank] = Rank::Waiting(Post { number, call, words });
+        state.ranks[rank] = Rank::Waiting(call, words);
         state.deliver();
     }
 
     /// The result of a completed call for a rank.
     pub(super) fn result(&self, rank: usize) -> Gathered {
-        let result = match &mut self.lock().ranks[rank] {
-            Rank::Ready(result) => result.take(),
-            _ => None,
-        };
-        result.expect("a completed call has a result for every rank")
+        match std::mem::replace(&mut self.lock().ranks[rank], Rank::Ready(None)) {
+            Rank::Ready(Some(result)) => result,
+            _ => unreachable!("a completed call has a result for every rank"),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -124,32 +115,31 @@ impl State {
     /// Completes the current call once all ranks have contributed.
     fn deliver(&mut self) {
         let posts = self.ranks.iter().map(|rank| match rank {
-            Rank::Waiting(post) => Some(post),
+            Rank::Waiting(call, words) => Some((*call, words)),
             _ => None,
         });
-        let Some(posts) = posts.collect::<Option<Vec<&Post>>>() else {
-            return;
-        };
-        let call = posts[0].call;
-        assert!(posts.iter().all(|p| (p.number, p.call) == (posts[0].number, call)), "{UNEQUAL}");
-        let words = || posts.iter().map(|post| post.words.words());
-        let by_all = |words: MessageBuffer| vec![Gathered::new(words); posts.len()];
+        let Some(posts) = posts.collect::<Option<Vec<_>>>() else { return };
+        let call = posts[0].0;
+        assert!(posts.iter().all(|post| post.0 == call), "{UNEQUAL}");
+        let sent: Vec<&MessageBuffer> = posts.iter().map(|post| post.1).collect();
+        let words = || sent.iter().map(|messages| messages.words());
+        let by_all = |words: MessageBuffer| vec![Gathered::new(words); sent.len()];
         let results = match call {
             Call::Gather => by_all(
                 words().enumerate().map(|(rank, words)| (rank, words.iter().copied())).collect(),
             ),
             Call::Sum => by_all([(0, sums(words()))].into_iter().collect()),
-            Call::Send => delivered(&posts, &mut *self.schedule),
+            Call::Send => delivered(&sent, &mut *self.schedule),
         };
         self.ranks = results.into_iter().map(|result| Rank::Ready(Some(result))).collect();
     }
 }
 
 /// Messages by receiver, in an order that the schedule chooses, from those by sender.
-fn delivered(sent: &[&Post], schedule: &mut dyn Schedule) -> Vec<Gathered> {
+fn delivered(sent: &[&MessageBuffer], schedule: &mut dyn Schedule) -> Vec<Gathered> {
     let mut by_receiver: Vec<Vec<Arrival>> = vec![Vec::new(); sent.len()];
-    for (from, post) in sent.iter().enumerate() {
-        for (to, words) in post.words.messages() {
+    for (from, messages) in sent.iter().enumerate() {
+        for (to, words) in messages.messages() {
             let is_first = by_receiver[to].last().is_none_or(|l| l.0 != from);
             assert!(is_first, "at most one message to a receiver");
             by_receiver[to].push((from, words));
@@ -157,10 +147,7 @@ fn delivered(sent: &[&Post], schedule: &mut dyn Schedule) -> Vec<Gathered> {
     }
     let arrived = |(receiver, mut messages): (usize, Vec<Arrival>)| {
         schedule.arrange(receiver, &mut messages);
-        let words = messages.iter().map(|message| message.1.len()).sum();
-        let mut buffer = MessageBuffer::with_capacity(words);
-        messages.iter().for_each(|(from, words)| buffer.write(*from, words.iter().copied()));
-        Gathered::new(buffer)
+        Gathered::new(messages.iter().map(|(from, words)| (*from, words.iter().copied())).collect())
     };
     by_receiver.into_iter().enumerate().map(arrived).collect()
 }
