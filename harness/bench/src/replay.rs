@@ -11,7 +11,7 @@ use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
 use serde::Serialize;
 use statistics::Median;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 /// Name and version of the schema.
 const SCHEMA: &str = "octree-replay/1";
@@ -78,23 +78,16 @@ impl Expected {
         if groups.all.is_empty() {
             return Err(Failure::missing("the record has no run that could be repeated"));
         }
-        let (mut seconds, mut once) = (0.0, 0.0);
-        // In an order of its own, so that the sum has the same last digit every time.
-        let mut longest: BTreeMap<String, f64> = BTreeMap::new();
-        for run in lines.iter().filter_map(Line::run) {
-            seconds += run.time_launch_s;
-            if run.warm_up {
-                once += run.time_launch_s;
-            } else {
-                let longest = longest.entry(run.setup.to_string()).or_default();
-                *longest = longest.max(run.time_launch_s);
-            }
-        }
-        once += longest.values().sum::<f64>();
+        let runs = || lines.iter().filter_map(Line::run);
+        let seconds = runs().map(|run| run.time_launch_s).sum();
+        let warm_ups = runs().filter(|run| run.warm_up).map(|run| run.time_launch_s);
+        let longest =
+            |group: &Group| group.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
+        let seconds_once = warm_ups.chain(groups.all.iter().map(longest)).sum();
         let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
-        let expected = Self { schema, commit, seconds, seconds_once: once, values };
+        let expected = Self { schema, commit, seconds, seconds_once, values };
         expected.check_invariants();
         Ok(expected)
     }
@@ -118,10 +111,9 @@ impl Expected {
 
     /// Executes the invariants at the head of this file.
     fn check_invariants(&self) {
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         for Value { run, quantity, found } in &self.values {
-            let before = seen.insert((run, quantity), found);
-            assert!(before.is_none(), "{run}: {quantity} is there twice");
+            assert!(seen.insert((run, quantity)), "{run}: {quantity} is there twice");
             if let Found::Ratio { value, low, high, .. } = found {
                 assert!(low <= value && value <= high, "{run}: {quantity} is not in its band");
             }

@@ -46,9 +46,7 @@ mod tests {
             let mut coarse = run(Comm::Solo, 1000, &[("a", &[2.0])]);
             (coarse.time_launch_s, coarse.peak_rss_bytes.sum) = (2.0, bytes);
             let machine = Machine { memory_bytes: 8 << 30, ..Machine::default() };
-            let (command, lacks) = (Vec::new(), Default::default());
-            let session =
-                Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
+            let session = Session { machine, ..Session::default() };
             [line(Entry::Session(Box::new(session))), line(Entry::Run(Box::new(coarse)))]
         };
         let finer = |lines: &[Line], spacing_min: f64, limit: u64| {

@@ -11,7 +11,7 @@
 //! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
 //! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup, Spread};
+use super::entry::{Comm, Entry, Line, Network, NoResult, Run, Session, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
@@ -146,7 +146,7 @@ pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
     /// Runs that failed or were left out.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
     pub lacks: BTreeMap<String, Vec<String>>,
     /// A sentence for every program and case of which there are several series.
@@ -157,7 +157,8 @@ impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
         let (mut sessions, mut networks) = (HashMap::new(), HashMap::new());
-        let (mut origins, mut digests) = (OriginsOfRuns::default(), HashMap::new());
+        let ([mut programs, mut geometries], mut digests) =
+            (<[Origins; 2]>::default(), HashMap::new());
         let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
         let mut runs: Vec<(Run, Option<String>)> = Vec::new();
         for line in lines {
@@ -170,18 +171,19 @@ impl Groups {
                     sessions.insert(&line.session, session);
                 }
                 Entry::LeftOut(left) => left_out.push(left.clone()),
-                Entry::Failure(Failure { setup, why, .. }) => {
+                Entry::Failure(NoResult { setup, why }) => {
                     let why = format!("{} failed: {why}", setup.engine);
-                    left_out.push(LeftOut { setup: setup.clone(), why });
+                    left_out.push(NoResult { setup: setup.clone(), why });
                 }
                 Entry::Run(run) => {
-                    let run = Run { setup: origins.apart(run, session), ..(**run).clone() };
+                    let setup = apart(run, session, &mut programs, &mut geometries);
+                    let run = Run { setup, ..(**run).clone() };
                     if run.warm_up {
                         continue;
                     }
                     match another_mesh(&run, &lacks, &mut digests) {
                         None => runs.push((run, machine)),
-                        Some(why) => left_out.push(LeftOut { setup: run.setup, why }),
+                        Some(why) => left_out.push(NoResult { setup: run.setup, why }),
                     }
                 }
                 Entry::Former => {}
@@ -193,7 +195,7 @@ impl Groups {
             Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
         };
         let all = by_key(&runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
-        let origins = [origins.programs.described(), origins.geometries.described()].concat();
+        let origins = [programs.described(), geometries.described()].concat();
         let groups = Self { all: all.collect(), left_out, lacks, origins };
         groups.check_invariants();
         groups
@@ -309,43 +311,36 @@ pub(crate) fn another_mesh(
         .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
 }
 
-/// The machines and builds of programs, and the geometries of cases, seen so far.
-#[derive(Default)]
-struct OriginsOfRuns {
-    programs: Origins,
-    geometries: Origins,
-}
-
-impl OriginsOfRuns {
-    /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry.
-    fn apart(&mut self, run: &Run, session: Option<&Session>) -> Setup {
-        let mut setup = run.setup.clone();
-        let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
-        // Old records have no digest of the program: the commit stands for it.
-        let origin = match (session, run.program.as_str()) {
-            (None, "") => machine,
-            (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
-            (_, program) => format!("{machine}program {program}"),
-        };
-        setup.engine += &self.programs.suffix(&run.setup.engine, &origin);
-        if let Some(digest) = &run.geometry {
-            let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
-            let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
-            setup.case += &self.geometries.suffix(&mesh, digest);
-        }
-        setup
+/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry. `programs` and
+/// `geometries` are those seen so far.
+fn apart(
+    run: &Run,
+    session: Option<&Session>,
+    programs: &mut Origins,
+    geometries: &mut Origins,
+) -> Setup {
+    let mut setup = run.setup.clone();
+    let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
+    // Old records have no digest of the program: the commit stands for it.
+    let origin = match (session, run.program.as_str()) {
+        (None, "") => machine,
+        (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
+        (_, program) => format!("{machine}program {program}"),
+    };
+    setup.engine += &programs.suffix(&run.setup.engine, &origin);
+    if let Some(digest) = &run.geometry {
+        let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
+        let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
+        setup.case += &geometries.suffix(&mesh, digest);
     }
+    setup
 }
 
 /// The runs of one case and n by several programs.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
-    /// The case.
-    pub case: &'a str,
-    /// n.
-    pub layer_cells_min: u32,
-    /// At least two programs in the order of the record, each with its runs by cells.
-    pub programs: Vec<(&'a str, Vec<&'a Group>)>,
+    /// Of at least two programs in the order of the record, each with its runs by cells.
+    pub groups: Vec<&'a Group>,
     /// Runs that failed or were left out, and what the programs do not provide, a sentence each.
     pub notes: Vec<String>,
 }
@@ -363,17 +358,17 @@ impl Groups {
         };
         let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
         let by_case = by_key(self.all.iter().filter(is_compared), of_case);
-        let all = by_case.into_iter().map(|(_, groups)| self.comparison(groups));
-        all.filter(|comparison| comparison.programs.len() > 1).collect()
+        by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
     }
 
-    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Comparison<'a> {
-        let (case, layer_cells_min) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
+    /// Returns the comparison of the programs that have these groups, if there are several.
+    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
+        let (case, n) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
         let mut programs = by_key(groups, |g| g.setup.engine.as_str());
         programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
         let left_out = self.left_out.iter().filter(|left| {
             let s = &left.setup;
-            (&s.case, s.layer_cells_min) == (case, layer_cells_min) && is_on_one_core(s)
+            (&s.case, s.layer_cells_min) == (case, n) && is_on_one_core(s)
         });
         let left_out = left_out.map(|left| {
             let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
@@ -385,7 +380,9 @@ impl Groups {
             Some(format!("{name} does not provide: {}", lacks.join(", ")))
         });
         let notes = left_out.chain(lacks).collect();
-        Comparison { case, layer_cells_min, programs, notes }
+        let is_compared = programs.len() > 1;
+        let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
+        is_compared.then_some(Comparison { groups, notes })
     }
 }
 

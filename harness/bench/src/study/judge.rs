@@ -177,7 +177,7 @@ mod tests {
     use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
+    use crate::experiments::entry::{Comm, Machine, NoResult, Session, Setup};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -218,8 +218,8 @@ mod tests {
     }
 
     fn failed(ranks: usize) -> Line {
-        let (command, why) = (String::new(), "killed after 9 s".to_owned());
-        line(Entry::Failure(Failure { setup: setup(ranks), command, why }))
+        let why = "killed after 9 s".to_owned();
+        line(Entry::Failure(NoResult { setup: setup(ranks), why }))
     }
 
     #[test]
@@ -244,13 +244,7 @@ mod tests {
             (run.setup.engine, run.program) = (engine.to_owned(), program.to_owned());
             line(Entry::Run(Box::new(run)))
         };
-        let opened = line(Entry::Session(Box::new(Session {
-            command: Vec::new(),
-            machine: Machine::default(),
-            nodes: String::new(),
-            load_average: 0.0,
-            lacks: Default::default(),
-        })));
+        let opened = line(Entry::Session(Box::default()));
         let (old, new, other) = (ran_by("a", "1"), ran_by("a", "2"), ran_by("b", "3"));
         let kept = of_last_origin(&[opened.clone(), other.clone(), old, new.clone()]);
         assert_eq!(kept, [opened, other, new]);
@@ -261,9 +255,7 @@ mod tests {
         let targets = read(FILE).unwrap();
         let session = |name: &str, cpu: &str| {
             let machine = Machine { cpu: cpu.into(), ..Machine::default() };
-            let (command, lacks) = (Vec::new(), Default::default());
-            let session =
-                Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
+            let session = Session { machine, ..Session::default() };
             Line { session: name.into(), ..line(Entry::Session(Box::new(session))) }
         };
         let of = |name: &str, run: Line| Line { session: name.into(), ..run };

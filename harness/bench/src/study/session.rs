@@ -7,7 +7,7 @@ use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, Verdict, judge, unjudged};
 use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    Comm, Entry, Failure as Failed, LeftOut, Line, Network, Run, Session as Opening, Setup,
+    Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
 use crate::experiments::group::another_mesh;
@@ -51,6 +51,9 @@ impl SessionOptions {
         self.repeat.map_or(of_file, usize::from)
     }
 }
+
+/// Why a row on MPI is left out without a launcher.
+const NO_LAUNCHER: &str = "the launcher is missing";
 
 /// A run to be repeated.
 struct Planned {
@@ -119,10 +122,8 @@ pub fn measure(
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, Verdict::LeftOut, "interrupted".to_owned())));
-    let needs_mpi = |row: &Row| study.runs_of(row).any(|name| study.run[name].comm == Comm::Mpi);
-    let is_missing = !options.no_mpi && session.mpi_left_out().is_some();
     let program = launcher.program();
-    let missing = (is_missing && study.row.iter().any(needs_mpi))
+    let missing = (rows.iter().any(|row| row.why == NO_LAUNCHER))
         .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
@@ -205,14 +206,14 @@ impl Session<'_> {
     /// Leaves a run out, with the reason.
     fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
         (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
-        self.append(Entry::LeftOut(LeftOut { setup, why }))
+        self.append(Entry::LeftOut(NoResult { setup, why }))
     }
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
         match self.options.no_mpi {
             true => Some("--no-mpi was given"),
-            false => (!self.options.launcher.is_found()).then_some("the launcher is missing"),
+            false => (!self.options.launcher.is_found()).then_some(NO_LAUNCHER),
         }
     }
 
@@ -409,8 +410,7 @@ impl Session<'_> {
                 (self.progress)(&format!("failed: {why}"));
                 point.failed = true;
                 let setup = point.setup.clone();
-                let command = format!("{} on {} ranks", setup.engine, setup.ranks);
-                self.append(Entry::Failure(Failed { setup, command, why }))
+                self.append(Entry::Failure(NoResult { setup, why }))
             }
         }
     }
