@@ -4,7 +4,7 @@
 use super::Bench;
 use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
 use super::report::{GateFinding, Layer, Verdict, change_percent};
-use super::rules::Selected;
+use super::rules::GateCase;
 use check::promises::Independence;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions, SERIAL};
@@ -36,9 +36,6 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         return;
     }
     for case in bench.cases_of(name) {
-        let noted = |metric: &str, verdict, why: String| {
-            vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
-        };
         let baseline = bench.baseline.as_ref();
         let old = baseline.map(|subject| bench.measured(subject, case, name));
         let new = bench.measured(&bench.candidate, case, name);
@@ -46,40 +43,44 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             break;
         }
         if let Ok(new) = &new {
-            measures.case(&case.rule.name).add(new.clone());
+            measures.case(&case.name).add(new.clone());
         }
-        layer.findings.extend(match (old, new) {
-            (Some(Ok(old)), Ok(new)) => compare(bench, case, name, &old, &new),
-            (Some(Err(why)), Ok(_)) => {
-                noted("baseline", Verdict::Missing, format!("the baseline has no result: {why}"))
+        let (verdict, why) = match (old, new) {
+            (Some(Ok(old)), Ok(new)) => {
+                layer.findings.extend(compare(bench, case, name, &old, &new));
+                continue;
             }
-            (Some(Ok(old)), Err(why)) if !old.of_layer(name).is_empty() => {
-                noted("runs", Verdict::Regression, format!("the candidate has no result: {why}"))
-            }
-            (Some(_), Err(why)) => {
-                noted("runs", Verdict::Missing, format!("neither program has a result: {why}"))
-            }
-            (None, Err(why)) => noted("runs", Verdict::Regression, why.to_string()),
             (None, Ok(new)) => {
                 let compared = new.of_layer(name).len() as u64;
                 let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
-                let mut found = noted(&name.to_string(), verdict, format!("{compared} quantities"));
-                found[0].compared = compared;
-                found
+                let why = format!("{compared} quantities");
+                let found = GateFinding::noted(&case.name, &name.to_string(), verdict, why);
+                layer.findings.push(GateFinding { compared, ..found });
+                continue;
             }
-        });
+            (Some(Err(why)), Ok(_)) => {
+                (Verdict::Missing, format!("the baseline has no result: {why}"))
+            }
+            (Some(old), Err(why))
+                if old.as_ref().map_or(true, |old| old.of_layer(name).is_empty()) =>
+            {
+                (Verdict::Missing, format!("neither program has a result: {why}"))
+            }
+            (_, Err(why)) => (Verdict::Regression, format!("the candidate has no result: {why}")),
+        };
+        layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, why));
     }
 }
 
 /// Compares two measurements of a case.
 fn compare(
     bench: &Bench,
-    case: &Selected,
+    case: &GateCase,
     layer: LayerName,
     old: &CaseMeasures,
     new: &CaseMeasures,
 ) -> Vec<GateFinding> {
-    let name = &case.rule.name;
+    let name = &case.name;
     if let (Some(one), Some(other)) = (&old.geometry, &new.geometry)
         && one != other
     {
@@ -171,7 +172,7 @@ fn verdict(
 pub(super) fn count(
     bench: &Bench,
     engine: &Engine,
-    case: &Selected,
+    case: &GateCase,
 ) -> Result<CaseMeasures, Failure> {
     let path = bench.prepare(engine, case, "counters")?;
     let mut measures = CaseMeasures::default();
@@ -218,7 +219,7 @@ pub(super) fn prefix(ranks: Ranks) -> String {
 pub(super) fn instructions(
     bench: &Bench,
     engine: &Engine,
-    case: &Selected,
+    case: &GateCase,
 ) -> Result<CaseMeasures, Failure> {
     let path = bench.prepare(engine, case, "instructions")?;
     let place = bench.place.join("instructions");

@@ -11,7 +11,7 @@ use super::Bench;
 use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
-use super::rules::{Selected, TimeRules};
+use super::rules::{GateCase, TimeRules};
 use super::subject::Subject;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions};
@@ -48,7 +48,7 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
         return;
     };
     let rules = &bench.rules.time;
-    let mut measured: Vec<(&Selected, Ranks, [Quantity; 2])> = Vec::new();
+    let mut measured: Vec<(&GateCase, Ranks, [Quantity; 2])> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
             match rounds(bench, baseline, case, ranks, false) {
@@ -84,8 +84,8 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
 type NoTimes = (Verdict, Failure);
 
 /// The finding about runs that failed; none if the user interrupted them.
-fn failed(case: &Selected, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
-    let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
+fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
+    let (name, metric) = (&case.name, format!("{}time", prefix(ranks)));
     let who = if *verdict == Verdict::Missing { "baseline" } else { "candidate" };
     let note = || format!("the {who} has no result: {why}");
     (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, *verdict, note()))
@@ -95,7 +95,7 @@ fn failed(case: &Selected, ranks: Ranks, (verdict, why): &NoTimes) -> Option<Gat
 fn rounds(
     bench: &Bench,
     baseline: &Engine,
-    case: &Selected,
+    case: &GateCase,
     ranks: Ranks,
     again: bool,
 ) -> Result<[Quantity; 2], NoTimes> {
@@ -131,7 +131,7 @@ fn rounds(
         wall.push(times.map(|(_, wall_s)| f64::max(wall_s, 1e-6).ln()));
     }
     Ok([(CPU, cpu), (WALL, wall)].map(|(name, rounds): (&str, Vec<Round>)| {
-        let (case, metric) = (case.rule.name.clone(), format!("{}{name}", prefix(ranks)));
+        let (case, metric) = (case.name.clone(), format!("{}{name}", prefix(ranks)));
         let found = compare(&rounds, rules.alpha.sqrt(), seed);
         Quantity { case, metric, rounds, found, first: None }
     }))
