@@ -15,6 +15,7 @@ pub mod rules;
 mod subject;
 pub mod time;
 
+use crate::emptied;
 use crate::experiments::machine;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -181,17 +182,9 @@ impl Bench<'_> {
         counted.entry(case.name.clone()).or_insert_with(count).clone()
     }
 
-    /// Creates an empty directory for one run of an engine.
-    fn enter(&self, engine: &Engine, name: &str) -> Result<PathBuf, Ended> {
-        let place = self.place.join(name);
-        let _ = std::fs::remove_dir_all(&place);
-        let created = std::fs::create_dir_all(&place);
-        created.map(|()| place).map_err(|error| engine.unusable(error.to_string()))
-    }
-
     /// Returns the file of a case in a form that an engine reads.
     fn prepare(&self, engine: &Engine, case: &GateCase, name: &str) -> Result<PathBuf, Ended> {
-        let place = self.enter(engine, name)?.join("case");
+        let place = emptied(self.place.join(name), engine)?.join("case");
         engine.prepare(&case.file, &place).map_err(|why| engine.unusable(why))
     }
 }

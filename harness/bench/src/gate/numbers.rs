@@ -5,6 +5,7 @@ use super::Bench;
 use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
 use super::report::{GateFinding, Layer, Verdict, change_percent};
 use super::rules::GateCase;
+use crate::emptied;
 use check::promises::Independence;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions, SERIAL};
@@ -177,7 +178,7 @@ pub(super) fn count(
     let path = bench.prepare(engine, case, "counters")?;
     let mut measures = CaseMeasures::default();
     for ranks in case.layouts() {
-        let place = bench.enter(engine, "counters/run")?;
+        let place = emptied(bench.place.join("counters/run"), engine)?;
         let options =
             RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit()) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;

@@ -13,6 +13,7 @@ use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{GateCase, TimeRules};
 use super::subject::Subject;
+use crate::emptied;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
@@ -105,7 +106,7 @@ fn rounds(
             CANDIDATE => (&bench.candidate.engine, Verdict::Regression),
             _ => (baseline, Verdict::Missing),
         };
-        let place = bench.enter(engine, "time/run").map_err(|why| (verdict, why))?;
+        let place = emptied(bench.place.join("time/run"), engine).map_err(|why| (verdict, why))?;
         let options = RunOptions::new(&place, bench.options.limit());
         engine.run(&path, &Layout::on(ranks), &options).map_err(|why| (verdict, why))
     };

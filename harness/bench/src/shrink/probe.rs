@@ -1,12 +1,14 @@
 //! Which checks a case fails: those of the definition or of the engine's promises on a serial run, and the comparison
 //! with the serial run on several ranks.
 
+use crate::emptied;
 use check::checks::{self, CheckResult, Outcome, Subject, identical};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
+use run::engine::description::Description;
 use run::engine::failure::{self, End};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
@@ -84,17 +86,6 @@ impl Probe {
         Ok(Self { engine, reference, limit, place })
     }
 
-    /// What must make the same mesh as the engine on these ranks, and its name; `None` if only promises are checked.
-    fn truth(&self, ranks: Ranks) -> Option<(&Engine, &'static str)> {
-        let promises = &self.engine.description().promises;
-        match ranks {
-            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
-            _ => promises
-                .is_independent_of(Independence::Ranks)
-                .then_some((&self.engine, "its serial run")),
-        }
-    }
-
     /// The checks of a trial, in order. A serial engine is compared with the reference if it promises the definition, and its own
     /// promises are checked if not. An engine on several ranks is compared with its own serial run: if both runs are wrong in the same
     /// way, the serial case is the simpler one to shrink. A case that both programs refuse fails none.
@@ -103,26 +94,31 @@ impl Probe {
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
     pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, Failure> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
-        let path = trial.case.write(self.place.path(), self.engine.description().takes.stl)?;
+        let Description { takes, promises, .. } = self.engine.description();
+        let path = trial.case.write(self.place.path(), takes.stl)?;
         let case = Case::read(&path)?;
         if let Some(why) = self.engine.description().declines(&case) {
             return Err(left_out(&why));
         }
-        let truth = match self.truth(trial.ranks) {
-            None => None,
-            Some((engine, name)) => {
-                let mesh = self.run(engine, &path, Ranks::Serial, "truth", false);
-                let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
-                Some(mesh.map_err(none)?)
-            }
+        let of_definition = promises.definition.then_some((&self.reference, "the reference"));
+        let independent = promises.is_independent_of(Independence::Ranks);
+        let (engine, ranks) = (&self.engine, trial.ranks);
+        let truth = match ranks {
+            Ranks::Serial => of_definition,
+            _ => independent.then_some((engine, "its serial run")),
         };
-        let mesh = match self.run(&self.engine, &path, trial.ranks, "engine", false) {
+        let truth = truth.map(|(engine, name)| {
+            let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
+            self.run(engine, &path, Ranks::Serial, "truth", false).map_err(none)
+        });
+        let truth = truth.transpose()?;
+        let mesh = match self.run(engine, &path, ranks, "engine", false) {
             Ok(mesh) => mesh,
-            Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, trial.ranks)?))]),
+            Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, ranks)?))]),
         };
         let subject = Subject::new(&case, &mesh);
         let results = match truth {
-            Some(truth) if trial.ranks != Ranks::Serial => {
+            Some(truth) if ranks != Ranks::Serial => {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
             Some(truth) => {
@@ -130,12 +126,12 @@ impl Probe {
                 let base = base.map_err(Failure::input)?;
                 checks::all(&subject.with_base(&base).with_reference(&truth))
             }
-            None => self.promised(&path, trial, subject)?,
+            None => self.promised(&path, ranks, subject)?,
         };
         let judged = |result: &CheckResult| match result.outcome() {
             Outcome::LeftOut { .. } => None,
             Outcome::Pass { .. } => Some((result.name, None)),
-            Outcome::Fail { .. } => Some((result.name, Some(failed_check(result, trial.ranks)))),
+            Outcome::Fail { .. } => Some((result.name, Some(failed_check(result, ranks)))),
         };
         let judged: Vec<Judged> = results.iter().filter_map(judged).collect();
         match judged.is_empty() {
@@ -148,14 +144,14 @@ impl Probe {
     fn promised(
         &self,
         path: &Path,
-        trial: &Trial,
+        ranks: Ranks,
         subject: Subject,
     ) -> Result<Vec<CheckResult>, Failure> {
         let promises = &self.engine.description().promises;
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
-        if promises.deterministic && trial.ranks == Ranks::Serial {
-            let again = self.run(&self.engine, path, trial.ranks, "again", false);
+        if promises.deterministic && ranks == Ranks::Serial {
+            let again = self.run(&self.engine, path, ranks, "again", false);
             let again = again.map_err(Failure::input)?;
             let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
             let compared = identical::compare(&again.words, words, &subject.terms.root);
@@ -173,12 +169,7 @@ impl Probe {
         name: &str,
         ungraded: bool,
     ) -> Result<LeafSet, failure::Failure> {
-        let place = self.place.path().join(name);
-        let _ = std::fs::remove_dir_all(&place);
-        std::fs::create_dir_all(&place).map_err(|error| {
-            let why = format!("has no directory {}: {error}", place.display());
-            failure::Failure::new(engine.name(), End::Missing(why))
-        })?;
+        let place = emptied(self.place.path().join(name), engine)?;
         let mesh = place.join("mesh");
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };

@@ -217,7 +217,7 @@ impl Session<'_> {
         }
     }
 
-    /// Plans the runs of a series by one engine at one size, and leaves out those that the engine declines.
+    /// Plans the runs of a series by one engine at one size.
     fn of_series(
         &mut self,
         series: &Series,
@@ -242,9 +242,8 @@ impl Session<'_> {
         {
             for spacing in self.spacings(series, &base, cells, ranks)? {
                 let case = base.write(spacing, n, false)?;
-                let declined = description.declines(&Case::read(&case)?);
-                for (weights, partitioner) in series.choices() {
-                    let setup = Setup {
+                points.extend(series.choices().iter().map(|(weights, partitioner)| Planned {
+                    setup: Setup {
                         experiment: series.experiment.to_string(),
                         engine: engine.to_owned(),
                         ranks,
@@ -253,18 +252,12 @@ impl Session<'_> {
                         partitioner: (*partitioner).to_owned(),
                         series_cells: cells.filter(|_| has_several_meshes),
                         ..Setup::serial(&base.name, spacing, n)
-                    };
-                    match &declined {
-                        Some(why) => self.leave_out(setup, why.clone())?,
-                        None => points.push(Planned {
-                            setup,
-                            case: case.clone(),
-                            repeats: self.options.repeats(series.repeats),
-                            warm_up: true,
-                            failed: false,
-                        }),
-                    }
-                }
+                    },
+                    case: case.clone(),
+                    repeats: self.options.repeats(series.repeats),
+                    warm_up: true,
+                    failed: false,
+                }));
             }
         }
         Ok(points)
@@ -358,8 +351,8 @@ impl Session<'_> {
         Ok(judge(study, row, &self.lines))
     }
 
-    /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
-    /// the time or the memory is not run on that mesh.
+    /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
+    /// a mesh, or would exceed the time or the memory, is not run on it.
     fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
         let is_known = self.lines.iter().any(|line| matches!(line.entry, Entry::Network(_)));
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
@@ -371,7 +364,10 @@ impl Session<'_> {
             if !may_warm_up || !self.warm.insert(mesh.clone()) {
                 continue;
             }
-            match feasible::excess(&self.lines, &setup, self.runner.limit) {
+            let engine = self.runner.programs.labelled(&setup.engine).description();
+            let declined = engine.declines(&Case::read(&mesh.1)?);
+            let excess = || feasible::excess(&self.lines, &setup, self.runner.limit);
+            match declined.or_else(excess) {
                 None => self.run(&mut points[index], 0, true)?,
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
