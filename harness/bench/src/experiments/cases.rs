@@ -132,61 +132,44 @@ impl Sizes {
         if let Some(answer) = self.answers.iter().find(|answer| answer.0 == cells) {
             return Ok(answer.1);
         }
-        let mut answer = None;
-        for count in 0..MESHES_MAX {
-            let next = match self.nearest(cells, |_| true) {
-                None => coarse,
-                Some(made) if (made.1 / cells).ln().abs() < TOLERANCE => break,
-                Some(made) if made.1 < cells / 2.0 => {
-                    let more = (cells / 2.0 / made.1).clamp(1.5, STEP);
-                    // The exponent grows with refinement up to about 2; a smaller one would overshoot.
-                    made.0 / more.powf(1.0 / self.power(cells).max(2.0))
-                }
-                Some(_) if cells > MADE_MAX => {
-                    answer = Some(self.guess(cells));
+        let (mut next, mut answer) = (coarse, coarse);
+        for count in 0..=MESHES_MAX {
+            let off = |mesh: &&(f64, f64)| (mesh.1 / cells).ln().abs();
+            let nearest_of = |is_wanted: &dyn Fn(f64) -> bool| {
+                let wanted = self.meshes.iter().filter(|mesh| is_wanted(mesh.1));
+                wanted.min_by(|a, b| off(a).total_cmp(&off(b))).copied()
+            };
+            if let Some((spacing, made)) = nearest_of(&|_| true) {
+                answer = spacing;
+                if count == MESHES_MAX || (made / cells).ln().abs() < TOLERANCE {
                     break;
                 }
-                Some(_) => self.between(cells, count),
-            };
+                // The exponent p in cells ~ spacing^-p.
+                let power = nearest_of(&|other| other != made).map_or(2.0, |other| {
+                    ((made / other.1).ln() / (other.0 / spacing).ln()).clamp(1.0, 3.0)
+                });
+                let guess = spacing * (made / cells).powf(1.0 / power);
+                let beyond = nearest_of(&|other| (other < cells) != (made < cells));
+                next = match beyond {
+                    _ if made < cells / 2.0 => {
+                        let more = (cells / 2.0 / made).clamp(1.5, STEP);
+                        // The exponent grows with refinement up to about 2; a smaller one would overshoot.
+                        spacing / more.powf(1.0 / power.max(2.0))
+                    }
+                    _ if cells > MADE_MAX => {
+                        answer = guess;
+                        break;
+                    }
+                    // The number of cells jumps, so extrapolation alone may return to the same meshes.
+                    Some(other) if count % 2 == 1 => (spacing * other.0).sqrt(),
+                    _ => guess,
+                };
+            }
             let made = mesh(next)?.max(1) as f64;
             self.meshes.push((next, made));
         }
-        let nearest = self.nearest(cells, |_| true);
-        let answer = answer.or(nearest.map(|made| made.0)).unwrap_or(coarse);
         self.answers.push((cells, answer));
         Ok(answer)
-    }
-
-    /// Returns the mesh whose size is nearest, of those with such a number of cells.
-    fn nearest(&self, cells: f64, is_wanted: impl Fn(f64) -> bool) -> Option<(f64, f64)> {
-        let off = |made: &(f64, f64)| (made.1 / cells).ln().abs();
-        let made = self.meshes.iter().filter(|made| is_wanted(made.1)).copied();
-        made.min_by(|a, b| off(a).total_cmp(&off(b)))
-    }
-
-    /// The spacing to try next. The number of cells jumps, so extrapolation alone may return to the same meshes: every second time, the middle
-    /// between the nearest meshes with fewer and with more cells.
-    fn between(&self, cells: f64, count: usize) -> f64 {
-        let below = self.nearest(cells, |count| count < cells);
-        let ends = below.zip(self.nearest(cells, |count| count > cells));
-        match ends.filter(|_| count % 2 == 1) {
-            Some((below, above)) => (below.0 * above.0).sqrt(),
-            None => self.guess(cells),
-        }
-    }
-
-    /// The extrapolated spacing; there is a mesh.
-    fn guess(&self, cells: f64) -> f64 {
-        let near = self.nearest(cells, |_| true);
-        near.map_or(1.0, |made| made.0 * (made.1 / cells).powf(1.0 / self.power(cells)))
-    }
-
-    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
-    fn power(&self, cells: f64) -> f64 {
-        let ends = self.nearest(cells, |_| true);
-        let other = ends.and_then(|one| self.nearest(cells, |count| count != one.1));
-        let power = |(a, b): ((f64, f64), (f64, f64))| (a.1 / b.1).ln() / (b.0 / a.0).ln();
-        ends.zip(other).map_or(2.0, |both| power(both).clamp(1.0, 3.0))
     }
 }
 

@@ -107,7 +107,7 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
         }
         Some(_) => {
             let values = [old.unwrap_or(0), new].map(|count| count as f64);
-            GateFinding::of_values(case, &metric, verdict, values, why.to_owned())
+            noted(verdict, why.to_owned()).of_values(values)
         }
     })
 }

@@ -132,7 +132,7 @@ fn compared_numbers(
         match [old, new].map(|of| of.get(metric)) {
             [Some(&old), Some(&new)] => {
                 let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
-                GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
+                noted(verdict, note).of_values([old as f64, new as f64])
             }
             [Some(old), None] => noted(Verdict::Missing, gone(old)),
             [None, new] => noted(Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),

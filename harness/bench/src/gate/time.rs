@@ -12,11 +12,9 @@ use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
 use super::rules::{GateCase, TimeRules};
-use super::subject::Subject;
 use crate::emptied;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions};
-use run::engine::runner::Engine;
 use statistics::comparison::{Comparison, Round, adjusted, compare, trimmed_mean};
 use statistics::random::Random;
 
@@ -44,15 +42,15 @@ struct Quantity {
 
 /// Compares the times of candidate and baseline.
 pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
-    let Some(Subject { engine: baseline, .. }) = &bench.baseline else {
+    if bench.baseline.is_none() {
         layer.left_out = Some("no baseline was given".to_owned());
         return;
-    };
+    }
     let rules = &bench.rules.time;
     let mut measured: Vec<(&GateCase, Ranks, [Quantity; 2])> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
-            match rounds(bench, baseline, case, ranks, false) {
+            match rounds(bench, case, ranks, false) {
                 Ok(times) => measured.push((case, ranks, times)),
                 Err(why) => layer.findings.extend(failed(case, ranks, &why)),
             }
@@ -69,7 +67,7 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
             layer.findings.extend(times.iter().map(|quantity| quantity.finding(rules)));
             continue;
         }
-        match rounds(bench, baseline, case, ranks, true) {
+        match rounds(bench, case, ranks, true) {
             Ok(again) => {
                 layer.findings.extend(times.into_iter().zip(again).map(|(first, again)| {
                     let last = if is_change(&first) { again.confirming(&first) } else { first };
@@ -95,11 +93,11 @@ fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<Gat
 /// Runs all rounds of a case: of the first measurement, or of the second.
 fn rounds(
     bench: &Bench,
-    baseline: &Engine,
     case: &GateCase,
     ranks: Ranks,
     again: bool,
 ) -> Result<[Quantity; 2], NoTimes> {
+    let baseline = &bench.baseline.as_ref().expect("times are compared with a baseline").engine;
     let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
     let run = |index: usize| {
         let (engine, verdict) = match index {
@@ -178,7 +176,7 @@ impl Quantity {
                 "; a second measurement, which {answer} {first:+.1} % in the first"
             ));
         }
-        GateFinding::of_values(&self.case, &self.metric, verdict, self.times(), note)
+        GateFinding::noted(&self.case, &self.metric, verdict, note).of_values(self.times())
     }
 
     /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), and of the same

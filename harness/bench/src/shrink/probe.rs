@@ -9,7 +9,7 @@ use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
 use run::engine::description::Description;
-use run::engine::failure::{self, End};
+use run::engine::failure::{End, Failure as Ended};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
@@ -109,10 +109,10 @@ impl Probe {
         };
         let truth = truth.map(|(engine, name)| {
             let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
-            self.run(engine, &path, Ranks::Serial, "truth", false).map_err(none)
+            self.run(engine, &path, Ranks::Serial, false).map_err(none)
         });
         let truth = truth.transpose()?;
-        let mesh = match self.run(engine, &path, ranks, "engine", false) {
+        let mesh = match self.run(engine, &path, ranks, false) {
             Ok(mesh) => mesh,
             Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, ranks)?))]),
         };
@@ -122,7 +122,7 @@ impl Probe {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
             Some(truth) => {
-                let base = self.run(&self.reference, &path, Ranks::Serial, "base", true);
+                let base = self.run(&self.reference, &path, Ranks::Serial, true);
                 let base = base.map_err(Failure::input)?;
                 checks::all(&subject.with_base(&base).with_reference(&truth))
             }
@@ -151,7 +151,7 @@ impl Probe {
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
         if promises.deterministic && ranks == Ranks::Serial {
-            let again = self.run(&self.engine, path, ranks, "again", false);
+            let again = self.run(&self.engine, path, ranks, false);
             let again = again.map_err(Failure::input)?;
             let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
             let compared = identical::compare(&again.words, words, &subject.terms.root);
@@ -166,10 +166,9 @@ impl Probe {
         engine: &Engine,
         case: &Path,
         ranks: Ranks,
-        name: &str,
         ungraded: bool,
-    ) -> Result<LeafSet, failure::Failure> {
-        let place = emptied(self.place.path().join(name), engine)?;
+    ) -> Result<LeafSet, Ended> {
+        let place = emptied(self.place.path().join("run"), engine)?;
         let mesh = place.join("mesh");
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
@@ -179,7 +178,7 @@ impl Probe {
 }
 
 /// A run without a mesh as a failed check.
-fn failed_run(failure: failure::Failure, ranks: Ranks) -> Result<Fault, Failure> {
+fn failed_run(failure: Ended, ranks: Ranks) -> Result<Fault, Failure> {
     let end = match &failure.end {
         End::Missing(_) | End::Interrupted => return Err(Failure::input(failure)),
         End::TimedOut { .. } => "hangs".to_owned(),
@@ -217,7 +216,7 @@ mod tests {
     fn a_panic_elsewhere_is_another_failure() {
         let failed = |error: &str| {
             let end = End::Exited { code: 70, error: error.to_owned() };
-            failed_run(failure::Failure::new("m", end), Ranks::Mpi(2)).unwrap()
+            failed_run(Ended::new("m", end), Ranks::Mpi(2)).unwrap()
         };
         let first = failed("m: panicked at src/tree.rs:12:40: | 7 points");
         assert!(first.is_same_as(&failed("m: panicked at src/tree.rs:12:40: | 9 points")));

@@ -289,7 +289,7 @@ impl Session<'_> {
         sizes.spacing(cells, base.coarse(), |spacing| {
             let case = base.write(spacing, n, false)?;
             let setup = Setup::serial(&base.name, spacing, n);
-            self.runner.run(&setup, &case, 0, true).map(|run| run.cells)
+            self.runner.run(&setup, &case, None).map(|run| run.cells)
         })
     }
 
@@ -368,7 +368,7 @@ impl Session<'_> {
             let declined = engine.declines(&Case::read(&mesh.1)?);
             let excess = || feasible::excess(&self.lines, &setup, self.runner.limit);
             match declined.or_else(excess) {
-                None => self.run(&mut points[index], 0, true)?,
+                None => self.run(&mut points[index], None)?,
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
                     self.leave_out(setup, why)?;
@@ -377,7 +377,7 @@ impl Session<'_> {
         }
         for repeat in 0..points.iter().map(|p| p.repeats).max().unwrap_or(0) {
             for point in points.iter_mut().filter(|p| repeat < p.repeats && !p.failed) {
-                self.run(point, repeat, false)?;
+                self.run(point, Some(repeat))?;
             }
         }
         Ok(())
@@ -394,11 +394,11 @@ impl Session<'_> {
     }
 
     /// Runs a point and records the result.
-    fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
+    fn run(&mut self, point: &mut Planned, repeat: Option<usize>) -> Result<(), Failure> {
         let s = &point.setup;
-        let which = if warm_up { "warm-up".to_owned() } else { format!("repeat {}", repeat + 1) };
+        let which = repeat.map_or("warm-up".to_owned(), |number| format!("repeat {}", number + 1));
         (self.progress)(&format!("{s}, {which}"));
-        let run = self.runner.run(s, &point.case, repeat, warm_up);
+        let run = self.runner.run(s, &point.case, repeat);
         match run.and_then(|run| self.check_mesh(point, &run).map(|()| run)) {
             Ok(run) => self.append(Entry::Run(Box::new(run))),
             Err(failure) if failure.is_interrupt() => Err(failure),
@@ -419,7 +419,7 @@ impl Session<'_> {
         if run.warm_up && engine.name() != "mesher" && promises.definition {
             let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
             // Whether the mesher can be run is not a property of this engine.
-            let expected = self.runner.run(&setup, &point.case, 0, true);
+            let expected = self.runner.run(&setup, &point.case, None);
             if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
                 let (digest, of_definition) = (&run.digest, expected.digest);
                 return Err(Failure::input(format!(
