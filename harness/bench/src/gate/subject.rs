@@ -12,7 +12,7 @@ use crate::experiments::machine::digest_of_file;
 use crate::git;
 use contract::failure::Failure;
 use run::engine::description::Build;
-use run::engine::failure::{End, Failure as Ended};
+use run::engine::failure::Failure as Ended;
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use run::engine::templates::{Values, fill};
@@ -138,7 +138,7 @@ fn program(
     if program.is_file() && fs::read_to_string(&done).is_ok_and(|with| with == command) {
         return Ok(program);
     }
-    unpack(revision, &options.repository, &tree)?;
+    unpack(revision, &options.repository, &tree, &place)?;
     let program = make(&words, &tree, &place, &revision[..12.min(revision.len())], program)?;
     fs::write(&done, command).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
@@ -158,12 +158,9 @@ fn make(
     let mut command = Command::new(builder);
     command.args(arguments).current_dir(tree);
     let built = process::run(&mut command, &Watch::new("build", LIMIT, place));
-    built.map_err(|failure| match failure.end {
-        End::Missing(_) => Failure::missing(failure),
-        _ => {
-            let log = place.join("build.stderr");
-            Failure::input(format!("{label}: {failure} (full output: {})", log.display()))
-        }
+    built.map_err(|failure| {
+        let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
+        Failure { why, ..failure.into() }
     })?;
     match program.is_file() {
         true => Ok(program),
@@ -181,17 +178,12 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
 }
 
 /// Puts a revision's files into a directory.
-fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), Failure> {
+fn unpack(revision: &str, repository: &Path, tree: &Path, place: &Path) -> Result<(), Failure> {
     let mut command = Command::new("sh");
     command.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
-    let output = command.arg(repository).arg(revision).arg(tree).output()?;
-    match output.status.success() {
-        true => Ok(()),
-        false => {
-            let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            Err(Failure::input(format!("{revision} cannot be unpacked: {error}")))
-        }
-    }
+    command.arg(repository).arg(revision).arg(tree);
+    process::run(&mut command, &Watch::new("git archive", LIMIT, place))?;
+    Ok(())
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.
