@@ -20,7 +20,7 @@ use crate::experiments::machine;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use contract::failure::Failure;
-use measures::{CaseMeasures, LayerName, Measures};
+use measures::{LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
 use rules::GateCase;
 pub use rules::Rules;
@@ -31,7 +31,7 @@ use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use subject::{Subject, top_level};
+use subject::{Counted, Subject, top_level};
 
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
@@ -168,12 +168,7 @@ impl Bench<'_> {
     }
 
     /// Returns what a layer measures of a program on a case; counters and memory are of the same runs.
-    fn measured(
-        &self,
-        subject: &Subject,
-        case: &GateCase,
-        layer: LayerName,
-    ) -> Result<CaseMeasures, Ended> {
+    fn measured(&self, subject: &Subject, case: &GateCase, layer: LayerName) -> Counted {
         if layer == LayerName::Instructions {
             return numbers::instructions(self, &subject.engine, case);
         }

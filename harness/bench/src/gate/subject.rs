@@ -30,6 +30,9 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// The working tree, by name.
 const WORKING_TREE: &str = ".";
 
+/// What a layer measures of a program on a case.
+pub type Counted = Result<CaseMeasures, Ended>;
+
 /// A program under comparison.
 #[derive(Clone, Debug)]
 pub struct Subject {
@@ -38,7 +41,7 @@ pub struct Subject {
     /// Its name in the report.
     pub measured: Measured,
     /// Its counters and memory by case, of which each layer takes its own.
-    pub counted: RefCell<BTreeMap<String, Result<CaseMeasures, Ended>>>,
+    pub counted: RefCell<BTreeMap<String, Counted>>,
 }
 
 impl Subject {
@@ -131,44 +134,33 @@ fn program(
     ]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    if is_working_tree {
-        return make(&words, &tree, &place, "the working tree", program);
+    let (done, command_line) = (place.join("built"), build.command.join("\n"));
+    let mut label = "the working tree";
+    if !is_working_tree {
+        let is_built = fs::read_to_string(&done).is_ok_and(|with| with == command_line);
+        if is_built && program.is_file() {
+            return Ok(program);
+        }
+        unpack(revision, &options.repository, &tree, &place)?;
+        label = &revision[..12.min(revision.len())];
     }
-    let (done, command) = (place.join("built"), build.command.join("\n"));
-    if program.is_file() && fs::read_to_string(&done).is_ok_and(|with| with == command) {
-        return Ok(program);
-    }
-    unpack(revision, &options.repository, &tree, &place)?;
-    let program = make(&words, &tree, &place, &revision[..12.min(revision.len())], program)?;
-    fs::write(&done, command).map_err(|error| Failure::at(&done, error))?;
-    Ok(program)
-}
-
-/// Builds a program and returns it; `label` is the revision, for messages. The output of the build is kept in `place`.
-fn make(
-    words: &[String],
-    tree: &Path,
-    place: &Path,
-    label: &str,
-    program: PathBuf,
-) -> Result<PathBuf, Failure> {
     crate::announce(&format!("harness gate: building {label}"));
     let (builder, arguments) =
         words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
     let mut command = Command::new(builder);
     command.args(arguments).current_dir(tree);
-    let built = process::run(&mut command, &Watch::new("build", LIMIT, place));
+    let built = process::run(&mut command, &Watch::new("build", LIMIT, &place));
     built.map_err(|failure| {
         let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
         Failure { why, ..failure.into() }
     })?;
-    match program.is_file() {
-        true => Ok(program),
-        false => Err(Failure::input(format!(
-            "{label}: the build succeeded, but {} is missing: check [build] program",
-            program.display()
-        ))),
+    if !program.is_file() {
+        let program = program.display();
+        let why = "is missing: check [build] program";
+        return Err(Failure::input(format!("{label}: the build succeeded, but {program} {why}")));
     }
+    fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
+    Ok(program)
 }
 
 /// Returns the absolute path of a directory, after creating it if it is missing.

@@ -79,8 +79,11 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
     }
 }
 
-/// The verdict on a case without times, and why: the baseline fails, or the candidate alone.
+/// Why a case has no times, and the verdict on that: the baseline fails, or the candidate alone.
 type NoTimes = (Verdict, Failure);
+
+/// The CPU times and the wall times of a case.
+type Times = Result<[Quantity; 2], NoTimes>;
 
 /// The finding about runs that failed; none if the user interrupted them.
 fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
@@ -91,12 +94,7 @@ fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<Gat
 }
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
-fn rounds(
-    bench: &Bench,
-    case: &GateCase,
-    ranks: Ranks,
-    again: bool,
-) -> Result<[Quantity; 2], NoTimes> {
+fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
     let baseline = &bench.baseline.as_ref().expect("times are compared with a baseline").engine;
     let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
     let run = |index: usize| {
