@@ -11,6 +11,7 @@
 
 use contract::case::Case;
 use contract::failure::Failure;
+use contract::lattice::Root;
 use contract::plain::PlainCase;
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -27,8 +28,7 @@ pub struct Base {
     /// n of the unchanged case.
     pub layer_cells_min: u32,
     table: Table,
-    origin: [f64; 3],
-    edge: f64,
+    root: Root,
     directory: PathBuf,
 }
 
@@ -50,15 +50,14 @@ impl Base {
             spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
             layer_cells_min: case.layer_cells_min,
             table,
-            origin: case.root.origin,
-            edge: case.root.edge,
+            root: case.root,
             directory: directory.to_owned(),
         })
     }
 
     /// Returns an initial spacing that gives at most some thousand cells.
     pub fn coarse(&self) -> f64 {
-        self.spacing_min.max(self.edge / 512.0)
+        self.spacing_min.max(self.root.edge / 512.0)
     }
 
     /// Writes the case with this spacing and n; returns the path. In its own root, the finest cells are between once and twice as fine
@@ -66,24 +65,14 @@ impl Base {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(
-        &self,
-        spacing_min: f64,
-        layer_cells_min: u32,
-        in_own_root: bool,
-    ) -> Result<PathBuf, Failure> {
-        let (origin, edge) = match in_own_root {
-            true => (self.origin, self.edge),
-            false => root(self.origin, self.edge, spacing_min),
-        };
-        let of_root = [("origin", Value::from(origin.to_vec())), ("edge", edge.into())];
-        let of_root: Table =
-            of_root.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
+    pub fn write(&self, spacing_min: f64, n: u32, in_own_root: bool) -> Result<PathBuf, Failure> {
+        let root = if in_own_root { self.root } else { fitted(self.root, spacing_min) };
         let mut table = self.table.clone();
         table.insert("spacing_min".into(), spacing_min.into());
-        table.insert("layer_cells_min".into(), i64::from(layer_cells_min).into());
-        table.insert("root".into(), of_root.into());
-        let name = format!("{}-{spacing_min:e}-{layer_cells_min}-{edge:e}.toml", self.name);
+        table.insert("layer_cells_min".into(), i64::from(n).into());
+        let of_root = Value::try_from(root).expect("a root is representable in TOML");
+        table.insert("root".into(), of_root);
+        let name = format!("{}-{spacing_min:e}-{n}-{:e}.toml", self.name, root.edge);
         let path = self.directory.join(name);
         fs::write(&path, table.to_string()).map_err(|error| Failure::at(&path, error))?;
         Ok(path)
@@ -91,13 +80,13 @@ impl Base {
 }
 
 /// Returns the smallest concentric root that is not smaller and has `spacing` as the edge of a level.
-fn root(origin: [f64; 3], edge: f64, spacing: f64) -> ([f64; 3], f64) {
+fn fitted(Root { origin, edge }: Root, spacing: f64) -> Root {
     let mut wider = spacing;
     // Doubling is exact, so the edge equals the spacing bit by bit.
     while wider < edge {
         wider *= 2.0;
     }
-    (origin.map(|o| o + edge * 0.5 - wider * 0.5), wider)
+    Root { origin: origin.map(|o| o + edge * 0.5 - wider * 0.5), edge: wider }
 }
 
 /// Tolerated relative deviation of the number of cells.
@@ -179,11 +168,12 @@ mod tests {
 
     #[test]
     fn the_edge_of_a_level_equals_the_spacing() {
-        let (origin, edge) = root([-5.0; 3], 10.0, 0.3);
+        let Root { origin, edge } = fitted(Root { origin: [-5.0; 3], edge: 10.0 }, 0.3);
         assert_eq!(edge, 0.3 * 64.0);
         assert_eq!(edge / 64.0, 0.3);
         assert!((origin[0] + edge * 0.5).abs() < 1e-12);
-        assert_eq!(root([0.0; 3], 8.0, 0.5), ([0.0; 3], 8.0));
+        let same = Root { origin: [0.0; 3], edge: 8.0 };
+        assert_eq!(fitted(same, 0.5), same);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::entry::{Comm, Phase, Run, Setup, Spread};
 use super::machine;
+use crate::refuse;
 use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::Failure;
@@ -62,18 +63,18 @@ impl Runner<'_> {
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
         kept?;
-        if setup.comm == Comm::Sim && report.phases.is_empty() {
-            let why =
-                "its run report has no phases, without which simulated ranks cannot be projected";
-            return Err(Failure::input(why));
-        }
-        if setup.partitioner == METIS
-            && report.partitioner.as_deref().is_some_and(|used| used != METIS)
-        {
-            let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use \
-                       fewer ranks or more cells";
-            return Err(Failure::input(why));
-        }
+        let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
+        refuse(&[
+            (
+                setup.comm == Comm::Sim && report.phases.is_empty(),
+                "its run report has no phases, without which simulated ranks cannot be projected",
+            ),
+            (
+                setup.partitioner == METIS && not_metis,
+                "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use fewer \
+                 ranks or more cells",
+            ),
+        ])?;
         Ok(Run {
             program: machine::digest_of_file(engine.program()),
             repeat: repeat.unwrap_or(0),

@@ -123,15 +123,15 @@ fn program(
     let cache = options.repository.join("target/gate");
     let place = cache.join(if is_working_tree { "working-tree" } else { revision });
     let tree = if is_working_tree { options.repository.clone() } else { place.join("tree") };
-    let [place, tree, target, shared] =
-        [&place, &tree, &place.join("build"), &cache.join("shared")].map(|path| absolute(path));
-    let (place, tree) = (place?, tree?);
-    let text = |path: PathBuf| path.to_string_lossy().into_owned();
-    let values = Values::from([
-        ("target", text(target?)),
-        ("shared", text(shared?)),
-        ("root", text(tree.clone())),
-    ]);
+    let mut values = Values::default();
+    for (name, path) in
+        [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)]
+    {
+        let made = fs::create_dir_all(&path).and_then(|()| fs::canonicalize(&path));
+        let made = made.map_err(|error| Failure::at(&path, error))?;
+        values.insert(name, made.to_string_lossy().into_owned());
+    }
+    let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
     let (done, command_line) = (place.join("built"), build.command.join("\n"));
@@ -141,7 +141,7 @@ fn program(
         if is_built && program.is_file() {
             return Ok(program);
         }
-        unpack(revision, &options.repository, &tree, &place)?;
+        unpack(revision, &options.repository, tree, &place)?;
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));
@@ -161,12 +161,6 @@ fn program(
     }
     fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
-}
-
-/// Returns the absolute path of a directory, after creating it if it is missing.
-fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    let created = fs::create_dir_all(path).and_then(|()| fs::canonicalize(path));
-    created.map_err(|error| Failure::at(path, error))
 }
 
 /// Puts a revision's files into a directory.

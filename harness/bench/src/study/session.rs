@@ -157,10 +157,7 @@ impl Session<'_> {
         let study = self.study;
         for series in &study.series {
             for cells in series.sizes() {
-                let mut points = Vec::new();
-                for engine in &series.engines {
-                    points.extend(self.of_series(series, engine, cells)?);
-                }
+                let mut points = self.of_series(series, cells)?;
                 self.make(&mut points)?;
             }
         }
@@ -217,70 +214,50 @@ impl Session<'_> {
         }
     }
 
-    /// Plans the runs of a series by one engine at one size.
-    fn of_series(
-        &mut self,
-        series: &Series,
-        engine: &str,
-        cells: Option<f64>,
-    ) -> Result<Vec<Planned>, Failure> {
-        let description = self.runner.programs.labelled(engine).description();
-        let layouts = series.layouts(description, self.mpi_left_out().is_some());
-        if layouts.is_empty() {
-            let experiment = series.experiment;
-            (self.progress)(&format!("{engine} cannot run the series {experiment}"));
-        }
-        let has_several_meshes = matches!(
-            series.experiment,
-            Experiment::Weak | Experiment::Spacing | Experiment::Layers
-        );
+    /// Plans the runs of a series at one size.
+    fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>, Failure> {
+        use Experiment::{Spacing, Strong, Weak, Weights};
+        let experiment = series.experiment;
         let base = self.base(&series.case)?;
         let of_case = [base.layer_cells_min];
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
-        for (&n, &(comm, ranks)) in layers.iter().flat_map(|n| layouts.iter().map(move |l| (n, l)))
-        {
-            for spacing in self.spacings(series, &base, cells, ranks)? {
-                let case = base.write(spacing, n, false)?;
-                points.extend(series.choices().iter().map(|(weights, partitioner)| Planned {
-                    setup: Setup {
-                        experiment: series.experiment.to_string(),
-                        engine: engine.to_owned(),
+        for engine in &series.engines {
+            let description = self.runner.programs.labelled(engine).description();
+            let layouts = series.layouts(description, self.mpi_left_out().is_some());
+            if layouts.is_empty() {
+                (self.progress)(&format!("{engine} cannot run the series {experiment}"));
+            }
+            let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
+            for (n, (comm, ranks)) in all {
+                let target = cells.map(|n| if experiment == Weak { n * ranks as f64 } else { n });
+                let finest = match target {
+                    None => base.spacing_min,
+                    Some(target) => self.spacing(&base, base.layer_cells_min, target)?,
+                };
+                // Coarser by factors of two, while there are enough cells to measure.
+                let target = target.filter(|_| experiment == Spacing).unwrap_or_default();
+                let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
+                for spacing in (0..=halvings).rev().map(|k| finest * 2f64.powi(k)) {
+                    let of_mesh = Setup {
+                        experiment: experiment.to_string(),
+                        engine: engine.clone(),
                         ranks,
                         comm,
-                        weights: (*weights).to_owned(),
-                        partitioner: (*partitioner).to_owned(),
-                        series_cells: cells.filter(|_| has_several_meshes),
+                        series_cells: cells.filter(|_| !matches!(experiment, Strong | Weights)),
                         ..Setup::serial(&base.name, spacing, n)
-                    },
-                    case: case.clone(),
-                    repeats: self.options.repeats(series.repeats),
-                    warm_up: true,
-                    failed: false,
-                }));
+                    };
+                    let case = base.write(spacing, n, false)?;
+                    points.extend(series.choices().iter().map(|(weights, partitioner)| {
+                        let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
+                        let setup = Setup { weights, partitioner, ..of_mesh.clone() };
+                        let repeats = self.options.repeats(series.repeats);
+                        Planned { setup, case: case.clone(), repeats, warm_up: true, failed: false }
+                    }));
+                }
             }
         }
         Ok(points)
-    }
-
-    /// Returns the spacings of the meshes of a series for a number of ranks.
-    fn spacings(
-        &mut self,
-        series: &Series,
-        base: &Base,
-        cells: Option<f64>,
-        ranks: usize,
-    ) -> Result<Vec<f64>, Failure> {
-        let Some(cells) = cells else { return Ok(vec![base.spacing_min]) };
-        let is_weak = series.experiment == Experiment::Weak;
-        let target = if is_weak { cells * ranks as f64 } else { cells };
-        let finest = self.spacing(base, base.layer_cells_min, target)?;
-        if series.experiment != Experiment::Spacing {
-            return Ok(vec![finest]);
-        }
-        // Coarser by factors of two, while there are enough cells to measure.
-        let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
-        Ok((0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect())
     }
 
     /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
