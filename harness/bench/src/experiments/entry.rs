@@ -104,8 +104,11 @@ pub struct Session {
     pub load_average: f64,
     /// By program: what it does not do or promise.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub lacks: BTreeMap<String, Vec<String>>,
+    pub lacks: Lacks,
 }
+
+/// By program: what it does not do or promise.
+pub type Lacks = BTreeMap<String, Vec<String>>;
 
 /// A machine, and the software that affects measurements on it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

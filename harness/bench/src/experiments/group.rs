@@ -11,7 +11,7 @@
 //! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
 //! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::entry::{Comm, Entry, Line, Network, NoResult, Run, Session, Setup, Spread};
+use super::entry::{Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
@@ -148,7 +148,7 @@ pub struct Groups {
     /// Runs that failed or were left out.
     pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
-    pub lacks: BTreeMap<String, Vec<String>>,
+    pub lacks: Lacks,
     /// A sentence for every program and case of which there are several series.
     pub origins: Vec<String>,
 }
@@ -157,8 +157,7 @@ impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
         let (mut sessions, mut networks) = (HashMap::new(), HashMap::new());
-        let ([mut programs, mut geometries], mut digests) =
-            (<[Origins; 2]>::default(), HashMap::new());
+        let (mut origins, mut digests) = (<[Origins; 2]>::default(), HashMap::new());
         let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
         let mut runs: Vec<(Run, Option<String>)> = Vec::new();
         for line in lines {
@@ -176,7 +175,7 @@ impl Groups {
                     left_out.push(NoResult { setup: setup.clone(), why });
                 }
                 Entry::Run(run) => {
-                    let setup = apart(run, session, &mut programs, &mut geometries);
+                    let setup = apart(run, session, &mut origins);
                     let run = Run { setup, ..(**run).clone() };
                     if run.warm_up {
                         continue;
@@ -195,7 +194,7 @@ impl Groups {
             Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
         };
         let all = by_key(&runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
-        let origins = [programs.described(), geometries.described()].concat();
+        let origins = origins.each_ref().map(Origins::described).concat();
         let groups = Self { all: all.collect(), left_out, lacks, origins };
         groups.check_invariants();
         groups
@@ -209,11 +208,8 @@ impl Groups {
             assert!(count > 0 && t.count == count, "{name} has {count} runs");
             assert!(runs.iter().all(|run| run.setup == *setup), "{name} pools other setups");
             assert!(t.low <= t.value && t.value <= t.high, "{name}: {t:?} is in its interval");
-            let is_in_phases = setup.comm == Comm::Sim && !*by_rank;
-            assert!(
-                is_in_phases || pop::time_s(typical, network) == t.value,
-                "{name} has one time"
-            );
+            let has_one_time = pop::time_s(typical, network) == t.value;
+            assert!(has_one_time || setup.comm == Comm::Sim && !*by_rank, "{name} has one time");
             assert!((0.0..=1.0).contains(&t.coverage), "{name}: {t:?} is a coverage");
             for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
                 spread.check_invariants();
@@ -227,21 +223,16 @@ impl Groups {
         let is_comparable = |o: &&Group| {
             let o = &o.setup;
             let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
-            let size = match weak {
-                true => o.experiment == "weak",
-                // Another partition on as many ranks is no base.
-                false => {
-                    let is_base = o.ranks == 1 || alike && s.experiment != "weights";
-                    o.spacing_min == s.spacing_min && is_base
-                }
+            let same_size = match weak {
+                true => o.experiment == "weak" && o.series_cells == s.series_cells,
+                false => o.spacing_min == s.spacing_min,
             };
+            // Another partition on as many ranks is no base.
+            let is_base = weak || o.ranks == 1 || alike && s.experiment != "weights";
             // A measured time has no projected base.
             let is_measured = s.comm == Comm::Sim || o.comm != Comm::Sim;
-            let is_of_series = !weak || o.series_cells == s.series_cells;
-            size && is_measured
-                && is_of_series
-                && (&o.case, o.layer_cells_min, &o.engine)
-                    == (&s.case, s.layer_cells_min, &s.engine)
+            let [mesh, other] = [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine));
+            same_size && is_base && is_measured && mesh == other
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
         let rank = |o: &&Group| {
@@ -289,12 +280,11 @@ impl Groups {
     }
 }
 
+/// Digests by mesh.
+pub(crate) type Digests = HashMap<String, String>;
+
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
-pub(crate) fn another_mesh(
-    run: &Run,
-    lacks: &BTreeMap<String, Vec<String>>,
-    digests: &mut HashMap<String, String>,
-) -> Option<String> {
+pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, digests: &mut Digests) -> Option<String> {
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
     let lacks = lacks.get(engine).map_or(&[][..], Vec::as_slice);
@@ -311,14 +301,8 @@ pub(crate) fn another_mesh(
         .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
 }
 
-/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry. `programs` and
-/// `geometries` are those seen so far.
-fn apart(
-    run: &Run,
-    session: Option<&Session>,
-    programs: &mut Origins,
-    geometries: &mut Origins,
-) -> Setup {
+/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry before.
+fn apart(run: &Run, session: Option<&Session>, [programs, geometries]: &mut [Origins; 2]) -> Setup {
     let mut setup = run.setup.clone();
     let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
     // Old records have no digest of the program: the commit stands for it.

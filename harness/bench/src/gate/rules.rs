@@ -164,10 +164,8 @@ impl Rules {
     /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
     fn check(&self) -> Result<(), String> {
         let TimeRules { alpha, effect_min, rounds_min: fewest, rounds_max, .. } = self.time;
-        if !(alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0) {
-            return Err("alpha must be between 0 and 0.5, and effect_min at least 0".to_owned());
-        }
-        let least = rounds_min(alpha);
+        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0;
+        let least = if is_level { rounds_min(alpha) } else { 0 };
         let few = format!(
             "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
         );
@@ -175,6 +173,7 @@ impl Rules {
         let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
         let are_percentages = tolerances.all(|percent| (0.0..=1e6).contains(percent));
         refuse(&[
+            (!is_level, "alpha must be between 0 and 0.5, and effect_min at least 0"),
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
             (!are_percentages, "a tolerance must be between 0 and 1000000 percent"),

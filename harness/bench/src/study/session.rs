@@ -10,7 +10,7 @@ use crate::experiments::entry::{
     Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
-use crate::experiments::group::another_mesh;
+use crate::experiments::group::{Digests, another_mesh};
 use crate::experiments::record::now_utc;
 use crate::experiments::{feasible, machine, network};
 use crate::jsonl;
@@ -21,7 +21,7 @@ use run::engine::interrupt;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
 use run::verify::options::whole_seconds;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -109,7 +109,7 @@ pub fn measure(
         lines: Vec::new(),
         bases: BTreeMap::new(),
         sizes: BTreeMap::new(),
-        digests: HashMap::new(),
+        digests: Digests::new(),
         made: BTreeSet::new(),
         warm: BTreeSet::new(),
     };
@@ -143,7 +143,7 @@ struct Session<'a> {
     /// The known sizes of meshes, by case and n.
     sizes: BTreeMap<(String, u32), Sizes>,
     /// Digests of the meshes.
-    digests: HashMap<String, String>,
+    digests: Digests,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
