@@ -179,10 +179,7 @@ impl Session<'_> {
         let programs = self.runner.programs;
         let catalogue = programs.paths.catalogue.path();
         let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
-        let lacks = |engine: String| {
-            let lacks = programs.labelled(&engine).description().lacks();
-            (engine, lacks)
-        };
+        let lacks = |name: String| (name.clone(), programs.labelled(&name).description().lacks());
         let opening = Opening {
             command: std::env::args().collect(),
             machine: machine::describe(&self.runner.launcher.program(), repository),
