@@ -129,12 +129,8 @@ fn gone(old: impl Display) -> String {
 }
 
 /// The verdict on a number with a tolerance in percent, and the reason.
-fn verdict(
-    layer: LayerName,
-    metric: &str,
-    [old, new]: [u64; 2],
-    tolerance: f64,
-) -> (Verdict, String) {
+fn verdict(layer: LayerName, metric: &str, values: [u64; 2], tolerance: f64) -> (Verdict, String) {
+    let [old, new] = values;
     let change = change_percent(old as f64, new as f64);
     // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
     let is_within = change.is_some_and(|by| by.abs() <= tolerance + 1e-9);

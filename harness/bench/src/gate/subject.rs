@@ -107,22 +107,17 @@ impl Subject {
             let repository = repository.display();
             Failure::input(format!("{named} is neither a file nor a revision in {repository}"))
         })?;
-        let program = program(build, named, &revision, options)?;
+        let built = (named != WORKING_TREE).then_some(revision.as_str());
+        let program = program(build, built, repository)?;
         Ok(Self::new(engine.with_program(program), named.to_owned(), Some(revision)))
     }
 }
 
 /// Returns the program of a revision, built unless an earlier gate has kept it, or that of the repository's working tree.
-fn program(
-    build: &Build,
-    named: &str,
-    revision: &str,
-    options: &GateOptions,
-) -> Result<PathBuf, Failure> {
-    let is_working_tree = named == WORKING_TREE;
-    let cache = options.repository.join("target/gate");
-    let place = cache.join(if is_working_tree { "working-tree" } else { revision });
-    let tree = if is_working_tree { options.repository.clone() } else { place.join("tree") };
+fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf, Failure> {
+    let cache = repository.join("target/gate");
+    let place = cache.join(revision.unwrap_or("working-tree"));
+    let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));
     let mut values = Values::default();
     for (name, path) in
         [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)]
@@ -136,12 +131,12 @@ fn program(
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
     let (done, command_line) = (place.join("built"), build.command.join("\n"));
     let mut label = "the working tree";
-    if !is_working_tree {
+    if let Some(revision) = revision {
         let is_built = fs::read_to_string(&done).is_ok_and(|with| with == command_line);
         if is_built && program.is_file() {
             return Ok(program);
         }
-        unpack(revision, &options.repository, tree, &place)?;
+        unpack(revision, repository, tree, &place)?;
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));

@@ -64,16 +64,11 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
-    let judged = match measured(study, row, lines) {
-        Ok((value, how, why)) => {
-            Judged { measured: Some((value, how)), ..unjudged(row, verdict(row, value), why) }
-        }
-        Err(why) => {
-            let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
-            let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
-            unjudged(row, verdict, failed.unwrap_or(why))
-        }
-    };
+    let judged = measured(study, row, lines).unwrap_or_else(|why| {
+        let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
+        let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
+        unjudged(row, verdict, failed.unwrap_or(why))
+    });
     check_invariants(&judged);
     judged
 }
@@ -105,19 +100,15 @@ fn verdict(row: &Row, value: f64) -> Verdict {
     // NaN is within no bounds.
     let is_within = row.at_least.is_none_or(|least| value >= least)
         && row.at_most.is_none_or(|most| value <= most);
-    match (row.at_least.is_some() || row.at_most.is_some(), is_within) {
-        (false, _) => Verdict::ForComparison,
-        (true, true) => Verdict::Met,
-        (true, false) => Verdict::Missed,
+    match () {
+        () if row.at_least.or(row.at_most).is_none() => Verdict::ForComparison,
+        () if is_within => Verdict::Met,
+        () => Verdict::Missed,
     }
 }
 
-/// Returns the row's value, how it was measured, and the reason for an efficiency above 1.
-fn measured(
-    study: &Study,
-    row: &Row,
-    lines: &[Line],
-) -> Result<(f64, &'static str, String), String> {
+/// Returns the row with its value, how it was measured, and the reason for an efficiency above 1.
+fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> {
     let groups = Groups::of(lines);
     let find = |name: &String| {
         let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
@@ -135,7 +126,8 @@ fn measured(
     };
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
-    Ok((value, how, why))
+    let measured = Some((value, how));
+    Ok(Judged { measured, ..unjudged(row, verdict(row, value), why) })
 }
 
 /// Returns the reason for which a run failed, if it did.

@@ -334,19 +334,19 @@ impl Session<'_> {
         }
         for index in 0..points.len() {
             let (mesh, setup) = (points[index].mesh(), points[index].setup.clone());
-            let may_warm_up = points[index].warm_up && !points[index].failed;
-            if !may_warm_up || !self.warm.insert(mesh.clone()) {
+            if !points[index].warm_up || points[index].failed {
                 continue;
             }
             let engine = self.runner.programs.labelled(&setup.engine).description();
             let declined = engine.declines(&Case::read(&mesh.1)?);
             let excess = || feasible::excess(&self.lines, &setup, self.runner.limit);
             match declined.or_else(excess) {
-                None => self.run(&mut points[index], None)?,
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
                     self.leave_out(setup, why)?;
                 }
+                None if self.warm.insert(mesh) => self.run(&mut points[index], None)?,
+                None => {}
             }
         }
         for repeat in 0..points.iter().map(|p| p.repeats).max().unwrap_or(0) {
