@@ -32,6 +32,7 @@ impl Line {
     /// What cannot be true of any run, in one sentence.
     pub fn fault(&self) -> Option<String> {
         let times: Vec<f64> = match &self.entry {
+            _ if self.schema != SCHEMA => return Some(format!("its schema is {}", self.schema)),
             Entry::Network(network) => {
                 let bandwidth = network.bandwidth_bytes_per_s;
                 if bandwidth <= 0.0 || !bandwidth.is_finite() {

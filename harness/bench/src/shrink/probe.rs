@@ -131,7 +131,10 @@ impl Probe {
         let judged = |result: &CheckResult| match result.outcome() {
             Outcome::LeftOut { .. } => None,
             Outcome::Pass { .. } => Some((result.name, None)),
-            Outcome::Fail { .. } => Some((result.name, Some(failed_check(result, ranks)))),
+            Outcome::Fail { why } => {
+                let sentence = format!("{ranks}: {}", why.replace('\n', "; "));
+                Some((result.name, Some(Fault::of(result.name, &sentence))))
+            }
         };
         let judged: Vec<Judged> = results.iter().filter_map(judged).collect();
         match judged.is_empty() {
@@ -197,15 +200,6 @@ fn place_in_source(error: &str) -> String {
         file.contains('.') && line.starts_with(|c: char| c.is_ascii_digit())
     };
     error.split_whitespace().find(is_place).unwrap_or_default().to_owned()
-}
-
-fn failed_check(result: &CheckResult, ranks: Ranks) -> Fault {
-    let first = result.findings.first().map_or("", |finding| finding.as_str());
-    let sentence = match result.findings_total {
-        1 => format!("{ranks}: {first}"),
-        count => format!("{ranks}: {count} findings, the first: {first}"),
-    };
-    Fault::of(result.name, &sentence)
 }
 
 #[cfg(test)]
