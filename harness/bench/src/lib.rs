@@ -15,7 +15,9 @@ pub mod study;
 pub mod testing;
 pub mod track;
 
-use std::path::Path;
+use run::engine::failure::{End, Failure};
+use run::engine::runner::Engine;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Returns the name of a variant, as files have it.
@@ -38,6 +40,15 @@ fn printed(command: &mut Command) -> Option<String> {
 /// Returns what git prints in a directory; `None` if it fails.
 fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
     printed(Command::new("git").arg("-C").arg(directory).args(arguments))
+}
+
+/// Creates an empty directory for one run of an engine.
+fn emptied(place: PathBuf, engine: &Engine) -> Result<PathBuf, Failure> {
+    let _ = std::fs::remove_dir_all(&place);
+    let created = std::fs::create_dir_all(&place);
+    let why = |error| format!("has no directory {}: {error}", place.display());
+    created.map_err(|error| Failure::new(engine.name(), End::Missing(why(error))))?;
+    Ok(place)
 }
 
 /// Prints what a long command does on standard error. If that cannot be written, the command goes on.

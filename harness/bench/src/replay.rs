@@ -5,13 +5,13 @@
 //! quantity of a run is there once; a band contains its value; a ratio is inside if and only if its band contains it, and an exact
 //! value is equal if and only if it is the same text.
 
-use crate::experiments::entry::{Line, Run};
+use crate::experiments::entry::{Line, Run, Spread};
 use crate::experiments::group::{Group, Groups};
 use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
 use serde::Serialize;
 use statistics::Median;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeSet;
 
 /// Name and version of the schema.
 const SCHEMA: &str = "octree-replay/1";
@@ -78,23 +78,16 @@ impl Expected {
         if groups.all.is_empty() {
             return Err(Failure::missing("the record has no run that could be repeated"));
         }
-        let (mut seconds, mut once) = (0.0, 0.0);
-        // In an order of its own, so that the sum has the same last digit every time.
-        let mut longest: BTreeMap<String, f64> = BTreeMap::new();
-        for run in lines.iter().filter_map(Line::run) {
-            seconds += run.time_launch_s;
-            if run.warm_up {
-                once += run.time_launch_s;
-            } else {
-                let longest = longest.entry(run.setup.to_string()).or_default();
-                *longest = longest.max(run.time_launch_s);
-            }
-        }
-        once += longest.values().sum::<f64>();
+        let runs = || lines.iter().filter_map(Line::run);
+        let seconds = runs().map(|run| run.time_launch_s).sum();
+        let warm_ups = runs().filter(|run| run.warm_up).map(|run| run.time_launch_s);
+        let longest =
+            |group: &Group| group.runs.iter().map(|run| run.time_launch_s).fold(0.0, f64::max);
+        let seconds_once = warm_ups.chain(groups.all.iter().map(longest)).sum();
         let values = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
         let commit = lines.iter().rev().find_map(Line::session).map(|s| s.machine.commit.clone());
         let (schema, commit) = (SCHEMA.to_owned(), commit.unwrap_or_default());
-        let expected = Self { schema, commit, seconds, seconds_once: once, values };
+        let expected = Self { schema, commit, seconds, seconds_once, values };
         expected.check_invariants();
         Ok(expected)
     }
@@ -118,10 +111,9 @@ impl Expected {
 
     /// Executes the invariants at the head of this file.
     fn check_invariants(&self) {
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         for Value { run, quantity, found } in &self.values {
-            let before = seen.insert((run, quantity), found);
-            assert!(before.is_none(), "{run}: {quantity} is there twice");
+            assert!(seen.insert((run, quantity)), "{run}: {quantity} is there twice");
             if let Found::Ratio { value, low, high, .. } = found {
                 assert!(low <= value && value <= high, "{run}: {quantity} is not in its band");
             }
@@ -132,13 +124,12 @@ impl Expected {
     /// Compares with a record of the repetition.
     pub fn compare(&self, lines: &[Line]) -> Replayed {
         let groups = Groups::of(lines);
-        let measured = groups.all.iter().flat_map(|group| values(&groups, group));
-        let measured: HashMap<(String, String), Found> =
-            measured.map(|v| ((v.run, v.quantity), v.found)).collect();
+        let all: Vec<Value> = groups.all.iter().flat_map(|group| values(&groups, group)).collect();
         let row = |expected: &Value| {
-            let key = (expected.run.clone(), expected.quantity.clone());
-            let measured = measured.get(&key).cloned();
-            let verdict = verdict(&expected.found, measured.as_ref());
+            let Value { run, quantity, found } = expected;
+            let measured = all.iter().find(|of| (&of.run, &of.quantity) == (run, quantity));
+            let measured = measured.map(|of| of.found.clone());
+            let verdict = verdict(found, measured.as_ref());
             Row { expected: expected.clone(), measured, verdict }
         };
         let replayed = Replayed(self.values.iter().map(row).collect());
@@ -227,17 +218,17 @@ impl Replayed {
 fn values(groups: &Groups, group: &Group) -> Vec<Value> {
     let (run, first) = (group.setup.to_string(), &group.runs[0]);
     let mut exact = vec![
-        ("cells".to_owned(), first.cells.to_string()),
-        ("digest".to_owned(), first.digest.clone()),
-        ("facets".to_owned(), first.geometry.clone().unwrap_or_default()),
+        ("cells", first.cells.to_string()),
+        ("digest", first.digest.clone()),
+        ("facets", first.geometry.clone().unwrap_or_default()),
     ];
-    for (name, counted) in &first.counters {
-        let is_same = |run: &Run| run.counters.get(name).is_some_and(|of| of.sum == counted.sum);
-        // A program may count what it does not promise to be the same.
-        if group.runs.iter().all(is_same) {
-            exact.push((name.clone(), counted.sum.to_string()));
-        }
-    }
+    // A program may count what it does not promise to be the same.
+    let is_same = |(name, counted): &(&String, &Spread)| {
+        let is_same = |run: &Run| run.counters.get(*name).is_some_and(|of| of.sum == counted.sum);
+        group.runs.iter().all(is_same)
+    };
+    let counters = first.counters.iter().filter(is_same);
+    exact.extend(counters.map(|(name, of)| (name.as_str(), of.sum.to_string())));
     exact.retain(|(_, value)| !value.is_empty());
     let exact = exact.into_iter().map(|(quantity, value)| (quantity, Found::Exact(value)));
 
@@ -251,20 +242,24 @@ fn values(groups: &Groups, group: &Group) -> Vec<Value> {
         ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
         ("efficiency", scales.then(|| single(efficiency.global()))),
     ];
-    let ratio = |(quantity, median): (&str, Option<Median>)| {
+    let ratio = |(quantity, median): (&'static str, Option<Median>)| {
         let Median { value, low, high, .. } = median.filter(|m| m.value.is_finite())?;
         let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
-        Some((quantity.to_owned(), Found::Ratio { value, low, high, how: how.clone() }))
+        Some((quantity, Found::Ratio { value, low, high, how: how.clone() }))
     };
-    let time = ("time".to_owned(), Found::Time(group.time_s.value));
+    let time = ("time", Found::Time(group.time_s.value));
     let all = exact.chain(ratios.into_iter().filter_map(ratio)).chain([time]);
-    all.map(|(quantity, found)| Value { run: run.clone(), quantity, found }).collect()
+    let named = |(quantity, found): (&str, Found)| {
+        let (run, quantity) = (run.clone(), quantity.to_owned());
+        Value { run, quantity, found }
+    };
+    all.map(named).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::entry::{Comm, Entry, Spread};
+    use crate::experiments::entry::{Comm, Entry};
     use crate::testing::{line, run};
     use proptest::prelude::*;
 

@@ -128,7 +128,7 @@ mod tests {
             GateReport::new(Some(measured("main")), Measures::of_program(measured(".")));
         let cases = || vec!["cube".to_owned()];
         let values = |metric: &str, verdict, values, note: &str| {
-            GateFinding::of_values("cube", metric, verdict, values, note.to_owned())
+            GateFinding::noted("cube", metric, verdict, note).of_values(values)
         };
         let mut counters = Layer::new(LayerName::Counters, cases());
         counters.findings = vec![

@@ -114,30 +114,25 @@ impl<'a> Model<'a> {
     /// Selects the model of at least four values.
     fn select(values: &'a [f64], floor: f64) -> Self {
         let count_max = (values.len() / 5).clamp(2, SEGMENTS_MAX) - 1;
-        let mut best: [Option<(f64, Self)>; 2] = [None, None];
+        let mut models: Vec<(f64, Self)> = Vec::new();
         for (phi, mean) in
             PHIS.iter().flat_map(|phi| [(*phi, Mean::Constant), (*phi, Mean::Linear)])
         {
             let series = Series::new(values, phi);
             let found = series.boundaries(mean, count_max);
-            for count in 0..=found.len() {
+            models.extend((0..=found.len()).map(|count| {
                 let mut boundaries = found[..count].to_vec();
                 boundaries.sort_unstable();
                 let model = Self { values, floor, phi, mean, boundaries };
-                let criterion = model.criterion(&series);
-                let best = &mut best[usize::from(count > 0)];
-                if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
-                    *best = Some((criterion, model));
-                }
-            }
+                (model.criterion(&series), model)
+            }));
         }
-        let [whole, divided] = best;
-        let (whole, advantage) =
-            (whole.expect("no boundary is always tried"), ADVANTAGE_OF_ONE / values.len() as f64);
-        match divided {
-            Some((least, model)) if least + advantage.min(ADVANTAGE_MAX) < whole.0 => model,
-            _ => whole.1,
-        }
+        let (divided, whole): (Vec<_>, Vec<_>) =
+            models.into_iter().partition(|(_, model)| !model.boundaries.is_empty());
+        let best = |of: Vec<(f64, Self)>| of.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let whole = best(whole).expect("no boundary is always tried");
+        let advantage = (ADVANTAGE_OF_ONE / values.len() as f64).min(ADVANTAGE_MAX);
+        best(divided).filter(|(least, _)| least + advantage < whole.0).unwrap_or(whole).1
     }
 
     /// Returns twice the negative logarithm of the likelihood, plus penalties that grow where there are few values per parameter;
@@ -176,10 +171,7 @@ impl<'a> Model<'a> {
 
     /// Returns the first index of every segment and the index after the last value.
     fn edges(&self) -> Vec<usize> {
-        std::iter::once(0)
-            .chain(self.boundaries.iter().copied())
-            .chain([self.values.len()])
-            .collect()
+        [&[0], &self.boundaries[..], &[self.values.len()]].concat()
     }
 
     fn fits(&self, series: &Series) -> Vec<Fit> {

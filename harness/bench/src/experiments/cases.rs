@@ -11,6 +11,7 @@
 
 use contract::case::Case;
 use contract::failure::Failure;
+use contract::lattice::Root;
 use contract::plain::PlainCase;
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -27,8 +28,7 @@ pub struct Base {
     /// n of the unchanged case.
     pub layer_cells_min: u32,
     table: Table,
-    origin: [f64; 3],
-    edge: f64,
+    root: Root,
     directory: PathBuf,
 }
 
@@ -50,15 +50,14 @@ impl Base {
             spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
             layer_cells_min: case.layer_cells_min,
             table,
-            origin: case.root.origin,
-            edge: case.root.edge,
+            root: case.root,
             directory: directory.to_owned(),
         })
     }
 
     /// Returns an initial spacing that gives at most some thousand cells.
     pub fn coarse(&self) -> f64 {
-        self.spacing_min.max(self.edge / 512.0)
+        self.spacing_min.max(self.root.edge / 512.0)
     }
 
     /// Writes the case with this spacing and n; returns the path. In its own root, the finest cells are between once and twice as fine
@@ -66,24 +65,14 @@ impl Base {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(
-        &self,
-        spacing_min: f64,
-        layer_cells_min: u32,
-        in_own_root: bool,
-    ) -> Result<PathBuf, Failure> {
-        let (origin, edge) = match in_own_root {
-            true => (self.origin, self.edge),
-            false => root(self.origin, self.edge, spacing_min),
-        };
-        let of_root = [("origin", Value::from(origin.to_vec())), ("edge", edge.into())];
-        let of_root: Table =
-            of_root.map(|(key, value)| (key.to_owned(), value)).into_iter().collect();
+    pub fn write(&self, spacing_min: f64, n: u32, in_own_root: bool) -> Result<PathBuf, Failure> {
+        let root = if in_own_root { self.root } else { fitted(self.root, spacing_min) };
         let mut table = self.table.clone();
         table.insert("spacing_min".into(), spacing_min.into());
-        table.insert("layer_cells_min".into(), i64::from(layer_cells_min).into());
-        table.insert("root".into(), of_root.into());
-        let name = format!("{}-{spacing_min:e}-{layer_cells_min}-{edge:e}.toml", self.name);
+        table.insert("layer_cells_min".into(), i64::from(n).into());
+        let of_root = Value::try_from(root).expect("a root is representable in TOML");
+        table.insert("root".into(), of_root);
+        let name = format!("{}-{spacing_min:e}-{n}-{:e}.toml", self.name, root.edge);
         let path = self.directory.join(name);
         fs::write(&path, table.to_string()).map_err(|error| Failure::at(&path, error))?;
         Ok(path)
@@ -91,13 +80,13 @@ impl Base {
 }
 
 /// Returns the smallest concentric root that is not smaller and has `spacing` as the edge of a level.
-fn root(origin: [f64; 3], edge: f64, spacing: f64) -> ([f64; 3], f64) {
+fn fitted(Root { origin, edge }: Root, spacing: f64) -> Root {
     let mut wider = spacing;
     // Doubling is exact, so the edge equals the spacing bit by bit.
     while wider < edge {
         wider *= 2.0;
     }
-    (origin.map(|o| o + edge * 0.5 - wider * 0.5), wider)
+    Root { origin: origin.map(|o| o + edge * 0.5 - wider * 0.5), edge: wider }
 }
 
 /// Tolerated relative deviation of the number of cells.
@@ -132,61 +121,44 @@ impl Sizes {
         if let Some(answer) = self.answers.iter().find(|answer| answer.0 == cells) {
             return Ok(answer.1);
         }
-        let mut answer = None;
-        for count in 0..MESHES_MAX {
-            let next = match self.nearest(cells, |_| true) {
-                None => coarse,
-                Some(made) if (made.1 / cells).ln().abs() < TOLERANCE => break,
-                Some(made) if made.1 < cells / 2.0 => {
-                    let more = (cells / 2.0 / made.1).clamp(1.5, STEP);
-                    // The exponent grows with refinement up to about 2; a smaller one would overshoot.
-                    made.0 / more.powf(1.0 / self.power(cells).max(2.0))
-                }
-                Some(_) if cells > MADE_MAX => {
-                    answer = Some(self.guess(cells));
+        let (mut next, mut answer) = (coarse, coarse);
+        for count in 0..=MESHES_MAX {
+            let off = |mesh: &&(f64, f64)| (mesh.1 / cells).ln().abs();
+            let nearest_of = |is_wanted: &dyn Fn(f64) -> bool| {
+                let wanted = self.meshes.iter().filter(|mesh| is_wanted(mesh.1));
+                wanted.min_by(|a, b| off(a).total_cmp(&off(b))).copied()
+            };
+            if let Some((spacing, made)) = nearest_of(&|_| true) {
+                answer = spacing;
+                if count == MESHES_MAX || (made / cells).ln().abs() < TOLERANCE {
                     break;
                 }
-                Some(_) => self.between(cells, count),
-            };
+                // The exponent p in cells ~ spacing^-p.
+                let power = nearest_of(&|other| other != made).map_or(2.0, |other| {
+                    ((made / other.1).ln() / (other.0 / spacing).ln()).clamp(1.0, 3.0)
+                });
+                let guess = spacing * (made / cells).powf(1.0 / power);
+                let beyond = nearest_of(&|other| (other < cells) != (made < cells));
+                next = match beyond {
+                    _ if made < cells / 2.0 => {
+                        let more = (cells / 2.0 / made).clamp(1.5, STEP);
+                        // The exponent grows with refinement up to about 2; a smaller one would overshoot.
+                        spacing / more.powf(1.0 / power.max(2.0))
+                    }
+                    _ if cells > MADE_MAX => {
+                        answer = guess;
+                        break;
+                    }
+                    // The number of cells jumps, so extrapolation alone may return to the same meshes.
+                    Some(other) if count % 2 == 1 => (spacing * other.0).sqrt(),
+                    _ => guess,
+                };
+            }
             let made = mesh(next)?.max(1) as f64;
             self.meshes.push((next, made));
         }
-        let nearest = self.nearest(cells, |_| true);
-        let answer = answer.or(nearest.map(|made| made.0)).unwrap_or(coarse);
         self.answers.push((cells, answer));
         Ok(answer)
-    }
-
-    /// Returns the mesh whose size is nearest, of those with such a number of cells.
-    fn nearest(&self, cells: f64, is_wanted: impl Fn(f64) -> bool) -> Option<(f64, f64)> {
-        let off = |made: &(f64, f64)| (made.1 / cells).ln().abs();
-        let made = self.meshes.iter().filter(|made| is_wanted(made.1)).copied();
-        made.min_by(|a, b| off(a).total_cmp(&off(b)))
-    }
-
-    /// The spacing to try next. The number of cells jumps, so extrapolation alone may return to the same meshes: every second time, the middle
-    /// between the nearest meshes with fewer and with more cells.
-    fn between(&self, cells: f64, count: usize) -> f64 {
-        let below = self.nearest(cells, |count| count < cells);
-        let ends = below.zip(self.nearest(cells, |count| count > cells));
-        match ends.filter(|_| count % 2 == 1) {
-            Some((below, above)) => (below.0 * above.0).sqrt(),
-            None => self.guess(cells),
-        }
-    }
-
-    /// The extrapolated spacing; there is a mesh.
-    fn guess(&self, cells: f64) -> f64 {
-        let near = self.nearest(cells, |_| true);
-        near.map_or(1.0, |made| made.0 * (made.1 / cells).powf(1.0 / self.power(cells)))
-    }
-
-    /// Returns the exponent p in cells ~ spacing^-p, from the two meshes nearest to the requested size.
-    fn power(&self, cells: f64) -> f64 {
-        let ends = self.nearest(cells, |_| true);
-        let other = ends.and_then(|one| self.nearest(cells, |count| count != one.1));
-        let power = |(a, b): ((f64, f64), (f64, f64))| (a.1 / b.1).ln() / (b.0 / a.0).ln();
-        ends.zip(other).map_or(2.0, |both| power(both).clamp(1.0, 3.0))
     }
 }
 
@@ -196,11 +168,12 @@ mod tests {
 
     #[test]
     fn the_edge_of_a_level_equals_the_spacing() {
-        let (origin, edge) = root([-5.0; 3], 10.0, 0.3);
+        let Root { origin, edge } = fitted(Root { origin: [-5.0; 3], edge: 10.0 }, 0.3);
         assert_eq!(edge, 0.3 * 64.0);
         assert_eq!(edge / 64.0, 0.3);
         assert!((origin[0] + edge * 0.5).abs() < 1e-12);
-        assert_eq!(root([0.0; 3], 8.0, 0.5), ([0.0; 3], 8.0));
+        let same = Root { origin: [0.0; 3], edge: 8.0 };
+        assert_eq!(fitted(same, 0.5), same);
     }
 
     #[test]

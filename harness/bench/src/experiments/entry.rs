@@ -31,27 +31,28 @@ pub struct Line {
 impl Line {
     /// What cannot be true of any run, in one sentence.
     pub fn fault(&self) -> Option<String> {
-        let is_time = |time: &f64| (0.0..=SECONDS_MAX).contains(time);
-        match &self.entry {
-            Entry::Network(Network { latency_s, bandwidth_bytes_per_s, .. }) => {
-                let is_bandwidth =
-                    *bandwidth_bytes_per_s > 0.0 && bandwidth_bytes_per_s.is_finite();
-                let is_possible = is_time(latency_s) && is_bandwidth;
-                (!is_possible).then(|| "its network is not possible".to_owned())
+        let times: Vec<f64> = match &self.entry {
+            _ if self.schema != SCHEMA => return Some(format!("its schema is {}", self.schema)),
+            Entry::Network(network) => {
+                let bandwidth = network.bandwidth_bytes_per_s;
+                if bandwidth <= 0.0 || !bandwidth.is_finite() {
+                    return Some(format!("a bandwidth of {bandwidth:e} is not possible"));
+                }
+                vec![network.latency_s]
             }
             Entry::Run(run) if run.time_wall_s == 0.0 || run.setup.ranks == 0 => {
-                Some("it has no wall time, or no ranks".to_owned())
+                return Some("it has no wall time, or no ranks".to_owned());
             }
             Entry::Run(run) => {
                 let phases = run.phases.iter().flat_map(|phase| [&phase.useful_s, &phase.wall_s]);
                 let of_ranks = phases.chain([&run.useful_s]);
-                let of_ranks =
-                    of_ranks.flat_map(|s| s.by_rank.iter().copied().chain([s.sum, s.max]));
-                let time = of_ranks.chain([run.time_wall_s]).find(|time| !is_time(time))?;
-                Some(format!("a time of {time:e} s is not possible"))
+                let times = of_ranks.flat_map(|s| s.by_rank.iter().chain([&s.sum, &s.max]));
+                times.chain([&run.time_wall_s]).copied().collect()
             }
-            _ => None,
-        }
+            _ => return None,
+        };
+        let wrong = times.into_iter().find(|time| !(0.0..=SECONDS_MAX).contains(time))?;
+        Some(format!("a time of {wrong:e} s is not possible"))
     }
 
     /// Returns the session that the line begins, if it begins one.
@@ -82,16 +83,16 @@ pub enum Entry {
     /// A program ran.
     Run(Box<Run>),
     /// A program failed.
-    Failure(Failure),
+    Failure(NoResult),
     /// A program was not run on a mesh.
-    LeftOut(LeftOut),
+    LeftOut(NoResult),
     /// A verdict on a target, or the audit of a mesh, of records before 2026-11-24. It is not read.
     #[serde(rename = "target", alias = "audit")]
     Former,
 }
 
 /// The circumstances of a session.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// The harness's command line.
     pub command: Vec<String>,
@@ -104,8 +105,11 @@ pub struct Session {
     pub load_average: f64,
     /// By program: what it does not do or promise.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub lacks: BTreeMap<String, Vec<String>>,
+    pub lacks: Lacks,
 }
+
+/// By program: what it does not do or promise.
+pub type Lacks = BTreeMap<String, Vec<String>>;
 
 /// A machine, and the software that affects measurements on it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -316,20 +320,9 @@ pub struct Run {
     pub counters: BTreeMap<String, Spread>,
 }
 
-/// A run without a result.
+/// A run without a result: one that failed, or was not made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Failure {
-    /// A run's parameters.
-    pub setup: Setup,
-    /// The command line.
-    pub command: String,
-    /// The failure in a sentence.
-    pub why: String,
-}
-
-/// A run that was not made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LeftOut {
+pub struct NoResult {
     /// A run's parameters.
     pub setup: Setup,
     /// The reason in a sentence.

@@ -2,6 +2,7 @@
 
 use super::entry::{Comm, Phase, Run, Setup, Spread};
 use super::machine;
+use crate::refuse;
 use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::Failure;
@@ -37,20 +38,14 @@ pub struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    /// Runs `setup` on the case file `case`. The mesh of a warm-up run is checked against the promises of an engine that
+    /// Runs `setup` on the case file `case`; a warm-up is no repetition. The mesh of a warm-up is checked against the promises of an engine that
     /// does not promise the definition.
     ///
     /// # Errors
     /// If the run gives no result, or the mesh breaks a promise.
-    pub fn run(
-        &self,
-        setup: &Setup,
-        case: &Path,
-        repeat: usize,
-        warm_up: bool,
-    ) -> Result<Run, Failure> {
+    pub fn run(&self, setup: &Setup, case: &Path, repeat: Option<usize>) -> Result<Run, Failure> {
         let engine = self.programs.labelled(&setup.engine).with_launcher(self.launcher.clone());
-        let written = warm_up && !is_own(engine.name());
+        let written = repeat.is_none() && !is_own(engine.name());
         let checked = written && !engine.description().promises.definition;
         let mesh = self.place.join("mesh");
         let options = RunOptions {
@@ -68,22 +63,22 @@ impl Runner<'_> {
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
         kept?;
-        if setup.comm == Comm::Sim && report.phases.is_empty() {
-            let why =
-                "its run report has no phases, without which simulated ranks cannot be projected";
-            return Err(Failure::input(why));
-        }
-        if setup.partitioner == METIS
-            && report.partitioner.as_deref().is_some_and(|used| used != METIS)
-        {
-            let why = "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use \
-                       fewer ranks or more cells";
-            return Err(Failure::input(why));
-        }
+        let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
+        refuse(&[
+            (
+                setup.comm == Comm::Sim && report.phases.is_empty(),
+                "its run report has no phases, without which simulated ranks cannot be projected",
+            ),
+            (
+                setup.partitioner == METIS && not_metis,
+                "METIS was asked for, and has too few base leaves for these ranks, so that the curve was divided: use fewer \
+                 ranks or more cells",
+            ),
+        ])?;
         Ok(Run {
             program: machine::digest_of_file(engine.program()),
-            repeat,
-            warm_up,
+            repeat: repeat.unwrap_or(0),
+            warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
             command: shown(&command),
             time_launch_s: time_process_s,
@@ -248,7 +243,7 @@ mod tests {
         let ranks = if comm == Comm::Solo { 1 } else { 2 };
         let setup = Setup { engine: programs.engine.label(), ranks, ..setup };
         let case = place.join("case.toml");
-        runner.run(&setup, &case, 0, warm_up).map_err(|why| format!("{why:?}"))
+        runner.run(&setup, &case, (!warm_up).then_some(0)).map_err(|why| format!("{why:?}"))
     }
 
     #[test]

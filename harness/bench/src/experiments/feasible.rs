@@ -6,32 +6,30 @@ use std::time::Duration;
 /// Returns the reason for which a run would exceed `limit` or the memory of the machine, extrapolated from the finest coarser
 /// mesh of the same program; `None` if it would not, or if the lines have no such mesh.
 pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<String> {
-    let finest = coarser(lines, setup)?;
+    let is_coarser = |run: &&Run| {
+        let [wanted, found] =
+            [setup, &run.setup].map(|s| (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm));
+        wanted == found && run.setup.spacing_min > setup.spacing_min
+    };
+    let coarser = lines.iter().filter_map(Line::run).filter(is_coarser);
+    let spacing = |run: &&Run| run.setup.spacing_min;
+    let finest = coarser.min_by(|a, b| spacing(a).total_cmp(&spacing(b)))?;
     // Cells, and with them time and memory, grow with the inverse square of the spacing.
     let growth = (finest.setup.spacing_min / setup.spacing_min).powi(2);
-    let from = |what: String| {
-        let cells = finest.cells as f64;
-        format!("{} would {what}, extrapolated from {cells:.1e} cells", setup.engine)
-    };
     let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
-    if time_s > limit.as_secs_f64() {
-        return Some(from(format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())));
-    }
     let memory = lines.iter().find_map(Line::session)?.machine.memory_bytes as f64;
     let [needed, available] = [bytes, memory].map(|b| b / 1e9);
-    let why = || format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB");
-    (bytes > memory).then(|| from(why()))
-}
-
-/// Returns the finest mesh of a program that is coarser than that of `setup`, on the same ranks.
-fn coarser<'a>(lines: &'a [Line], setup: &Setup) -> Option<&'a Run> {
-    let same = |s: &Setup| {
-        (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm)
-            == (&setup.engine, &setup.case, setup.layer_cells_min, setup.ranks, setup.comm)
+    let would = match () {
+        () if time_s > limit.as_secs_f64() => {
+            format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())
+        }
+        () if bytes > memory => {
+            format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB")
+        }
+        () => return None,
     };
-    let runs = lines.iter().filter_map(Line::run).filter(|run| same(&run.setup));
-    runs.filter(|run| run.setup.spacing_min > setup.spacing_min)
-        .min_by(|a, b| a.setup.spacing_min.total_cmp(&b.setup.spacing_min))
+    let (program, cells) = (&setup.engine, finest.cells as f64);
+    Some(format!("{program} would {would}, extrapolated from {cells:.1e} cells"))
 }
 
 #[cfg(test)]
@@ -46,9 +44,7 @@ mod tests {
             let mut coarse = run(Comm::Solo, 1000, &[("a", &[2.0])]);
             (coarse.time_launch_s, coarse.peak_rss_bytes.sum) = (2.0, bytes);
             let machine = Machine { memory_bytes: 8 << 30, ..Machine::default() };
-            let (command, lacks) = (Vec::new(), Default::default());
-            let session =
-                Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
+            let session = Session { machine, ..Session::default() };
             [line(Entry::Session(Box::new(session))), line(Entry::Run(Box::new(coarse)))]
         };
         let finer = |lines: &[Line], spacing_min: f64, limit: u64| {

@@ -11,7 +11,7 @@
 //! and reading, hardly depend on other processes, and mean the same for every program. A phase named `search` is the part of that time in
 //! which a program finds the facets near an octant. With mpirun, times and memory are those of both.
 
-use super::entry::{Comm, Entry, Failure, LeftOut, Line, Network, Run, Session, Setup, Spread};
+use super::entry::{Comm, Entry, Lacks, Line, Network, NoResult, Run, Session, Setup, Spread};
 use super::network::ASSUMED;
 use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
@@ -146,9 +146,9 @@ pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
     /// Runs that failed or were left out.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
-    pub lacks: BTreeMap<String, Vec<String>>,
+    pub lacks: Lacks,
     /// A sentence for every program and case of which there are several series.
     pub origins: Vec<String>,
 }
@@ -157,7 +157,7 @@ impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
         let (mut sessions, mut networks) = (HashMap::new(), HashMap::new());
-        let (mut origins, mut digests) = (OriginsOfRuns::default(), HashMap::new());
+        let (mut origins, mut digests) = (<[Origins; 2]>::default(), HashMap::new());
         let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
         let mut runs: Vec<(Run, Option<String>)> = Vec::new();
         for line in lines {
@@ -170,18 +170,19 @@ impl Groups {
                     sessions.insert(&line.session, session);
                 }
                 Entry::LeftOut(left) => left_out.push(left.clone()),
-                Entry::Failure(Failure { setup, why, .. }) => {
+                Entry::Failure(NoResult { setup, why }) => {
                     let why = format!("{} failed: {why}", setup.engine);
-                    left_out.push(LeftOut { setup: setup.clone(), why });
+                    left_out.push(NoResult { setup: setup.clone(), why });
                 }
                 Entry::Run(run) => {
-                    let run = Run { setup: origins.apart(run, session), ..(**run).clone() };
+                    let setup = apart(run, session, &mut origins);
+                    let run = Run { setup, ..(**run).clone() };
                     if run.warm_up {
                         continue;
                     }
                     match another_mesh(&run, &lacks, &mut digests) {
                         None => runs.push((run, machine)),
-                        Some(why) => left_out.push(LeftOut { setup: run.setup, why }),
+                        Some(why) => left_out.push(NoResult { setup: run.setup, why }),
                     }
                 }
                 Entry::Former => {}
@@ -193,7 +194,7 @@ impl Groups {
             Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
         };
         let all = by_key(&runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
-        let origins = [origins.programs.described(), origins.geometries.described()].concat();
+        let origins = origins.each_ref().map(Origins::described).concat();
         let groups = Self { all: all.collect(), left_out, lacks, origins };
         groups.check_invariants();
         groups
@@ -207,11 +208,8 @@ impl Groups {
             assert!(count > 0 && t.count == count, "{name} has {count} runs");
             assert!(runs.iter().all(|run| run.setup == *setup), "{name} pools other setups");
             assert!(t.low <= t.value && t.value <= t.high, "{name}: {t:?} is in its interval");
-            let is_in_phases = setup.comm == Comm::Sim && !*by_rank;
-            assert!(
-                is_in_phases || pop::time_s(typical, network) == t.value,
-                "{name} has one time"
-            );
+            let has_one_time = pop::time_s(typical, network) == t.value;
+            assert!(has_one_time || setup.comm == Comm::Sim && !*by_rank, "{name} has one time");
             assert!((0.0..=1.0).contains(&t.coverage), "{name}: {t:?} is a coverage");
             for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
                 spread.check_invariants();
@@ -225,21 +223,16 @@ impl Groups {
         let is_comparable = |o: &&Group| {
             let o = &o.setup;
             let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
-            let size = match weak {
-                true => o.experiment == "weak",
-                // Another partition on as many ranks is no base.
-                false => {
-                    let is_base = o.ranks == 1 || alike && s.experiment != "weights";
-                    o.spacing_min == s.spacing_min && is_base
-                }
+            let same_size = match weak {
+                true => o.experiment == "weak" && o.series_cells == s.series_cells,
+                false => o.spacing_min == s.spacing_min,
             };
+            // Another partition on as many ranks is no base.
+            let is_base = weak || o.ranks == 1 || alike && s.experiment != "weights";
             // A measured time has no projected base.
             let is_measured = s.comm == Comm::Sim || o.comm != Comm::Sim;
-            let is_of_series = !weak || o.series_cells == s.series_cells;
-            size && is_measured
-                && is_of_series
-                && (&o.case, o.layer_cells_min, &o.engine)
-                    == (&s.case, s.layer_cells_min, &s.engine)
+            let [mesh, other] = [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine));
+            same_size && is_base && is_measured && mesh == other
         };
         // Fewest ranks first; among those the same communication, then the same experiment.
         let rank = |o: &&Group| {
@@ -287,12 +280,11 @@ impl Groups {
     }
 }
 
+/// Digests by mesh.
+pub(crate) type Digests = HashMap<String, String>;
+
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
-pub(crate) fn another_mesh(
-    run: &Run,
-    lacks: &BTreeMap<String, Vec<String>>,
-    digests: &mut HashMap<String, String>,
-) -> Option<String> {
+pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, digests: &mut Digests) -> Option<String> {
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
     let lacks = lacks.get(engine).map_or(&[][..], Vec::as_slice);
@@ -309,43 +301,30 @@ pub(crate) fn another_mesh(
         .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
 }
 
-/// The machines and builds of programs, and the geometries of cases, seen so far.
-#[derive(Default)]
-struct OriginsOfRuns {
-    programs: Origins,
-    geometries: Origins,
-}
-
-impl OriginsOfRuns {
-    /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry.
-    fn apart(&mut self, run: &Run, session: Option<&Session>) -> Setup {
-        let mut setup = run.setup.clone();
-        let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
-        // Old records have no digest of the program: the commit stands for it.
-        let origin = match (session, run.program.as_str()) {
-            (None, "") => machine,
-            (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
-            (_, program) => format!("{machine}program {program}"),
-        };
-        setup.engine += &self.programs.suffix(&run.setup.engine, &origin);
-        if let Some(digest) = &run.geometry {
-            let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
-            let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
-            setup.case += &self.geometries.suffix(&mesh, digest);
-        }
-        setup
+/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry before.
+fn apart(run: &Run, session: Option<&Session>, [programs, geometries]: &mut [Origins; 2]) -> Setup {
+    let mut setup = run.setup.clone();
+    let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
+    // Old records have no digest of the program: the commit stands for it.
+    let origin = match (session, run.program.as_str()) {
+        (None, "") => machine,
+        (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
+        (_, program) => format!("{machine}program {program}"),
+    };
+    setup.engine += &programs.suffix(&run.setup.engine, &origin);
+    if let Some(digest) = &run.geometry {
+        let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
+        let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");
+        setup.case += &geometries.suffix(&mesh, digest);
     }
+    setup
 }
 
 /// The runs of one case and n by several programs.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
-    /// The case.
-    pub case: &'a str,
-    /// n.
-    pub layer_cells_min: u32,
-    /// At least two programs in the order of the record, each with its runs by cells.
-    pub programs: Vec<(&'a str, Vec<&'a Group>)>,
+    /// Of at least two programs in the order of the record, each with its runs by cells.
+    pub groups: Vec<&'a Group>,
     /// Runs that failed or were left out, and what the programs do not provide, a sentence each.
     pub notes: Vec<String>,
 }
@@ -363,17 +342,17 @@ impl Groups {
         };
         let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
         let by_case = by_key(self.all.iter().filter(is_compared), of_case);
-        let all = by_case.into_iter().map(|(_, groups)| self.comparison(groups));
-        all.filter(|comparison| comparison.programs.len() > 1).collect()
+        by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
     }
 
-    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Comparison<'a> {
-        let (case, layer_cells_min) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
+    /// Returns the comparison of the programs that have these groups, if there are several.
+    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
+        let (case, n) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
         let mut programs = by_key(groups, |g| g.setup.engine.as_str());
         programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
         let left_out = self.left_out.iter().filter(|left| {
             let s = &left.setup;
-            (&s.case, s.layer_cells_min) == (case, layer_cells_min) && is_on_one_core(s)
+            (&s.case, s.layer_cells_min) == (case, n) && is_on_one_core(s)
         });
         let left_out = left_out.map(|left| {
             let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
@@ -385,7 +364,9 @@ impl Groups {
             Some(format!("{name} does not provide: {}", lacks.join(", ")))
         });
         let notes = left_out.chain(lacks).collect();
-        Comparison { case, layer_cells_min, programs, notes }
+        let is_compared = programs.len() > 1;
+        let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
+        is_compared.then_some(Comparison { groups, notes })
     }
 }
 

@@ -6,7 +6,7 @@
 use super::Bench;
 use super::measures::LayerName;
 use super::report::{CHECKS, GateFinding, Layer, Verdict};
-use super::rules::Selected;
+use super::rules::GateCase;
 use check::checks::CHECKS as CHECKS_OF_MESHES;
 use contract::failure::Failure;
 use run::engine::programs::Programs;
@@ -32,15 +32,14 @@ pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
             false => verified(bench, &subject.engine, case),
         });
         let baseline = baseline.transpose()?;
-        layer.findings.extend(findings(&case.rule.name, &case.mpi, &report, baseline.as_ref()));
+        layer.findings.extend(findings(&case.name, &case.mpi, &report, baseline.as_ref()));
     }
     Ok(())
 }
 
 /// Verifies a program on a case.
-fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseReport, Failure> {
+fn verified(bench: &Bench, engine: &Engine, case: &GateCase) -> Result<CaseReport, Failure> {
     let programs = Programs { engine: engine.clone(), ..bench.programs.clone() };
-    let path = case.path.clone()?;
     let options = Options {
         timeout: bench.options.timeout,
         // The files of a case that fails end with the gate.
@@ -50,11 +49,11 @@ fn verified(bench: &Bench, engine: &Engine, case: &Selected) -> Result<CaseRepor
         // `harness verify` varies the partition.
         partitioners: vec!["morton".to_owned()],
         level_bases: vec!["auto".to_owned()],
-        ..Options::of_leaves_alone(vec![path.to_string_lossy().into_owned()])
+        ..Options::of_leaves_alone(vec![case.file.to_string_lossy().into_owned()])
     };
     let report = verify(&options, &programs)?;
     let mut cases = report.cases.into_iter();
-    cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.rule.name)))
+    cases.next().ok_or_else(|| Failure::input(format!("{} was not verified", case.name)))
 }
 
 /// Whether a mesh gave this check nothing to check.
@@ -108,7 +107,7 @@ fn finding(case: &str, check: &Check, baseline: Option<&CaseReport>) -> Option<G
         }
         Some(_) => {
             let values = [old.unwrap_or(0), new].map(|count| count as f64);
-            GateFinding::of_values(case, &metric, verdict, values, why.to_owned())
+            noted(verdict, why.to_owned()).of_values(values)
         }
     })
 }

@@ -15,14 +15,15 @@ pub mod rules;
 mod subject;
 pub mod time;
 
+use crate::emptied;
 use crate::experiments::machine;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use contract::failure::Failure;
-use measures::{CaseMeasures, LayerName, Measures};
+use measures::{LayerName, Measures};
 use report::{GateFinding, GateReport, Layer, Verdict};
+use rules::GateCase;
 pub use rules::Rules;
-use rules::Selected;
 use run::engine::failure::Failure as Ended;
 use run::engine::interrupt;
 use run::engine::programs::Programs;
@@ -30,7 +31,7 @@ use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use subject::{Subject, top_level};
+use subject::{Counted, Subject, top_level};
 
 /// The options of a gate, as on the command line.
 #[derive(Args, Clone, Debug)]
@@ -83,7 +84,7 @@ fn input(path: PathBuf) -> std::io::Result<PathBuf> {
 struct Bench<'a> {
     options: &'a GateOptions,
     rules: &'a Rules,
-    cases: Vec<Selected>,
+    cases: Vec<GateCase>,
     programs: &'a Programs,
     candidate: Subject,
     /// What the candidate is compared with; `None` if it is only measured.
@@ -132,7 +133,7 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
         }
         let start = Instant::now();
         crate::announce(&format!("harness gate: {name}"));
-        let cases = bench.asked(name).map(|case| case.rule.name.clone()).collect();
+        let cases = bench.asked(name).map(|case| case.name.clone()).collect();
         let mut layer = Layer::new(name, cases);
         let measures = &mut report.candidate_measures;
         match name {
@@ -140,15 +141,13 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
             LayerName::Time => time::layer(bench, &mut layer),
             _ => numbers::layer(bench, measures, &mut layer),
         }
+        let on_ranks = name != LayerName::Instructions && layer.left_out.is_none();
         for case in bench.asked(name) {
-            let (unread, no_mpi) = (case.path.as_ref().err(), case.no_mpi.as_ref());
-            let on_ranks =
-                name != LayerName::Instructions && unread.is_none() && layer.left_out.is_none();
-            let notes = [("runs", unread), ("ranks on MPI", no_mpi.filter(|_| on_ranks))];
-            for (metric, why) in notes.into_iter().filter_map(|(of, why)| Some((of, why?))) {
-                let (case, left_out) = (&case.rule.name, Verdict::LeftOut);
-                layer.findings.push(GateFinding::noted(case, metric, left_out, why));
-            }
+            let no_mpi = case.no_mpi.as_ref().filter(|_| on_ranks && case.absent.is_none());
+            let notes = [("runs", case.absent.as_ref()), ("ranks on MPI", no_mpi)];
+            layer.findings.extend(notes.into_iter().filter_map(|(metric, why)| {
+                Some(GateFinding::noted(&case.name, metric, Verdict::LeftOut, why?))
+            }));
         }
         layer.time_s = start.elapsed().as_secs_f64();
         report.layers.push(layer);
@@ -158,43 +157,29 @@ fn run_layers(bench: &Bench, report: &mut GateReport) -> Result<(), Failure> {
 
 impl Bench<'_> {
     /// Returns the cases for which the rules ask a layer.
-    fn asked(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
-        self.cases.iter().filter(move |case| case.rule.layers.contains(&layer))
+    fn asked(&self, layer: LayerName) -> impl Iterator<Item = &GateCase> {
+        self.cases.iter().filter(move |case| case.layers.contains(&layer))
     }
 
     /// Returns the cases of a layer that can be run, until the user interrupts it.
-    fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &Selected> {
-        let runs = |case: &&Selected| case.path.is_ok();
-        self.asked(layer).filter(runs).take_while(|_| !interrupt::requested())
+    fn cases_of(&self, layer: LayerName) -> impl Iterator<Item = &GateCase> {
+        let runs = self.asked(layer).filter(|case| case.absent.is_none());
+        runs.take_while(|_| !interrupt::requested())
     }
 
     /// Returns what a layer measures of a program on a case; counters and memory are of the same runs.
-    fn measured(
-        &self,
-        subject: &Subject,
-        case: &Selected,
-        layer: LayerName,
-    ) -> Result<CaseMeasures, Ended> {
+    fn measured(&self, subject: &Subject, case: &GateCase, layer: LayerName) -> Counted {
         if layer == LayerName::Instructions {
             return numbers::instructions(self, &subject.engine, case);
         }
         let mut counted = subject.counted.borrow_mut();
         let count = || numbers::count(self, &subject.engine, case);
-        counted.entry(case.rule.name.clone()).or_insert_with(count).clone()
-    }
-
-    /// Creates an empty directory for one run of an engine.
-    fn enter(&self, engine: &Engine, name: &str) -> Result<PathBuf, Ended> {
-        let place = self.place.join(name);
-        let _ = std::fs::remove_dir_all(&place);
-        let created = std::fs::create_dir_all(&place);
-        created.map(|()| place).map_err(|error| engine.unusable(error.to_string()))
+        counted.entry(case.name.clone()).or_insert_with(count).clone()
     }
 
     /// Returns the file of a case in a form that an engine reads.
-    fn prepare(&self, engine: &Engine, case: &Selected, name: &str) -> Result<PathBuf, Ended> {
-        let place = self.enter(engine, name)?.join("case");
-        let prepared = case.path.clone().and_then(|path| engine.prepare(&path, &place));
-        prepared.map_err(|why| engine.unusable(why))
+    fn prepare(&self, engine: &Engine, case: &GateCase, name: &str) -> Result<PathBuf, Ended> {
+        let place = emptied(self.place.join(name), engine)?.join("case");
+        engine.prepare(&case.file, &place).map_err(|why| engine.unusable(why))
     }
 }

@@ -2,9 +2,11 @@
 //! counts. Numbers are compared by name; one that the candidate no longer has is missing, and a new one is a change.
 
 use super::Bench;
-use super::measures::{CaseMeasures, LayerName, Measures, Numbers};
+use super::measures::{CaseMeasures, LayerName, Measures};
 use super::report::{GateFinding, Layer, Verdict, change_percent};
-use super::rules::Selected;
+use super::rules::{GateCase, Tolerance};
+use super::subject::Counted;
+use crate::emptied;
 use check::promises::Independence;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions, SERIAL};
@@ -36,9 +38,6 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         return;
     }
     for case in bench.cases_of(name) {
-        let noted = |metric: &str, verdict, why: String| {
-            vec![GateFinding::noted(&case.rule.name, metric, verdict, why)]
-        };
         let baseline = bench.baseline.as_ref();
         let old = baseline.map(|subject| bench.measured(subject, case, name));
         let new = bench.measured(&bench.candidate, case, name);
@@ -46,51 +45,70 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             break;
         }
         if let Ok(new) = &new {
-            measures.case(&case.rule.name).add(new.clone());
+            measures.case(&case.name).add(new.clone());
         }
-        layer.findings.extend(match (old, new) {
-            (Some(Ok(old)), Ok(new)) => compare(bench, case, name, &old, &new),
-            (Some(Err(why)), Ok(_)) => {
-                noted("baseline", Verdict::Missing, format!("the baseline has no result: {why}"))
+        let has_numbers = |of: &CaseMeasures| !of.of_layer(name).is_empty();
+        let had = old.as_ref().is_none_or(|old| old.as_ref().is_ok_and(has_numbers));
+        let (verdict, why) = match (old, new) {
+            (Some(Ok(old)), Ok(new)) => {
+                let tolerance = &bench.rules.tolerance;
+                layer.findings.extend(compare(&case.name, name, [&old, &new], tolerance));
+                continue;
             }
-            (Some(Ok(old)), Err(why)) if !old.of_layer(name).is_empty() => {
-                noted("runs", Verdict::Regression, format!("the candidate has no result: {why}"))
-            }
-            (Some(_), Err(why)) => {
-                noted("runs", Verdict::Missing, format!("neither program has a result: {why}"))
-            }
-            (None, Err(why)) => noted("runs", Verdict::Regression, why.to_string()),
             (None, Ok(new)) => {
                 let compared = new.of_layer(name).len() as u64;
                 let verdict = if compared == 0 { Verdict::Missing } else { Verdict::Measured };
-                let mut found = noted(&name.to_string(), verdict, format!("{compared} quantities"));
-                found[0].compared = compared;
-                found
+                let why = format!("{compared} quantities");
+                let found = GateFinding::noted(&case.name, &name.to_string(), verdict, why);
+                layer.findings.push(GateFinding { compared, ..found });
+                continue;
             }
-        });
+            (Some(Err(why)), Ok(_)) => {
+                (Verdict::Missing, format!("the baseline has no result: {why}"))
+            }
+            (_, Err(why)) if had => {
+                (Verdict::Regression, format!("the candidate has no result: {why}"))
+            }
+            (_, Err(why)) => (Verdict::Missing, format!("neither program has a result: {why}")),
+        };
+        layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, why));
     }
 }
 
-/// Compares two measurements of a case.
+/// Compares two measurements of a case. If both together have numbers beside the cells, they must share one of them.
 fn compare(
-    bench: &Bench,
-    case: &Selected,
+    case: &str,
     layer: LayerName,
-    old: &CaseMeasures,
-    new: &CaseMeasures,
+    [old, new]: [&CaseMeasures; 2],
+    tolerance: &Tolerance,
 ) -> Vec<GateFinding> {
-    let name = &case.rule.name;
+    let noted = |metric: &str, verdict, note| GateFinding::noted(case, metric, verdict, note);
     if let (Some(one), Some(other)) = (&old.geometry, &new.geometry)
         && one != other
     {
         let why = format!("other facets were read: their digest is {other}, and was {one}");
-        return vec![GateFinding::noted(name, "geometry", Verdict::Missing, why)];
+        return vec![noted("geometry", Verdict::Missing, why)];
     }
-    let tolerance = |metric: &str| bench.rules.tolerance.of_metric(metric, layer);
-    let numbers = [old.of_layer(layer), new.of_layer(layer)];
-    let digests = [&old.digest, &new.digest];
-    let mesh = (layer == LayerName::Counters).then(|| same_mesh(name, digests)).flatten();
-    mesh.into_iter().chain(compared_numbers(name, layer, numbers, &tolerance)).collect()
+    let mesh = (layer == LayerName::Counters).then(|| same_mesh(case, [&old.digest, &new.digest]));
+    let mut findings: Vec<GateFinding> = mesh.flatten().into_iter().collect();
+    let [old, new] = [old, new].map(|of| of.of_layer(layer));
+    let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+    let is_shared = |name: &String| old.contains_key(name) && new.contains_key(name);
+    let mut counters = names.iter().filter(|name| **name != CELLS).peekable();
+    if counters.peek().is_some() && !counters.any(|name| is_shared(name)) {
+        let why = format!("no quantity but {CELLS} is in both programs' reports");
+        findings.push(noted(&layer.to_string(), Verdict::Missing, why));
+    }
+    findings.extend(names.into_iter().map(|metric| match [old, new].map(|of| of.get(metric)) {
+        [Some(&old), Some(&new)] => {
+            let tolerance = tolerance.of_metric(metric, layer);
+            let (verdict, note) = verdict(layer, metric, [old, new], tolerance);
+            noted(metric, verdict, note).of_values([old as f64, new as f64])
+        }
+        [Some(old), None] => noted(metric, Verdict::Missing, gone(old)),
+        [None, new] => noted(metric, Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),
+    }));
+    findings
 }
 
 /// A different digest means a different mesh; the layer of correctness decides whether it is correct. `None` if neither side has one.
@@ -110,42 +128,9 @@ fn gone(old: impl Display) -> String {
     format!("the candidate does not report it; it was {old}")
 }
 
-/// Compares all numbers of both sides. If both sides together have numbers beside the cells, they must share one of them.
-fn compared_numbers(
-    case: &str,
-    layer: LayerName,
-    [old, new]: [&Numbers; 2],
-    tolerance: &dyn Fn(&str) -> f64,
-) -> Vec<GateFinding> {
-    let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
-    let is_in_both = |name: &String| old.contains_key(name) && new.contains_key(name);
-    let mut counters = names.iter().filter(|name| **name != CELLS).peekable();
-    let mut findings = Vec::new();
-    if counters.peek().is_some() && !counters.any(|name| is_in_both(name)) {
-        let why = format!("no quantity but {CELLS} is in both programs' reports");
-        findings.push(GateFinding::noted(case, &layer.to_string(), Verdict::Missing, why));
-    }
-    findings.extend(names.into_iter().map(|metric| {
-        let noted = |verdict, note| GateFinding::noted(case, metric, verdict, note);
-        match [old, new].map(|of| of.get(metric)) {
-            [Some(&old), Some(&new)] => {
-                let (verdict, note) = verdict(layer, metric, [old, new], tolerance(metric));
-                GateFinding::of_values(case, metric, verdict, [old as f64, new as f64], note)
-            }
-            [Some(old), None] => noted(Verdict::Missing, gone(old)),
-            [None, new] => noted(Verdict::Changed, format!("new, {}", new.unwrap_or(&0))),
-        }
-    }));
-    findings
-}
-
 /// The verdict on a number with a tolerance in percent, and the reason.
-fn verdict(
-    layer: LayerName,
-    metric: &str,
-    [old, new]: [u64; 2],
-    tolerance: f64,
-) -> (Verdict, String) {
+fn verdict(layer: LayerName, metric: &str, values: [u64; 2], tolerance: f64) -> (Verdict, String) {
+    let [old, new] = values;
     let change = change_percent(old as f64, new as f64);
     // Rounding: 11 / 10 - 1 exceeds 0.1 in binary.
     let is_within = change.is_some_and(|by| by.abs() <= tolerance + 1e-9);
@@ -159,24 +144,19 @@ fn verdict(
         () if is_within && layer == LayerName::Counters => {
             (Verdict::Changed, format!("within the tolerance of {tolerance} %"))
         }
+        () if new < old && !is_within => (Verdict::Improvement, String::new()),
         // Noise within the tolerance is not worth a line.
-        () if is_within => (Verdict::Unchanged, String::new()),
-        () if new < old => (Verdict::Improvement, String::new()),
-        () if is_noise => (Verdict::Unchanged, String::new()),
+        () if is_within || is_noise => (Verdict::Unchanged, String::new()),
         () => (Verdict::Regression, format!("exceeds the tolerance of {tolerance} %")),
     }
 }
 
 /// Counters and memory of a program on a case. Digests of all rank counts must be the same if the engine promises that.
-pub(super) fn count(
-    bench: &Bench,
-    engine: &Engine,
-    case: &Selected,
-) -> Result<CaseMeasures, Failure> {
+pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted {
     let path = bench.prepare(engine, case, "counters")?;
     let mut measures = CaseMeasures::default();
     for ranks in case.layouts() {
-        let place = bench.enter(engine, "counters/run")?;
+        let place = emptied(bench.place.join("counters/run"), engine)?;
         let options =
             RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit()) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
@@ -215,11 +195,7 @@ pub(super) fn prefix(ranks: Ranks) -> String {
 
 /// Instructions of a serial run under valgrind, of all its processes. They do not depend on the load of
 /// the machine, so a difference of a percent is significant.
-pub(super) fn instructions(
-    bench: &Bench,
-    engine: &Engine,
-    case: &Selected,
-) -> Result<CaseMeasures, Failure> {
+pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted {
     let path = bench.prepare(engine, case, "instructions")?;
     let place = bench.place.join("instructions");
     // Without output files, the count is that of meshing alone.
@@ -264,6 +240,7 @@ fn instructions_in(profile: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::measures::Numbers;
     use super::*;
 
     fn numbers(of: &[(&str, u64)]) -> Numbers {
@@ -271,8 +248,14 @@ mod tests {
     }
 
     fn verdicts(layer: LayerName, old: &Numbers, new: &Numbers) -> Vec<(String, Verdict)> {
-        let tolerance = |metric: &str| if metric.ends_with("messages") { 10.0 } else { 0.0 };
-        let found = compared_numbers("c", layer, [old, new], &tolerance);
+        let tolerance = Tolerance { memory: 0.0, ..Tolerance::default() };
+        let tolerance = Tolerance { of: [("messages".to_owned(), 10.0)].into(), ..tolerance };
+        let [old, new] = [old, new].map(|numbers| CaseMeasures {
+            exact: numbers.clone(),
+            memory: numbers.clone(),
+            ..CaseMeasures::default()
+        });
+        let found = compare("c", layer, [&old, &new], &tolerance);
         found.into_iter().map(|finding| (finding.metric, finding.verdict)).collect()
     }
 

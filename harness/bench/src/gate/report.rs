@@ -74,21 +74,12 @@ impl GateFinding {
         Self { case, metric, verdict, note, ..Self::default() }
     }
 
-    /// Returns a finding about two values.
-    pub fn of_values(
-        case: &str,
-        metric: &str,
-        verdict: Verdict,
-        [baseline, candidate]: [f64; 2],
-        note: String,
-    ) -> Self {
-        Self {
-            compared: 1,
-            baseline: Some(baseline),
-            candidate: Some(candidate),
-            change_percent: change_percent(baseline, candidate),
-            ..Self::noted(case, metric, verdict, note)
-        }
+    /// Returns the finding with the values of baseline and candidate.
+    #[must_use]
+    pub fn of_values(self, [baseline, candidate]: [f64; 2]) -> Self {
+        let change_percent = change_percent(baseline, candidate);
+        let (baseline, candidate) = (Some(baseline), Some(candidate));
+        Self { compared: 1, baseline, candidate, change_percent, ..self }
     }
 
     fn check_invariants(&self) {
@@ -220,12 +211,11 @@ impl GateReport {
     fn unmet(&self, layer: &Layer) -> Option<String> {
         let name = layer.name;
         for case in &layer.cases {
-            let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
             let is_left_out = |finding: &GateFinding| finding.verdict == Verdict::LeftOut;
-            let is_excused = layer.left_out.is_some()
-                || of_case().next().is_some() && of_case().all(is_left_out);
-            let is_compared = of_case().any(|finding| finding.compared > 0);
-            if !is_compared && (self.require_layers || !is_excused) {
+            let of_case = || layer.findings.iter().filter(|finding| finding.case == *case);
+            let all_left_out = of_case().next().is_some() && of_case().all(is_left_out);
+            let is_excused = !self.require_layers && (layer.left_out.is_some() || all_left_out);
+            if !is_excused && of_case().all(|finding| finding.compared == 0) {
                 let unmet = of_case().find(|f| is_left_out(f) || f.verdict == Verdict::Missing);
                 let why = layer.left_out.as_ref().or(unmet.map(|finding| &finding.note));
                 let why = why.map_or("it has no quantity", String::as_str);
@@ -272,7 +262,7 @@ mod tests {
     }
 
     fn equal(case: &str) -> GateFinding {
-        GateFinding::of_values(case, "rays", Verdict::Unchanged, [7.0, 7.0], String::new())
+        GateFinding::noted(case, "rays", Verdict::Unchanged, "").of_values([7.0, 7.0])
     }
 
     #[test]
@@ -326,7 +316,7 @@ mod tests {
 
     fn planted(fault: impl FnOnce(&mut GateFinding)) {
         let mut wrong =
-            GateFinding::of_values("a", "rays", Verdict::Regression, [10.0, 12.0], String::new());
+            GateFinding::noted("a", "rays", Verdict::Regression, "").of_values([10.0, 12.0]);
         fault(&mut wrong);
         report(vec![layer(&[wrong, equal("b")])]).check_invariants();
     }

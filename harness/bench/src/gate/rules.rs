@@ -23,7 +23,7 @@ pub struct Rules {
     pub time: TimeRules,
     /// The cases.
     #[serde(default, rename = "case")]
-    pub cases: Vec<CaseRule>,
+    pub cases: Vec<GateCase>,
 }
 
 /// Tolerated growth, in percent.
@@ -77,15 +77,13 @@ impl Default for TimeRules {
     }
 }
 
-/// One case's rules.
+/// A case.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CaseRule {
+pub struct GateCase {
     /// Name in the catalogue. The file may have the path of a case file here, whose stem becomes the name: records must not depend on the
     /// directory of a checkout.
     pub name: String,
-    #[serde(skip)]
-    file: Option<PathBuf>,
     /// Layers that include the case.
     pub layers: Vec<LayerName>,
     /// Numbers of simulated ranks on which counters and memory are also compared; ranks on MPI for an engine without them.
@@ -94,29 +92,49 @@ pub struct CaseRule {
     /// Numbers of ranks on MPI on which correctness, counters, memory and time are also compared.
     #[serde(default)]
     pub mpi: Vec<usize>,
-}
-
-/// A selected case.
-#[derive(Clone, Debug)]
-pub struct Selected {
-    /// Its rules.
-    pub rule: CaseRule,
-    /// Its file, or the reason why it cannot be run: it is missing, or the engine does not support it.
-    pub path: Result<PathBuf, String>,
-    /// The numbers of simulated ranks on which it is run.
-    pub simulated: Vec<usize>,
-    /// The numbers of ranks on MPI: those of the rules, and those that the engine cannot simulate.
-    pub mpi: Vec<usize>,
+    /// Its file; empty for one of the catalogue until it is selected.
+    #[serde(skip)]
+    pub file: PathBuf,
+    /// Why it cannot be run: its geometry is missing, or the engine does not support it.
+    #[serde(skip)]
+    pub absent: Option<String>,
     /// Why it is not run on ranks of MPI although the rules ask for them.
+    #[serde(skip)]
     pub no_mpi: Option<String>,
 }
 
-impl Selected {
+impl GateCase {
     /// The ranks on which it is counted: serially, then those of the rules.
     pub fn layouts(&self) -> impl Iterator<Item = Ranks> {
-        let simulated = self.simulated.iter().map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
+        let simulated = self.ranks.iter().map(|&ranks| Ranks::Simulated { ranks, seed: SEED });
         let real = self.mpi.iter().copied().map(Ranks::Mpi);
         std::iter::once(Ranks::Serial).chain(simulated).chain(real)
+    }
+
+    /// Finds what this machine and an engine lack to run it; ranks that the engine cannot simulate become ranks on MPI.
+    fn find(mut self, programs: &Programs) -> Result<Self, Failure> {
+        if self.file.as_os_str().is_empty() {
+            let found = programs.paths.catalogue.named(&self.name)?;
+            (self.file, self.absent) = (found.path.clone(), found.absent.clone());
+        }
+        self.file = std::path::absolute(&self.file)?;
+        let engine = programs.engine.description();
+        // Only a geometry that has to be fetched may be missing.
+        if self.absent.is_none() {
+            self.absent = engine.declines(&Case::read(&self.file)?);
+        }
+        if engine.run.simulated.is_empty() {
+            let unknown = |ranks: &usize| !self.mpi.contains(ranks);
+            let more: Vec<usize> = self.ranks.drain(..).filter(unknown).collect();
+            self.mpi.extend(more);
+        }
+        if !self.mpi.is_empty() {
+            self.no_mpi = programs.engine.lacks_mpi();
+        }
+        if self.no_mpi.is_some() {
+            self.mpi.clear();
+        }
+        Ok(self)
     }
 }
 
@@ -137,7 +155,7 @@ impl Rules {
         for case in rules.cases.iter_mut().filter(|case| case.name.ends_with(".toml")) {
             let file = directory.join(&case.name);
             case.name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            case.file = Some(file);
+            case.file = file;
         }
         rules.check().map_err(wrong)?;
         Ok(rules)
@@ -146,10 +164,8 @@ impl Rules {
     /// Checks that there are cases, each with a name of its own and something to compare, and that times can be compared.
     fn check(&self) -> Result<(), String> {
         let TimeRules { alpha, effect_min, rounds_min: fewest, rounds_max, .. } = self.time;
-        if !(alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0) {
-            return Err("alpha must be between 0 and 0.5, and effect_min at least 0".to_owned());
-        }
-        let least = rounds_min(alpha);
+        let is_level = alpha > 0.0 && alpha < 0.5 && effect_min >= 0.0;
+        let least = if is_level { rounds_min(alpha) } else { 0 };
         let few = format!(
             "rounds_min must be at least {least} for this alpha, and rounds_max at least rounds_min"
         );
@@ -157,6 +173,7 @@ impl Rules {
         let mut tolerances = [counters, instructions, memory].into_iter().chain(of.values());
         let are_percentages = tolerances.all(|percent| (0.0..=1e6).contains(percent));
         refuse(&[
+            (!is_level, "alpha must be between 0 and 0.5, and effect_min at least 0"),
             (fewest < least || rounds_max < fewest, &few),
             (self.cases.is_empty(), "it has no [[case]], so there is nothing to compare"),
             (!are_percentages, "a tolerance must be between 0 and 1000000 percent"),
@@ -178,39 +195,14 @@ impl Rules {
     ///
     /// # Errors
     /// If a name is missing from the rules or the catalogue, or a case cannot be read.
-    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<Selected>, Failure> {
+    pub fn select(&self, names: &[String], programs: &Programs) -> Result<Vec<GateCase>, Failure> {
         let known: Vec<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
             let known = known.join(", ");
             return Err(format!("no case {name} in the gate's rules, which have {known}").into());
         }
-        let named = |case: &&CaseRule| names.is_empty() || names.contains(&case.name);
-        self.cases.iter().filter(named).map(|rule| Self::find(rule, programs)).collect()
-    }
-
-    fn find(rule: &CaseRule, programs: &Programs) -> Result<Selected, Failure> {
-        let (path, absent) = match &rule.file {
-            Some(path) => (std::path::absolute(path)?, None),
-            None => {
-                let found = programs.paths.catalogue.named(&rule.name)?;
-                (found.path.clone(), found.absent.clone())
-            }
-        };
-        let engine = programs.engine.description();
-        // Only a geometry that has to be fetched may be missing.
-        let path = match absent {
-            Some(why) => Err(why),
-            None => engine.declines(&Case::read(&path)?).map_or(Ok(path), Err),
-        };
-        let (mut simulated, mut mpi) = (rule.ranks.clone(), rule.mpi.clone());
-        if engine.run.simulated.is_empty() {
-            mpi.extend(simulated.drain(..).filter(|ranks| !rule.mpi.contains(ranks)));
-        }
-        let no_mpi = if mpi.is_empty() { None } else { programs.engine.lacks_mpi() };
-        if no_mpi.is_some() {
-            mpi.clear();
-        }
-        Ok(Selected { rule: rule.clone(), path, simulated, mpi, no_mpi })
+        let named = |case: &&GateCase| names.is_empty() || names.contains(&case.name);
+        self.cases.iter().filter(named).map(|case| case.clone().find(programs)).collect()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::experiments::machine::digest_of_file;
 use crate::git;
 use contract::failure::Failure;
 use run::engine::description::Build;
-use run::engine::failure::{End, Failure as Ended};
+use run::engine::failure::Failure as Ended;
 use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use run::engine::templates::{Values, fill};
@@ -30,6 +30,9 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// The working tree, by name.
 const WORKING_TREE: &str = ".";
 
+/// What a layer measures of a program on a case.
+pub type Counted = Result<CaseMeasures, Ended>;
+
 /// A program under comparison.
 #[derive(Clone, Debug)]
 pub struct Subject {
@@ -38,7 +41,7 @@ pub struct Subject {
     /// Its name in the report.
     pub measured: Measured,
     /// Its counters and memory by case, of which each layer takes its own.
-    pub counted: RefCell<BTreeMap<String, Result<CaseMeasures, Ended>>>,
+    pub counted: RefCell<BTreeMap<String, Counted>>,
 }
 
 impl Subject {
@@ -104,94 +107,64 @@ impl Subject {
             let repository = repository.display();
             Failure::input(format!("{named} is neither a file nor a revision in {repository}"))
         })?;
-        let program = program(build, named, &revision, options)?;
+        let built = (named != WORKING_TREE).then_some(revision.as_str());
+        let program = program(build, built, repository)?;
         Ok(Self::new(engine.with_program(program), named.to_owned(), Some(revision)))
     }
 }
 
 /// Returns the program of a revision, built unless an earlier gate has kept it, or that of the repository's working tree.
-fn program(
-    build: &Build,
-    named: &str,
-    revision: &str,
-    options: &GateOptions,
-) -> Result<PathBuf, Failure> {
-    let is_working_tree = named == WORKING_TREE;
-    let cache = options.repository.join("target/gate");
-    let place = cache.join(if is_working_tree { "working-tree" } else { revision });
-    let tree = if is_working_tree { options.repository.clone() } else { place.join("tree") };
-    let [place, tree, target, shared] =
-        [&place, &tree, &place.join("build"), &cache.join("shared")].map(|path| absolute(path));
-    let (place, tree) = (place?, tree?);
-    let text = |path: PathBuf| path.to_string_lossy().into_owned();
-    let values = Values::from([
-        ("target", text(target?)),
-        ("shared", text(shared?)),
-        ("root", text(tree.clone())),
-    ]);
+fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<PathBuf, Failure> {
+    let cache = repository.join("target/gate");
+    let place = cache.join(revision.unwrap_or("working-tree"));
+    let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));
+    let mut values = Values::default();
+    for (name, path) in
+        [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)]
+    {
+        let made = fs::create_dir_all(&path).and_then(|()| fs::canonicalize(&path));
+        let made = made.map_err(|error| Failure::at(&path, error))?;
+        values.insert(name, made.to_string_lossy().into_owned());
+    }
+    let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    if is_working_tree {
-        return make(&words, &tree, &place, "the working tree", program);
+    let (done, command_line) = (place.join("built"), build.command.join("\n"));
+    let mut label = "the working tree";
+    if let Some(revision) = revision {
+        let is_built = fs::read_to_string(&done).is_ok_and(|with| with == command_line);
+        if is_built && program.is_file() {
+            return Ok(program);
+        }
+        unpack(revision, repository, tree, &place)?;
+        label = &revision[..12.min(revision.len())];
     }
-    let (done, command) = (place.join("built"), build.command.join("\n"));
-    if program.is_file() && fs::read_to_string(&done).is_ok_and(|with| with == command) {
-        return Ok(program);
-    }
-    unpack(revision, &options.repository, &tree)?;
-    let program = make(&words, &tree, &place, &revision[..12.min(revision.len())], program)?;
-    fs::write(&done, command).map_err(|error| Failure::at(&done, error))?;
-    Ok(program)
-}
-
-/// Builds a program and returns it; `label` is the revision, for messages. The output of the build is kept in `place`.
-fn make(
-    words: &[String],
-    tree: &Path,
-    place: &Path,
-    label: &str,
-    program: PathBuf,
-) -> Result<PathBuf, Failure> {
     crate::announce(&format!("harness gate: building {label}"));
     let (builder, arguments) =
         words.split_first().ok_or_else(|| Failure::input("an empty build command"))?;
     let mut command = Command::new(builder);
     command.args(arguments).current_dir(tree);
-    let built = process::run(&mut command, &Watch::new("build", LIMIT, place));
-    built.map_err(|failure| match failure.end {
-        End::Missing(_) => Failure::missing(failure),
-        _ => {
-            let log = place.join("build.stderr");
-            Failure::input(format!("{label}: {failure} (full output: {})", log.display()))
-        }
+    let built = process::run(&mut command, &Watch::new("build", LIMIT, &place));
+    built.map_err(|failure| {
+        let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
+        Failure { why, ..failure.into() }
     })?;
-    match program.is_file() {
-        true => Ok(program),
-        false => Err(Failure::input(format!(
-            "{label}: the build succeeded, but {} is missing: check [build] program",
-            program.display()
-        ))),
+    if !program.is_file() {
+        let program = program.display();
+        let why = "is missing: check [build] program";
+        return Err(Failure::input(format!("{label}: the build succeeded, but {program} {why}")));
     }
-}
-
-/// Returns the absolute path of a directory, after creating it if it is missing.
-fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    let created = fs::create_dir_all(path).and_then(|()| fs::canonicalize(path));
-    created.map_err(|error| Failure::at(path, error))
+    fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
+    Ok(program)
 }
 
 /// Puts a revision's files into a directory.
-fn unpack(revision: &str, repository: &Path, tree: &Path) -> Result<(), Failure> {
+fn unpack(revision: &str, repository: &Path, tree: &Path, place: &Path) -> Result<(), Failure> {
     let mut command = Command::new("sh");
     command.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
-    let output = command.arg(repository).arg(revision).arg(tree).output()?;
-    match output.status.success() {
-        true => Ok(()),
-        false => {
-            let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            Err(Failure::input(format!("{revision} cannot be unpacked: {error}")))
-        }
-    }
+    command.arg(repository).arg(revision).arg(tree);
+    process::run(&mut command, &Watch::new("git archive", LIMIT, place))?;
+    Ok(())
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

@@ -11,11 +11,10 @@ use super::Bench;
 use super::measures::LayerName;
 use super::numbers::prefix;
 use super::report::{GateFinding, Layer, Verdict};
-use super::rules::{Selected, TimeRules};
-use super::subject::Subject;
+use super::rules::{GateCase, TimeRules};
+use crate::emptied;
 use run::engine::failure::Failure;
 use run::engine::layout::{Layout, Ranks, RunOptions};
-use run::engine::runner::Engine;
 use statistics::comparison::{Comparison, Round, adjusted, compare, trimmed_mean};
 use statistics::random::Random;
 
@@ -43,15 +42,15 @@ struct Quantity {
 
 /// Compares the times of candidate and baseline.
 pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
-    let Some(Subject { engine: baseline, .. }) = &bench.baseline else {
+    if bench.baseline.is_none() {
         layer.left_out = Some("no baseline was given".to_owned());
         return;
-    };
+    }
     let rules = &bench.rules.time;
-    let mut measured: Vec<(&Selected, Ranks, [Quantity; 2])> = Vec::new();
+    let mut measured: Vec<(&GateCase, Ranks, [Quantity; 2])> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
         for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
-            match rounds(bench, baseline, case, ranks, false) {
+            match rounds(bench, case, ranks, false) {
                 Ok(times) => measured.push((case, ranks, times)),
                 Err(why) => layer.findings.extend(failed(case, ranks, &why)),
             }
@@ -68,7 +67,7 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
             layer.findings.extend(times.iter().map(|quantity| quantity.finding(rules)));
             continue;
         }
-        match rounds(bench, baseline, case, ranks, true) {
+        match rounds(bench, case, ranks, true) {
             Ok(again) => {
                 layer.findings.extend(times.into_iter().zip(again).map(|(first, again)| {
                     let last = if is_change(&first) { again.confirming(&first) } else { first };
@@ -80,32 +79,30 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
     }
 }
 
-/// The verdict on a case without times, and why: the baseline fails, or the candidate alone.
+/// Why a case has no times, and the verdict on that: the baseline fails, or the candidate alone.
 type NoTimes = (Verdict, Failure);
 
+/// The CPU times and the wall times of a case.
+type Times = Result<[Quantity; 2], NoTimes>;
+
 /// The finding about runs that failed; none if the user interrupted them.
-fn failed(case: &Selected, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
-    let (name, metric) = (&case.rule.name, format!("{}time", prefix(ranks)));
+fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
+    let (name, metric) = (&case.name, format!("{}time", prefix(ranks)));
     let who = if *verdict == Verdict::Missing { "baseline" } else { "candidate" };
     let note = || format!("the {who} has no result: {why}");
     (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, *verdict, note()))
 }
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
-fn rounds(
-    bench: &Bench,
-    baseline: &Engine,
-    case: &Selected,
-    ranks: Ranks,
-    again: bool,
-) -> Result<[Quantity; 2], NoTimes> {
+fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
+    let baseline = &bench.baseline.as_ref().expect("times are compared with a baseline").engine;
     let path = bench.prepare(baseline, case, "time").map_err(|why| (Verdict::Missing, why))?;
     let run = |index: usize| {
         let (engine, verdict) = match index {
             CANDIDATE => (&bench.candidate.engine, Verdict::Regression),
             _ => (baseline, Verdict::Missing),
         };
-        let place = bench.enter(engine, "time/run").map_err(|why| (verdict, why))?;
+        let place = emptied(bench.place.join("time/run"), engine).map_err(|why| (verdict, why))?;
         let options = RunOptions::new(&place, bench.options.limit());
         engine.run(&path, &Layout::on(ranks), &options).map_err(|why| (verdict, why))
     };
@@ -131,7 +128,7 @@ fn rounds(
         wall.push(times.map(|(_, wall_s)| f64::max(wall_s, 1e-6).ln()));
     }
     Ok([(CPU, cpu), (WALL, wall)].map(|(name, rounds): (&str, Vec<Round>)| {
-        let (case, metric) = (case.rule.name.clone(), format!("{}{name}", prefix(ranks)));
+        let (case, metric) = (case.name.clone(), format!("{}{name}", prefix(ranks)));
         let found = compare(&rounds, rules.alpha.sqrt(), seed);
         Quantity { case, metric, rounds, found, first: None }
     }))
@@ -177,7 +174,7 @@ impl Quantity {
                 "; a second measurement, which {answer} {first:+.1} % in the first"
             ));
         }
-        GateFinding::of_values(&self.case, &self.metric, verdict, self.times(), note)
+        GateFinding::noted(&self.case, &self.metric, verdict, note).of_values(self.times())
     }
 
     /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), and of the same

@@ -1,13 +1,15 @@
 //! Which checks a case fails: those of the definition or of the engine's promises on a serial run, and the comparison
 //! with the serial run on several ranks.
 
+use crate::emptied;
 use check::checks::{self, CheckResult, Outcome, Subject, identical};
 use check::promises::Independence;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
-use run::engine::failure::{self, End};
+use run::engine::description::Description;
+use run::engine::failure::{End, Failure as Ended};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
@@ -84,17 +86,6 @@ impl Probe {
         Ok(Self { engine, reference, limit, place })
     }
 
-    /// What must make the same mesh as the engine on these ranks, and its name; `None` if only promises are checked.
-    fn truth(&self, ranks: Ranks) -> Option<(&Engine, &'static str)> {
-        let promises = &self.engine.description().promises;
-        match ranks {
-            Ranks::Serial => promises.definition.then_some((&self.reference, "the reference")),
-            _ => promises
-                .is_independent_of(Independence::Ranks)
-                .then_some((&self.engine, "its serial run")),
-        }
-    }
-
     /// The checks of a trial, in order. A serial engine is compared with the reference if it promises the definition, and its own
     /// promises are checked if not. An engine on several ranks is compared with its own serial run: if both runs are wrong in the same
     /// way, the serial case is the simpler one to shrink. A case that both programs refuse fails none.
@@ -103,39 +94,47 @@ impl Probe {
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
     pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, Failure> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
-        let path = trial.case.write(self.place.path(), self.engine.description().takes.stl)?;
+        let Description { takes, promises, .. } = self.engine.description();
+        let path = trial.case.write(self.place.path(), takes.stl)?;
         let case = Case::read(&path)?;
         if let Some(why) = self.engine.description().declines(&case) {
             return Err(left_out(&why));
         }
-        let truth = match self.truth(trial.ranks) {
-            None => None,
-            Some((engine, name)) => {
-                let mesh = self.run(engine, &path, Ranks::Serial, "truth", false);
-                let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
-                Some(mesh.map_err(none)?)
-            }
+        let of_definition = promises.definition.then_some((&self.reference, "the reference"));
+        let independent = promises.is_independent_of(Independence::Ranks);
+        let (engine, ranks) = (&self.engine, trial.ranks);
+        let truth = match ranks {
+            Ranks::Serial => of_definition,
+            _ => independent.then_some((engine, "its serial run")),
         };
-        let mesh = match self.run(&self.engine, &path, trial.ranks, "engine", false) {
+        let truth = truth.map(|(engine, name)| {
+            let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
+            self.run(engine, &path, Ranks::Serial, false).map_err(none)
+        });
+        let truth = truth.transpose()?;
+        let mesh = match self.run(engine, &path, ranks, false) {
             Ok(mesh) => mesh,
-            Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, trial.ranks)?))]),
+            Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, ranks)?))]),
         };
         let subject = Subject::new(&case, &mesh);
         let results = match truth {
-            Some(truth) if trial.ranks != Ranks::Serial => {
+            Some(truth) if ranks != Ranks::Serial => {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
             Some(truth) => {
-                let base = self.run(&self.reference, &path, Ranks::Serial, "base", true);
+                let base = self.run(&self.reference, &path, Ranks::Serial, true);
                 let base = base.map_err(Failure::input)?;
                 checks::all(&subject.with_base(&base).with_reference(&truth))
             }
-            None => self.promised(&path, trial, subject)?,
+            None => self.promised(&path, ranks, subject)?,
         };
         let judged = |result: &CheckResult| match result.outcome() {
             Outcome::LeftOut { .. } => None,
             Outcome::Pass { .. } => Some((result.name, None)),
-            Outcome::Fail { .. } => Some((result.name, Some(failed_check(result, trial.ranks)))),
+            Outcome::Fail { why } => {
+                let sentence = format!("{ranks}: {}", why.replace('\n', "; "));
+                Some((result.name, Some(Fault::of(result.name, &sentence))))
+            }
         };
         let judged: Vec<Judged> = results.iter().filter_map(judged).collect();
         match judged.is_empty() {
@@ -148,14 +147,14 @@ impl Probe {
     fn promised(
         &self,
         path: &Path,
-        trial: &Trial,
+        ranks: Ranks,
         subject: Subject,
     ) -> Result<Vec<CheckResult>, Failure> {
         let promises = &self.engine.description().promises;
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
-        if promises.deterministic && trial.ranks == Ranks::Serial {
-            let again = self.run(&self.engine, path, trial.ranks, "again", false);
+        if promises.deterministic && ranks == Ranks::Serial {
+            let again = self.run(&self.engine, path, ranks, false);
             let again = again.map_err(Failure::input)?;
             let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
             let compared = identical::compare(&again.words, words, &subject.terms.root);
@@ -170,15 +169,9 @@ impl Probe {
         engine: &Engine,
         case: &Path,
         ranks: Ranks,
-        name: &str,
         ungraded: bool,
-    ) -> Result<LeafSet, failure::Failure> {
-        let place = self.place.path().join(name);
-        let _ = std::fs::remove_dir_all(&place);
-        std::fs::create_dir_all(&place).map_err(|error| {
-            let why = format!("has no directory {}: {error}", place.display());
-            failure::Failure::new(engine.name(), End::Missing(why))
-        })?;
+    ) -> Result<LeafSet, Ended> {
+        let place = emptied(self.place.path().join("run"), engine)?;
         let mesh = place.join("mesh");
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
@@ -188,7 +181,7 @@ impl Probe {
 }
 
 /// A run without a mesh as a failed check.
-fn failed_run(failure: failure::Failure, ranks: Ranks) -> Result<Fault, Failure> {
+fn failed_run(failure: Ended, ranks: Ranks) -> Result<Fault, Failure> {
     let end = match &failure.end {
         End::Missing(_) | End::Interrupted => return Err(Failure::input(failure)),
         End::TimedOut { .. } => "hangs".to_owned(),
@@ -209,15 +202,6 @@ fn place_in_source(error: &str) -> String {
     error.split_whitespace().find(is_place).unwrap_or_default().to_owned()
 }
 
-fn failed_check(result: &CheckResult, ranks: Ranks) -> Fault {
-    let first = result.findings.first().map_or("", |finding| finding.as_str());
-    let sentence = match result.findings_total {
-        1 => format!("{ranks}: {first}"),
-        count => format!("{ranks}: {count} findings, the first: {first}"),
-    };
-    Fault::of(result.name, &sentence)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,7 +210,7 @@ mod tests {
     fn a_panic_elsewhere_is_another_failure() {
         let failed = |error: &str| {
             let end = End::Exited { code: 70, error: error.to_owned() };
-            failed_run(failure::Failure::new("m", end), Ranks::Mpi(2)).unwrap()
+            failed_run(Ended::new("m", end), Ranks::Mpi(2)).unwrap()
         };
         let first = failed("m: panicked at src/tree.rs:12:40: | 7 points");
         assert!(first.is_same_as(&failed("m: panicked at src/tree.rs:12:40: | 9 points")));

@@ -70,12 +70,9 @@ fn with(trial: &Trial, key: &str, value: Option<Value>) -> Trial {
 fn depth(trial: Trial, fails: Fails) -> Trial {
     let mut smallest = trial;
     for levels in [4, 2, 1] {
-        loop {
-            let coarser = coarsened(&smallest, f64::from(1 << levels));
-            if coarser.as_ref().is_none_or(|coarser| !fails(coarser)) {
-                break;
-            }
-            smallest = coarser.unwrap_or(smallest);
+        let factor = f64::from(1 << levels);
+        while let Some(coarser) = coarsened(&smallest, factor).filter(|coarser| fails(coarser)) {
+            smallest = coarser;
         }
     }
     smallest

@@ -223,12 +223,12 @@ impl Study {
             row.name == *name || row.name == format!("{name}: {}", row.run[0])
         };
         let is_series = |series: &Series, name: &String| series.experiment.to_string() == *name;
-        for name in names {
-            let is_known = self.row.iter().any(|row| is_row(row, name))
-                || self.series.iter().any(|series| is_series(series, name));
-            if !is_known {
-                return Err(format!("no row and no experiment is called {name:?}"));
-            }
+        let is_known = |name: &&String| {
+            self.row.iter().any(|row| is_row(row, name))
+                || self.series.iter().any(|series| is_series(series, name))
+        };
+        if let Some(name) = names.iter().find(|name| !is_known(name)) {
+            return Err(format!("no row and no experiment is called {name:?}"));
         }
         if !names.is_empty() {
             self.row.retain(|row| names.iter().any(|name| is_row(row, name)));

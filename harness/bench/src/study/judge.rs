@@ -64,16 +64,11 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
-    let judged = match measured(study, row, lines) {
-        Ok((value, how, why)) => {
-            Judged { measured: Some((value, how)), ..unjudged(row, verdict(row, value), why) }
-        }
-        Err(why) => {
-            let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
-            let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
-            unjudged(row, verdict, failed.unwrap_or(why))
-        }
-    };
+    let judged = measured(study, row, lines).unwrap_or_else(|why| {
+        let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
+        let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
+        unjudged(row, verdict, failed.unwrap_or(why))
+    });
     check_invariants(&judged);
     judged
 }
@@ -105,19 +100,15 @@ fn verdict(row: &Row, value: f64) -> Verdict {
     // NaN is within no bounds.
     let is_within = row.at_least.is_none_or(|least| value >= least)
         && row.at_most.is_none_or(|most| value <= most);
-    match (row.at_least.is_some() || row.at_most.is_some(), is_within) {
-        (false, _) => Verdict::ForComparison,
-        (true, true) => Verdict::Met,
-        (true, false) => Verdict::Missed,
+    match () {
+        () if row.at_least.or(row.at_most).is_none() => Verdict::ForComparison,
+        () if is_within => Verdict::Met,
+        () => Verdict::Missed,
     }
 }
 
-/// Returns the row's value, how it was measured, and the reason for an efficiency above 1.
-fn measured(
-    study: &Study,
-    row: &Row,
-    lines: &[Line],
-) -> Result<(f64, &'static str, String), String> {
+/// Returns the row with its value, how it was measured, and the reason for an efficiency above 1.
+fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> {
     let groups = Groups::of(lines);
     let find = |name: &String| {
         let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
@@ -135,7 +126,8 @@ fn measured(
     };
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
-    Ok((value, how, why))
+    let measured = Some((value, how));
+    Ok(Judged { measured, ..unjudged(row, verdict(row, value), why) })
 }
 
 /// Returns the reason for which a run failed, if it did.
@@ -177,7 +169,7 @@ mod tests {
     use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{Comm, Failure, Machine, Session, Setup};
+    use crate::experiments::entry::{Comm, Machine, NoResult, Session, Setup};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -218,8 +210,8 @@ mod tests {
     }
 
     fn failed(ranks: usize) -> Line {
-        let (command, why) = (String::new(), "killed after 9 s".to_owned());
-        line(Entry::Failure(Failure { setup: setup(ranks), command, why }))
+        let why = "killed after 9 s".to_owned();
+        line(Entry::Failure(NoResult { setup: setup(ranks), why }))
     }
 
     #[test]
@@ -244,13 +236,7 @@ mod tests {
             (run.setup.engine, run.program) = (engine.to_owned(), program.to_owned());
             line(Entry::Run(Box::new(run)))
         };
-        let opened = line(Entry::Session(Box::new(Session {
-            command: Vec::new(),
-            machine: Machine::default(),
-            nodes: String::new(),
-            load_average: 0.0,
-            lacks: Default::default(),
-        })));
+        let opened = line(Entry::Session(Box::default()));
         let (old, new, other) = (ran_by("a", "1"), ran_by("a", "2"), ran_by("b", "3"));
         let kept = of_last_origin(&[opened.clone(), other.clone(), old, new.clone()]);
         assert_eq!(kept, [opened, other, new]);
@@ -261,9 +247,7 @@ mod tests {
         let targets = read(FILE).unwrap();
         let session = |name: &str, cpu: &str| {
             let machine = Machine { cpu: cpu.into(), ..Machine::default() };
-            let (command, lacks) = (Vec::new(), Default::default());
-            let session =
-                Session { command, machine, nodes: String::new(), load_average: 0.0, lacks };
+            let session = Session { machine, ..Session::default() };
             Line { session: name.into(), ..line(Entry::Session(Box::new(session))) }
         };
         let of = |name: &str, run: Line| Line { session: name.into(), ..run };

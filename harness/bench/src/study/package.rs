@@ -4,8 +4,7 @@ use super::Study;
 use contract::catalogue::Catalogue;
 use contract::failure::Failure;
 use contract::files::{self, read_text, write_atomically};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Table, Value};
 
 /// Name of the study's file in the directory.
@@ -18,9 +17,6 @@ pub const STUDY: &str = "study.toml";
 pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Failure> {
     let directory = Study::read(study)?.directory;
     let mut table = read(study)?;
-    let mut package = Package { out, copied: BTreeMap::new() };
-    // No case may have the name of the study.
-    package.copied.insert(STUDY.into(), canonical(study)?);
     for (key, value) in &mut table {
         let with_cases: Vec<&mut Value> = match (key.as_str(), value) {
             ("mesh", Value::Table(meshes)) => meshes.iter_mut().map(|(_, mesh)| mesh).collect(),
@@ -28,10 +24,23 @@ pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Fa
             _ => Vec::new(),
         };
         for value in with_cases {
-            package.case_of(value, &directory, catalogue)?;
+            let Some(Value::String(case)) = value.get_mut("case") else { continue };
+            let path = catalogue.case_file(case, &directory)?;
+            *case = file_name(&path);
+            let mut of_case = read(&path)?;
+            if let Some(Value::String(geometry)) = of_case.get_mut("geometry") {
+                let body = path.with_file_name(&*geometry);
+                *geometry = file_name(&body);
+                copy(&body, &out.join(&*geometry))?;
+            }
+            put(&out.join(&*case), of_case.to_string().as_bytes())?;
         }
     }
     put(&out.join(STUDY), table.to_string().as_bytes())
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn read(path: &Path) -> Result<Table, Failure> {
@@ -39,69 +48,23 @@ fn read(path: &Path) -> Result<Table, Failure> {
     text.parse().map_err(|error: toml::de::Error| Failure::input(error).of_file(path))
 }
 
-fn canonical(path: &Path) -> Result<PathBuf, Failure> {
-    path.canonicalize().map_err(|error| Failure::at(path, error))
-}
-
 /// Copies a file, which must be no pipe: it would be waited for.
 ///
 /// # Errors
-/// If it cannot be read or written.
+/// If it cannot be read or written, or the place has another file.
 pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     let bytes = files::read(from).map_err(|error| Failure::at(from, error))?;
     put(to, &bytes)
 }
 
+/// Writes a file unless it is there.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    match std::fs::read(path) {
+        Ok(before) if before == bytes => return Ok(()),
+        Ok(_) => return Err(Failure::about(path, "two files have this name: rename one")),
+        Err(_) => {}
+    }
     write_atomically(path, |out| out.write_all(bytes)).map_err(|error| Failure::at(path, error))
-}
-
-struct Package<'a> {
-    out: &'a Path,
-    /// The files, by their names in the directory.
-    copied: BTreeMap<PathBuf, PathBuf>,
-}
-
-impl Package<'_> {
-    /// Copies the case of a mesh or of a series, and replaces its name.
-    fn case_of(
-        &mut self,
-        value: &mut Value,
-        directory: &Path,
-        catalogue: &Catalogue,
-    ) -> Result<(), Failure> {
-        let Some(Value::String(case)) = value.get_mut("case") else { return Ok(()) };
-        let path = catalogue.case_file(case, directory)?;
-        let (name, is_new) = self.place(&path)?;
-        *case = name.display().to_string();
-        if !is_new {
-            return Ok(());
-        }
-        let mut table = read(&path)?;
-        if let Some(Value::String(geometry)) = table.get_mut("geometry") {
-            let body = path.parent().unwrap_or(Path::new(".")).join(&*geometry);
-            let (name, is_new) = self.place(&body)?;
-            *geometry = name.display().to_string();
-            if is_new {
-                copy(&body, &self.out.join(name))?;
-            }
-        }
-        put(&self.out.join(name), table.to_string().as_bytes())
-    }
-
-    /// The name of a file in the directory, and whether it has not been copied yet.
-    fn place(&mut self, path: &Path) -> Result<(PathBuf, bool), Failure> {
-        let name = PathBuf::from(path.file_name().unwrap_or_default());
-        let path = canonical(path)?;
-        match self.copied.insert(name.clone(), path.clone()) {
-            Some(other) if other != path => Err(Failure::input(format!(
-                "{} and {} have one name: rename one",
-                other.display(),
-                path.display()
-            ))),
-            before => Ok((name, before.is_none())),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -141,15 +104,21 @@ mod tests {
     #[test]
     fn two_files_of_one_name_are_refused() {
         let place = tempfile::tempdir().unwrap();
-        let mut package = Package { out: place.path(), copied: BTreeMap::new() };
-        for (directory, is_new) in [("a", true), ("a", false)] {
-            let path = place.path().join(directory).join("b");
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(&path, "").unwrap();
-            assert_eq!(package.place(&path).unwrap().1, is_new);
+        let at = |name: &str| place.path().join(name);
+        for directory in ["a", "b", "out"] {
+            fs::create_dir(at(directory)).unwrap();
         }
-        fs::create_dir(place.path().join("c")).unwrap();
-        fs::write(place.path().join("c/b"), "").unwrap();
-        assert!(package.place(&place.path().join("c/b")).unwrap_err().why.contains("rename one"));
+        fs::write(at("a/ball.toml"), "spacing_min = 0.1\n").unwrap();
+        fs::write(at("b/ball.toml"), "spacing_min = 0.2\n").unwrap();
+        let package = |second: &str| {
+            let mesh =
+                |name: &str, case: &str| format!("[mesh.{name}]\ncase = '{case}/ball.toml'\n");
+            let series = "[[series]]\nexperiment = 'strong'\ncase = 'a/ball.toml'\n";
+            let text = series.to_owned() + &mesh("one", "a") + &mesh("two", second);
+            fs::write(at("s.toml"), text).unwrap();
+            package(&at("s.toml"), &Catalogue::new(at("none.toml")), &at("out"))
+        };
+        assert_eq!(package("a"), Ok(()));
+        assert!(package("b").unwrap_err().why.contains("rename one"));
     }
 }

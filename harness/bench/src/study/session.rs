@@ -7,10 +7,10 @@ use super::file::{Experiment, Row, Series, Study};
 use super::judge::{Judged, Verdict, judge, unjudged};
 use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    Comm, Entry, Failure as Failed, LeftOut, Line, Network, Run, Session as Opening, Setup,
+    Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup,
 };
 use crate::experiments::execute::Runner;
-use crate::experiments::group::another_mesh;
+use crate::experiments::group::{Digests, another_mesh};
 use crate::experiments::record::now_utc;
 use crate::experiments::{feasible, machine, network};
 use crate::jsonl;
@@ -21,7 +21,7 @@ use run::engine::interrupt;
 use run::engine::launcher::Launcher;
 use run::engine::programs::Programs;
 use run::verify::options::whole_seconds;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -51,6 +51,9 @@ impl SessionOptions {
         self.repeat.map_or(of_file, usize::from)
     }
 }
+
+/// Why a row on MPI is left out without a launcher.
+const NO_LAUNCHER: &str = "the launcher is missing";
 
 /// A run to be repeated.
 struct Planned {
@@ -106,7 +109,7 @@ pub fn measure(
         lines: Vec::new(),
         bases: BTreeMap::new(),
         sizes: BTreeMap::new(),
-        digests: HashMap::new(),
+        digests: Digests::new(),
         made: BTreeSet::new(),
         warm: BTreeSet::new(),
     };
@@ -119,10 +122,8 @@ pub fn measure(
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, Verdict::LeftOut, "interrupted".to_owned())));
-    let needs_mpi = |row: &Row| study.runs_of(row).any(|name| study.run[name].comm == Comm::Mpi);
-    let is_missing = !options.no_mpi && session.mpi_left_out().is_some();
     let program = launcher.program();
-    let missing = (is_missing && study.row.iter().any(needs_mpi))
+    let missing = (rows.iter().any(|row| row.why == NO_LAUNCHER))
         .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
@@ -142,7 +143,7 @@ struct Session<'a> {
     /// The known sizes of meshes, by case and n.
     sizes: BTreeMap<(String, u32), Sizes>,
     /// Digests of the meshes.
-    digests: HashMap<String, String>,
+    digests: Digests,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
@@ -156,10 +157,7 @@ impl Session<'_> {
         let study = self.study;
         for series in &study.series {
             for cells in series.sizes() {
-                let mut points = Vec::new();
-                for engine in &series.engines {
-                    points.extend(self.of_series(series, engine, cells)?);
-                }
+                let mut points = self.of_series(series, cells)?;
                 self.make(&mut points)?;
             }
         }
@@ -181,10 +179,7 @@ impl Session<'_> {
         let programs = self.runner.programs;
         let catalogue = programs.paths.catalogue.path();
         let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
-        let lacks = |engine: String| {
-            let lacks = programs.labelled(&engine).description().lacks();
-            (engine, lacks)
-        };
+        let lacks = |name: String| (name.clone(), programs.labelled(&name).description().lacks());
         let opening = Opening {
             command: std::env::args().collect(),
             machine: machine::describe(&self.runner.launcher.program(), repository),
@@ -205,88 +200,61 @@ impl Session<'_> {
     /// Leaves a run out, with the reason.
     fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
         (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
-        self.append(Entry::LeftOut(LeftOut { setup, why }))
+        self.append(Entry::LeftOut(NoResult { setup, why }))
     }
 
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
         match self.options.no_mpi {
             true => Some("--no-mpi was given"),
-            false => (!self.options.launcher.is_found()).then_some("the launcher is missing"),
+            false => (!self.options.launcher.is_found()).then_some(NO_LAUNCHER),
         }
     }
 
-    /// Plans the runs of a series by one engine at one size, and leaves out those that the engine declines.
-    fn of_series(
-        &mut self,
-        series: &Series,
-        engine: &str,
-        cells: Option<f64>,
-    ) -> Result<Vec<Planned>, Failure> {
-        let description = self.runner.programs.labelled(engine).description();
-        let layouts = series.layouts(description, self.mpi_left_out().is_some());
-        if layouts.is_empty() {
-            let experiment = series.experiment;
-            (self.progress)(&format!("{engine} cannot run the series {experiment}"));
-        }
-        let has_several_meshes = matches!(
-            series.experiment,
-            Experiment::Weak | Experiment::Spacing | Experiment::Layers
-        );
+    /// Plans the runs of a series at one size.
+    fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>, Failure> {
+        use Experiment::{Spacing, Strong, Weak, Weights};
+        let experiment = series.experiment;
         let base = self.base(&series.case)?;
         let of_case = [base.layer_cells_min];
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
-        for (&n, &(comm, ranks)) in layers.iter().flat_map(|n| layouts.iter().map(move |l| (n, l)))
-        {
-            for spacing in self.spacings(series, &base, cells, ranks)? {
-                let case = base.write(spacing, n, false)?;
-                let declined = description.declines(&Case::read(&case)?);
-                for (weights, partitioner) in series.choices() {
-                    let setup = Setup {
-                        experiment: series.experiment.to_string(),
-                        engine: engine.to_owned(),
+        for engine in &series.engines {
+            let description = self.runner.programs.labelled(engine).description();
+            let layouts = series.layouts(description, self.mpi_left_out().is_some());
+            if layouts.is_empty() {
+                (self.progress)(&format!("{engine} cannot run the series {experiment}"));
+            }
+            let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
+            for (n, (comm, ranks)) in all {
+                let target = cells.map(|n| if experiment == Weak { n * ranks as f64 } else { n });
+                let finest = match target {
+                    None => base.spacing_min,
+                    Some(target) => self.spacing(&base, base.layer_cells_min, target)?,
+                };
+                // Coarser by factors of two, while there are enough cells to measure.
+                let target = target.filter(|_| experiment == Spacing).unwrap_or_default();
+                let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
+                for spacing in (0..=halvings).rev().map(|k| finest * 2f64.powi(k)) {
+                    let of_mesh = Setup {
+                        experiment: experiment.to_string(),
+                        engine: engine.clone(),
                         ranks,
                         comm,
-                        weights: (*weights).to_owned(),
-                        partitioner: (*partitioner).to_owned(),
-                        series_cells: cells.filter(|_| has_several_meshes),
+                        series_cells: cells.filter(|_| !matches!(experiment, Strong | Weights)),
                         ..Setup::serial(&base.name, spacing, n)
                     };
-                    match &declined {
-                        Some(why) => self.leave_out(setup, why.clone())?,
-                        None => points.push(Planned {
-                            setup,
-                            case: case.clone(),
-                            repeats: self.options.repeats(series.repeats),
-                            warm_up: true,
-                            failed: false,
-                        }),
-                    }
+                    let case = base.write(spacing, n, false)?;
+                    points.extend(series.choices().iter().map(|(weights, partitioner)| {
+                        let [weights, partitioner] = [*weights, *partitioner].map(str::to_owned);
+                        let setup = Setup { weights, partitioner, ..of_mesh.clone() };
+                        let repeats = self.options.repeats(series.repeats);
+                        Planned { setup, case: case.clone(), repeats, warm_up: true, failed: false }
+                    }));
                 }
             }
         }
         Ok(points)
-    }
-
-    /// Returns the spacings of the meshes of a series for a number of ranks.
-    fn spacings(
-        &mut self,
-        series: &Series,
-        base: &Base,
-        cells: Option<f64>,
-        ranks: usize,
-    ) -> Result<Vec<f64>, Failure> {
-        let Some(cells) = cells else { return Ok(vec![base.spacing_min]) };
-        let is_weak = series.experiment == Experiment::Weak;
-        let target = if is_weak { cells * ranks as f64 } else { cells };
-        let finest = self.spacing(base, base.layer_cells_min, target)?;
-        if series.experiment != Experiment::Spacing {
-            return Ok(vec![finest]);
-        }
-        // Coarser by factors of two, while there are enough cells to measure.
-        let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
-        Ok((0..=halvings).rev().map(|k| finest * 2f64.powi(k)).collect())
     }
 
     /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
@@ -295,7 +263,7 @@ impl Session<'_> {
         sizes.spacing(cells, base.coarse(), |spacing| {
             let case = base.write(spacing, n, false)?;
             let setup = Setup::serial(&base.name, spacing, n);
-            self.runner.run(&setup, &case, 0, true).map(|run| run.cells)
+            self.runner.run(&setup, &case, None).map(|run| run.cells)
         })
     }
 
@@ -357,8 +325,8 @@ impl Session<'_> {
         Ok(judge(study, row, &self.lines))
     }
 
-    /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that would exceed
-    /// the time or the memory is not run on that mesh.
+    /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
+    /// a mesh, or would exceed the time or the memory, is not run on it.
     fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
         let is_known = self.lines.iter().any(|line| matches!(line.entry, Entry::Network(_)));
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
@@ -366,21 +334,24 @@ impl Session<'_> {
         }
         for index in 0..points.len() {
             let (mesh, setup) = (points[index].mesh(), points[index].setup.clone());
-            let may_warm_up = points[index].warm_up && !points[index].failed;
-            if !may_warm_up || !self.warm.insert(mesh.clone()) {
+            if !points[index].warm_up || points[index].failed {
                 continue;
             }
-            match feasible::excess(&self.lines, &setup, self.runner.limit) {
-                None => self.run(&mut points[index], 0, true)?,
+            let engine = self.runner.programs.labelled(&setup.engine).description();
+            let declined = engine.declines(&Case::read(&mesh.1)?);
+            let excess = || feasible::excess(&self.lines, &setup, self.runner.limit);
+            match declined.or_else(excess) {
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
                     self.leave_out(setup, why)?;
                 }
+                None if self.warm.insert(mesh) => self.run(&mut points[index], None)?,
+                None => {}
             }
         }
         for repeat in 0..points.iter().map(|p| p.repeats).max().unwrap_or(0) {
             for point in points.iter_mut().filter(|p| repeat < p.repeats && !p.failed) {
-                self.run(point, repeat, false)?;
+                self.run(point, Some(repeat))?;
             }
         }
         Ok(())
@@ -397,11 +368,11 @@ impl Session<'_> {
     }
 
     /// Runs a point and records the result.
-    fn run(&mut self, point: &mut Planned, repeat: usize, warm_up: bool) -> Result<(), Failure> {
+    fn run(&mut self, point: &mut Planned, repeat: Option<usize>) -> Result<(), Failure> {
         let s = &point.setup;
-        let which = if warm_up { "warm-up".to_owned() } else { format!("repeat {}", repeat + 1) };
+        let which = repeat.map_or("warm-up".to_owned(), |number| format!("repeat {}", number + 1));
         (self.progress)(&format!("{s}, {which}"));
-        let run = self.runner.run(s, &point.case, repeat, warm_up);
+        let run = self.runner.run(s, &point.case, repeat);
         match run.and_then(|run| self.check_mesh(point, &run).map(|()| run)) {
             Ok(run) => self.append(Entry::Run(Box::new(run))),
             Err(failure) if failure.is_interrupt() => Err(failure),
@@ -409,8 +380,7 @@ impl Session<'_> {
                 (self.progress)(&format!("failed: {why}"));
                 point.failed = true;
                 let setup = point.setup.clone();
-                let command = format!("{} on {} ranks", setup.engine, setup.ranks);
-                self.append(Entry::Failure(Failed { setup, command, why }))
+                self.append(Entry::Failure(NoResult { setup, why }))
             }
         }
     }
@@ -423,7 +393,7 @@ impl Session<'_> {
         if run.warm_up && engine.name() != "mesher" && promises.definition {
             let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
             // Whether the mesher can be run is not a property of this engine.
-            let expected = self.runner.run(&setup, &point.case, 0, true);
+            let expected = self.runner.run(&setup, &point.case, None);
             if let Some(expected) = expected.ok().filter(|other| other.digest != run.digest) {
                 let (digest, of_definition) = (&run.digest, expected.digest);
                 return Err(Failure::input(format!(

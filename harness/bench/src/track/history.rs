@@ -17,14 +17,14 @@
 use super::unit;
 use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
-use crate::gate::report::GateReport;
+use crate::gate::report::{GateFinding, GateReport};
 use crate::gate::time::{CPU, WALL};
 use crate::git;
 use crate::jsonl::{self, Line};
 use crate::order::Origins;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -102,35 +102,29 @@ impl Record {
     /// One sentence, if it is neither.
     pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
         let measures = Measures::parse(text)?;
+        let apart = |has: String| {
+            Err(format!("it {has} than the values before it: append it by a command of its own"))
+        };
         if !self.machine.is_empty() && self.machine != measures.machine {
-            return Err(format!(
-                "it is of another machine ({}) than the values before it: append it by a command of its own",
-                measures.machine
-            ));
+            return apart(format!("is of another machine ({})", measures.machine));
         }
-        self.machine.clone_from(&measures.machine);
-        for (case, measures) in &measures.cases {
+        self.machine = measures.machine;
+        for (case, measures) in measures.cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
-            if let Some(digest) = geometry {
-                let before = self.geometries.insert(case.clone(), digest.clone());
-                if before.is_some_and(|before| before != *digest) {
-                    return Err(format!(
-                        "its {case} has other facets than that of the values before it: append it by a command of its own"
-                    ));
-                }
+            if let Some(digest) = geometry
+                && *self.geometries.entry(case.clone()).or_insert_with(|| digest.clone()) != digest
+            {
+                return apart(format!("has other facets of {case}"));
             }
-            for (metric, value) in exact.iter().chain(memory).chain(counted) {
-                self.metrics.insert(format!("{case}/{metric}"), *value as f64);
-            }
+            let numbers = exact.into_iter().chain(memory).chain(counted);
+            let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
+            self.metrics.extend(numbers.map(named));
         }
-        if let Ok(report) = serde_json::from_slice::<GateReport>(text) {
-            let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
-            for finding in times.flat_map(|layer| &layer.findings) {
-                let name = finding.metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
-                if let Some(seconds) = finding.candidate {
-                    self.metrics.insert(format!("{}/{name}", finding.case), seconds);
-                }
-            }
+        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(()) };
+        let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
+        for GateFinding { case, metric, candidate, .. } in times.flat_map(|layer| &layer.findings) {
+            let metric = metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
+            self.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
         }
         Ok(())
     }
@@ -167,7 +161,6 @@ fn is_of_machine(name: &str) -> bool {
 /// Returns one record for every commit.
 fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
-    let mut index: HashMap<String, usize> = HashMap::new();
     let (mut machines, mut geometries) = (Origins::default(), Origins::default());
     let mut records: Vec<(Timestamp, Record)> = Vec::new();
     for Line { number, is_finished, content } in lines {
@@ -198,9 +191,8 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             (name, value)
         };
         record.metrics = record.metrics.into_iter().map(named).collect();
-        match index.get(&record.commit) {
-            Some(&same) => {
-                let (_, same) = &mut records[same];
+        match records.iter_mut().find(|(_, same)| same.commit == record.commit) {
+            Some((_, same)) => {
                 same.metrics.extend(record.metrics);
                 same.accepted |= record.accepted;
             }
@@ -209,7 +201,6 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
                     "" => records.last().map_or(Timestamp::MIN, |(time, _)| *time),
                     time => time.parse().map_err(|why| wrong(format!("time: {why}")))?,
                 };
-                index.insert(record.commit.clone(), records.len());
                 records.push((time, record));
             }
         }

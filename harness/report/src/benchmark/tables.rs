@@ -2,7 +2,7 @@
 
 use super::groups::{Subject, is_summarised};
 use crate::table::Table;
-use bench::experiments::entry::Comm;
+use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, above_one, phase_s};
@@ -130,11 +130,11 @@ fn phases(group: &Group) -> Table {
 
 /// Several programs on one core, the meshes that are missing, and what the programs do not provide.
 fn programs(comparison: &Comparison) -> Table {
-    let groups: Vec<&Group> = comparison.programs.iter().flat_map(|p| p.1.clone()).collect();
+    let Setup { case, layer_cells_min, .. } = &comparison.groups[0].setup;
     let cpu_s = |g: &Group| g.cpu_s().map_or(f64::NAN, |time| time.value);
     let table = Table::of(
-        format!("programs on one core: {}, n = {}", comparison.case, comparison.layer_cells_min),
-        &groups,
+        format!("programs on one core: {case}, n = {layer_cells_min}"),
+        &comparison.groups,
         &[
             ("engine", &|g| match g.setup.comm {
                 Comm::Mpi => format!("{} with mpirun", g.setup.engine),
@@ -155,7 +155,7 @@ fn programs(comparison: &Comparison) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Entry, LeftOut, Line, Machine, Session, Setup};
+    use bench::experiments::entry::{Entry, Line, NoResult, Session};
     use bench::testing::{line, run};
 
     #[test]
@@ -188,15 +188,9 @@ mod tests {
     #[test]
     fn programs_are_compared_and_what_they_cannot_do_is_stated() {
         let lacks = [("slow".to_owned(), vec!["layers".to_owned(), "MPI".to_owned()])];
-        let session = Session {
-            command: Vec::new(),
-            machine: Machine::default(),
-            nodes: String::new(),
-            load_average: 0.0,
-            lacks: lacks.into(),
-        };
+        let session = Session { lacks: lacks.into(), ..Session::default() };
         let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
-        let left = LeftOut {
+        let left = NoResult {
             setup: Setup { engine: "slow".into(), spacing_min: 0.05, ..setup },
             why: "slow would take 9 s".into(),
         };
