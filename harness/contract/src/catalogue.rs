@@ -52,12 +52,6 @@ struct CatalogueFile {
     case: Vec<Selected>,
 }
 
-/// The one key of a case file that the catalogue reads.
-#[derive(Debug, Deserialize)]
-struct Geometry {
-    geometry: Option<PathBuf>,
-}
-
 impl Catalogue {
     /// The catalogue in this file, which is not opened yet.
     pub fn new(path: PathBuf) -> Self {
@@ -179,13 +173,11 @@ fn read(path: &Path) -> Result<Vec<Selected>, String> {
 /// when the case is used.
 fn missing_geometry(case: &Path) -> Option<String> {
     let text = files::read_text(case).ok()?;
-    let geometry = toml::from_str::<Geometry>(&text).ok()?.geometry?;
-    let exists = case.parent()?.join(&geometry).exists();
+    let table = text.parse::<toml::Table>().ok()?;
+    let geometry = table.get("geometry")?.as_str()?;
+    let exists = case.parent()?.join(geometry).exists();
     (!exists).then(|| {
-        format!(
-            "{} is missing; ci/setup --geometries fetches it if it can be fetched",
-            geometry.display()
-        )
+        format!("{geometry} is missing; ci/setup --geometries fetches it if it can be fetched")
     })
 }
 

@@ -65,8 +65,7 @@ impl TreeFile {
         }
         let described = levels.last().map_or(0, |last| last.start);
         let split = Bits::read(&file, &file.split, described)?;
-        let masked = file.masked.as_ref().map(|array| Bits::read(&file, array, end)).transpose()?;
-        let masked = masked.unwrap_or_default();
+        let masked = Bits::read(&file, &file.masked, end)?;
         if !split.are_disjoint(&masked) {
             return Err(TreeError::Damaged("a node is masked and split".to_owned()));
         }
@@ -175,9 +174,9 @@ impl Walk<'_> {
 
 /// The bits of an array, all in memory: an eighth of a byte for each node in a chunk that is stored. The first bit of a byte is the most
 /// significant one.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Bits {
-    /// The chunks; empty without set bits.
+    /// The chunks; one without set bits is empty.
     chunks: Vec<Vec<u8>>,
     /// Bytes of a chunk.
     chunk_bytes: u64,
@@ -212,8 +211,7 @@ impl Bits {
     }
 
     fn byte(&self, at: u64) -> u8 {
-        let Some(chunk) = at.checked_div(self.chunk_bytes) else { return 0 };
-        let chunk = self.chunks.get(chunk as usize);
+        let chunk = self.chunks.get((at / self.chunk_bytes) as usize);
         let byte = chunk.and_then(|chunk| chunk.get((at % self.chunk_bytes) as usize));
         byte.copied().unwrap_or(0)
     }

@@ -256,16 +256,13 @@ impl Mesh {
         }
     }
 
-    /// Whether the rank of each leaf is known: words have a file for each rank, and a tree has none.
-    pub fn has_ranks(&self) -> bool {
-        self.tree_file.is_none()
-    }
-
-    /// The error of a request that needs them.
-    pub fn ranks_unknown(&self) -> Failure {
-        Failure::input(
-            "the ranks of a mesh that has only a tree are unknown: mesh with --write words",
-        )
+    /// Makes sure that the rank of each leaf is known: words have a file for each rank, and a tree has none.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn require_ranks(&self) -> Result<(), Failure> {
+        let why = "the ranks of a mesh that has only a tree are unknown: mesh with --write words";
+        if self.tree_file.is_none() { Ok(()) } else { Err(Failure::input(why)) }
     }
 }
 

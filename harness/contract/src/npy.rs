@@ -30,7 +30,7 @@ impl PartFile {
         let file = ::files::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head).map_err(unreadable)?;
-        let (Header { descr, shape }, offset) =
+        let (descr, shape, offset) =
             read_header(&head).map_err(|why| wrong(format!("has no npy header: {why}")))?;
         if descr == ">u8" {
             let why = "has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'";
@@ -86,22 +86,10 @@ impl PartFile {
     }
 }
 
-/// What an npy header states of an array.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Header {
-    /// Its type.
-    pub descr: String,
-    /// Its dimensions.
-    pub shape: Vec<u64>,
-}
-
-/// The npy header at the beginning of a file, and its length. It is read as NumPy writes it: a dictionary of Python, with its keys in
+/// The type and the dimensions in the npy header at the beginning of a file, and the header's length. It is read as NumPy writes it: a dictionary of Python, with its keys in
 /// alphabetical order.
-///
-/// # Errors
-/// If there is none, or if it is longer than the file.
-pub fn read_header(head: &[u8]) -> std::io::Result<(Header, u64)> {
-    let wrong = |why: &str| std::io::Error::other(why);
+fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), String> {
+    let wrong = |why: &str| why.to_owned();
     let [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, low, high, ..] = *head else {
         return Err(wrong("it is too short, or not of version 1"));
     };
@@ -117,7 +105,7 @@ pub fn read_header(head: &[u8]) -> std::io::Result<(Header, u64)> {
     let dimensions = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
     let shape = dimensions.map(|n| n.parse().map_err(|_| wrong("its shape is not of numbers")));
     let descr = descr.trim_matches('\'').to_owned();
-    Ok((Header { descr, shape: shape.collect::<Result<_, _>>()? }, end as u64))
+    Ok((descr, shape.collect::<Result<_, _>>()?, end as u64))
 }
 
 /// Writes words as a part file.

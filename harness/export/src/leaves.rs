@@ -10,18 +10,15 @@
 //!
 //! Invariants: words ascend and do not overlap; cells are numbered from 0 in this order, without the leaves that are [`CUT`].
 
-use crate::options::Options;
+use crate::options::{Export, Options};
 use crate::points::Point;
-use crate::selection::Selection;
 use contract::failure::Failure;
-use contract::mesh::{Leaf, Mesh};
+use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant};
 use contract::word;
 
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
-/// Number of cells that can be distinguished.
-const CELLS_MAX: u64 = u32::MAX as u64;
 
 /// The leaves.
 #[derive(Debug, Default)]
@@ -58,38 +55,31 @@ impl Leaves {
     /// The leaves of a mesh that `takes` accepts, given each and whether it is selected; those that are not selected are [`CUT`].
     ///
     /// # Errors
-    /// If the mesh cannot be read, if there are too many cells, or if the user interrupts.
+    /// If the mesh cannot be read, or if the user interrupts.
     pub fn read(
-        mesh: &Mesh,
-        selection: &Selection,
-        options: &Options<'_>,
+        export: &Export<'_>,
         takes: &mut dyn FnMut(&Leaf, bool) -> bool,
     ) -> Result<Self, Failure> {
-        let (mut words, mut cells) = (Vec::new(), 0);
-        mesh.leaves(&|| options.check(), &mut |leaf| {
-            let is_selected = selection.has(&leaf);
+        let mut words = Vec::new();
+        export.mesh.leaves(&|| export.options.check(), &mut |leaf| {
+            let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
-                cells += u64::from(is_selected);
                 let Octant { corner, level } = leaf.octant;
                 let side = if is_selected { leaf.side as u64 } else { CUT };
                 words.push(word::key_of(corner) << 7 | u64::from(level) << 2 | side);
             }
-            match cells {
-                ..=CELLS_MAX => Ok(()),
-                _ => Err(Failure::input(format!(
-                    "more than {CELLS_MAX} cells, which is the limit here: select fewer leaves"
-                ))),
-            }
+            Ok(())
         })?;
         Ok(Self::new(words))
     }
 
-    /// Leaves with these words, of which there are at most [`CELLS_MAX`].
+    /// Leaves with these words.
     pub fn new(words: Vec<u64>) -> Self {
-        let mut cells = 0;
+        let mut cells = 0u32;
         let number = |word: &u64| {
             let number = cells;
-            cells += u32::from(word & 3 != CUT);
+            // So many cells would take hundreds of gigabytes.
+            cells = cells.checked_add(u32::from(word & 3 != CUT)).expect("fewer than 2^32 cells");
             number
         };
         let numbers = words.iter().map(number).collect();

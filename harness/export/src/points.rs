@@ -14,10 +14,11 @@ pub struct Points {
 }
 
 impl Points {
-    /// Returns the number of a point, which is added if it is new. There are fewer than 2^32.
+    /// Returns the number of a point, which is added if it is new. 2^32 points, which would take far more than 100 GB, are a panic.
     pub fn add(&mut self, point: Point) -> u32 {
-        let number = *self.numbers.entry(point).or_insert(self.all.len() as u32);
-        if number as usize == self.all.len() {
+        let next = u32::try_from(self.all.len()).expect("fewer than 2^32 points");
+        let number = *self.numbers.entry(point).or_insert(next);
+        if number == next {
             self.all.push(point);
         }
         number

@@ -74,22 +74,6 @@ impl Selection {
         mesh.leaves(check, &mut |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) })
     }
 
-    /// Number of selected leaves of a mesh, which is not 0.
-    ///
-    /// # Errors
-    /// As [`Mesh::leaves`], and if no leaf is selected.
-    pub(crate) fn count(&self, mesh: &Mesh, check: Check<'_>) -> Result<u64, Failure> {
-        let mut leaves = 0;
-        match *self == Self::default() {
-            true => leaves = mesh.len(),
-            false => self.visit(mesh, check, &mut |_| {
-                leaves += 1;
-                Ok(())
-            })?,
-        }
-        if leaves == 0 { Err(nothing_selected(mesh)) } else { Ok(leaves) }
-    }
-
     /// Whether an octant may contain selected leaves, by its position.
     fn meets(&self, octant: &Octant) -> bool {
         let (low, high) = octant.bounds();
@@ -98,14 +82,6 @@ impl Selection {
                 .clip
                 .is_none_or(|[from, to]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]))
     }
-}
-
-/// The error of an export without leaves.
-pub(crate) fn nothing_selected(mesh: &Mesh) -> Failure {
-    Failure::input(match mesh.is_empty() {
-        true => "the mesh has no leaves",
-        false => "no leaf satisfies all conditions of the selection: remove one of them",
-    })
 }
 
 #[cfg(test)]

@@ -8,8 +8,7 @@ use crate::format::{
     Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED,
 };
 use crate::tree::{
-    CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays,
-    has_chunks, metadata,
+    CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays, metadata,
 };
 use crate::write::{Value, attribute, link};
 use flate2::{Decompress, FlushDecompress, Status};
@@ -38,8 +37,8 @@ pub struct TreeReader {
     pub shape: Shape,
     /// The bits of split nodes.
     pub split: Chunked,
-    /// The bits of leaves that are not in the mesh, if there are any.
-    pub masked: Option<Chunked>,
+    /// The bits of leaves that are not in the mesh.
+    pub masked: Chunked,
     /// The sides of all nodes.
     pub sides: Chunked,
 }
@@ -73,7 +72,7 @@ impl TreeReader {
             return Err(error("its metadata are not those of its tree".to_owned()));
         }
         let [split, masked, sides] = arrays;
-        Ok(Self { source, shape, split, masked: Some(masked).filter(has_chunks), sides })
+        Ok(Self { source, shape, split, masked, sides })
     }
 
     /// The bytes of a chunk, as many as every chunk has.
@@ -138,9 +137,6 @@ impl Source {
         let places = [Some(of_grid(SPLIT)?), member(&grid, MASK), member(&data, SIDE)];
         for (array, address) in arrays.iter_mut().zip(places) {
             address.map_or(Ok(()), |address| self.fill(array, address))?;
-        }
-        if member(&data, "rank").is_some() {
-            return Err(unknown("its cells have ranks, which only earlier versions wrote"));
         }
         Ok((shape, arrays, of_grid(FIRST)?))
     }

@@ -9,7 +9,8 @@ use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tally, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
-use contract::tree::{Builder, Refusal, Tree};
+use contract::tree::{Builder, Tree};
+use contract::word;
 
 /// What the pass found.
 #[derive(Debug)]
@@ -126,18 +127,16 @@ impl<'a> State<'a> {
             return;
         }
         for &word in run {
-            let Err(why) = self.builder.push(word) else {
+            if self.builder.push(word).is_ok() {
                 self.last = word;
                 continue;
-            };
+            }
             self.pass.linear.report_with(|| {
                 let [leaf, last] =
                     [word, self.last].map(|word| identical::describe(word, &self.manifest.root));
-                match why {
-                    Refusal::Fault(_) => format!("{}not a leaf: {leaf}", self.prefix),
-                    Refusal::Overlap => {
-                        format!("{}two leaves overlap: {leaf} and {last}", self.prefix)
-                    }
+                match word::fault(word) {
+                    Some(_) => format!("{}not a leaf: {leaf}", self.prefix),
+                    None => format!("{}two leaves overlap: {leaf} and {last}", self.prefix),
                 }
             });
         }

@@ -142,7 +142,12 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") || is_xml() {
         return Some(Format::Vtk);
     }
-    let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
+    let text = match std::str::from_utf8(head) {
+        // The head may end within a character.
+        Err(cut) if cut.error_len().is_none() => std::str::from_utf8(&head[..cut.valid_up_to()]),
+        text => text,
+    };
+    let text = text.ok()?;
     if text.trim_start().starts_with('{') {
         return Some(Format::Discretize);
     }
@@ -162,14 +167,6 @@ pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
     let has_points =
         |place: &PathBuf| ["points", "points.gz"].iter().any(|name| place.join(name).is_file());
     below.into_iter().find(has_points)
-}
-
-/// Number of bytes of an incomplete UTF-8 character at the end.
-fn incomplete(head: &[u8]) -> usize {
-    match std::str::from_utf8(head) {
-        Err(error) if error.error_len().is_none() => head.len() - error.valid_up_to(),
-        _ => 0,
-    }
 }
 
 /// Reads the cells of a file in a format that is read here.

@@ -23,20 +23,15 @@ use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
 use contract::lattice::Root;
 use contract::manifest::Sides;
-use contract::mesh;
 use contract::octant::CELLS_PER_EDGE;
 use contract::sets::Sets;
 use contract::word::{self, Side};
 
 use crate::leaves::{Leaves, squares};
-use crate::options::{Options, Regions, Summary};
+use crate::options::{Export, Options, Regions, Summary};
 use crate::points::{Point, Points};
-use crate::selection::{Selection, nothing_selected};
 use faces::Faces;
 use patches::{Patches, SIDES};
-
-/// Greatest number of points, so that adding those of one more cell cannot exceed 32 bits.
-const POINTS_MAX: usize = 4_000_000_000;
 
 /// A mesh for OpenFOAM.
 pub struct Mesh<'a> {
@@ -61,13 +56,8 @@ pub struct Mesh<'a> {
 ///
 /// # Panics
 /// If an invariant of the answer is violated: see [`Faces::check_invariants`].
-pub fn write(
-    mesh: &mesh::Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
-    let of_mesh = read(mesh, selection, options)?;
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let of_mesh = read(export)?;
     let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
     if has_content {
         let why = format!("{} exists: remove it, or choose another case", path.display());
@@ -83,14 +73,14 @@ pub fn write(
         files += 1;
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
-    options.check()?;
+    export.options.check()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));
         moved.and_then(|()| fs::rename(&dir, path)).map_err(named)
     })?;
     let mut notes = of_mesh.notes();
-    let is_selected = selection.side.is_none_or(|side| side == Side::Crossing);
-    if is_selected && mesh.manifest.leaves_by_side.crossing > 0 {
+    let is_selected = export.selection.side.is_none_or(|side| side == Side::Crossing);
+    if is_selected && export.mesh.manifest.leaves_by_side.crossing > 0 {
         notes.push(CROSSED.to_owned());
     }
     Ok(Summary { leaves: of_mesh.leaves.count().into(), files, bytes, notes })
@@ -101,23 +91,18 @@ const CROSSED: &str = "warning: the geometry crosses cells of this mesh, and a f
      keep_crossing = false for a solver";
 
 /// The selected leaves as a mesh.
-fn read<'a>(
-    mesh: &mesh::Mesh,
-    selection: &Selection,
-    options: &'a Options<'a>,
-) -> Result<Mesh<'a>, Failure> {
+fn read<'a>(export: &Export<'a>) -> Result<Mesh<'a>, Failure> {
+    let Export { mesh, options, .. } = *export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.parts.len() > 1).then(Vec::new);
-    let leaves = Leaves::read(mesh, selection, options, &mut |leaf, is_selected| {
+    let leaves = Leaves::read(export, &mut |leaf, is_selected| {
         if let Some(ranks) = ranks.as_mut().filter(|_| is_selected) {
             ranks.push(leaf.rank);
         }
         true
     })?;
-    if leaves.count() == 0 {
-        return Err(nothing_selected(mesh));
-    }
-    let patches = Patches::new(options.case, *selection != Selection::default());
+    export.require_some(leaves.count().into())?;
+    let patches = Patches::new(options.case, !export.is_of_all());
     let mut of_mesh = Mesh::new(leaves, ranks, patches.map_err(Failure::input)?, options)?;
     of_mesh.root = mesh.manifest.root;
     of_mesh.has_sides = mesh.manifest.sides == Sides::Known;
@@ -162,12 +147,7 @@ fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
         for corner in of_boundary.flat_map(|square| square.corners(true)) {
             points.add(corner);
         }
-        match points.all.len() {
-            ..=POINTS_MAX => Ok(()),
-            _ => Err(Failure::input(format!(
-                "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
-            ))),
-        }
+        Ok(())
     })?;
     points.sort_by(key);
     Ok(points)

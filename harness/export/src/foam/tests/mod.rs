@@ -16,7 +16,8 @@ use proptest::prelude::*;
 use super::*;
 use crate::leaves::{Around, CUT, Square};
 use crate::options::Label;
-pub use crate::testing::options;
+use crate::selection::Selection;
+pub use crate::testing::{options, whole};
 use contract::mesh::Mesh as OnDisk;
 
 /// Faces with their points, and the cells on both sides of each.
@@ -216,7 +217,7 @@ proptest! {
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
         let mut options = options();
         options.label = label;
-        let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
+        let summary = write(&whole(&mesh, &options), &target).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
     }
