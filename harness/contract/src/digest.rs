@@ -58,11 +58,6 @@ impl Digest {
     pub fn merge(&mut self, other: Self) {
         self.0 = self.0.wrapping_add(other.0);
     }
-
-    /// Removes words that were added.
-    pub fn remove(&mut self, other: Self) {
-        self.0 = self.0.wrapping_sub(other.0);
-    }
 }
 
 impl fmt::Display for Digest {

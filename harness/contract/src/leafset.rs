@@ -105,7 +105,7 @@ impl LeafSet {
     /// # Errors
     /// If the directory is not empty or a file cannot be written; the message names it.
     pub fn create(&self, dir: &Path) -> io::Result<()> {
-        create(dir, &self.manifest, |part, out| npy::write_to(out, &self.parts[part]))
+        create(dir, &self.manifest, |part, out| out.write_all(&npy::bytes(&self.parts[part])))
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.

@@ -1,7 +1,7 @@
 //! Part files: one-dimensional NumPy arrays of type `<u8`.
 
-use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub struct PartFile {
     path: PathBuf,
     file: File,
     offset: u64,
-    len: u64,
+    leaves: u64,
 }
 
 impl PartFile {
@@ -48,17 +48,12 @@ impl PartFile {
             let implied = format!("its header implies {expected} ({len} leaves)");
             return Err(wrong(format!("has {found} bytes, but {implied}")));
         }
-        Ok(Self { path: path.to_owned(), file, offset, len })
+        Ok(Self { path: path.to_owned(), file, offset, leaves: len })
     }
 
     /// Number of words.
-    pub fn len(&self) -> u64 {
-        self.len
-    }
-
-    /// Whether the part has no words, which is allowed.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
+    pub fn leaves(&self) -> u64 {
+        self.leaves
     }
 
     /// Fills `words` with the words from index `first` on.
@@ -80,7 +75,8 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be read.
     pub fn read_all(&self) -> Result<Vec<u64>, Failure> {
-        let mut words = vec![0; usize::try_from(self.len).expect("a part fits the address space")];
+        let mut words =
+            vec![0; usize::try_from(self.leaves).expect("a part fits the address space")];
         self.read_at(0, &mut words)?;
         Ok(words)
     }
@@ -113,18 +109,14 @@ fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), String> {
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
-    let mut out = BufWriter::new(File::create(path)?);
-    write_to(&mut out, words)?;
-    out.flush()
+    fs::write(path, bytes(words))
 }
 
-/// Writes words in the format of a part file.
-///
-/// # Errors
-/// Whatever the writer returns.
-pub fn write_to(out: &mut dyn Write, words: &[u64]) -> std::io::Result<()> {
-    out.write_all(&header("<u8", &format!("({},)", words.len())))?;
-    words.iter().try_for_each(|w| out.write_all(&w.to_le_bytes()))
+/// The bytes of a part file.
+pub fn bytes(words: &[u64]) -> Vec<u8> {
+    let mut bytes = header("<u8", &format!("({},)", words.len()));
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    bytes
 }
 
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does.
@@ -142,6 +134,7 @@ pub fn header(descr: &str, shape: &str) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
 
     fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -156,7 +149,7 @@ mod tests {
         write(file.path(), &words).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!(part.read_all().unwrap(), words);
-        assert!(!part.is_empty());
+        assert!(part.leaves() > 0);
     }
 
     #[test]
@@ -175,8 +168,8 @@ mod tests {
         let file = file_of(b"");
         write(file.path(), &[]).unwrap();
         let part = PartFile::open(file.path()).unwrap();
-        assert_eq!((part.len(), part.read_all().unwrap()), (0, Vec::new()));
-        assert!(part.is_empty());
+        assert_eq!((part.leaves(), part.read_all().unwrap()), (0, Vec::new()));
+        assert_eq!(part.leaves(), 0);
     }
 
     #[test]

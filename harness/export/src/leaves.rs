@@ -130,18 +130,22 @@ impl Leaves {
         })
     }
 
-    /// Visits the cells in the order of their numbers.
+    /// Visits the cells in the order of their numbers, with their octants and squares.
     ///
     /// # Errors
     /// The first error of `visit`, or the user's interrupt.
     pub fn walk(
         &self,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around) -> Result<(), Failure>,
+        visit: &mut impl FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let content = self.content(0, self.words.len(), 0);
-        let across = [[Content::Outside; 2]; 3];
-        self.descend(&Around { octant: Octant::ROOT, content, across }, options, visit)
+        let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
+        let mut squares = Vec::new();
+        self.descend(&root, options, &mut |number, around| {
+            self.squares(around, &mut squares);
+            visit(number, &around.octant, &squares)
+        })
     }
 
     fn descend(
@@ -175,16 +179,57 @@ impl Leaves {
         }
         Ok(())
     }
+
+    /// Replaces `squares` by those of a cell.
+    fn squares(&self, around: &Around, squares: &mut Vec<Square>) {
+        squares.clear();
+        let (edge, level) = (around.octant.edge(), around.octant.level);
+        for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
+            let mut corner = around.octant.corner;
+            corner[axis] += if is_high { edge } else { 0 };
+            let across = around.across[axis][usize::from(is_high)];
+            self.split(Square { corner, level, axis, is_high, across }, squares);
+        }
+    }
+
+    /// Appends the squares of a square whose `across` may be split.
+    fn split(&self, square: Square, squares: &mut Vec<Square>) {
+        if !matches!(square.across, Content::Split(..)) {
+            return squares.push(square);
+        }
+        let (u, v) = ((square.axis + 1) % 3, (square.axis + 2) % 3);
+        let (begin, level) = (squares.len(), square.level + 1);
+        let edge = CELLS_PER_EDGE >> level;
+        let children = self.children(square.across, level);
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let mut corner = square.corner;
+            corner[u] += i * edge;
+            corner[v] += j * edge;
+            // The children that touch the square are on the side from which it is seen.
+            let digit =
+                (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << square.axis;
+            self.split(Square { corner, level, across: children[digit], ..square }, squares);
+        }
+        let parts = &squares[begin..];
+        let across = parts[0].across;
+        if across.as_cell().is_none()
+            && parts.len() == 4
+            && parts.iter().all(|part| part.across == across && part.level == level)
+        {
+            squares.truncate(begin);
+            squares.push(Square { across, ..square });
+        }
+    }
 }
 
 /// An octant with its content and that of the octants of the same level across its faces.
 #[derive(Clone, Copy, Debug)]
-pub struct Around {
+struct Around {
     /// The octant.
-    pub octant: Octant,
+    octant: Octant,
     content: Content,
     /// On the low and on the high side of each axis.
-    pub across: [[Content; 2]; 3],
+    across: [[Content; 2]; 3],
 }
 
 /// A square that a cell shares with another cell or with a boundary.
@@ -200,47 +245,6 @@ pub struct Square {
     pub is_high: bool,
     /// A cell, a hole, a cut or the outside.
     pub across: Content,
-}
-
-/// Replaces `squares` by those of a cell.
-pub fn squares(leaves: &Leaves, around: &Around, squares: &mut Vec<Square>) {
-    squares.clear();
-    let (edge, level) = (around.octant.edge(), around.octant.level);
-    for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
-        let mut corner = around.octant.corner;
-        corner[axis] += if is_high { edge } else { 0 };
-        let across = around.across[axis][usize::from(is_high)];
-        split(leaves, Square { corner, level, axis, is_high, across }, squares);
-    }
-}
-
-/// Appends the squares of a square whose `across` may be split.
-fn split(leaves: &Leaves, square: Square, squares: &mut Vec<Square>) {
-    if !matches!(square.across, Content::Split(..)) {
-        return squares.push(square);
-    }
-    let (u, v) = ((square.axis + 1) % 3, (square.axis + 2) % 3);
-    let (begin, level) = (squares.len(), square.level + 1);
-    let edge = CELLS_PER_EDGE >> level;
-    let children = leaves.children(square.across, level);
-    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let mut corner = square.corner;
-        corner[u] += i * edge;
-        corner[v] += j * edge;
-        // The children that touch the square are on the side from which it is seen.
-        let digit =
-            (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << square.axis;
-        split(leaves, Square { corner, level, across: children[digit], ..square }, squares);
-    }
-    let parts = &squares[begin..];
-    let across = parts[0].across;
-    if across.as_cell().is_none()
-        && parts.len() == 4
-        && parts.iter().all(|part| part.across == across && part.level == level)
-    {
-        squares.truncate(begin);
-        squares.push(Square { across, ..square });
-    }
 }
 
 impl Square {

@@ -42,7 +42,7 @@ impl Export<'_> {
     pub(crate) fn count(&self) -> Result<u64, Failure> {
         let mut leaves = 0;
         match self.is_of_all() {
-            true => leaves = self.mesh.len(),
+            true => leaves = self.mesh.leaf_count(),
             false => self.visit(&mut |_| {
                 leaves += 1;
                 Ok(())
@@ -54,7 +54,7 @@ impl Export<'_> {
     /// Refuses an export without leaves.
     pub(crate) fn require_some(&self, leaves: u64) -> Result<u64, Failure> {
         match leaves {
-            0 if self.mesh.is_empty() => Err(Failure::input("the mesh has no leaves")),
+            0 if self.mesh.leaf_count() == 0 => Err(Failure::input("the mesh has no leaves")),
             0 => Err(Failure::input(
                 "no leaf satisfies all conditions of the selection: remove one of them",
             )),
@@ -194,7 +194,7 @@ impl Written {
         assert_eq!(cells, selected, "cells written and leaves selected");
         assert!(volume <= KEY_END, "{cells} cells of volume {volume} are more than the root");
         if export.is_of_all() {
-            assert_eq!(cells, export.mesh.len(), "cells written and leaves of the mesh");
+            assert_eq!(cells, export.mesh.leaf_count(), "cells written and leaves of the mesh");
         }
     }
 }
@@ -223,7 +223,7 @@ mod tests {
             let export = whole(&mesh, &options);
             written(&words).check_invariants(&export, words.len() as u64);
             let noticed = |words: Vec<u64>| {
-                let check = || written(&words).check_invariants(&export, mesh.len());
+                let check = || written(&words).check_invariants(&export, mesh.leaf_count());
                 std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
             };
             let i = at.index(words.len());

@@ -108,7 +108,7 @@ proptest! {
             let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), true).unwrap();
             prop_assert_eq!(file.root, ROOT);
             prop_assert_eq!(&words(&file).unwrap(), &expected);
-            prop_assert_eq!(tree.len(), expected.len() as u64);
+            prop_assert_eq!(tree.leaf_count(), expected.len() as u64);
             if selection == Selection::default() {
                 prop_assert_eq!(leaves(&tree, &cut), leaves(&mesh, &cut));
                 prop_assert!(mesh.require_ranks().is_ok() && tree.require_ranks().is_err());

@@ -43,21 +43,20 @@ pub fn leaf_set(
 
 /// The manifest of a mesh in a root, without leaves, whose finest leaf has this level.
 pub(super) fn manifest(root: Root, finest: u8, case: Option<&Case>, program: String) -> Manifest {
-    let required = match case {
-        Some(case) => case.manifest(Tree::Final, program),
+    match case {
+        Some(case) => Manifest { root, ..case.manifest(Tree::Final, program) },
         None => Manifest {
             level_surface: finest,
             ..Manifest::without_leaves(Tree::Final, root, program)
         },
-    };
-    Manifest { root, ..required }
+    }
 }
 
 /// Panics if an invariant of the answer does not hold: the leaves are a linear oct-tree, as many as there are cells, and fill
 /// the same part of the root; the manifest has their counts and digest.
 pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let LeafSet { manifest, words, .. } = set;
-    assert_eq!(cells.len(), words.len(), "cells and leaves");
+    assert_eq!(cells.count(), words.len(), "cells and leaves");
     let mut end = 0;
     for &leaf in words {
         let fault = word::fault(leaf);

@@ -86,33 +86,24 @@ pub struct Request {
 pub fn guess(path: &Path) -> Result<Format, Failure> {
     let is_directory = fs::metadata(path).map_err(Failure::unreadable)?.is_dir();
     refuse_leaf_set(path)?;
-    let has_parts = is_directory && path.join(manifest::part_name(0)).is_file();
-    let is_manifest = !is_directory && path.ends_with(manifest::FILE);
-    let mistakes = [
-        (
-            has_parts,
-            "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
-             --format leaf-words",
-        ),
-        (is_manifest, "is the manifest of a leaf set: give its directory"),
-        (
-            path.extension().is_some_and(|extension| extension == "toml"),
-            "is a case file by its name: give a mesh",
-        ),
-    ];
-    if let Some((_, why)) = mistakes.into_iter().find(|(is_made, _)| *is_made) {
-        return Err(Failure::input(why));
-    }
-    let mut head = Vec::new();
-    let format = match is_directory {
-        true => poly_mesh(path).map(|_| Format::Openfoam),
-        false => {
-            let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
-            read.map_err(Failure::unreadable)?;
-            of_content(&head)
-        }
-    };
     let unknown = "its format was not recognised: choose one with --format (see --help)";
+    let format = if is_directory {
+        if path.join(manifest::part_name(0)).is_file() {
+            let why = "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
+                 --format leaf-words";
+            return Err(Failure::input(why));
+        }
+        poly_mesh(path).map(|_| Format::Openfoam)
+    } else if path.ends_with(manifest::FILE) {
+        return Err(Failure::input("is the manifest of a leaf set: give its directory"));
+    } else if path.extension().is_some_and(|extension| extension == "toml") {
+        return Err(Failure::input("is a case file by its name: give a mesh"));
+    } else {
+        let mut head = Vec::new();
+        let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
+        read.map_err(Failure::unreadable)?;
+        of_content(&head)
+    };
     format.ok_or_else(|| Failure::input(unknown))
 }
 

@@ -32,7 +32,7 @@ use geometries::{Facet, write_stl_binary};
 use geometry::tree::{FacetTree, Point};
 use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
-use crate::leaves::{Content, Leaves, Square, squares};
+use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Options, Summary};
 use crate::polydata::{self, array};
 use polygons::Polygons;
@@ -68,11 +68,10 @@ type Front = (Root, Vec<Face>, Polygons);
 fn front(export: &Export<'_>) -> Result<Vec<Face>, Failure> {
     // Without crossing leaves, exposed faces are those at holes.
     let leaves = Leaves::read(export, &mut |leaf, _| leaf.side != Side::Crossing)?;
-    let (mut faces, mut of_cell, mut words) = (Vec::new(), Vec::new(), leaves.cells());
-    leaves.walk(export.options, &mut |_, around| {
+    let (mut faces, mut words) = (Vec::new(), leaves.cells());
+    leaves.walk(export.options, &mut |_, _, squares| {
         let leaf = words.next().expect("cells are visited in the order of their words");
-        squares(&leaves, around, &mut of_cell);
-        let exposed = of_cell.iter().filter(|square| square.across == Content::Hole);
+        let exposed = squares.iter().filter(|square| square.across == Content::Hole);
         faces.extend(exposed.map(|&square| Face { square, leaf }));
         Ok(())
     })?;

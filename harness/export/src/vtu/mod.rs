@@ -21,7 +21,7 @@ use contract::manifest::Sides;
 
 use crate::options::{Export, Summary, Written};
 use contract::failure::Failure;
-use piece::{Encoder, Piece, Place};
+use piece::{Encoder, Piece};
 
 /// Maximum number of leaves in a piece.
 pub const PIECE: usize = 1 << 19;
@@ -66,25 +66,25 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         _ => true,
     };
     let arrays: Vec<Array> = ARRAYS.into_iter().filter(is_known).collect();
-    let longest =
-        Place { points: u64::MAX, cells: u64::MAX, offsets: vec![u64::MAX; arrays.len()] };
+    let offsets = vec![u64::MAX; arrays.len()];
+    let mut longest = Piece { points: u64::MAX, offsets, ..Piece::default() };
+    longest.written.cells = u64::MAX;
     let content = Content { root: mesh.manifest.root, arrays };
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
-        let (mut places, mut digest, mut data_bytes) = (Vec::new(), Digest::default(), 0);
+        let (mut pieces, mut data_bytes) = (Vec::new(), 0);
         let longest = vec![longest; leaves.div_ceil(PIECE as u64) as usize];
-        let header_bytes = content.header(&longest, digest, 0).len();
+        let header_bytes = content.header(&longest, 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
         encode(export, leaves, &content, &mut |mut piece| {
             // The user's interrupt waits for a flush to end, so none may have much to flush.
             file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
-            piece.place.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
-            places.push(piece.place);
+            piece.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
             data_bytes += piece.bytes.len() as u64;
-            digest.merge(piece.digest);
+            pieces.push(Piece { bytes: Vec::new(), ..piece });
             Ok(())
         })?;
-        let header = content.header(&places, digest, header_bytes);
+        let header = content.header(&pieces, header_bytes);
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
@@ -136,9 +136,11 @@ fn encode(
 }
 
 impl Content {
-    /// The file up to the appended data, with the digest of its leaves, filled up with blanks to `length` bytes.
-    fn header(&self, places: &[Place], digest: Digest, length: usize) -> String {
+    /// The file up to the appended data, filled up with blanks to `length` bytes.
+    fn header(&self, pieces: &[Piece], length: usize) -> String {
         let Root { origin: [x, y, z], edge } = self.root;
+        let mut digest = Digest::default();
+        pieces.iter().for_each(|piece| digest.merge(piece.digest));
         // VTK reads text as the codes of its characters.
         let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
         let mut xml = format!(
@@ -150,15 +152,16 @@ impl Content {
              <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
              </FieldData>\n"
         );
-        for place in places {
-            self.piece(place, &mut xml);
+        for piece in pieces {
+            self.piece(piece, &mut xml);
         }
         let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
         let blanks = length.saturating_sub(xml.len() + end.len());
         xml + &" ".repeat(blanks) + end
     }
 
-    fn piece(&self, Place { points, cells, offsets }: &Place, xml: &mut String) {
+    fn piece(&self, Piece { points, written, offsets, .. }: &Piece, xml: &mut String) {
+        let cells = written.cells;
         *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
         let arrays: Vec<_> = self.arrays.iter().zip(offsets).collect();
         for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {

@@ -18,24 +18,15 @@ const HEXAHEDRON: u8 = 12;
 const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
-/// Place and size of a piece in its file.
+/// A piece in the form in which it is written.
 #[derive(Clone, Debug, Default)]
-pub struct Place {
+pub struct Piece {
     /// Number of points.
     pub points: u64,
-    /// Number of cells.
-    pub cells: u64,
-    /// Position of each array in the appended data, or in the piece's.
-    pub offsets: Vec<u64>,
-}
-
-/// A piece in the form in which it is written.
-#[derive(Debug)]
-pub struct Piece {
-    /// Its place.
-    pub place: Place,
     /// The cells.
     pub written: Written,
+    /// Position of each array in the appended data, or in the piece's.
+    pub offsets: Vec<u64>,
     /// Digest of the leaves.
     pub digest: Digest,
     /// The compressed arrays.
@@ -89,9 +80,8 @@ impl Encoder {
                 _ => zlib.append(leaves.iter().map(|leaf| [[leaf.side as u8]]), to),
             }
         }
-        let place = Place { points: points.len() as u64, cells: leaves.len() as u64, offsets };
         leaves.clear();
-        Piece { place, written, digest, bytes }
+        Piece { points: points.len() as u64, written, offsets, digest, bytes }
     }
 
     /// Finds the points.
