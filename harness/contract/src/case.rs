@@ -84,9 +84,18 @@ impl Case {
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
-        let facets = facets(path, &file)?;
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let geometry = file.geometry.as_ref().map(|stl| directory.join(stl));
+        let facets = match (&geometry, &file.generator) {
+            (Some(stl), None) => {
+                stl::read(stl)
+                    .map_err(|why| Failure::input(format!("{} {why}", stl.display())))?
+                    .facets
+            }
+            (None, Some(generator)) => generator.facets().map_err(|e| Failure::about(path, e))?,
+            _ => return Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
+        };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let geometry = file.geometry.as_ref().map(|stl| beside(path, stl));
         Ok(Self { geometry, ..Self::build(name, &file, facets).map_err(wrong)? })
     }
 
@@ -167,25 +176,6 @@ impl Case {
     /// The manifest of a mesh of this case, without leaves.
     pub fn manifest(&self, tree: Tree, program: String) -> Manifest {
         Manifest { tree, program, ..self.rules.clone() }
-    }
-}
-
-/// A path relative to the case file.
-fn beside(case: &Path, path: &Path) -> PathBuf {
-    case.parent().unwrap_or(Path::new("")).join(path)
-}
-
-/// The body, read from a file or generated.
-fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, Failure> {
-    match (&file.geometry, &file.generator) {
-        (Some(stl), None) => {
-            let path = beside(case, stl);
-            let body = stl::read(&path)
-                .map_err(|why| Failure::input(format!("{} {why}", path.display())))?;
-            Ok(body.facets)
-        }
-        (None, Some(generator)) => generator.facets().map_err(|error| Failure::about(case, error)),
-        _ => Err(Failure::about(case, "give exactly one of `geometry` and `[generator]`")),
     }
 }
 

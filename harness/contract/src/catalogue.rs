@@ -22,7 +22,7 @@ pub enum Size {
 }
 
 /// A case that was selected.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 pub struct Selected {
     /// Its name, which is also the name of its directory.
     pub name: String,
@@ -145,8 +145,7 @@ fn from_path(argument: &str) -> Result<Selected, String> {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         argument: path.to_string_lossy().into_owned(),
         path,
-        size: None,
-        absent: None,
+        ..Selected::default()
     })
 }
 

@@ -110,16 +110,15 @@ fn made(
 /// # Errors
 /// If no format has such names.
 pub fn of(path: &Path) -> Result<&'static Format, Failure> {
-    let name = path.to_string_lossy();
-    // A shell completes the name of a directory with a slash.
-    let name = name.trim_end_matches('/');
-    // A dot that begins the name is no extension.
-    let stem = |format: &Format| name.strip_suffix(format.ending).unwrap_or_default();
-    let fits = |format: &&Format| !matches!(stem(format).chars().last(), None | Some('/'));
+    let fits = |format: &&Format| match format.ending.strip_prefix('.') {
+        Some(extension) => path.extension().is_some_and(|of_path| of_path == extension),
+        None => path.ends_with("polyMesh") && path.components().count() > 1,
+    };
     FORMATS.iter().find(fits).ok_or_else(|| {
         let endings: Vec<_> = FORMATS.iter().map(|format| format.ending).collect();
         Failure::input(format!(
-            "{name}: no format has such a name: choose one that ends in {}",
+            "{}: no format has such a name: choose one that ends in {}",
+            path.display(),
             endings.join(", ")
         ))
     })

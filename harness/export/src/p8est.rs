@@ -8,7 +8,7 @@
 //! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
 //! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
 
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use contract::failure::Failure;
@@ -32,35 +32,41 @@ const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
 const VERSION: &[u8] = b"2.2";
 
-/// Writes the selected leaves and the fillers as a forest. The mesh is read twice, because the numbers of quadrants precede them.
+/// Writes the selected leaves and the fillers as a forest. The numbers of quadrants precede them, and are written last.
 ///
 /// # Errors
 /// If no leaf is selected, if one is deeper than level 18, if the mesh cannot be read or the file cannot be written, or if
 /// the user interrupts.
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
-    let (leaves, ends) = counted(export)?;
-    export.require_some(leaves)?;
-    let total = ends[ends.len() - 1];
+    let leaves = export.count()?;
+    let mut ends = vec![0; export.mesh.parts.len().max(1)];
+    let start = |ends: &[u64]| {
+        let mut bytes = connectivity(&export.mesh.manifest.root);
+        bytes.extend(header(ends));
+        pad(&mut bytes);
+        bytes
+    };
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
-        let mut start = connectivity(&export.mesh.manifest.root);
-        start.extend(header(&ends));
-        pad(&mut start);
-        out.write_all(&start).map_err(named)?;
-        let (mut done, mut written) = (0, Written::default());
-        quadrants(export, &mut |quadrant| {
-            export.options.progress(done, total);
-            done += 1;
-            written.add(&quadrant.octant, quadrant.data != FILLER);
-            let Octant { corner: [x, y, z], level } = quadrant.octant;
+        out.write_all(&start(&ends)).map_err(named)?;
+        let mut written = Written::default();
+        quadrants(export, &mut |Quadrant { octant, data, part }| {
+            export.options.progress(written.cells, leaves);
+            ends[part as usize] += 1;
+            written.add(&octant, data != FILLER);
+            let Octant { corner: [x, y, z], level } = octant;
             let numbers = [x, y, z, level.into()].map(u32::to_le_bytes);
             out.write_all(numbers.as_flattened()).map_err(named)?;
-            out.write_all(&[quadrant.data]).map_err(named)
+            out.write_all(&[data]).map_err(named)
         })?;
         written.check_invariants(export, leaves);
-        assert_eq!((done, written.volume), (total, KEY_END), "quadrants, which tile the root");
-        out.flush().map_err(named)
+        assert_eq!(written.volume, KEY_END, "quadrants tile the root");
+        for part in 1..ends.len() {
+            ends[part] += ends[part - 1];
+        }
+        let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(&ends)));
+        begun.and_then(|()| out.flush()).map_err(named)
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
@@ -109,21 +115,6 @@ fn fill(
         key += word::span(level);
     }
     Ok(())
-}
-
-/// Number of leaves, and of quadrants up to the end of each saved part, fillers included.
-fn counted(export: &Export<'_>) -> Result<(u64, Vec<u64>), Failure> {
-    let mut ends = vec![0; export.mesh.parts.len().max(1)];
-    let mut leaves = 0;
-    quadrants(export, &mut |quadrant| {
-        leaves += u64::from(quadrant.data != FILLER);
-        ends[quadrant.part as usize] += 1;
-        Ok(())
-    })?;
-    for part in 1..ends.len() {
-        ends[part] += ends[part - 1];
-    }
-    Ok((leaves, ends))
 }
 
 /// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their

@@ -4,15 +4,14 @@
 //! that the writer would make of them must be those of the file, byte by byte, their checksums included. No memory is allocated for a
 //! count before the file has been seen to be long enough for it.
 
-use crate::format::{
-    Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED,
-};
+use crate::format::{Chunked, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED};
 use crate::tree::{
     CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays, metadata,
 };
 use crate::write::{Value, attribute, link};
 use flate2::{Decompress, FlushDecompress, Status};
 use std::fs;
+use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
@@ -82,7 +81,8 @@ impl TreeReader {
     pub fn read_chunk(&self, array: &Chunked, index: usize, into: &mut Vec<u8>) -> Result<()> {
         into.clear();
         into.resize(array.chunk_len as usize, 0);
-        let Some(Extent { address, bytes }) = array.chunks[index] else { return Ok(()) };
+        let Some(Range { start: address, end }) = array.chunks[index] else { return Ok(()) };
+        let bytes = end - address;
         let stored = self.source.bytes_at(address, bytes)?;
         let mut inflater = Decompress::new(true);
         let status = inflater.decompress(&stored, into, FlushDecompress::Finish);
@@ -169,8 +169,8 @@ impl Source {
         let bytes = array.chunks.len() as u64 * (size as u64 + 4);
         let entries = self.bytes_at(table + TABLE_HEAD_BYTES + TABLE_BYTES, bytes)?;
         for (slot, entry) in array.chunks.iter_mut().zip(entries.chunks_exact(size + 4)) {
-            let extent = Extent { address: number(&entry[..8]), bytes: number(&entry[8..size]) };
-            *slot = (extent.address != UNDEFINED).then_some(extent);
+            let (address, bytes) = (number(&entry[..8]), number(&entry[8..size]));
+            *slot = (address != UNDEFINED).then(|| address..address.saturating_add(bytes));
         }
         Ok(())
     }

@@ -157,7 +157,7 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
         return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
     }
     let level = depth as u8;
-    let edge_of_level = root.edge / f64::from(1u32 << level);
+    let edge_of_level = root.edge_of(level);
     if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
         return wrong("has an edge that is not the root's edge halved a whole number of times");
     }

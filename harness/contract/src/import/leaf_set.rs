@@ -7,7 +7,7 @@ use crate::digest::Digest;
 use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
-use crate::manifest::{Manifest, Sides, Tally, Tree};
+use crate::manifest::{Manifest, Sides, Tree};
 use crate::word;
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
@@ -74,7 +74,7 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
         "cells fill {of_cells} of the root, and their leaves {of_leaves}"
     );
     let mut expected = manifest.clone();
-    expected.set_tally(Tally::of(words));
+    expected.set_leaves(words);
     assert!(*manifest == expected, "counts or digests of {}", expected.digest);
     let known = manifest.sides == Sides::Known;
     assert!(known == cells.sides.is_some(), "sides are known: {known}");

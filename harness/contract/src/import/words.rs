@@ -49,8 +49,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
                 )));
             }
             let octant = word::octant(word);
-            let edge = root.edge / f64::from(1u32 << octant.level);
-            cells.push(root.to_user(octant.bounds().0), edge);
+            cells.push(root.to_user(octant.bounds().0), root.edge_of(octant.level));
             cells.sides.iter_mut().for_each(|sides| sides.push(Side::ALL[(word & 3) as usize]));
         }
     }

@@ -23,7 +23,7 @@ impl Mesh {
         let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
-        if vertices.max(points) > label_max(options.label) {
+        if options.label == Label::Bits32 && vertices.max(points) > i32::MAX as u64 {
             return Err(Failure::input(
                 "the mesh has more faces than 32-bit labels can number: choose --label 64",
             ));
@@ -78,14 +78,6 @@ impl Mesh {
         let mut file = File::create(dir.join("boundary"))?;
         file.write_all(text.as_bytes())?;
         Ok(file.sync_all()?)
-    }
-}
-
-/// Greatest label.
-fn label_max(label: Label) -> u64 {
-    match label {
-        Label::Bits32 => i32::MAX as u64,
-        Label::Bits64 => i64::MAX as u64,
     }
 }
 

@@ -88,7 +88,7 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     write(export, path, &|(root, faces, polygons), out| {
         let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
         let point = |at: &[u32; 3]| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
-        let spacing = |face: &Face| edge_of_level(root, word::level(face.leaf));
+        let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
         let mut cell = vec![
             array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
             array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
@@ -132,7 +132,7 @@ fn write(
     let (root, polygons) = (export.mesh.manifest.root, Polygons::new(&faces));
     let open = polygons.edges_open();
     polygons.check_invariants(&faces, export.is_of_all() && open == 0);
-    let area: f64 = faces.iter().map(|face| edge_of_level(&root, face.square.level).powi(2)).sum();
+    let area: f64 = faces.iter().map(|face| root.edge_of(face.square.level).powi(2)).sum();
     let front = (root, faces, polygons);
     let bytes = fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
@@ -197,9 +197,4 @@ fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, 
         Ok(gap * unit)
     };
     (0..).zip(faces).map(gap).collect()
-}
-
-/// Edge of the cells of a level, in the user's units.
-fn edge_of_level(root: &Root, level: u8) -> f64 {
-    root.edge / f64::from(1u32 << level)
 }

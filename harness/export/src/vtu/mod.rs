@@ -4,10 +4,9 @@
 //! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
-//! - `piece`: the arrays of a piece; `zlib`: their compression.
+//! - `piece`: the arrays of a piece, compressed.
 
 mod piece;
-mod zlib;
 
 use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
