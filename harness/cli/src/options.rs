@@ -189,9 +189,7 @@ impl SelectionArguments {
     /// Refuses conditions on what the mesh does not have.
     fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
         if let Some(rank) = self.rank {
-            if !mesh.has_ranks() {
-                return Err(mesh.ranks_unknown());
-            }
+            mesh.require_ranks()?;
             let ranks = mesh.parts.len();
             if rank as usize >= ranks {
                 return Err(Failure::input(format!(

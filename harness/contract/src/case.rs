@@ -48,12 +48,10 @@ struct CaseFile {
     geometry: Option<PathBuf>,
     generator: Option<geometries::Generator>,
     spacing_min: f64,
-    #[serde(default = "layer_cells_min_default")]
-    layer_cells_min: u32,
+    layer_cells_min: Option<u32>,
     #[serde(default)]
     keep: Keep,
-    #[serde(default = "keep_crossing_default")]
-    keep_crossing: bool,
+    keep_crossing: Option<bool>,
     root_scale: Option<f64>,
     root: Option<Root>,
     #[serde(default)]
@@ -72,15 +70,9 @@ struct BoxFile {
     spacing: f64,
 }
 
+const LAYER_CELLS_MIN_DEFAULT: u32 = 4;
+const KEEP_CROSSING_DEFAULT: bool = true;
 const ROOT_SCALE_DEFAULT: f64 = 10.0;
-
-fn layer_cells_min_default() -> u32 {
-    4
-}
-
-fn keep_crossing_default() -> bool {
-    true
-}
 
 impl Case {
     /// Reads a case file and the body that it names or generates.
@@ -92,9 +84,18 @@ impl Case {
         let wrong = |why: String| Failure::about(path, why);
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
-        let facets = facets(path, &file)?;
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let geometry = file.geometry.as_ref().map(|stl| directory.join(stl));
+        let facets = match (&geometry, &file.generator) {
+            (Some(stl), None) => {
+                stl::read(stl)
+                    .map_err(|why| Failure::input(format!("{} {why}", stl.display())))?
+                    .facets
+            }
+            (None, Some(generator)) => generator.facets().map_err(|e| Failure::about(path, e))?,
+            _ => return Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
+        };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let geometry = file.geometry.as_ref().map(|stl| beside(path, stl));
         Ok(Self { geometry, ..Self::build(name, &file, facets).map_err(wrong)? })
     }
 
@@ -108,9 +109,15 @@ impl Case {
     }
 
     fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self, String> {
+        if let Some((i, [x, y, z])) = not_finite(&facets) {
+            return Err(format!(
+                "facet {i} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry"
+            ));
+        }
         let root = root(file, &facets)?;
         positive("spacing_min", file.spacing_min)?;
-        if file.layer_cells_min == 0 {
+        let layer_cells_min = file.layer_cells_min.unwrap_or(LAYER_CELLS_MIN_DEFAULT);
+        if layer_cells_min == 0 {
             return Err("layer_cells_min is 0; a layer has at least one cell".to_owned());
         }
         let level = |what: &str, spacing| {
@@ -132,9 +139,9 @@ impl Case {
         }
         let rules = Manifest {
             level_surface,
-            layer_cells_min: file.layer_cells_min,
+            layer_cells_min,
             keep: file.keep,
-            keep_crossing: file.keep_crossing,
+            keep_crossing: file.keep_crossing.unwrap_or(KEEP_CROSSING_DEFAULT),
             boxes,
             seeds: seeds_on_lattice(&root, &file.seeds)?,
             enclosed: file.enclosed,
@@ -172,25 +179,6 @@ impl Case {
     }
 }
 
-/// A path relative to the case file.
-fn beside(case: &Path, path: &Path) -> PathBuf {
-    case.parent().unwrap_or(Path::new("")).join(path)
-}
-
-/// The body, read from a file or generated.
-fn facets(case: &Path, file: &CaseFile) -> Result<Vec<Facet>, Failure> {
-    match (&file.geometry, &file.generator) {
-        (Some(stl), None) => {
-            let path = beside(case, stl);
-            let body = stl::read(&path)
-                .map_err(|why| Failure::input(format!("{} {why}", path.display())))?;
-            Ok(body.facets)
-        }
-        (None, Some(generator)) => generator.facets().map_err(|error| Failure::about(case, error)),
-        _ => Err(Failure::about(case, "give exactly one of `geometry` and `[generator]`")),
-    }
-}
-
 /// The root cube, given or computed from the body. The order of floating-point operations is part of the
 /// definition.
 fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
@@ -205,15 +193,10 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     let scale = file.root_scale.unwrap_or(ROOT_SCALE_DEFAULT);
     positive("root_scale", scale)?;
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for (i, facet) in facets.iter().enumerate() {
-        for vertex in facet {
-            if !vertex.iter().all(|c| c.is_finite()) {
-                return Err(not_finite(i, vertex));
-            }
-            for a in 0..3 {
-                low[a] = low[a].min(f64::from(vertex[a]));
-                high[a] = high[a].max(f64::from(vertex[a]));
-            }
+    for vertex in facets.as_flattened() {
+        for a in 0..3 {
+            low[a] = low[a].min(f64::from(vertex[a]));
+            high[a] = high[a].max(f64::from(vertex[a]));
         }
     }
     let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::NEG_INFINITY, f64::max);
@@ -226,22 +209,20 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
 }
 
 fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String> {
-    let mut all = Vec::with_capacity(facets.len());
-    for (i, facet) in facets.iter().enumerate() {
-        let mut on = [[0; 3]; 3];
+    let on_lattice = |(i, facet): (usize, &Facet)| {
+        let mut on = FacetLattice::default();
         for (q, vertex) in on.iter_mut().zip(facet) {
             let [x, y, z] = vertex;
-            let why = || match vertex.iter().all(|c| c.is_finite()) {
-                true => format!(
+            let far = || {
+                format!(
                     "facet {i} has a vertex at ({x}, {y}, {z}), more than one root edge outside the root: enlarge or move the root"
-                ),
-                false => not_finite(i, vertex),
+                )
             };
-            *q = root.quantise(vertex.map(f64::from)).ok_or_else(why)?;
+            *q = root.quantise(vertex.map(f64::from)).ok_or_else(far)?;
         }
-        all.push(on);
-    }
-    Ok(all)
+        Ok(on)
+    };
+    facets.iter().enumerate().map(on_lattice).collect()
 }
 
 /// A point as text.
@@ -249,8 +230,11 @@ fn shown([x, y, z]: [f64; 3]) -> String {
     format!("({x}, {y}, {z})")
 }
 
-fn not_finite(facet: usize, [x, y, z]: &[f32; 3]) -> String {
-    format!("facet {facet} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry")
+/// The first vertex with a coordinate that is not finite, and its facet.
+fn not_finite(facets: &[Facet]) -> Option<(usize, &[f32; 3])> {
+    let mut vertices = facets.as_flattened().iter().enumerate();
+    let (i, vertex) = vertices.find(|(_, vertex)| !vertex.iter().all(|c| c.is_finite()))?;
+    Some((i / 3, vertex))
 }
 
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {

@@ -22,7 +22,7 @@ pub enum Size {
 }
 
 /// A case that was selected.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 pub struct Selected {
     /// Its name, which is also the name of its directory.
     pub name: String,
@@ -50,12 +50,6 @@ pub struct Catalogue {
 #[derive(Debug, Deserialize)]
 struct CatalogueFile {
     case: Vec<Selected>,
-}
-
-/// The one key of a case file that the catalogue reads.
-#[derive(Debug, Deserialize)]
-struct Geometry {
-    geometry: Option<PathBuf>,
 }
 
 impl Catalogue {
@@ -151,8 +145,7 @@ fn from_path(argument: &str) -> Result<Selected, String> {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         argument: path.to_string_lossy().into_owned(),
         path,
-        size: None,
-        absent: None,
+        ..Selected::default()
     })
 }
 
@@ -179,13 +172,11 @@ fn read(path: &Path) -> Result<Vec<Selected>, String> {
 /// when the case is used.
 fn missing_geometry(case: &Path) -> Option<String> {
     let text = files::read_text(case).ok()?;
-    let geometry = toml::from_str::<Geometry>(&text).ok()?.geometry?;
-    let exists = case.parent()?.join(&geometry).exists();
+    let table = text.parse::<toml::Table>().ok()?;
+    let geometry = table.get("geometry")?.as_str()?;
+    let exists = case.parent()?.join(geometry).exists();
     (!exists).then(|| {
-        format!(
-            "{} is missing; ci/setup --geometries fetches it if it can be fetched",
-            geometry.display()
-        )
+        format!("{geometry} is missing; ci/setup --geometries fetches it if it can be fetched")
     })
 }
 

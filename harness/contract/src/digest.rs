@@ -2,14 +2,14 @@
 //! on order nor on the partition, and the digests of parts are merged by addition.
 
 use std::fmt;
-use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::FacetLattice;
 
 /// Sum of [`mix`] over all leaf words, modulo 2^128.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Digest(pub u128);
 
 /// The finaliser of SplitMix64.
@@ -58,11 +58,6 @@ impl Digest {
     pub fn merge(&mut self, other: Self) {
         self.0 = self.0.wrapping_add(other.0);
     }
-
-    /// Removes words that were added.
-    pub fn remove(&mut self, other: Self) {
-        self.0 = self.0.wrapping_sub(other.0);
-    }
 }
 
 impl fmt::Display for Digest {
@@ -71,33 +66,21 @@ impl fmt::Display for Digest {
     }
 }
 
-impl fmt::Debug for Digest {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self}")
+impl From<Digest> for String {
+    fn from(digest: Digest) -> Self {
+        digest.to_string()
     }
 }
 
-impl FromStr for Digest {
-    type Err = String;
+impl TryFrom<String> for Digest {
+    type Error = String;
 
-    fn from_str(s: &str) -> Result<Self, String> {
+    fn try_from(s: String) -> Result<Self, String> {
         let hex = s.len() == 32 && s.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-        match u128::from_str_radix(s, 16) {
+        match u128::from_str_radix(&s, 16) {
             Ok(value) if hex => Ok(Self(value)),
             _ => Err(format!("a digest is 32 lower-case hex digits, not {s:?}")),
         }
-    }
-}
-
-impl Serialize for Digest {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for Digest {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        String::deserialize(from)?.parse().map_err(serde::de::Error::custom)
     }
 }
 
@@ -117,9 +100,9 @@ mod tests {
     #[test]
     fn digests_are_parsed_from_32_hex_digits_only() {
         let digest = Digest::of(&[42]);
-        assert_eq!(digest.to_string().parse(), Ok(digest));
-        assert!("12".parse::<Digest>().is_err());
-        assert!("+0000000000000000000000000000001".parse::<Digest>().is_err());
+        assert_eq!(Digest::try_from(digest.to_string()), Ok(digest));
+        assert!(Digest::try_from("12".to_owned()).is_err());
+        assert!(Digest::try_from("+0000000000000000000000000000001".to_owned()).is_err());
     }
 
     /// Published value: the first output of SplitMix64 with seed 0.

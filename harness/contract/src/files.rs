@@ -1,5 +1,6 @@
 //! Reading without waiting, and files that are either complete or absent.
 
+use crate::failure::Failure;
 use ::files::Draft;
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, Write};
@@ -15,19 +16,20 @@ pub fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
-/// Like [`write_atomically`], for files that are not written from the beginning to the end.
+/// Like [`write_atomically`], for files that are not written from the beginning to the end. Returns the number of bytes.
 ///
 /// # Errors
-/// If the file cannot be written, through `failed`, or with whatever `fill` returns.
-pub fn fill_atomically<T, E>(
+/// If the file cannot be written, or with whatever `fill` returns.
+pub fn fill_atomically(
     path: &Path,
-    failed: impl Fn(io::Error) -> E,
-    fill: impl FnOnce(&mut File) -> Result<T, E>,
-) -> Result<T, E> {
-    let mut draft = Draft::create(path).map_err(&failed)?;
-    let result = fill(draft.file_mut())?;
-    draft.publish().map_err(failed)?;
-    Ok(result)
+    fill: impl FnOnce(&mut File) -> Result<(), Failure>,
+) -> Result<u64, Failure> {
+    let named = |error| Failure::at(path, error);
+    let mut draft = Draft::create(path).map_err(named)?;
+    fill(draft.file_mut())?;
+    let bytes = draft.file_mut().metadata().map_err(named)?.len();
+    draft.publish().map_err(named)?;
+    Ok(bytes)
 }
 
 /// What [`write_together`] writes into a file.
@@ -36,11 +38,8 @@ pub type Content<'a> = &'a dyn Fn(&mut dyn Write) -> io::Result<()>;
 /// Like [`write_atomically`], for several files that are complete or absent together.
 ///
 /// # Errors
-/// If a file cannot be written, through `failed`.
-pub fn write_together<E>(
-    files: &[(&Path, Content<'_>)],
-    failed: impl Fn(&Path, io::Error) -> E,
-) -> Result<(), E> {
+/// If a file cannot be written.
+pub fn write_together(files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
     let draft = |(path, fill): &(&Path, Content<'_>)| {
         let mut out = BufWriter::new(Draft::create(path)?);
         fill(&mut out)?;
@@ -48,10 +47,11 @@ pub fn write_together<E>(
         draft.synchronise()?;
         Ok(draft)
     };
-    let drafts: Result<Vec<Draft>, E> =
-        files.iter().map(|file| draft(file).map_err(|error| failed(file.0, error))).collect();
-    let mut drafts = files.iter().zip(drafts?);
+    let failed = |path: &Path, error| Failure::at(path, error);
+    let drafts = files.iter().map(|file| draft(file).map_err(|error| failed(file.0, error)));
+    let drafts = drafts.collect::<Result<Vec<Draft>, Failure>>()?;
     let _publication = publications();
+    let mut drafts = files.iter().zip(drafts);
     drafts.try_for_each(|((path, _), draft)| draft.publish().map_err(|error| failed(path, error)))
 }
 
@@ -140,10 +140,10 @@ mod tests {
                     false => out.write_all(b"new"),
                 }),
             ];
-            write_together(&content, |path, _| path.to_owned())
+            write_together(&content).map_err(|failure| failure.why)
         };
         fs::write(&first, "old").unwrap();
-        assert_eq!(write(), Err(second.clone()));
+        assert_eq!(write(), Err(format!("{}: full", second.display())));
         assert_eq!(fs::read(&first).unwrap(), b"old");
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
         fail.set(false);

@@ -65,8 +65,7 @@ impl TreeFile {
         }
         let described = levels.last().map_or(0, |last| last.start);
         let split = Bits::read(&file, &file.split, described)?;
-        let masked = file.masked.as_ref().map(|array| Bits::read(&file, array, end)).transpose()?;
-        let masked = masked.unwrap_or_default();
+        let masked = Bits::read(&file, &file.masked, end)?;
         if !split.are_disjoint(&masked) {
             return Err(TreeError::Damaged("a node is masked and split".to_owned()));
         }
@@ -173,49 +172,32 @@ impl Walk<'_> {
     }
 }
 
-/// The bits of an array, all in memory: an eighth of a byte for each node in a chunk that is stored. The first bit of a byte is the most
-/// significant one.
-#[derive(Debug, Default)]
-struct Bits {
-    /// The chunks; empty without set bits.
-    chunks: Vec<Vec<u8>>,
-    /// Bytes of a chunk.
-    chunk_bytes: u64,
-}
+/// The first bits of an array, in bytes up to the last chunk that is stored. The first bit of a byte is the most significant one.
+#[derive(Debug)]
+struct Bits(Vec<u8>);
 
 impl Bits {
     /// The first `count` bits of an array. Those after them have no meaning, and are zero here.
     fn read(file: &TreeReader, array: &Chunked, count: u64) -> Result<Self> {
-        let mut bits = Self { chunks: Vec::new(), chunk_bytes: u64::from(array.chunk_len) };
-        for (index, begin) in (0..array.chunks.len()).zip((0..).step_by(array.chunk_len as usize)) {
-            let mut chunk = Vec::new();
-            if array.chunks[index].is_some() {
-                file.read_chunk(array, index, &mut chunk)?;
-            }
-            let left = count.saturating_sub(8 * begin);
-            if left < 8 * chunk.len() as u64 {
-                chunk.truncate(left.div_ceil(8) as usize);
-                if let Some(last) = chunk.last_mut().filter(|_| !left.is_multiple_of(8)) {
-                    *last &= !(0xff >> (left % 8));
-                }
-            }
-            bits.chunks.push(chunk);
+        let (mut bits, mut chunk) = (Vec::new(), Vec::new());
+        let stored = array.chunks.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+        for index in 0..stored {
+            file.read_chunk(array, index, &mut chunk)?;
+            bits.extend_from_slice(&chunk);
         }
-        Ok(bits)
+        bits.truncate(count.div_ceil(8) as usize);
+        if let Some(last) = bits.get_mut((count / 8) as usize) {
+            *last &= !(0xff >> (count % 8));
+        }
+        Ok(Self(bits))
     }
 
     /// Up to eight bits from a position on; the first becomes the lowest.
     fn get(&self, first: u64, count: u32) -> u8 {
-        let pair = u16::from_be_bytes([self.byte(first / 8), self.byte(first / 8 + 1)]);
+        let byte = |at: u64| self.0.get(at as usize).copied().unwrap_or(0);
+        let pair = u16::from_be_bytes([byte(first / 8), byte(first / 8 + 1)]);
         let bits = ((pair << (first % 8) >> 8) as u8).reverse_bits();
         bits & ((1u16 << count) - 1) as u8
-    }
-
-    fn byte(&self, at: u64) -> u8 {
-        let Some(chunk) = at.checked_div(self.chunk_bytes) else { return 0 };
-        let chunk = self.chunks.get(chunk as usize);
-        let byte = chunk.and_then(|chunk| chunk.get((at % self.chunk_bytes) as usize));
-        byte.copied().unwrap_or(0)
     }
 
     /// Number of bits that are set in a range.
@@ -226,8 +208,6 @@ impl Bits {
 
     /// Whether no bit is set in both.
     fn are_disjoint(&self, other: &Self) -> bool {
-        let of_chunk = |(a, b): (&Vec<u8>, &Vec<u8>)| a.iter().zip(b).all(|(a, b)| a & b == 0);
-        // Of two arrays of which one has a shorter chunk, that is the only one.
-        self.chunks.iter().zip(&other.chunks).all(of_chunk)
+        self.0.iter().zip(&other.0).all(|(a, b)| a & b == 0)
     }
 }

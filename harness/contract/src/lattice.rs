@@ -82,6 +82,11 @@ impl Root {
         std::array::from_fn(|a| self.origin[a] + at[a] as f64 * scale)
     }
 
+    /// Edge of the cells of a level, in the user's units.
+    pub fn edge_of(&self, level: u8) -> f64 {
+        self.edge / f64::from(1u32 << level)
+    }
+
     /// A point of the user with as few decimals as its lattice point needs, and without the rounding errors beyond them: what
     /// is printed. A lattice point next to 24900 is printed as 24900.
     pub fn rounded(&self, at: [f64; 3]) -> [f64; 3] {
@@ -98,8 +103,7 @@ impl Root {
 
     /// The coarsest level whose cells are at most `spacing` wide; `None` if it is deeper than 19.
     pub fn level_for(&self, spacing: f64) -> Option<u8> {
-        let fits = |level: &u8| self.edge / f64::from(1u32 << level) <= spacing;
-        (0..=LEVEL_MAX).find(fits)
+        (0..=LEVEL_MAX).find(|&level| self.edge_of(level) <= spacing)
     }
 
     /// An octant as text: path, level, and bounds in the user's units.

@@ -4,7 +4,7 @@
 use crate::digest::Digest;
 use crate::failure::Failure;
 use crate::files::named;
-use crate::manifest::{self, Manifest, Part, Tally};
+use crate::manifest::{self, Manifest, Part};
 use crate::mesh::{Mesh, part_names};
 use crate::npy::{self, PartFile};
 use ::files::Claim;
@@ -89,7 +89,7 @@ impl LeafSet {
     /// The mesh with other parts, and with the counts and digests of its manifest updated to match.
     pub fn with_parts(&self, parts: Vec<Vec<u64>>) -> Self {
         let mut set = Self::new(self.manifest.clone(), parts);
-        set.manifest.set_tally(Tally::of(&set.words));
+        set.manifest.set_leaves(&set.words);
         let part = |(rank, words): (usize, &Vec<u64>)| Part {
             file: manifest::part_name(rank),
             leaves: words.len() as u64,
@@ -105,7 +105,7 @@ impl LeafSet {
     /// # Errors
     /// If the directory is not empty or a file cannot be written; the message names it.
     pub fn create(&self, dir: &Path) -> io::Result<()> {
-        create(dir, &self.manifest, |part, out| npy::write_to(out, &self.parts[part]))
+        create(dir, &self.manifest, |part, out| out.write_all(&npy::bytes(&self.parts[part])))
     }
 
     /// Writes the mesh into an existing directory, whether or not its manifest is correct.

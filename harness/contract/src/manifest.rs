@@ -296,13 +296,43 @@ impl Manifest {
         faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault.to_owned())
     }
 
-    /// Replaces all entries that depend on the leaves.
-    pub fn set_tally(&mut self, tally: Tally) {
-        self.leaves = tally.leaves;
-        self.leaves_by_level = tally.by_level;
-        self.leaves_by_side = tally.by_side;
-        self.digest = tally.digest;
-        self.octant_digests = tally.octants;
+    /// Replaces all entries that depend on the leaves, but for the parts, by those of these words.
+    pub fn set_leaves(&mut self, words: &[u64]) {
+        self.clear_leaves();
+        words.iter().for_each(|&word| self.add(word));
+        self.finish();
+    }
+
+    /// Counts no leaves, and gives every octant the digest of none.
+    pub fn clear_leaves(&mut self) {
+        (self.leaves, self.leaves_by_level, self.leaves_by_side) = Default::default();
+        self.octant_digests = vec![Digest::default(); OCTANTS];
+    }
+
+    /// Adds one word to the counts and to the digest of its octant. Call [`Self::finish`] after the last.
+    pub fn add(&mut self, word: u64) {
+        self.count(word, 1);
+        self.octant_digests[octant_index(word)].add(word);
+    }
+
+    /// Counts this many words of the level and side of one, and leaves the digests unchanged. An invalid level or side counts among all leaves alone.
+    pub fn count(&mut self, word: u64, leaves: u64) {
+        self.leaves += leaves;
+        if let Some(count) = self.leaves_by_level.get_mut(usize::from(crate::word::level(word))) {
+            *count += leaves;
+        }
+        match word & 3 {
+            0 => self.leaves_by_side.outside += leaves,
+            1 => self.leaves_by_side.inside += leaves,
+            2 => self.leaves_by_side.crossing += leaves,
+            _ => {}
+        }
+    }
+
+    /// Computes the digest of all words from those of the octants, which saves one addition per leaf.
+    pub fn finish(&mut self) {
+        self.digest = Digest::default();
+        self.octant_digests.iter().for_each(|&octant| self.digest.merge(octant));
     }
 
     /// Reads the manifest of a directory.
@@ -340,71 +370,6 @@ impl Manifest {
 /// The name of the part file with this index.
 pub fn part_name(index: usize) -> String {
     format!("leaves-{index:05}.npy")
-}
-
-/// The entries of a manifest that depend on the leaves alone.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Tally {
-    /// Number of words.
-    pub leaves: u64,
-    /// Leaves by level, without words of an invalid level.
-    pub by_level: [u64; LEVEL_MAX as usize + 1],
-    /// Leaves by side, without words of an invalid side.
-    pub by_side: BySide,
-    /// Digest of all words.
-    pub digest: Digest,
-    /// Digest of the words in each level-3 octant.
-    pub octants: Vec<Digest>,
-}
-
-impl Default for Tally {
-    fn default() -> Self {
-        Self {
-            leaves: 0,
-            by_level: [0; LEVEL_MAX as usize + 1],
-            by_side: BySide::default(),
-            digest: Digest::default(),
-            octants: vec![Digest::default(); OCTANTS],
-        }
-    }
-}
-
-impl Tally {
-    /// The tally of these words.
-    pub fn of(words: &[u64]) -> Self {
-        let mut tally = Self::default();
-        words.iter().for_each(|&w| tally.add(w));
-        tally.finish();
-        tally
-    }
-
-    /// Adds one word. Call [`Tally::finish`] after the last.
-    pub fn add(&mut self, word: u64) {
-        self.count(word, 1);
-        self.octants[octant_index(word)].add(word);
-    }
-
-    /// Counts this many words of the level and side of one, and leaves the digests unchanged.
-    pub fn count(&mut self, word: u64, leaves: u64) {
-        self.leaves += leaves;
-        if let Some(count) = self.by_level.get_mut(usize::from(crate::word::level(word))) {
-            *count += leaves;
-        }
-        match word & 3 {
-            0 => self.by_side.outside += leaves,
-            1 => self.by_side.inside += leaves,
-            2 => self.by_side.crossing += leaves,
-            _ => {}
-        }
-    }
-
-    /// Computes the digest of all words from those of the octants, which saves one addition per leaf.
-    pub fn finish(&mut self) {
-        self.digest = Digest::default();
-        for &octant in &self.octants {
-            self.digest.merge(octant);
-        }
-    }
 }
 
 /// Index of the level-3 octant that contains the minimum corner of a leaf: the top nine bits of its word.

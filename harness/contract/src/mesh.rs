@@ -100,16 +100,11 @@ impl Mesh {
     }
 
     /// Number of leaves in the files, whatever the manifest states.
-    pub fn len(&self) -> u64 {
+    pub fn leaf_count(&self) -> u64 {
         match &self.tree_file {
             Some(tree) => tree.leaves,
-            None => self.parts.iter().map(PartFile::len).sum(),
+            None => self.parts.iter().map(PartFile::leaves).sum(),
         }
-    }
-
-    /// Whether there are no leaves.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Passes all words to `run`, until it returns false. Each run comes from the part with the given index. If every part is
@@ -256,16 +251,13 @@ impl Mesh {
         }
     }
 
-    /// Whether the rank of each leaf is known: words have a file for each rank, and a tree has none.
-    pub fn has_ranks(&self) -> bool {
-        self.tree_file.is_none()
-    }
-
-    /// The error of a request that needs them.
-    pub fn ranks_unknown(&self) -> Failure {
-        Failure::input(
-            "the ranks of a mesh that has only a tree are unknown: mesh with --write words",
-        )
+    /// Makes sure that the rank of each leaf is known: words have a file for each rank, and a tree has none.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn require_ranks(&self) -> Result<(), Failure> {
+        let why = "the ranks of a mesh that has only a tree are unknown: mesh with --write words";
+        if self.tree_file.is_none() { Ok(()) } else { Err(Failure::input(why)) }
     }
 }
 
@@ -306,7 +298,7 @@ impl Order {
 }
 
 /// Words per read: large enough for streaming, small enough for thousands of parts.
-const CHUNK: usize = 1 << 15;
+const CHUNK: u64 = 1 << 15;
 
 /// A part and its buffer.
 struct Reader<'a> {
@@ -322,10 +314,10 @@ impl Reader<'_> {
     /// Refills an exhausted buffer; false at the end of the part.
     fn fill(&mut self) -> Result<bool, Failure> {
         if self.position == self.words.len() {
-            let left = self.file.len() - self.next;
-            self.words.resize(usize::try_from(left).unwrap_or(usize::MAX).min(CHUNK), 0);
+            let left = (self.file.leaves() - self.next).min(CHUNK);
+            self.words.resize(left as usize, 0);
             self.file.read_at(self.next, &mut self.words)?;
-            (self.next, self.position) = (self.next + self.words.len() as u64, 0);
+            (self.next, self.position) = (self.next + left, 0);
         }
         Ok(!self.words.is_empty())
     }
@@ -388,7 +380,7 @@ mod tests {
         fn every_way_of_reading_gives_the_leaves_of_the_parts(words in random_words(3), part_of in prop::collection::vec(0usize..3, 600)) {
             let words: Vec<u64> = words.into_iter().take(part_of.len()).collect();
             let (_dir, mesh) = opened(&in_parts(&words, &part_of));
-            prop_assert_eq!(mesh.len(), words.len() as u64);
+            prop_assert_eq!(mesh.leaf_count(), words.len() as u64);
             let mut visited = Vec::new();
             mesh.visit(&mut |run| visited.extend_from_slice(run)).unwrap();
             prop_assert_eq!(&visited, &words);
@@ -424,7 +416,7 @@ mod tests {
     fn leaves_are_counted_in_the_files_and_not_in_the_manifest() {
         let mut set = leaf_set(vec![words_of(|o| o.level < 1), vec![]]);
         set.manifest.leaves = u64::MAX;
-        assert_eq!(opened(&set).1.len(), 8);
+        assert_eq!(opened(&set).1.leaf_count(), 8);
     }
 }
 
@@ -454,13 +446,8 @@ mod merging {
             words.sort_unstable();
             words
         };
-        let given = [
-            random(2 * CHUNK as u64 + 5, 1),
-            vec![],
-            random(300, 2),
-            vec![7; 3],
-            random(CHUNK as u64, 3),
-        ];
+        let given =
+            [random(2 * CHUNK + 5, 1), vec![], random(300, 2), vec![7; 3], random(CHUNK, 3)];
         let (_dir, files) = parts(&given);
         let (mut found, mut by_part) = (Vec::new(), vec![Vec::new(); given.len()]);
         merge(&files, &mut |part, run| {

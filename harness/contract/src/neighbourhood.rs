@@ -2,6 +2,8 @@
 
 use crate::octant::{CELLS_PER_EDGE, Octant};
 use crate::tree::{Handle, NO_LEAF, Tree};
+use std::array;
+use std::sync::LazyLock;
 
 /// Index of the octant itself among the 27 octants.
 const SELF: usize = 13;
@@ -11,7 +13,21 @@ pub const OFFSETS: [[i32; 3]; 27] = offsets();
 
 /// For each child and each of its 27 neighbours: the index of the neighbour's parent in the parent's
 /// neighbourhood, and the neighbour's digit.
-const DESCENT: [[(u8, u8); 27]; 8] = descent();
+static DESCENT: LazyLock<[[(usize, u8); 27]; 8]> = LazyLock::new(|| {
+    array::from_fn(|child| {
+        OFFSETS.map(|offset| {
+            // In child edges from the parent's minimum corner: -1, 0, 1 or 2.
+            let position = [0, 1, 2].map(|a| (child as i32 >> a & 1) + offset[a]);
+            let digit = (0..3).map(|a| position[a].rem_euclid(2) << a).sum::<i32>();
+            (index(position.map(|p| p.div_euclid(2))), digit as u8)
+        })
+    })
+});
+
+/// The index of the octant at an offset in edges.
+const fn index([x, y, z]: [i32; 3]) -> usize {
+    (SELF as i32 + x + 3 * y + 9 * z) as usize
+}
 
 const fn offsets() -> [[i32; 3]; 27] {
     let mut all = [[0; 3]; 27];
@@ -19,29 +35,6 @@ const fn offsets() -> [[i32; 3]; 27] {
     while i < 27 {
         all[i] = [i as i32 % 3 - 1, i as i32 / 3 % 3 - 1, i as i32 / 9 - 1];
         i += 1;
-    }
-    all
-}
-
-const fn descent() -> [[(u8, u8); 27]; 8] {
-    let mut all = [[(0, 0); 27]; 8];
-    let mut child = 0;
-    while child < 8 {
-        let mut i = 0;
-        while i < 27 {
-            let (mut index, mut digit, mut a, mut stride) = (0, 0, 0, 1);
-            while a < 3 {
-                // In child edges from the parent's minimum corner: -1, 0, 1 or 2.
-                let position = (child >> a & 1) + OFFSETS[i][a];
-                index += (position.div_euclid(2) + 1) * stride;
-                digit |= position.rem_euclid(2) << a;
-                stride *= 3;
-                a += 1;
-            }
-            all[child as usize][i] = (index as u8, digit as u8);
-            i += 1;
-        }
-        child += 1;
     }
     all
 }
@@ -67,15 +60,15 @@ impl Neighbourhood {
     pub fn child(&self, tree: &Tree, digit: u8) -> Self {
         let level = self.octant.level;
         let handles = DESCENT[usize::from(digit)]
-            .map(|(index, digit)| tree.child(self.handles[usize::from(index)], digit, level));
+            .map(|(index, digit)| tree.child(self.handles[index], digit, level));
         Self { octant: self.octant.child(digit), handles }
     }
 
     /// The content across a face of a child, on the low (-1) or high (1) side of an axis.
     pub fn across(&self, tree: &Tree, digit: u8, axis: usize, side: i32) -> Handle {
-        let neighbour = (SELF as i32 + side * [1, 3, 9][axis]) as usize;
+        let neighbour = index(array::from_fn(|a| if a == axis { side } else { 0 }));
         let (index, digit) = DESCENT[usize::from(digit)][neighbour];
-        tree.child(self.handles[usize::from(index)], digit, self.octant.level)
+        tree.child(self.handles[index], digit, self.octant.level)
     }
 
     /// The neighbourhood of any octant, found by descent from the root.
@@ -93,8 +86,8 @@ impl Neighbourhood {
     }
 
     /// The content of the neighbour at an offset in edges.
-    pub fn at_offset(&self, [x, y, z]: [i32; 3]) -> Handle {
-        self.handles[(SELF as i32 + x + 3 * y + 9 * z) as usize]
+    pub fn at_offset(&self, offset: [i32; 3]) -> Handle {
+        self.handles[index(offset)]
     }
 
     /// Level of the coarsest leaf in all 27 octants, deleted leaves excluded.

@@ -1,7 +1,7 @@
 //! Part files: one-dimensional NumPy arrays of type `<u8`.
 
-use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub struct PartFile {
     path: PathBuf,
     file: File,
     offset: u64,
-    len: u64,
+    leaves: u64,
 }
 
 impl PartFile {
@@ -30,7 +30,7 @@ impl PartFile {
         let file = ::files::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head).map_err(unreadable)?;
-        let (Header { descr, shape }, offset) =
+        let (descr, shape, offset) =
             read_header(&head).map_err(|why| wrong(format!("has no npy header: {why}")))?;
         if descr == ">u8" {
             let why = "has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'";
@@ -48,17 +48,12 @@ impl PartFile {
             let implied = format!("its header implies {expected} ({len} leaves)");
             return Err(wrong(format!("has {found} bytes, but {implied}")));
         }
-        Ok(Self { path: path.to_owned(), file, offset, len })
+        Ok(Self { path: path.to_owned(), file, offset, leaves: len })
     }
 
     /// Number of words.
-    pub fn len(&self) -> u64 {
-        self.len
-    }
-
-    /// Whether the part has no words, which is allowed.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
+    pub fn leaves(&self) -> u64 {
+        self.leaves
     }
 
     /// Fills `words` with the words from index `first` on.
@@ -80,28 +75,17 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be read.
     pub fn read_all(&self) -> Result<Vec<u64>, Failure> {
-        let mut words = vec![0; usize::try_from(self.len).expect("a part fits the address space")];
+        let mut words =
+            vec![0; usize::try_from(self.leaves).expect("a part fits the address space")];
         self.read_at(0, &mut words)?;
         Ok(words)
     }
 }
 
-/// What an npy header states of an array.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Header {
-    /// Its type.
-    pub descr: String,
-    /// Its dimensions.
-    pub shape: Vec<u64>,
-}
-
-/// The npy header at the beginning of a file, and its length. It is read as NumPy writes it: a dictionary of Python, with its keys in
+/// The type and the dimensions in the npy header at the beginning of a file, and the header's length. It is read as NumPy writes it: a dictionary of Python, with its keys in
 /// alphabetical order.
-///
-/// # Errors
-/// If there is none, or if it is longer than the file.
-pub fn read_header(head: &[u8]) -> std::io::Result<(Header, u64)> {
-    let wrong = |why: &str| std::io::Error::other(why);
+fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), String> {
+    let wrong = |why: &str| why.to_owned();
     let [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, low, high, ..] = *head else {
         return Err(wrong("it is too short, or not of version 1"));
     };
@@ -117,7 +101,7 @@ pub fn read_header(head: &[u8]) -> std::io::Result<(Header, u64)> {
     let dimensions = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
     let shape = dimensions.map(|n| n.parse().map_err(|_| wrong("its shape is not of numbers")));
     let descr = descr.trim_matches('\'').to_owned();
-    Ok((Header { descr, shape: shape.collect::<Result<_, _>>()? }, end as u64))
+    Ok((descr, shape.collect::<Result<_, _>>()?, end as u64))
 }
 
 /// Writes words as a part file.
@@ -125,18 +109,14 @@ pub fn read_header(head: &[u8]) -> std::io::Result<(Header, u64)> {
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
-    let mut out = BufWriter::new(File::create(path)?);
-    write_to(&mut out, words)?;
-    out.flush()
+    fs::write(path, bytes(words))
 }
 
-/// Writes words in the format of a part file.
-///
-/// # Errors
-/// Whatever the writer returns.
-pub fn write_to(out: &mut dyn Write, words: &[u64]) -> std::io::Result<()> {
-    out.write_all(&header("<u8", &format!("({},)", words.len())))?;
-    words.iter().try_for_each(|w| out.write_all(&w.to_le_bytes()))
+/// The bytes of a part file.
+pub fn bytes(words: &[u64]) -> Vec<u8> {
+    let mut bytes = header("<u8", &format!("({},)", words.len()));
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    bytes
 }
 
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does.
@@ -154,6 +134,7 @@ pub fn header(descr: &str, shape: &str) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
 
     fn file_of(bytes: &[u8]) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -168,7 +149,7 @@ mod tests {
         write(file.path(), &words).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!(part.read_all().unwrap(), words);
-        assert!(!part.is_empty());
+        assert!(part.leaves() > 0);
     }
 
     #[test]
@@ -187,8 +168,8 @@ mod tests {
         let file = file_of(b"");
         write(file.path(), &[]).unwrap();
         let part = PartFile::open(file.path()).unwrap();
-        assert_eq!((part.len(), part.read_all().unwrap()), (0, Vec::new()));
-        assert!(part.is_empty());
+        assert_eq!((part.leaves(), part.read_all().unwrap()), (0, Vec::new()));
+        assert_eq!(part.leaves(), 0);
     }
 
     #[test]

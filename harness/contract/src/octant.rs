@@ -53,16 +53,10 @@ impl Octant {
 
     /// The octant of the same level at an offset in edges of the octant; `None` outside the root.
     pub fn neighbour(&self, offset: [i32; 3]) -> Option<Self> {
-        let mut corner = [0; 3];
-        for a in 0..3 {
-            let coordinate =
-                i64::from(self.corner[a]) + i64::from(offset[a]) * i64::from(self.edge());
-            if !(0..i64::from(CELLS_PER_EDGE)).contains(&coordinate) {
-                return None;
-            }
-            corner[a] = coordinate as u32;
-        }
-        Some(Self { corner, level: self.level })
+        let edge = i64::from(self.edge());
+        let corner = [0, 1, 2].map(|a| i64::from(self.corner[a]) + i64::from(offset[a]) * edge);
+        let is_inside = corner.iter().all(|c| (0..i64::from(CELLS_PER_EDGE)).contains(c));
+        is_inside.then(|| Self { corner: corner.map(|c| c as u32), level: self.level })
     }
 
     /// Whether `other` is this octant or one of its descendants.

@@ -60,16 +60,11 @@ fn binary(bytes: &[u8]) -> Option<Vec<Facet>> {
     if bytes.len() as u64 != length(facet_count(bytes)?) {
         return None;
     }
-    let number = |b: &[u8]| f32::from_le_bytes(b.try_into().expect("four bytes"));
-    let facet = |record: &[u8]| -> Facet {
-        std::array::from_fn(|v| {
-            std::array::from_fn(|a| {
-                let at = 12 * (v + 1) + 4 * a;
-                number(&record[at..at + 4])
-            })
-        })
+    let facet = |record: &[u8; 50]| {
+        let (vertices, _) = record[12..].as_chunks::<4>().0.as_chunks::<3>();
+        std::array::from_fn(|v| vertices[v].map(f32::from_le_bytes))
     };
-    Some(bytes[84..].chunks_exact(50).map(facet).collect())
+    Some(bytes[84..].as_chunks().0.iter().map(facet).collect())
 }
 
 /// The facet count in the header of a binary file; `None` if the bytes end before it.

@@ -10,7 +10,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use crate::octant::{LEVEL_MAX, Octant};
 use crate::word;
 use hashbrown::HashTable;
 use hashbrown::hash_table::Entry;
@@ -98,8 +98,12 @@ pub const NO_LEAF: u8 = 100;
 /// `#[inline]`.
 #[derive(Debug, Default)]
 pub struct Tree {
-    store: Store,
     root: Handle,
+    /// The children of all nodes.
+    children: Vec<[Handle; 8]>,
+    summaries: Vec<Summary>,
+    /// The indices of all nodes, by the hash of their children.
+    indices: HashTable<u32>,
 }
 
 impl Tree {
@@ -120,14 +124,14 @@ impl Tree {
 
     /// Number of distinct nodes.
     pub fn nodes(&self) -> usize {
-        self.store.len()
+        self.children.len()
     }
 
     /// The content of a child of an octant with content `of` at this level.
     #[inline]
     pub fn child(&self, of: Handle, digit: u8, level: u8) -> Handle {
         if of.is_node() {
-            return self.store.children(of)[usize::from(digit)];
+            return self.children[of.index()][usize::from(digit)];
         }
         of.leaf_of(level).map_or(of, |(kind, level)| Handle::coarser_leaf(kind, level))
     }
@@ -136,7 +140,7 @@ impl Tree {
     #[inline]
     pub fn finest_level(&self, of: Handle, level: u8) -> u8 {
         if of.is_node() {
-            return level + self.store.summary(of).finest;
+            return level + self.summaries[of.index()].finest;
         }
         of.leaf_of(level).map_or(0, |(_, level)| level)
     }
@@ -146,7 +150,7 @@ impl Tree {
     #[inline]
     pub fn coarsest_level(&self, of: Handle, level: u8) -> u8 {
         if of.is_node() {
-            return level + self.store.summary(of).coarsest;
+            return level + self.summaries[of.index()].coarsest;
         }
         let leaf = of.leaf_of(level).filter(|(kind, _)| *kind != DELETED);
         leaf.map_or(NO_LEAF, |(_, level)| level)
@@ -156,7 +160,7 @@ impl Tree {
     #[inline]
     pub fn kinds(&self, of: Handle) -> Kinds {
         if of.is_node() {
-            return self.store.summary(of).kinds;
+            return self.summaries[of.index()].kinds;
         }
         let without_leaf = if of == Handle::HOLE { HOLES } else { 0 };
         of.leaf_of(0).map_or(without_leaf, |(kind, _)| 1 << kind)
@@ -184,150 +188,24 @@ impl Tree {
 
     /// What the tree has at an octant: a node, a leaf, or a hole. Within a leaf it is the leaf's handle.
     pub fn at(&self, octant: &Octant) -> Handle {
-        let mut handle = self.root;
-        for level in 1..=octant.level {
-            if !handle.is_node() {
-                break;
-            }
-            handle = self.child(handle, octant.ancestor(level).digit(), level - 1);
-        }
-        handle
+        self.descend(octant).1
     }
 
     /// The leaf that contains a level-19 cell, and its kind.
     pub fn locate(&self, cell: [u32; 3]) -> Option<(Octant, Kind)> {
-        debug_assert!(cell.iter().all(|&c| c < CELLS_PER_EDGE));
-        let key = word::key_of(cell);
-        let (mut handle, mut octant) = (self.root, Octant::ROOT);
-        while handle.is_node() {
-            let digit = ((key / word::span(octant.level + 1)) & 7) as u8;
-            handle = self.store.children(handle)[usize::from(digit)];
-            octant = octant.child(digit);
+        let cell = Octant { corner: cell, level: LEVEL_MAX };
+        let (level, handle) = self.descend(&cell);
+        handle.as_leaf().map(|kind| (cell.ancestor(level), kind))
+    }
+
+    /// The level of the first octant on the way from the root to this one that is not split, or of itself, and what the tree has there.
+    fn descend(&self, to: &Octant) -> (u8, Handle) {
+        let (mut level, mut handle) = (0, self.root);
+        while handle.is_node() && level < to.level {
+            level += 1;
+            handle = self.children[handle.index()][usize::from(to.ancestor(level).digit())];
         }
-        handle.as_leaf().map(|kind| (octant, kind))
-    }
-}
-
-/// Builds a tree from leaves in ascending order of their keys.
-///
-/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and
-/// its node is stored, as soon as a leaf follows that lies outside it.
-#[derive(Debug, Default)]
-pub struct Builder {
-    store: Store,
-    path: [[Handle; 8]; LEVEL_MAX as usize],
-    /// Number of open octants: `path[..open]` is in use.
-    open: usize,
-    /// Key of the last leaf, which determines the open octants.
-    key: u64,
-    /// End of the key range of the last leaf.
-    end: u64,
-    root: Handle,
-}
-
-/// Why a leaf was rejected.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// The word is not a leaf.
-    Fault(String),
-    /// The leaf overlaps an earlier leaf, or is not in ascending order.
-    Overlap,
-}
-
-impl Builder {
-    /// Adds a leaf word.
-    ///
-    /// # Errors
-    /// If it is rejected; the tree is unchanged.
-    pub fn push(&mut self, word: u64) -> Result<(), Refusal> {
-        match word::fault(word) {
-            Some(why) => Err(Refusal::Fault(why)),
-            None => self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind),
-        }
-    }
-
-    /// Adds a leaf of any kind, [`DELETED`] included.
-    ///
-    /// # Errors
-    /// If it is rejected; the tree is unchanged.
-    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), Refusal> {
-        if key < self.end {
-            return Err(Refusal::Overlap);
-        }
-        self.end = key + word::span(level);
-        let leaf = Handle::leaf(kind);
-        if level == 0 {
-            self.root = leaf;
-            return Ok(());
-        }
-        let parent = usize::from(level) - 1;
-        self.close_down_to(shared_levels(self.key, key));
-        self.key = key;
-        while self.open <= parent {
-            self.path[self.open] = [Handle::HOLE; 8];
-            self.open += 1;
-        }
-        self.path[parent][digit(key, parent)] = leaf;
-        Ok(())
-    }
-
-    /// Closes open octants until at most `levels` are open.
-    fn close_down_to(&mut self, levels: usize) {
-        while self.open > levels {
-            self.open -= 1;
-            let node = self.store.intern(self.path[self.open]);
-            match self.open.checked_sub(1) {
-                Some(parent) => self.path[parent][digit(self.key, parent)] = node,
-                None => self.root = node,
-            }
-        }
-    }
-
-    /// Number of distinct nodes so far.
-    pub fn nodes(&self) -> usize {
-        self.store.len()
-    }
-
-    /// The tree of all leaves added.
-    pub fn finish(mut self) -> Tree {
-        self.close_down_to(0);
-        Tree { store: self.store, root: self.root }
-    }
-}
-
-/// Number of common ancestors of two level-19 cells, themselves excluded.
-fn shared_levels(a: u64, b: u64) -> usize {
-    match (a ^ b).checked_ilog2() {
-        Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
-        None => usize::from(LEVEL_MAX),
-    }
-}
-
-/// The digit of the child that contains this cell, among the children of its ancestor at `level`.
-fn digit(key: u64, level: usize) -> usize {
-    (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
-}
-
-/// All nodes of a tree.
-#[derive(Debug, Default)]
-struct Store {
-    children: Vec<[Handle; 8]>,
-    summaries: Vec<Summary>,
-    /// The indices of all nodes, by the hash of their children.
-    indices: HashTable<u32>,
-}
-
-impl Store {
-    fn len(&self) -> usize {
-        self.children.len()
-    }
-
-    fn children(&self, of: Handle) -> &[Handle; 8] {
-        &self.children[of.index()]
-    }
-
-    fn summary(&self, of: Handle) -> Summary {
-        self.summaries[of.index()]
+        (level, handle)
     }
 
     /// The node with these children, which is stored if it is new.
@@ -349,25 +227,100 @@ impl Store {
     fn summarise(&self, children: &[Handle; 8]) -> Summary {
         let mut all = Summary { finest: 0, coarsest: NO_LEAF, kinds: 0 };
         for &child in children {
-            let below = self.summary_of_child(child);
-            all.finest = all.finest.max(below.finest);
-            all.coarsest = all.coarsest.min(below.coarsest);
-            all.kinds |= below.kinds;
+            all.finest = all.finest.max(self.finest_level(child, 1));
+            all.coarsest = all.coarsest.min(self.coarsest_level(child, 1));
+            all.kinds |= self.kinds(child);
         }
         all
     }
+}
 
-    /// The contribution of a child to its parent's summary, one level deeper.
-    fn summary_of_child(&self, child: Handle) -> Summary {
-        if child.is_node() {
-            let Summary { finest, coarsest, kinds } = self.summary(child);
-            let coarsest = if coarsest == NO_LEAF { NO_LEAF } else { coarsest + 1 };
-            return Summary { finest: finest + 1, coarsest, kinds };
-        }
-        match child.as_leaf() {
-            Some(DELETED) => Summary { finest: 1, coarsest: NO_LEAF, kinds: 1 << DELETED },
-            Some(kind) => Summary { finest: 1, coarsest: 1, kinds: 1 << kind },
-            None => Summary { finest: 0, coarsest: NO_LEAF, kinds: HOLES },
+/// Builds a tree from leaves in ascending order of their keys.
+///
+/// The octants from the root to the parent of the last leaf are open, one per level. An octant is closed, and
+/// its node is stored, as soon as a leaf follows that lies outside it.
+#[derive(Debug, Default)]
+pub struct Builder {
+    tree: Tree,
+    path: [[Handle; 8]; LEVEL_MAX as usize],
+    /// Number of open octants: `path[..open]` is in use.
+    open: usize,
+    /// Key of the last leaf, which determines the open octants.
+    key: u64,
+    /// End of the key range of the last leaf.
+    end: u64,
+}
+
+impl Builder {
+    /// Adds a leaf word.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
+    pub fn push(&mut self, word: u64) -> Result<(), String> {
+        match word::fault(word) {
+            Some(why) => Err(why),
+            None => self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind),
         }
     }
+
+    /// Adds a leaf of any kind, [`DELETED`] included.
+    ///
+    /// # Errors
+    /// If it is rejected; the tree is unchanged.
+    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), String> {
+        if key < self.end {
+            return Err("it overlaps or precedes the leaf before it".to_owned());
+        }
+        self.end = key + word::span(level);
+        let leaf = Handle::leaf(kind);
+        if level == 0 {
+            self.tree.root = leaf;
+            return Ok(());
+        }
+        let parent = usize::from(level) - 1;
+        self.close_down_to(shared_levels(self.key, key));
+        self.key = key;
+        while self.open <= parent {
+            self.path[self.open] = [Handle::HOLE; 8];
+            self.open += 1;
+        }
+        self.path[parent][digit(key, parent)] = leaf;
+        Ok(())
+    }
+
+    /// Closes open octants until at most `levels` are open.
+    fn close_down_to(&mut self, levels: usize) {
+        while self.open > levels {
+            self.open -= 1;
+            let node = self.tree.intern(self.path[self.open]);
+            match self.open.checked_sub(1) {
+                Some(parent) => self.path[parent][digit(self.key, parent)] = node,
+                None => self.tree.root = node,
+            }
+        }
+    }
+
+    /// Number of distinct nodes so far.
+    pub fn nodes(&self) -> usize {
+        self.tree.nodes()
+    }
+
+    /// The tree of all leaves added.
+    pub fn finish(mut self) -> Tree {
+        self.close_down_to(0);
+        self.tree
+    }
+}
+
+/// Number of common ancestors of two level-19 cells, themselves excluded.
+fn shared_levels(a: u64, b: u64) -> usize {
+    match (a ^ b).checked_ilog2() {
+        Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
+        None => usize::from(LEVEL_MAX),
+    }
+}
+
+/// The digit of the child that contains this cell, among the children of its ancestor at `level`.
+fn digit(key: u64, level: usize) -> usize {
+    (key >> (3 * (usize::from(LEVEL_MAX) - 1 - level)) & 7) as usize
 }

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
@@ -16,19 +17,7 @@ pub const KEY_END: u64 = 1 << 57;
 pub const SIDE_BITS: u64 = 3;
 
 /// Position of a leaf relative to the body.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    Hash,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
     /// Outside the body

@@ -7,12 +7,10 @@ use std::path::Path;
 use crate::foam;
 use crate::front;
 use crate::htg;
-use crate::options::{Options, Summary, Write};
-use crate::selection::Selection;
+use crate::options::{Export, Summary, Write};
 use crate::{p8est, vtu};
 use contract::failure::Failure;
 use contract::files::{Staging, fill_atomically};
-use contract::mesh::Mesh;
 
 /// A format of mesh files.
 #[derive(Debug)]
@@ -58,19 +56,13 @@ pub const FORMATS: &[Format] = &[
         ending: ".cgns",
         purpose: "the same polyhedra with named boundaries in CGNS, for solvers and pre-processors; needs Python with h5py",
         options: &["--case", "--regions"],
-        write: |mesh, selection, path, options| {
-            let source = ("polyMesh", foam::write as Write);
-            made("cgns", source, (mesh, selection, path, options))
-        },
+        write: |export, path| made("cgns", ("polyMesh", foam::write), export, path),
     },
     Format {
         ending: ".mfem",
         purpose: "a mesh with hanging nodes for MFEM; needs Python with NumPy",
         options: &[],
-        write: |mesh, selection, path, options| {
-            let source = ("mesh.p8est", p8est::write as Write);
-            made("mfem", source, (mesh, selection, path, options))
-        },
+        write: |export, path| made("mfem", ("mesh.p8est", p8est::write), export, path),
     },
     Format {
         ending: ".vtkhdf",
@@ -99,16 +91,17 @@ pub const FORMATS: &[Format] = &[
 fn made(
     format: &str,
     (name, write): (&str, Write),
-    (mesh, selection, path, options): (&Mesh, &Selection, &Path, &Options<'_>),
+    export: &Export<'_>,
+    path: &Path,
 ) -> Result<Summary, Failure> {
     let failed = |error: io::Error| Failure::at(path, error);
     let place = Staging::beside(path).map_err(failed)?;
     let (source, file) = (place.path().join(name), place.path().join("made"));
-    let written = write(mesh, selection, &source, options)?;
-    (options.script)(format, &source, &file)?;
+    let written = write(export, &source)?;
+    (export.options.script)(format, &source, &file)?;
     let mut made = File::open(&file).map_err(failed)?;
-    let copy = |draft: &mut File| io::copy(&mut made, draft).map_err(failed);
-    let bytes = fill_atomically(path, failed, copy)?;
+    let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
+    let bytes = fill_atomically(path, copy)?;
     Ok(Summary { files: 1, bytes, ..written })
 }
 
@@ -117,16 +110,15 @@ fn made(
 /// # Errors
 /// If no format has such names.
 pub fn of(path: &Path) -> Result<&'static Format, Failure> {
-    let name = path.to_string_lossy();
-    // A shell completes the name of a directory with a slash.
-    let name = name.trim_end_matches('/');
-    // A dot that begins the name is no extension.
-    let stem = |format: &Format| name.strip_suffix(format.ending).unwrap_or_default();
-    let fits = |format: &&Format| !matches!(stem(format).chars().last(), None | Some('/'));
+    let fits = |format: &&Format| match format.ending.strip_prefix('.') {
+        Some(extension) => path.extension().is_some_and(|of_path| of_path == extension),
+        None => path.ends_with("polyMesh") && path.components().count() > 1,
+    };
     FORMATS.iter().find(fits).ok_or_else(|| {
         let endings: Vec<_> = FORMATS.iter().map(|format| format.ending).collect();
         Failure::input(format!(
-            "{name}: no format has such a name: choose one that ends in {}",
+            "{}: no format has such a name: choose one that ends in {}",
+            path.display(),
             endings.join(", ")
         ))
     })

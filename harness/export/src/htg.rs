@@ -10,35 +10,30 @@ use std::path::Path;
 use contract::failure::Failure;
 use contract::files;
 use contract::lattice::Root;
-use contract::mesh::{Leaf, Mesh};
+use contract::mesh::Leaf;
 use contract::octant::LEVEL_MAX;
 use contract::word::{self, Side};
 use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window, groups};
 use vtkhdf::write::Deflater;
 
-use crate::options::{Options, Summary, Written};
-use crate::selection::Selection;
+use crate::options::{Export, Summary, Written};
 
 /// Writes the file.
 ///
 /// # Errors
 /// If the sides of the mesh are unknown, no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
-pub fn write(
-    mesh: &Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let Export { mesh, options, .. } = export;
     mesh.require_sides()?;
-    let leaves = selection.count(mesh, &|| options.check())?;
+    let leaves = export.count()?;
     let (mut families, mut written) = (Families::default(), Written::default());
-    selection.visit(mesh, &|| options.check(), &mut |leaf| {
+    export.visit(&mut |leaf| {
         options.progress(written.cells, leaves);
         written.add(&leaf.octant, true);
         families.push(&leaf);
         Ok(())
     })?;
-    written.check_invariants(mesh, selection, leaves);
+    written.check_invariants(export, leaves);
     let Root { origin, edge } = mesh.manifest.root;
     let below_root = families.levels[1..].iter().map(|level| 8 * level.len() as u64);
     let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };
@@ -48,7 +43,7 @@ pub fn write(
     let shown: u64 = shown.map(u64::from).sum();
     assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
     let named = |error| Failure::at(path, error);
-    let bytes = files::fill_atomically(path, named, |file| {
+    let bytes = files::fill_atomically(path, |file| {
         let out = BufWriter::with_capacity(1 << 20, file);
         let mut out = TreeWriter::new(out, shape.clone()).map_err(named)?;
         let mut deflater = Deflater::default();
@@ -63,9 +58,7 @@ pub fn write(
             }
             out.add(index, &window.compress(&shape, &mut deflater)).map_err(named)?;
         }
-        let file = out.finish().map_err(named)?.into_inner();
-        let file = file.map_err(|error| named(error.into_error()))?;
-        Ok::<_, Failure>(file.metadata().map_err(named)?.len())
+        Ok(drop(out.finish().map_err(named)?))
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }

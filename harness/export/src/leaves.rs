@@ -10,18 +10,15 @@
 //!
 //! Invariants: words ascend and do not overlap; cells are numbered from 0 in this order, without the leaves that are [`CUT`].
 
-use crate::options::Options;
+use crate::options::{Export, Options};
 use crate::points::Point;
-use crate::selection::Selection;
 use contract::failure::Failure;
-use contract::mesh::{Leaf, Mesh};
+use contract::mesh::Leaf;
 use contract::octant::{CELLS_PER_EDGE, Octant};
 use contract::word;
 
 /// In place of a side: a leaf of the mesh that is not exported.
 pub const CUT: u64 = 3;
-/// Number of cells that can be distinguished.
-const CELLS_MAX: u64 = u32::MAX as u64;
 
 /// The leaves.
 #[derive(Debug, Default)]
@@ -58,38 +55,31 @@ impl Leaves {
     /// The leaves of a mesh that `takes` accepts, given each and whether it is selected; those that are not selected are [`CUT`].
     ///
     /// # Errors
-    /// If the mesh cannot be read, if there are too many cells, or if the user interrupts.
+    /// If the mesh cannot be read, or if the user interrupts.
     pub fn read(
-        mesh: &Mesh,
-        selection: &Selection,
-        options: &Options<'_>,
+        export: &Export<'_>,
         takes: &mut dyn FnMut(&Leaf, bool) -> bool,
     ) -> Result<Self, Failure> {
-        let (mut words, mut cells) = (Vec::new(), 0);
-        mesh.leaves(&|| options.check(), &mut |leaf| {
-            let is_selected = selection.has(&leaf);
+        let mut words = Vec::new();
+        export.mesh.leaves(&|| export.options.check(), &mut |leaf| {
+            let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
-                cells += u64::from(is_selected);
                 let Octant { corner, level } = leaf.octant;
                 let side = if is_selected { leaf.side as u64 } else { CUT };
                 words.push(word::key_of(corner) << 7 | u64::from(level) << 2 | side);
             }
-            match cells {
-                ..=CELLS_MAX => Ok(()),
-                _ => Err(Failure::input(format!(
-                    "more than {CELLS_MAX} cells, which is the limit here: select fewer leaves"
-                ))),
-            }
+            Ok(())
         })?;
         Ok(Self::new(words))
     }
 
-    /// Leaves with these words, of which there are at most [`CELLS_MAX`].
+    /// Leaves with these words.
     pub fn new(words: Vec<u64>) -> Self {
-        let mut cells = 0;
+        let mut cells = 0u32;
         let number = |word: &u64| {
             let number = cells;
-            cells += u32::from(word & 3 != CUT);
+            // So many cells would take hundreds of gigabytes.
+            cells = cells.checked_add(u32::from(word & 3 != CUT)).expect("fewer than 2^32 cells");
             number
         };
         let numbers = words.iter().map(number).collect();
@@ -140,18 +130,22 @@ impl Leaves {
         })
     }
 
-    /// Visits the cells in the order of their numbers.
+    /// Visits the cells in the order of their numbers, with their octants and squares.
     ///
     /// # Errors
     /// The first error of `visit`, or the user's interrupt.
     pub fn walk(
         &self,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around) -> Result<(), Failure>,
+        visit: &mut impl FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let content = self.content(0, self.words.len(), 0);
-        let across = [[Content::Outside; 2]; 3];
-        self.descend(&Around { octant: Octant::ROOT, content, across }, options, visit)
+        let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
+        let mut squares = Vec::new();
+        self.descend(&root, options, &mut |number, around| {
+            self.squares(around, &mut squares);
+            visit(number, &around.octant, &squares)
+        })
     }
 
     fn descend(
@@ -185,16 +179,57 @@ impl Leaves {
         }
         Ok(())
     }
+
+    /// Replaces `squares` by those of a cell.
+    fn squares(&self, around: &Around, squares: &mut Vec<Square>) {
+        squares.clear();
+        let (edge, level) = (around.octant.edge(), around.octant.level);
+        for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
+            let mut corner = around.octant.corner;
+            corner[axis] += if is_high { edge } else { 0 };
+            let across = around.across[axis][usize::from(is_high)];
+            self.split(Square { corner, level, axis, is_high, across }, squares);
+        }
+    }
+
+    /// Appends the squares of a square whose `across` may be split.
+    fn split(&self, square: Square, squares: &mut Vec<Square>) {
+        if !matches!(square.across, Content::Split(..)) {
+            return squares.push(square);
+        }
+        let (u, v) = ((square.axis + 1) % 3, (square.axis + 2) % 3);
+        let (begin, level) = (squares.len(), square.level + 1);
+        let edge = CELLS_PER_EDGE >> level;
+        let children = self.children(square.across, level);
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let mut corner = square.corner;
+            corner[u] += i * edge;
+            corner[v] += j * edge;
+            // The children that touch the square are on the side from which it is seen.
+            let digit =
+                (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << square.axis;
+            self.split(Square { corner, level, across: children[digit], ..square }, squares);
+        }
+        let parts = &squares[begin..];
+        let across = parts[0].across;
+        if across.as_cell().is_none()
+            && parts.len() == 4
+            && parts.iter().all(|part| part.across == across && part.level == level)
+        {
+            squares.truncate(begin);
+            squares.push(Square { across, ..square });
+        }
+    }
 }
 
 /// An octant with its content and that of the octants of the same level across its faces.
 #[derive(Clone, Copy, Debug)]
-pub struct Around {
+struct Around {
     /// The octant.
-    pub octant: Octant,
+    octant: Octant,
     content: Content,
     /// On the low and on the high side of each axis.
-    pub across: [[Content; 2]; 3],
+    across: [[Content; 2]; 3],
 }
 
 /// A square that a cell shares with another cell or with a boundary.
@@ -210,47 +245,6 @@ pub struct Square {
     pub is_high: bool,
     /// A cell, a hole, a cut or the outside.
     pub across: Content,
-}
-
-/// Replaces `squares` by those of a cell.
-pub fn squares(leaves: &Leaves, around: &Around, squares: &mut Vec<Square>) {
-    squares.clear();
-    let (edge, level) = (around.octant.edge(), around.octant.level);
-    for (axis, is_high) in (0..6).map(|face| (face / 2, face % 2 == 1)) {
-        let mut corner = around.octant.corner;
-        corner[axis] += if is_high { edge } else { 0 };
-        let across = around.across[axis][usize::from(is_high)];
-        split(leaves, Square { corner, level, axis, is_high, across }, squares);
-    }
-}
-
-/// Appends the squares of a square whose `across` may be split.
-fn split(leaves: &Leaves, square: Square, squares: &mut Vec<Square>) {
-    if !matches!(square.across, Content::Split(..)) {
-        return squares.push(square);
-    }
-    let (u, v) = ((square.axis + 1) % 3, (square.axis + 2) % 3);
-    let (begin, level) = (squares.len(), square.level + 1);
-    let edge = CELLS_PER_EDGE >> level;
-    let children = leaves.children(square.across, level);
-    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let mut corner = square.corner;
-        corner[u] += i * edge;
-        corner[v] += j * edge;
-        // The children that touch the square are on the side from which it is seen.
-        let digit =
-            (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << square.axis;
-        split(leaves, Square { corner, level, across: children[digit], ..square }, squares);
-    }
-    let parts = &squares[begin..];
-    let across = parts[0].across;
-    if across.as_cell().is_none()
-        && parts.len() == 4
-        && parts.iter().all(|part| part.across == across && part.level == level)
-    {
-        squares.truncate(begin);
-        squares.push(Square { across, ..square });
-    }
 }
 
 impl Square {

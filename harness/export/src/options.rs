@@ -1,4 +1,4 @@
-//! What every export is given besides mesh and selection, what it returns, and what it has written: counted as it is written, and compared with
+//! What every export is given, what it returns, and what it has written: counted as it is written, and compared with
 //! what was to be written before a file gets its name.
 //!
 //! Invariants of what was written:
@@ -11,12 +11,62 @@ use std::path::Path;
 
 use contract::case::Case;
 use contract::failure::Failure;
-use contract::mesh::Mesh;
+use contract::mesh::{Leaf, Mesh};
 use contract::octant::Octant;
 use contract::watch::Watch;
 use contract::word::{self, KEY_END};
 
 use crate::selection::Selection;
+
+/// The leaves that are exported, and how.
+#[derive(Clone, Copy)]
+pub struct Export<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Which of its leaves are exported.
+    pub selection: &'a Selection,
+    /// How they are exported.
+    pub options: &'a Options<'a>,
+}
+
+impl Export<'_> {
+    /// Visits the selected leaves in Morton order. All leaves are read once.
+    pub(crate) fn visit(
+        &self,
+        visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.selection.visit(self.mesh, &|| self.options.check(), visit)
+    }
+
+    /// Number of selected leaves, which is not 0.
+    pub(crate) fn count(&self) -> Result<u64, Failure> {
+        let mut leaves = 0;
+        match self.is_of_all() {
+            true => leaves = self.mesh.leaf_count(),
+            false => self.visit(&mut |_| {
+                leaves += 1;
+                Ok(())
+            })?,
+        }
+        self.require_some(leaves)
+    }
+
+    /// Refuses an export without leaves.
+    pub(crate) fn require_some(&self, leaves: u64) -> Result<u64, Failure> {
+        match leaves {
+            0 if self.mesh.leaf_count() == 0 => Err(Failure::input("the mesh has no leaves")),
+            0 => Err(Failure::input(
+                "no leaf satisfies all conditions of the selection: remove one of them",
+            )),
+            _ => Ok(leaves),
+        }
+    }
+
+    /// Whether no leaf of the mesh is left out by a condition.
+    pub(crate) fn is_of_all(&self) -> bool {
+        *self.selection == Selection::default()
+    }
+}
 
 /// Options of every export.
 #[derive(Clone, Copy)]
@@ -82,8 +132,8 @@ impl Options<'_> {
     }
 }
 
-/// Writes the selected leaves of a mesh to a path. After an error, nothing exists under a final name.
-pub type Write = fn(&Mesh, &Selection, &Path, &Options<'_>) -> Result<Summary, Failure>;
+/// Writes to a path. After an error, nothing exists under a final name.
+pub type Write = fn(&Export<'_>, &Path) -> Result<Summary, Failure>;
 
 /// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -139,12 +189,12 @@ impl Written {
     ///
     /// # Panics
     /// If they are not.
-    pub(crate) fn check_invariants(&self, mesh: &Mesh, selection: &Selection, selected: u64) {
+    pub(crate) fn check_invariants(&self, export: &Export<'_>, selected: u64) {
         let Self { cells, volume, .. } = *self;
         assert_eq!(cells, selected, "cells written and leaves selected");
         assert!(volume <= KEY_END, "{cells} cells of volume {volume} are more than the root");
-        if *selection == Selection::default() {
-            assert_eq!(cells, mesh.len(), "cells written and leaves of the mesh");
+        if export.is_of_all() {
+            assert_eq!(cells, export.mesh.leaf_count(), "cells written and leaves of the mesh");
         }
     }
 }
@@ -152,7 +202,7 @@ impl Written {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::on_disk;
+    use crate::testing::{on_disk, options, whole};
     use contract::testing::random_words;
     use proptest::prelude::*;
 
@@ -169,10 +219,11 @@ mod tests {
         ) {
             prop_assume!(words.len() > 1);
             let (_dir, mesh) = on_disk(&words, 2, |i| i / 7);
-            let all = Selection::default();
-            written(&words).check_invariants(&mesh, &all, words.len() as u64);
+            let options = options();
+            let export = whole(&mesh, &options);
+            written(&words).check_invariants(&export, words.len() as u64);
             let noticed = |words: Vec<u64>| {
-                let check = || written(&words).check_invariants(&mesh, &all, mesh.len());
+                let check = || written(&words).check_invariants(&export, mesh.leaf_count());
                 std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
             };
             let i = at.index(words.len());

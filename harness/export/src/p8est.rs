@@ -8,7 +8,7 @@
 //! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
 //! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
 
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use contract::failure::Failure;
@@ -17,58 +17,56 @@ use contract::import::forest::{ALIGNMENT, FORMAT};
 use contract::import::p4est::FILLER;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
-use contract::mesh::{Leaf, Mesh};
+use contract::mesh::Leaf;
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{self, KEY_END};
 
-use crate::options::{Options, Summary, Written};
-use crate::selection::{Selection, nothing_selected};
+use crate::options::{Export, Summary, Written};
 
 /// Deepest level of quadrants (`P8EST_QMAXLEVEL`). Coordinates are in units of one level more, like ours.
 const QUADRANT_LEVEL_MAX: u8 = LEVEL_MAX - 1;
 /// Data of a leaf whose side is unknown.
 const NO_SIDE: u8 = 4;
-/// Bytes of a quadrant: x, y, z, level, and one byte of data.
-const RECORD_BYTES: usize = 17;
 /// `sizeof(p8est_quadrant_t)`, which `p8est_load` compares.
 const QUADRANT_STRUCT_BYTES: u64 = 24;
 /// The version of p4est whose format this is, which `p8est_connectivity_save` writes after the name of the format.
 const VERSION: &[u8] = b"2.2";
 
-/// Writes the selected leaves and the fillers as a forest. The mesh is read twice, because the numbers of quadrants precede them.
+/// Writes the selected leaves and the fillers as a forest. The numbers of quadrants precede them, and are written last.
 ///
 /// # Errors
 /// If no leaf is selected, if one is deeper than level 18, if the mesh cannot be read or the file cannot be written, or if
 /// the user interrupts.
-pub fn write(
-    mesh: &Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
-    let (leaves, ends) = counted(mesh, selection, options)?;
-    if leaves == 0 {
-        return Err(nothing_selected(mesh));
-    }
-    let total = ends[ends.len() - 1];
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let leaves = export.count()?;
+    let mut ends = vec![0; export.mesh.parts.len().max(1)];
+    let start = |ends: &[u64]| {
+        let mut bytes = connectivity(&export.mesh.manifest.root);
+        bytes.extend(header(ends));
+        pad(&mut bytes);
+        bytes
+    };
     let named = |error| Failure::at(path, error);
-    let bytes = files::fill_atomically(path, named, |file| {
+    let bytes = files::fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
-        let mut start = connectivity(&mesh.manifest.root);
-        start.extend(header(&ends));
-        pad(&mut start);
-        out.write_all(&start).map_err(named)?;
-        let (mut done, mut written) = (0, Written::default());
-        quadrants(mesh, selection, options, &mut |quadrant| {
-            options.progress(done, total);
-            done += 1;
-            written.add(&quadrant.octant, quadrant.data != FILLER);
-            out.write_all(&quadrant.record()).map_err(named)
+        out.write_all(&start(&ends)).map_err(named)?;
+        let mut written = Written::default();
+        quadrants(export, &mut |Quadrant { octant, data, part }| {
+            export.options.progress(written.cells, leaves);
+            ends[part as usize] += 1;
+            written.add(&octant, data != FILLER);
+            let Octant { corner: [x, y, z], level } = octant;
+            let numbers = [x, y, z, level.into()].map(u32::to_le_bytes);
+            out.write_all(numbers.as_flattened()).map_err(named)?;
+            out.write_all(&[data]).map_err(named)
         })?;
-        written.check_invariants(mesh, selection, leaves);
-        assert_eq!((done, written.volume), (total, KEY_END), "quadrants, which tile the root");
-        out.flush().map_err(named)?;
-        Ok(start.len() as u64 + total * RECORD_BYTES as u64)
+        written.check_invariants(export, leaves);
+        assert_eq!(written.volume, KEY_END, "quadrants tile the root");
+        for part in 1..ends.len() {
+            ends[part] += ends[part - 1];
+        }
+        let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(&ends)));
+        begun.and_then(|()| out.flush()).map_err(named)
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
@@ -80,28 +78,14 @@ struct Quadrant {
     part: u32,
 }
 
-impl Quadrant {
-    fn record(&self) -> [u8; RECORD_BYTES] {
-        let mut record = [0; RECORD_BYTES];
-        let numbers = self.octant.corner.into_iter().chain([u32::from(self.octant.level)]);
-        for (field, number) in record.chunks_exact_mut(4).zip(numbers) {
-            field.copy_from_slice(&number.to_le_bytes());
-        }
-        record[RECORD_BYTES - 1] = self.data;
-        record
-    }
-}
-
 /// Visits the quadrants of the forest in Morton order.
 fn quadrants(
-    mesh: &Mesh,
-    selection: &Selection,
-    options: &Options<'_>,
+    export: &Export<'_>,
     visit: &mut impl FnMut(Quadrant) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let has_sides = mesh.manifest.sides == Sides::Known;
+    let has_sides = export.mesh.manifest.sides == Sides::Known;
     let (mut next, mut part_last) = (0, 0);
-    selection.visit(mesh, &|| options.check(), &mut |Leaf { octant, side, rank: part, .. }| {
+    export.visit(&mut |Leaf { octant, side, rank: part, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(Failure::input(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
@@ -131,25 +115,6 @@ fn fill(
         key += word::span(level);
     }
     Ok(())
-}
-
-/// Number of leaves, and of quadrants up to the end of each saved part, fillers included.
-fn counted(
-    mesh: &Mesh,
-    selection: &Selection,
-    options: &Options<'_>,
-) -> Result<(u64, Vec<u64>), Failure> {
-    let mut ends = vec![0; mesh.parts.len().max(1)];
-    let mut leaves = 0;
-    quadrants(mesh, selection, options, &mut |quadrant| {
-        leaves += u64::from(quadrant.data != FILLER);
-        ends[quadrant.part as usize] += 1;
-        Ok(())
-    })?;
-    for part in 1..ends.len() {
-        ends[part] += ends[part - 1];
-    }
-    Ok((leaves, ends))
 }
 
 /// The connectivity of one tree, as `p8est_connectivity_new_unitcube` makes it, with the corners of the root as vertices. If their
@@ -203,9 +168,11 @@ fn pad(bytes: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::selection::Selection;
     use crate::testing::{options, stored};
     use contract::import::{Format, Request, leaf_set, read};
     use contract::leafset::LeafSet;
+    use contract::mesh::Mesh;
     use contract::testing::{random_words, words_of};
     use contract::word::Side;
     use proptest::prelude::*;
@@ -228,7 +195,7 @@ mod tests {
     fn exported(mesh: &Mesh, selection: &Selection) -> (tempfile::TempDir, Summary) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
-        let summary = write(mesh, selection, &path, &options()).unwrap();
+        let summary = write(&Export { mesh, selection, options: &options() }, &path).unwrap();
         assert_eq!(fs::metadata(path).unwrap().len(), summary.bytes);
         (dir, summary)
     }
@@ -349,7 +316,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("forest.p8est");
         let refusal = |selection: &Selection| {
-            write(&mesh_of(vec![deep.clone()]), selection, &path, &options())
+            let mesh = &mesh_of(vec![deep.clone()]);
+            write(&Export { mesh, selection, options: &options() }, &path)
         };
         let error = refusal(&Selection::default()).unwrap_err().to_string();
         assert!(error.contains("p4est has levels 0 to 18"), "{error}");

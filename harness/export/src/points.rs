@@ -1,5 +1,6 @@
 //! Points without duplicates, numbered in the order in which they were added, and the polygons that join them.
 
+use contract::lattice::cross;
 use rustc_hash::FxHashMap;
 
 /// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
@@ -14,10 +15,11 @@ pub struct Points {
 }
 
 impl Points {
-    /// Returns the number of a point, which is added if it is new. There are fewer than 2^32.
+    /// Returns the number of a point, which is added if it is new. 2^32 points, which would take far more than 100 GB, are a panic.
     pub fn add(&mut self, point: Point) -> u32 {
-        let number = *self.numbers.entry(point).or_insert(self.all.len() as u32);
-        if number as usize == self.all.len() {
+        let next = u32::try_from(self.all.len()).expect("fewer than 2^32 points");
+        let number = *self.numbers.entry(point).or_insert(next);
+        if number == next {
             self.all.push(point);
         }
         number
@@ -41,6 +43,14 @@ impl Points {
             polygon.push(self.numbers[corner]);
             self.hanging(*corner, corners[(i + 1) % 4], polygon);
         }
+    }
+
+    /// Twice the area vector of a polygon of these points, in level-19 cells.
+    pub fn area(&self, polygon: &[u32]) -> [i64; 3] {
+        let corner = |&number: &u32| self.all[number as usize].map(i64::from);
+        let next = polygon.iter().cycle().skip(1);
+        let products = polygon.iter().zip(next).map(|(p, q)| cross(corner(p), corner(q)));
+        products.fold([0; 3], |sum, product| std::array::from_fn(|a| sum[a] + product[a]))
     }
 
     /// Appends the points within an edge, in order: those that bisect it, or bisect a half of it, and so on. Squares are aligned with the

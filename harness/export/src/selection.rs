@@ -55,7 +55,10 @@ impl Slice {
 impl Selection {
     /// Whether the leaf is selected.
     pub fn has(&self, leaf: &Leaf) -> bool {
-        self.meets(&leaf.octant)
+        let (low, high) = leaf.octant.bounds();
+        let meets = |[from, to]: [[i64; 3]; 2]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]);
+        self.slice.is_none_or(|slice| slice.cuts(&leaf.octant))
+            && self.clip.is_none_or(meets)
             && self.level_max.is_none_or(|level| leaf.octant.level <= level)
             && self.side.is_none_or(|side| leaf.side == side)
             && self.rank.is_none_or(|rank| leaf.rank == rank)
@@ -73,39 +76,6 @@ impl Selection {
     ) -> Result<(), Failure> {
         mesh.leaves(check, &mut |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) })
     }
-
-    /// Number of selected leaves of a mesh, which is not 0.
-    ///
-    /// # Errors
-    /// As [`Mesh::leaves`], and if no leaf is selected.
-    pub(crate) fn count(&self, mesh: &Mesh, check: Check<'_>) -> Result<u64, Failure> {
-        let mut leaves = 0;
-        match *self == Self::default() {
-            true => leaves = mesh.len(),
-            false => self.visit(mesh, check, &mut |_| {
-                leaves += 1;
-                Ok(())
-            })?,
-        }
-        if leaves == 0 { Err(nothing_selected(mesh)) } else { Ok(leaves) }
-    }
-
-    /// Whether an octant may contain selected leaves, by its position.
-    fn meets(&self, octant: &Octant) -> bool {
-        let (low, high) = octant.bounds();
-        self.slice.is_none_or(|slice| slice.cuts(octant))
-            && self
-                .clip
-                .is_none_or(|[from, to]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]))
-    }
-}
-
-/// The error of an export without leaves.
-pub(crate) fn nothing_selected(mesh: &Mesh) -> Failure {
-    Failure::input(match mesh.is_empty() {
-        true => "the mesh has no leaves",
-        false => "no leaf satisfies all conditions of the selection: remove one of them",
-    })
 }
 
 #[cfg(test)]
@@ -194,7 +164,13 @@ mod tests {
         let half = UNITS_PER_EDGE / 2;
         let selection =
             Selection { clip: Some([[half; 3], [half + 1; 3]]), ..Selection::default() };
-        let chosen: Vec<u8> = (0..8).filter(|&d| selection.meets(&Octant::ROOT.child(d))).collect();
+        let leaf = |digit| Leaf {
+            octant: Octant::ROOT.child(digit),
+            side: Side::Outside,
+            rank: 0,
+            index: 0,
+        };
+        let chosen: Vec<u8> = (0..8).filter(|&d| selection.has(&leaf(d))).collect();
         assert_eq!(chosen, [7]);
     }
 }

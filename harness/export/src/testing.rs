@@ -1,6 +1,7 @@
 //! Meshes on disk, for tests.
 
-use crate::options::{Label, Options, Regions};
+use crate::options::{Export, Label, Options, Regions};
+use crate::selection::Selection;
 use contract::failure::Failure;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
@@ -33,6 +34,13 @@ pub fn options<'a>() -> Options<'a> {
     let (label, regions) = (Label::default(), Regions::default());
     let (jobs, watch, script) = (NonZero::<usize>::MIN, &Unwatched, no_script);
     Options { jobs, watch, case: None, label, regions, script }
+}
+
+/// An export of all leaves of a mesh.
+pub fn whole<'a>(mesh: &'a Mesh, options: &'a Options<'a>) -> Export<'a> {
+    const ALL: &Selection =
+        &Selection { clip: None, level_max: None, side: None, rank: None, slice: None };
+    Export { mesh, selection: ALL, options }
 }
 
 /// A mesh of these parts in a directory, which lasts as long as the first value.

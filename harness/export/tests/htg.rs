@@ -12,7 +12,7 @@ use contract::mesh::Mesh;
 use contract::testing::random_words;
 use contract::watch::Watch;
 use contract::word::{self, Leaf as WordLeaf};
-use export::options::{Label, Options, Regions};
+use export::options::{Export, Label, Options, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
@@ -50,7 +50,7 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let (label, regions) = (Label::Bits32, Regions::All);
     let jobs = NonZero::<usize>::MIN;
     let options = Options { jobs, watch: &Quiet, case: None, label, regions, script };
-    match export::htg::write(mesh, selection, &path, &options) {
+    match export::htg::write(&Export { mesh, selection, options: &options }, &path) {
         Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),
     }
@@ -108,10 +108,10 @@ proptest! {
             let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), true).unwrap();
             prop_assert_eq!(file.root, ROOT);
             prop_assert_eq!(&words(&file).unwrap(), &expected);
-            prop_assert_eq!(tree.len(), expected.len() as u64);
+            prop_assert_eq!(tree.leaf_count(), expected.len() as u64);
             if selection == Selection::default() {
                 prop_assert_eq!(leaves(&tree, &cut), leaves(&mesh, &cut));
-                prop_assert!(mesh.has_ranks() && !tree.has_ranks());
+                prop_assert!(mesh.require_ranks().is_ok() && tree.require_ranks().is_err());
             }
         }
     }

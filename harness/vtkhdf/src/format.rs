@@ -1,5 +1,7 @@
 //! What the writer and the reader know of HDF5: signatures, codes of messages, types of elements, arrays in chunks, and the checksum.
 
+use std::ops::Range;
+
 /// The first bytes of every file.
 pub const SIGNATURE: [u8; 8] = *b"\x89HDF\r\n\x1a\n";
 /// Bytes of the superblock, version 3.
@@ -47,15 +49,6 @@ pub(crate) mod datatype {
         &[0x11, 0x20, 63, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xff, 3, 0, 0];
 }
 
-/// Where some bytes of a file are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Extent {
-    /// Position of the first byte.
-    pub address: u64,
-    /// Number of bytes.
-    pub bytes: u64,
-}
-
 /// A one-dimensional array of bytes in compressed chunks of equal length.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chunked {
@@ -63,8 +56,8 @@ pub struct Chunked {
     pub len: u64,
     /// Bytes of a chunk before compression; the last one is padded.
     pub chunk_len: u32,
-    /// The compressed chunks. One that is not stored has zeros only.
-    pub chunks: Vec<Option<Extent>>,
+    /// Where the compressed chunks are in the file. One that is not stored has zeros only.
+    pub chunks: Vec<Option<Range<u64>>>,
 }
 
 impl Chunked {

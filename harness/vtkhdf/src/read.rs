@@ -4,16 +4,14 @@
 //! that the writer would make of them must be those of the file, byte by byte, their checksums included. No memory is allocated for a
 //! count before the file has been seen to be long enough for it.
 
-use crate::format::{
-    Chunked, Extent, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED,
-};
+use crate::format::{Chunked, ReadError, SIGNATURE, SUPERBLOCK_BYTES, TABLE_HEAD_BYTES, UNDEFINED};
 use crate::tree::{
-    CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays,
-    has_chunks, metadata,
+    CELL_DATA, COORDINATES, EDGE, FIRST, GROUP, MASK, NODES, SIDE, SPLIT, Shape, arrays, metadata,
 };
 use crate::write::{Value, attribute, link};
 use flate2::{Decompress, FlushDecompress, Status};
 use std::fs;
+use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
@@ -38,8 +36,8 @@ pub struct TreeReader {
     pub shape: Shape,
     /// The bits of split nodes.
     pub split: Chunked,
-    /// The bits of leaves that are not in the mesh, if there are any.
-    pub masked: Option<Chunked>,
+    /// The bits of leaves that are not in the mesh.
+    pub masked: Chunked,
     /// The sides of all nodes.
     pub sides: Chunked,
 }
@@ -73,7 +71,7 @@ impl TreeReader {
             return Err(error("its metadata are not those of its tree".to_owned()));
         }
         let [split, masked, sides] = arrays;
-        Ok(Self { source, shape, split, masked: Some(masked).filter(has_chunks), sides })
+        Ok(Self { source, shape, split, masked, sides })
     }
 
     /// The bytes of a chunk, as many as every chunk has.
@@ -83,7 +81,8 @@ impl TreeReader {
     pub fn read_chunk(&self, array: &Chunked, index: usize, into: &mut Vec<u8>) -> Result<()> {
         into.clear();
         into.resize(array.chunk_len as usize, 0);
-        let Some(Extent { address, bytes }) = array.chunks[index] else { return Ok(()) };
+        let Some(Range { start: address, end }) = array.chunks[index] else { return Ok(()) };
+        let bytes = end - address;
         let stored = self.source.bytes_at(address, bytes)?;
         let mut inflater = Decompress::new(true);
         let status = inflater.decompress(&stored, into, FlushDecompress::Finish);
@@ -139,9 +138,6 @@ impl Source {
         for (array, address) in arrays.iter_mut().zip(places) {
             address.map_or(Ok(()), |address| self.fill(array, address))?;
         }
-        if member(&data, "rank").is_some() {
-            return Err(unknown("its cells have ranks, which only earlier versions wrote"));
-        }
         Ok((shape, arrays, of_grid(FIRST)?))
     }
 
@@ -173,8 +169,8 @@ impl Source {
         let bytes = array.chunks.len() as u64 * (size as u64 + 4);
         let entries = self.bytes_at(table + TABLE_HEAD_BYTES + TABLE_BYTES, bytes)?;
         for (slot, entry) in array.chunks.iter_mut().zip(entries.chunks_exact(size + 4)) {
-            let extent = Extent { address: number(&entry[..8]), bytes: number(&entry[8..size]) };
-            *slot = (extent.address != UNDEFINED).then_some(extent);
+            let (address, bytes) = (number(&entry[..8]), number(&entry[8..size]));
+            *slot = (address != UNDEFINED).then(|| address..address.saturating_add(bytes));
         }
         Ok(())
     }

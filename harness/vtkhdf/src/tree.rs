@@ -6,7 +6,7 @@
 //! last, which is set for split nodes, and `Mask` one bit per node, which is set for leaves that are not in the mesh. Bits
 //! are packed from the most significant one. Cell data have an element for every node.
 
-use crate::format::{Chunked, Extent, SUPERBLOCK_BYTES, datatype};
+use crate::format::{Chunked, SUPERBLOCK_BYTES, datatype};
 use crate::write::{Deflater, Metadata, Value};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -242,9 +242,10 @@ impl<W: Write + Seek> TreeWriter<W> {
         for (array, chunk) in self.arrays.iter_mut().zip(chunks) {
             // Descriptors end before the last windows.
             if let (Some(slot), Some(chunk)) = (array.chunks.get_mut(window as usize), chunk) {
-                *slot = Some(Extent { address: self.end, bytes: chunk.len() as u64 });
+                let end = self.end + chunk.len() as u64;
+                *slot = Some(self.end..end);
                 self.out.write_all(chunk)?;
-                self.end += chunk.len() as u64;
+                self.end = end;
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Metadata of HDF5 files: tables of chunks, object headers and the superblock.
 
 use crate::format::{
-    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, Extent, FILTER_DEFLATE, INDEX_FIXED_ARRAY,
+    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, FILTER_DEFLATE, INDEX_FIXED_ARRAY,
     LAYOUT_CHUNKED, LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES,
     UNDEFINED, datatype, lookup3, message,
 };
@@ -148,8 +148,8 @@ impl Metadata {
         let mut table = b"FADB\x00\x01".to_vec();
         table.extend(header_at.to_le_bytes());
         for chunk in &array.chunks {
-            let Extent { address, bytes } =
-                chunk.unwrap_or(Extent { address: UNDEFINED, bytes: 0 });
+            let stored = chunk.as_ref().map(|at| (at.start, at.end - at.start));
+            let (address, bytes) = stored.unwrap_or((UNDEFINED, 0));
             table.extend(address.to_le_bytes());
             table.extend(&bytes.to_le_bytes()[..size_bytes]);
             // All filters were applied.

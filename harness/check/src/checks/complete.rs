@@ -51,7 +51,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         None => check_holes(tree, terms, result),
     }
     let volume: u128 = (0..)
-        .zip(subject.pass.tally.by_level)
+        .zip(subject.pass.tally.leaves_by_level)
         .map(|(level, leaves)| u128::from(leaves) * u128::from(word::span(level)))
         .sum();
     let fraction = volume as f64 / word::KEY_END as f64;

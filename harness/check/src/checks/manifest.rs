@@ -119,21 +119,24 @@ fn of_mesh(
 ) {
     let Pass { tally, parts, .. } = pass;
     result.examined += tally.leaves;
-    let mut right = subject.inputs.clone();
-    right.set_tally(tally.clone());
-    let [claimed, right] = [manifest, &right].map(|m| serde_json::to_value(m).expect("JSON"));
-    let of_leaves = ["leaves", "leaves_by_level", "leaves_by_side", "digest"];
-    for key in of_leaves.into_iter().chain(INPUTS) {
-        same(prefix, key, &claimed[key], &right[key], result);
+    let entries = |m: &Manifest| serde_json::to_value(m).expect("JSON");
+    let [claimed, of_leaves, inputs] = [manifest, tally, &subject.inputs].map(entries);
+    for key in ["leaves", "leaves_by_level", "leaves_by_side", "digest"] {
+        same(prefix, key, &claimed[key], &of_leaves[key], result);
     }
-    let BySide { outside, inside, crossing } = tally.by_side;
+    for key in INPUTS {
+        same(prefix, key, &claimed[key], &inputs[key], result);
+    }
+    let BySide { outside, inside, crossing } = tally.leaves_by_side;
     if manifest.sides == Sides::Unknown && outside < tally.leaves {
         result.report(format!(
             "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
             tally.leaves
         ));
     }
-    for (i, (claimed, found)) in manifest.octant_digests.iter().zip(&tally.octants).enumerate() {
+    for (i, (claimed, found)) in
+        manifest.octant_digests.iter().zip(&tally.octant_digests).enumerate()
+    {
         same(prefix, &format!("octant_digests[{i}]"), claimed, found, result);
     }
     for (claimed, &(leaves, digest)) in manifest.parts.iter().zip(parts) {

@@ -7,14 +7,16 @@ use super::{Check, CheckResult, always, identical, nothing};
 use contract::digest::Digest;
 use contract::failure::Failure;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, Tally, octant_index};
+use contract::manifest::{Manifest, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
-use contract::tree::{Builder, Refusal, Tree};
+use contract::tree::{Builder, Tree};
+use contract::word;
 
 /// What the pass found.
 #[derive(Debug)]
 pub(crate) struct Pass {
-    pub(crate) tally: Tally,
+    /// The manifest's entries about leaves, as they should be; it has no others.
+    pub(crate) tally: Manifest,
     /// Number of leaves and digest of each part.
     pub(crate) parts: Vec<(u64, Digest)>,
     pub(crate) linear: CheckResult,
@@ -70,8 +72,10 @@ impl<'a> State<'a> {
     fn new(manifest: &'a Manifest, prefix: &'static str, nodes_max: usize) -> Self {
         // A part without leaves gives no run.
         let parts = manifest.parts.len();
+        let mut tally = Manifest::default();
+        tally.clear_leaves();
         let pass = Pass {
-            tally: Tally::default(),
+            tally,
             parts: vec![(0, Digest::default()); parts],
             linear: CheckResult::new(CHECK.name),
             tree: None,
@@ -101,7 +105,7 @@ impl<'a> State<'a> {
         for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
             let digest = Digest::of(words);
             parts[part].1.merge(digest);
-            tally.octants[octant_index(words[0])].merge(digest);
+            tally.octant_digests[octant_index(words[0])].merge(digest);
         }
         let mut last = self.last_of_part[part];
         for &word in run {
@@ -126,18 +130,16 @@ impl<'a> State<'a> {
             return;
         }
         for &word in run {
-            let Err(why) = self.builder.push(word) else {
+            if self.builder.push(word).is_ok() {
                 self.last = word;
                 continue;
-            };
+            }
             self.pass.linear.report_with(|| {
                 let [leaf, last] =
                     [word, self.last].map(|word| identical::describe(word, &self.manifest.root));
-                match why {
-                    Refusal::Fault(_) => format!("{}not a leaf: {leaf}", self.prefix),
-                    Refusal::Overlap => {
-                        format!("{}two leaves overlap: {leaf} and {last}", self.prefix)
-                    }
+                match word::fault(word) {
+                    Some(_) => format!("{}not a leaf: {leaf}", self.prefix),
+                    None => format!("{}two leaves overlap: {leaf} and {last}", self.prefix),
                 }
             });
         }

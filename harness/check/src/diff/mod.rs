@@ -20,7 +20,7 @@ use crate::why::{self, Body};
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::lattice::Root;
-use contract::manifest::{Manifest, Sides, Tally};
+use contract::manifest::{Manifest, Sides};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
 use contract::word;
@@ -96,10 +96,11 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
     let mut report = DiffReport { without_sides, ..DiffReport::default() };
     let mask = if without_sides.is_some() { !word::SIDE_BITS } else { u64::MAX };
     for (_, mesh) in &mut meshes {
-        let mut tally = Tally::default();
-        mesh.visit(&mut |words| words.iter().for_each(|&word| tally.add(word & mask)))?;
-        tally.finish();
-        mesh.manifest.set_tally(tally);
+        let mut manifest = mesh.manifest.clone();
+        manifest.clear_leaves();
+        mesh.visit(&mut |words| words.iter().for_each(|&word| manifest.add(word & mask)))?;
+        manifest.finish();
+        mesh.manifest = manifest;
     }
     let [(_, a), (_, b)] = meshes;
     report.leaves = a.manifest.leaves;

@@ -5,7 +5,7 @@ use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
 use export::format::{self, FORMATS, Format};
-use export::options::{Label, Options, Regions, Summary};
+use export::options::{Export, Label, Options, Regions, Summary};
 use run::engine::paths::Paths;
 use run::progress::Progress;
 use run::python;
@@ -106,7 +106,8 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
         regions: regions.unwrap_or_default(),
         script,
     };
-    let written = (format.write)(&mesh, &selection, file, &options);
+    let written =
+        (format.write)(&Export { mesh: &mesh, selection: &selection, options: &options }, file);
     progress.finish();
     written
 }

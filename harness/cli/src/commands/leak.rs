@@ -153,7 +153,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     if interrupt::requested() {
         return Err(Failure::interrupted());
     }
-    write_together(&files, Failure::at)
+    write_together(&files)
 }
 
 fn target(text: &str) -> Result<Target, String> {

@@ -37,13 +37,8 @@ impl Cells {
     }
 
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.edges.len()
-    }
-
-    /// Whether there are no cells.
-    pub fn is_empty(&self) -> bool {
-        self.edges.is_empty()
     }
 
     /// The sorted leaf words of the cells in a root. Cells without a side are `outside`.
@@ -69,7 +64,7 @@ impl Cells {
             let side = self.sides.as_ref().map_or(Side::Outside, |sides| sides[i]);
             Ok(word::encode(&Leaf { octant, side }))
         };
-        (0..self.len()).map(word).collect()
+        (0..self.count()).map(word).collect()
     }
 
     /// The levels of the words differ from those of the file by one constant.
@@ -115,7 +110,7 @@ impl Cells {
             ))
         };
         let (edges, corners) = (&self.edges, &self.corners);
-        let coarsest = (0..self.len()).max_by(|&a, &b| edges[a].total_cmp(&edges[b]));
+        let coarsest = (0..self.count()).max_by(|&a, &b| edges[a].total_cmp(&edges[b]));
         let (edge, corner) = coarsest
             .map(|cell| (edges[cell], corners[cell]))
             .ok_or_else(|| unusable("there are none"))?;
@@ -162,7 +157,7 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
         return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
     }
     let level = depth as u8;
-    let edge_of_level = root.edge / f64::from(1u32 << level);
+    let edge_of_level = root.edge_of(level);
     if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
         return wrong("has an edge that is not the root's edge halved a whole number of times");
     }
@@ -249,9 +244,9 @@ mod tests {
         assert!(cells.words(&root).is_err());
         // The limit itself, which a cell of the root's size can have exactly.
         let mut whole = Cells::default();
-        assert!(whole.is_empty());
+        assert_eq!(whole.count(), 0);
         whole.push([TOLERANCE, 0.0, 0.0], 1.0);
-        assert!(!whole.is_empty() && whole.words(&root).is_ok());
+        assert!(whole.count() == 1 && whole.words(&root).is_ok());
         whole.corners[0][0] = TOLERANCE.next_up();
         assert!(whole.words(&root).is_err());
     }
@@ -312,7 +307,7 @@ mod roots {
     fn single_precision_coordinates_are_precise_enough() {
         let words = words_of(|o| o.level == 0 || o.level < 10 && o.corner == [0; 3]);
         let mut cells = cells_of(&words, &Root { origin: [0.1, 0.2, 0.3], edge: 0.7 });
-        for i in 0..cells.len() {
+        for i in 0..cells.count() {
             let far = cells.corners[i].map(|c| f64::from((c + cells.edges[i]) as f32));
             cells.corners[i] = cells.corners[i].map(|c| f64::from(c as f32));
             cells.edges[i] = far[0] - cells.corners[i][0];

@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
 use crate::leafset;
-use crate::manifest::{self, Manifest, Part, Tally};
+use crate::manifest::{self, Manifest, Part};
 use crate::npy;
 use crate::word;
 use std::fs;
@@ -50,16 +50,17 @@ impl ImportedTree {
             Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
             Err(error) => return Err(content(error)),
         };
-        let mut tally = Tally::default();
+        let mut manifest = leaf_set::manifest(tree.root, 0, case, program);
         tree.words(&mut |run| {
-            run.iter().for_each(|&word| tally.add(word));
+            run.iter().for_each(|&word| manifest.add(word));
             true
         })
         .map_err(content)?;
-        tally.finish();
-        let finest = tally.by_level.iter().rposition(|&leaves| leaves > 0).unwrap_or(0);
-        let mut manifest = leaf_set::manifest(tree.root, finest as u8, case, program);
-        manifest.set_tally(tally);
+        manifest.finish();
+        if case.is_none() {
+            let finest = manifest.leaves_by_level.iter().rposition(|&leaves| leaves > 0);
+            manifest.level_surface = finest.unwrap_or(0) as u8;
+        }
         let imported = Self { tree, manifest };
         imported.check_invariants();
         Ok(Some(imported))

@@ -7,7 +7,7 @@ use crate::digest::Digest;
 use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
-use crate::manifest::{Manifest, Sides, Tally, Tree};
+use crate::manifest::{Manifest, Sides, Tree};
 use crate::word;
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
@@ -43,21 +43,20 @@ pub fn leaf_set(
 
 /// The manifest of a mesh in a root, without leaves, whose finest leaf has this level.
 pub(super) fn manifest(root: Root, finest: u8, case: Option<&Case>, program: String) -> Manifest {
-    let required = match case {
-        Some(case) => case.manifest(Tree::Final, program),
+    match case {
+        Some(case) => Manifest { root, ..case.manifest(Tree::Final, program) },
         None => Manifest {
             level_surface: finest,
             ..Manifest::without_leaves(Tree::Final, root, program)
         },
-    };
-    Manifest { root, ..required }
+    }
 }
 
 /// Panics if an invariant of the answer does not hold: the leaves are a linear oct-tree, as many as there are cells, and fill
 /// the same part of the root; the manifest has their counts and digest.
 pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let LeafSet { manifest, words, .. } = set;
-    assert_eq!(cells.len(), words.len(), "cells and leaves");
+    assert_eq!(cells.count(), words.len(), "cells and leaves");
     let mut end = 0;
     for &leaf in words {
         let fault = word::fault(leaf);
@@ -74,14 +73,13 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
         (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells,
         "cells fill {of_cells} of the root, and their leaves {of_leaves}"
     );
-    let Tally { leaves, by_level, by_side, digest, octants } = Tally::of(words);
-    assert_eq!(manifest.leaves, leaves, "leaves");
-    assert_eq!(manifest.leaves_by_level, by_level, "leaves by level");
-    assert_eq!(manifest.leaves_by_side, by_side, "leaves by side");
-    assert!(manifest.digest == digest && manifest.octant_digests == octants, "digests of {digest}");
+    let mut expected = manifest.clone();
+    expected.set_leaves(words);
+    assert!(*manifest == expected, "counts or digests of {}", expected.digest);
     let known = manifest.sides == Sides::Known;
     assert!(known == cells.sides.is_some(), "sides are known: {known}");
-    assert!(known || by_side.outside == leaves, "unknown sides are {by_side:?}");
+    let by_side = manifest.leaves_by_side;
+    assert!(known || by_side.outside == manifest.leaves, "unknown sides are {by_side:?}");
 }
 
 #[cfg(test)]

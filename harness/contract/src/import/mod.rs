@@ -86,33 +86,24 @@ pub struct Request {
 pub fn guess(path: &Path) -> Result<Format, Failure> {
     let is_directory = fs::metadata(path).map_err(Failure::unreadable)?.is_dir();
     refuse_leaf_set(path)?;
-    let has_parts = is_directory && path.join(manifest::part_name(0)).is_file();
-    let is_manifest = !is_directory && path.ends_with(manifest::FILE);
-    let mistakes = [
-        (
-            has_parts,
-            "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
-             --format leaf-words",
-        ),
-        (is_manifest, "is the manifest of a leaf set: give its directory"),
-        (
-            path.extension().is_some_and(|extension| extension == "toml"),
-            "is a case file by its name: give a mesh",
-        ),
-    ];
-    if let Some((_, why)) = mistakes.into_iter().find(|(is_made, _)| *is_made) {
-        return Err(Failure::input(why));
-    }
-    let mut head = Vec::new();
-    let format = match is_directory {
-        true => poly_mesh(path).map(|_| Format::Openfoam),
-        false => {
-            let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
-            read.map_err(Failure::unreadable)?;
-            of_content(&head)
-        }
-    };
     let unknown = "its format was not recognised: choose one with --format (see --help)";
+    let format = if is_directory {
+        if path.join(manifest::part_name(0)).is_file() {
+            let why = "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
+                 --format leaf-words";
+            return Err(Failure::input(why));
+        }
+        poly_mesh(path).map(|_| Format::Openfoam)
+    } else if path.ends_with(manifest::FILE) {
+        return Err(Failure::input("is the manifest of a leaf set: give its directory"));
+    } else if path.extension().is_some_and(|extension| extension == "toml") {
+        return Err(Failure::input("is a case file by its name: give a mesh"));
+    } else {
+        let mut head = Vec::new();
+        let read = ::files::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
+        read.map_err(Failure::unreadable)?;
+        of_content(&head)
+    };
     format.ok_or_else(|| Failure::input(unknown))
 }
 
@@ -142,7 +133,12 @@ fn of_content(head: &[u8]) -> Option<Format> {
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") || is_xml() {
         return Some(Format::Vtk);
     }
-    let text = std::str::from_utf8(&head[..head.len() - incomplete(head)]).ok()?;
+    let text = match std::str::from_utf8(head) {
+        // The head may end within a character.
+        Err(cut) if cut.error_len().is_none() => std::str::from_utf8(&head[..cut.valid_up_to()]),
+        text => text,
+    };
+    let text = text.ok()?;
     if text.trim_start().starts_with('{') {
         return Some(Format::Discretize);
     }
@@ -162,14 +158,6 @@ pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
     let has_points =
         |place: &PathBuf| ["points", "points.gz"].iter().any(|name| place.join(name).is_file());
     below.into_iter().find(has_points)
-}
-
-/// Number of bytes of an incomplete UTF-8 character at the end.
-fn incomplete(head: &[u8]) -> usize {
-    match std::str::from_utf8(head) {
-        Err(error) if error.error_len().is_none() => head.len() - error.valid_up_to(),
-        _ => 0,
-    }
 }
 
 /// Reads the cells of a file in a format that is read here.

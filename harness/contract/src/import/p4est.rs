@@ -158,8 +158,7 @@ fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<()
             (None, _) => {}
         }
         let along = corner.map(|c| f64::from(c) / length as f64 * tree.edge);
-        let edge = tree.edge / f64::from(1u32 << octant.level);
-        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), edge);
+        cells.push([0, 1, 2].map(|a| tree.origin[a] + along[a]), tree.edge_of(octant.level));
     }
     Ok(())
 }

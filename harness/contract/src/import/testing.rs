@@ -8,7 +8,7 @@ use crate::word;
 pub(crate) fn cells_of(words: &[u64], root: &Root) -> Cells {
     let mut cells = Cells::default();
     for octant in words.iter().map(|&w| word::octant(w)) {
-        cells.push(root.to_user(octant.bounds().0), root.edge / f64::from(1u32 << octant.level));
+        cells.push(root.to_user(octant.bounds().0), root.edge_of(octant.level));
     }
     cells.sides = Some(words.iter().map(|&w| word::side(w)).collect());
     cells

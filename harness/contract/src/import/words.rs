@@ -38,7 +38,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
         for word in words {
             // Side bits must be valid only if they are used.
             if let Some(why) = word::fault(if with_sides { word } else { word & !3 }) {
-                let cell = cells.len();
+                let cell = cells.count();
                 let part = if part.is_empty() { part } else { part + ": " };
                 let swapped = match word::fault(word.swap_bytes()) {
                     None => "; with its bytes swapped it would be a leaf",
@@ -49,8 +49,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
                 )));
             }
             let octant = word::octant(word);
-            let edge = root.edge / f64::from(1u32 << octant.level);
-            cells.push(root.to_user(octant.bounds().0), edge);
+            cells.push(root.to_user(octant.bounds().0), root.edge_of(octant.level));
             cells.sides.iter_mut().for_each(|sides| sides.push(Side::ALL[(word & 3) as usize]));
         }
     }
@@ -98,7 +97,9 @@ mod tests {
             let mut words = words();
             words[7] = bad;
             npy::write(&path, &words).unwrap();
-            read(&path, &request(sides)).map(|cells| cells.len()).map_err(|error| error.to_string())
+            read(&path, &request(sides))
+                .map(|cells| cells.count())
+                .map_err(|error| error.to_string())
         };
         assert!(
             refused(1 << 7, true).unwrap_err().contains("cell 7 is the word 0x0000000000000080")

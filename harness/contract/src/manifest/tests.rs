@@ -76,18 +76,22 @@ fn numbers_at_the_ends_of_their_ranges_are_no_faults() {
 }
 
 #[test]
-fn a_tally_counts_words_by_level_side_and_octant() {
+fn leaves_are_counted_by_level_side_and_octant() {
     let words = [0, 3 << 2 | 1, 511 << 55 | 3 << 2 | 2, 25 << 2 | 3];
-    let tally = Tally::of(&words);
+    let mut tally = Manifest::default();
+    tally.set_leaves(&words);
     let mut by_level = [0; LEVEL_MAX as usize + 1];
     (by_level[0], by_level[3]) = (1, 2);
-    assert_eq!((tally.leaves, tally.by_level), (4, by_level));
-    assert_eq!(tally.by_side, BySide { outside: 1, inside: 1, crossing: 1 });
+    assert_eq!((tally.leaves, tally.leaves_by_level), (4, by_level));
+    assert_eq!(tally.leaves_by_side, BySide { outside: 1, inside: 1, crossing: 1 });
     assert_eq!(tally.digest, Digest::of(&words));
-    assert_eq!(tally.octants[511], Digest::of(&words[2..3]));
-    let mut counted = Tally::default();
+    assert_eq!(tally.octant_digests[511], Digest::of(&words[2..3]));
+    let mut counted = Manifest::default();
     counted.count(words[1], 1);
-    assert_eq!((counted.leaves, counted.by_side.inside, counted.by_level[3]), (1, 1, 1));
+    assert_eq!(
+        (counted.leaves, counted.leaves_by_side.inside, counted.leaves_by_level[3]),
+        (1, 1, 1)
+    );
     assert_eq!(
         (part_name(0), part_name(123_456)),
         ("leaves-00000.npy".to_owned(), "leaves-123456.npy".to_owned())

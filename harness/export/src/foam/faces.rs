@@ -10,9 +10,9 @@ use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
 use super::patches::Patches;
-use crate::leaves::{Leaves, squares};
+use crate::leaves::Leaves;
 use crate::options::Options;
-use crate::points::{Point, Points};
+use crate::points::Points;
 use contract::failure::Failure;
 
 /// The faces.
@@ -43,11 +43,10 @@ impl Faces {
     ) -> Result<Self, Failure> {
         let mut all = Self::default();
         let mut of_patches = vec![Self::default(); patches.names.len()];
-        let (mut of_cell, mut owned) = (Vec::new(), Vec::new());
-        leaves.walk(options, &mut |cell, around| {
-            squares(leaves, around, &mut of_cell);
+        let mut owned = Vec::new();
+        leaves.walk(options, &mut |cell, _, squares| {
             owned.clear();
-            for (i, square) in of_cell.iter().enumerate() {
+            for (i, square) in squares.iter().enumerate() {
                 match square.across.as_cell() {
                     // The cell on the high side has the higher number.
                     Some(across) => owned.extend(square.is_high.then_some((across, i))),
@@ -60,7 +59,7 @@ impl Faces {
             }
             owned.sort_unstable();
             for &(across, i) in &owned {
-                points.polygon(of_cell[i].corners(true), &mut all.vertices);
+                points.polygon(squares[i].corners(true), &mut all.vertices);
                 all.end(cell);
                 all.neighbour.push(across);
             }
@@ -116,6 +115,8 @@ impl Faces {
         );
         let (mut used, mut sums) = (vec![false; points.all.len()], vec![0u64; cells as usize]);
         let mut volume = 0;
+        let is_beyond = points.all.as_flattened().iter().any(|&c| c > CELLS_PER_EDGE);
+        assert!(!is_beyond, "a point outside of the root");
         for (face, &owner) in self.owner.iter().enumerate() {
             let vertices = self.vertices(face);
             assert!(
@@ -129,7 +130,11 @@ impl Faces {
             *to = to.wrapping_add(sum);
             match self.neighbour.get(face) {
                 Some(&across) => sums[across as usize] = sums[across as usize].wrapping_sub(sum),
-                None => volume += volume_below(vertices.iter().map(|&v| points.all[v as usize])),
+                // Twice the volume between the face and the plane x = 0.
+                None => {
+                    let x = points.all[vertices[0] as usize][0];
+                    volume += i128::from(points.area(vertices)[0]) * i128::from(x);
+                }
             }
         }
         assert_eq!(used.iter().position(|used| !used), None, "a point belongs to no face");
@@ -152,21 +157,6 @@ fn edges(vertices: &[u32]) -> u64 {
         if from < to { mixed(from, to) } else { mixed(to, from).wrapping_neg() }
     };
     vertices.iter().zip(next).map(edge).fold(0, u64::wrapping_add)
-}
-
-/// Twice the signed volume between a polygon that is normal to the x axis and the plane x = 0; 0 for other polygons.
-fn volume_below(polygon: impl Iterator<Item = Point>) -> i128 {
-    let corners: Vec<[i64; 3]> = polygon.map(|p| p.map(i64::from)).collect();
-    assert!(
-        corners.iter().flatten().all(|&c| c <= i64::from(CELLS_PER_EDGE)),
-        "a face outside of the root: {corners:?}"
-    );
-    if corners.iter().any(|c| c[0] != corners[0][0]) {
-        return 0;
-    }
-    let next = corners.iter().cycle().skip(1);
-    let area: i64 = corners.iter().zip(next).map(|(a, b)| a[1] * b[2] - a[2] * b[1]).sum();
-    i128::from(area) * i128::from(corners[0][0])
 }
 
 #[cfg(test)]

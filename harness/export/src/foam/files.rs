@@ -5,24 +5,25 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
+use contract::manifest::Sides;
 use contract::octant::UNITS_PER_CELL;
 use contract::word;
 
 use super::Mesh;
-use crate::options::{Label, Options};
+use crate::options::{Export, Label, Options};
 use crate::points::Point;
 use contract::failure::Failure;
 
-impl Mesh<'_> {
+impl Mesh {
     /// Writes the files into a directory.
     ///
     /// # Errors
     /// If a file cannot be written, if labels are too narrow, or if the user interrupts.
-    pub fn write(&self, dir: &Path) -> Result<(), Failure> {
-        let Self { faces, options, .. } = self;
+    pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<(), Failure> {
+        let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
-        if vertices.max(points) > label_max(options.label) {
+        if options.label == Label::Bits32 && vertices.max(points) > i32::MAX as u64 {
             return Err(Failure::input(
                 "the mesh has more faces than 32-bit labels can number: choose --label 64",
             ));
@@ -39,7 +40,7 @@ impl Mesh<'_> {
         labels("neighbour", &note, &mut faces.neighbour.iter().map(|&cell| cell.into()))?;
         let words: Vec<u64> = self.leaves.cells().collect();
         labels("cellLevel", "", &mut words.iter().map(|&word| word::level(word).into()))?;
-        if self.has_sides {
+        if manifest.sides == Sides::Known {
             labels("side", "", &mut words.iter().map(|word| (word & 3) as i64))?;
         }
         if let Some(ranks) = &self.ranks {
@@ -56,15 +57,15 @@ impl Mesh<'_> {
         file.finish()?;
         let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
         let units = |at: &Point| at.map(|c| i64::from(c) * UNITS_PER_CELL);
-        let place = |at: &Point| self.root.to_user(units(at)).map(f64::to_le_bytes);
+        let place = |at: &Point| manifest.root.to_user(units(at)).map(f64::to_le_bytes);
         file.list(points, self.points.all.iter().map(place))?;
         file.finish()?;
-        self.write_boundary(dir)
+        self.write_boundary(options.label, dir)
     }
 
-    fn write_boundary(&self, dir: &Path) -> Result<(), Failure> {
-        let Self { patches, faces, options, .. } = self;
-        let mut text = header("ascii", options.label, "polyBoundaryMesh", "boundary", "");
+    fn write_boundary(&self, label: Label, dir: &Path) -> Result<(), Failure> {
+        let Self { patches, faces, .. } = self;
+        let mut text = header("ascii", label, "polyBoundaryMesh", "boundary", "");
         let _ = writeln!(text, "{}\n(", patches.names.len());
         for ((patch, name), ends) in patches.names.iter().enumerate().zip(faces.starts.windows(2)) {
             let (kind, start, count) = (patches.type_of(patch), ends[0], ends[1] - ends[0]);
@@ -77,14 +78,6 @@ impl Mesh<'_> {
         let mut file = File::create(dir.join("boundary"))?;
         file.write_all(text.as_bytes())?;
         Ok(file.sync_all()?)
-    }
-}
-
-/// Greatest label.
-fn label_max(label: Label) -> u64 {
-    match label {
-        Label::Bits32 => i32::MAX as u64,
-        Label::Bits64 => i64::MAX as u64,
     }
 }
 

@@ -21,37 +21,26 @@ use std::path::Path;
 
 use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
-use contract::lattice::Root;
-use contract::manifest::Sides;
-use contract::mesh;
 use contract::octant::CELLS_PER_EDGE;
 use contract::sets::Sets;
 use contract::word::{self, Side};
 
-use crate::leaves::{Leaves, squares};
-use crate::options::{Options, Regions, Summary};
+use crate::leaves::Leaves;
+use crate::options::{Export, Options, Regions, Summary};
 use crate::points::{Point, Points};
-use crate::selection::{Selection, nothing_selected};
 use faces::Faces;
 use patches::{Patches, SIDES};
 
-/// Greatest number of points, so that adding those of one more cell cannot exceed 32 bits.
-const POINTS_MAX: usize = 4_000_000_000;
-
 /// A mesh for OpenFOAM.
-pub struct Mesh<'a> {
+pub struct Mesh {
     leaves: Leaves,
     points: Points,
     faces: Faces,
     patches: Patches,
     /// The rank that wrote each cell, if there are several.
     ranks: Option<Vec<u32>>,
-    root: Root,
-    /// Whether the sides of cells are known.
-    has_sides: bool,
     /// Number of regions of the selected leaves, of which only the largest may have been kept.
     regions: usize,
-    options: &'a Options<'a>,
 }
 
 /// Writes the selected leaves as `path`, which is a case's `constant/polyMesh`. It appears under its name when it is complete.
@@ -61,13 +50,8 @@ pub struct Mesh<'a> {
 ///
 /// # Panics
 /// If an invariant of the answer is violated: see [`Faces::check_invariants`].
-pub fn write(
-    mesh: &mesh::Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
-    let of_mesh = read(mesh, selection, options)?;
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let of_mesh = read(export)?;
     let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
     if has_content {
         let why = format!("{} exists: remove it, or choose another case", path.display());
@@ -77,20 +61,20 @@ pub fn write(
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let dir = staging.path().join("polyMesh");
     fs::create_dir(&dir).map_err(named)?;
-    of_mesh.write(&dir).map_err(|failure| failure.of_file(path))?;
+    of_mesh.write(export, &dir).map_err(|failure| failure.of_file(path))?;
     let (mut files, mut bytes) = (0, 0);
     for file in fs::read_dir(&dir).map_err(named)? {
         files += 1;
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
-    options.check()?;
+    export.options.check()?;
     staging.publish(|_| {
         let moved = fs::create_dir_all(path.parent().unwrap_or(path));
         moved.and_then(|()| fs::rename(&dir, path)).map_err(named)
     })?;
-    let mut notes = of_mesh.notes();
-    let is_selected = selection.side.is_none_or(|side| side == Side::Crossing);
-    if is_selected && mesh.manifest.leaves_by_side.crossing > 0 {
+    let mut notes = of_mesh.notes(export.options.regions);
+    let is_selected = export.selection.side.is_none_or(|side| side == Side::Crossing);
+    if is_selected && export.mesh.manifest.leaves_by_side.crossing > 0 {
         notes.push(CROSSED.to_owned());
     }
     Ok(Summary { leaves: of_mesh.leaves.count().into(), files, bytes, notes })
@@ -101,37 +85,27 @@ const CROSSED: &str = "warning: the geometry crosses cells of this mesh, and a f
      keep_crossing = false for a solver";
 
 /// The selected leaves as a mesh.
-fn read<'a>(
-    mesh: &mesh::Mesh,
-    selection: &Selection,
-    options: &'a Options<'a>,
-) -> Result<Mesh<'a>, Failure> {
+fn read(export: &Export<'_>) -> Result<Mesh, Failure> {
+    let Export { mesh, options, .. } = *export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     let mut ranks = (mesh.parts.len() > 1).then(Vec::new);
-    let leaves = Leaves::read(mesh, selection, options, &mut |leaf, is_selected| {
+    let leaves = Leaves::read(export, &mut |leaf, is_selected| {
         if let Some(ranks) = ranks.as_mut().filter(|_| is_selected) {
             ranks.push(leaf.rank);
         }
         true
     })?;
-    if leaves.count() == 0 {
-        return Err(nothing_selected(mesh));
-    }
-    let patches = Patches::new(options.case, *selection != Selection::default());
-    let mut of_mesh = Mesh::new(leaves, ranks, patches.map_err(Failure::input)?, options)?;
-    of_mesh.root = mesh.manifest.root;
-    of_mesh.has_sides = mesh.manifest.sides == Sides::Known;
-    Ok(of_mesh)
+    export.require_some(leaves.count().into())?;
+    let patches = Patches::new(options.case, !export.is_of_all());
+    Mesh::new(leaves, ranks, patches.map_err(Failure::input)?, options)
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then by cells.
 fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32), Failure> {
     // Sets of cells, which are represented by their first cells.
     let mut sets = Sets::new(leaves.count() as usize);
-    let mut of_cell = Vec::new();
-    leaves.walk(options, &mut |cell, around| {
-        squares(leaves, around, &mut of_cell);
-        let high = of_cell.iter().filter(|square| square.is_high);
+    leaves.walk(options, &mut |cell, _, squares| {
+        let high = squares.iter().filter(|square| square.is_high);
         for across in high.filter_map(|square| square.across.as_cell()) {
             sets.union(cell, across);
         }
@@ -151,23 +125,17 @@ fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32),
 /// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They ascend in Morton
 /// order.
 fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
-    let (mut points, mut of_cell) = (Points::default(), Vec::new());
-    leaves.walk(options, &mut |_, around| {
-        squares(leaves, around, &mut of_cell);
-        let (low, edge) = (around.octant.corner, around.octant.edge());
+    let mut points = Points::default();
+    leaves.walk(options, &mut |_, octant, squares| {
+        let (low, edge) = (octant.corner, octant.edge());
         for digit in 0..8 {
             points.add(std::array::from_fn(|a| low[a] + edge * (digit >> a & 1)));
         }
-        let of_boundary = of_cell.iter().filter(|square| square.across.as_cell().is_none());
+        let of_boundary = squares.iter().filter(|square| square.across.as_cell().is_none());
         for corner in of_boundary.flat_map(|square| square.corners(true)) {
             points.add(corner);
         }
-        match points.all.len() {
-            ..=POINTS_MAX => Ok(()),
-            _ => Err(Failure::input(format!(
-                "a polyMesh can have {POINTS_MAX} points here: select fewer leaves"
-            ))),
-        }
+        Ok(())
     })?;
     points.sort_by(key);
     Ok(points)
@@ -179,13 +147,13 @@ fn key(point: &Point) -> (u32, u64) {
     (beyond, word::key_of(point.map(|c| c % CELLS_PER_EDGE)))
 }
 
-impl<'a> Mesh<'a> {
-    /// The mesh of these cells in the unit cube, without the regions that are not to be exported.
+impl Mesh {
+    /// The mesh of these cells, without the regions that are not to be exported.
     fn new(
         mut leaves: Leaves,
         mut ranks: Option<Vec<u32>>,
         patches: Patches,
-        options: &'a Options<'a>,
+        options: &Options<'_>,
     ) -> Result<Self, Failure> {
         let (of_cell, regions, largest) = regions(&leaves, options)?;
         if options.regions == Regions::Largest && regions > 1 {
@@ -199,12 +167,11 @@ impl<'a> Mesh<'a> {
         let points = points(&leaves, options)?;
         let faces = Faces::new(&leaves, &points, &patches, options)?;
         faces.check_invariants(&leaves, &points);
-        let root = Root { origin: [0.0; 3], edge: 1.0 };
-        Ok(Self { leaves, points, faces, patches, ranks, root, has_sides: true, regions, options })
+        Ok(Self { leaves, points, faces, patches, ranks, regions })
     }
 
     /// What the user should know: patches, solids without faces, regions.
-    fn notes(&self) -> Vec<String> {
+    fn notes(&self, exported: Regions) -> Vec<String> {
         let faces = self.faces.starts.windows(2).map(|ends| ends[1] - ends[0]);
         let (with, without): (Vec<_>, Vec<_>) =
             self.patches.names.iter().zip(faces).partition(|(_, faces)| *faces > 0);
@@ -219,7 +186,7 @@ impl<'a> Mesh<'a> {
             ));
         }
         if self.regions > 1 {
-            let outcome = match self.options.regions {
+            let outcome = match exported {
                 Regions::All => "most solvers accept one: --regions largest leaves out the others",
                 Regions::Largest => "only the largest was exported",
             };

@@ -25,7 +25,6 @@ use contract::case::Case;
 use contract::failure::Failure;
 use contract::files::fill_atomically;
 use contract::lattice::{Root, UNITS_PER_EDGE};
-use contract::mesh::Mesh;
 use contract::number::number;
 use contract::octant::UNITS_PER_CELL;
 use contract::word::{self, Side};
@@ -33,10 +32,9 @@ use geometries::{Facet, write_stl_binary};
 use geometry::tree::{FacetTree, Point};
 use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
-use crate::leaves::{Content, Leaves, Square, squares};
-use crate::options::{Options, Summary};
+use crate::leaves::{Content, Leaves, Square};
+use crate::options::{Export, Options, Summary};
 use crate::polydata::{self, array};
-use crate::selection::Selection;
 use polygons::Polygons;
 
 /// A square of the front.
@@ -67,15 +65,13 @@ type Front = (Root, Vec<Face>, Polygons);
 ///
 /// # Errors
 /// If the mesh is not a linear oct-tree or cannot be read, or if the user interrupts.
-fn front(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Vec<Face>, Failure> {
+fn front(export: &Export<'_>) -> Result<Vec<Face>, Failure> {
     // Without crossing leaves, exposed faces are those at holes.
-    let leaves =
-        Leaves::read(mesh, selection, options, &mut |leaf, _| leaf.side != Side::Crossing)?;
-    let (mut faces, mut of_cell, mut words) = (Vec::new(), Vec::new(), leaves.cells());
-    leaves.walk(options, &mut |_, around| {
+    let leaves = Leaves::read(export, &mut |leaf, _| leaf.side != Side::Crossing)?;
+    let (mut faces, mut words) = (Vec::new(), leaves.cells());
+    leaves.walk(export.options, &mut |_, _, squares| {
         let leaf = words.next().expect("cells are visited in the order of their words");
-        squares(&leaves, around, &mut of_cell);
-        let exposed = of_cell.iter().filter(|square| square.across == Content::Hole);
+        let exposed = squares.iter().filter(|square| square.across == Content::Hole);
         faces.extend(exposed.map(|&square| Face { square, leaf }));
         Ok(())
     })?;
@@ -86,17 +82,13 @@ fn front(mesh: &Mesh, selection: &Selection, options: &Options<'_>) -> Result<Ve
 ///
 /// # Errors
 /// If the mesh cannot be read, is not of the case, or has no such faces, if the file cannot be written, or if the user interrupts.
-pub fn vtp(
-    mesh: &Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
+pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let Export { mesh, options, .. } = export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
-    write(mesh, selection, path, options, &|(root, faces, polygons), out| {
+    write(export, path, &|(root, faces, polygons), out| {
         let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
         let point = |at: &[u32; 3]| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
-        let spacing = |face: &Face| edge_of_level(root, word::level(face.leaf));
+        let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
         let mut cell = vec![
             array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
             array("side", faces.iter().map(|face| (face.leaf & 3) as u8).collect::<Vec<u8>>()),
@@ -120,44 +112,33 @@ pub fn vtp(
 ///
 /// # Errors
 /// As [`vtp`], and if there are more than 2^32 triangles, or if single precision does not resolve one.
-pub fn stl(
-    mesh: &Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
-    write(mesh, selection, path, options, &|front, out| {
-        Ok(write_stl_binary(&triangles(front)?, out)?)
-    })
+pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    write(export, path, &|front, out| Ok(write_stl_binary(&triangles(front)?, out)?))
 }
 
 /// Finds the front, and writes the file that `fill` makes of it.
 fn write(
-    mesh: &Mesh,
-    selection: &Selection,
+    export: &Export<'_>,
     path: &Path,
-    options: &Options<'_>,
     fill: &dyn Fn(&Front, &mut dyn Write) -> Result<(), Failure>,
 ) -> Result<Summary, Failure> {
-    mesh.require_sides()?;
-    let faces = front(mesh, selection, options)?;
+    export.mesh.require_sides()?;
+    let faces = front(export)?;
     if faces.is_empty() {
         return Err(Failure::input(
             "no selected cell borders a crossing cell, deleted or not, so there is no surface",
         ));
     }
-    let (root, polygons) = (mesh.manifest.root, Polygons::new(&faces));
+    let (root, polygons) = (export.mesh.manifest.root, Polygons::new(&faces));
     let open = polygons.edges_open();
-    polygons.check_invariants(&faces, *selection == Selection::default() && open == 0);
-    let area: f64 = faces.iter().map(|face| edge_of_level(&root, face.square.level).powi(2)).sum();
+    polygons.check_invariants(&faces, export.is_of_all() && open == 0);
+    let area: f64 = faces.iter().map(|face| root.edge_of(face.square.level).powi(2)).sum();
     let front = (root, faces, polygons);
-    let failed = |error| Failure::at(path, error);
-    let bytes = fill_atomically(path, failed, |file| {
+    let bytes = fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
-        out.flush().map_err(failed)?;
-        options.check()?;
-        Ok::<_, Failure>(out.get_ref().metadata().map_err(failed)?.len())
+        out.flush().map_err(|error| Failure::at(path, error))?;
+        export.options.check()
     })?;
     let closed = match open {
         0 => "closed".to_owned(),
@@ -216,9 +197,4 @@ fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, 
         Ok(gap * unit)
     };
     (0..).zip(faces).map(gap).collect()
-}
-
-/// Edge of the cells of a level, in the user's units.
-fn edge_of_level(root: &Root, level: u8) -> f64 {
-    root.edge / f64::from(1u32 << level)
 }

@@ -59,7 +59,7 @@ impl Polygons {
         assert_eq!(self.ends.len(), faces.len(), "a polygon for every face");
         let mut sum = [0i64; 3];
         for (face, corners) in faces.iter().zip(self.iter()) {
-            let area = area(corners.iter().map(|&c| self.points.all[c as usize]));
+            let area = self.points.area(corners);
             let edge = i64::from(face.square.edge());
             let mut expected = [0; 3];
             expected[face.square.axis] =
@@ -69,18 +69,4 @@ impl Polygons {
         }
         assert!(!is_closed || sum == [0; 3], "a closed front of areas that add up to {sum:?}");
     }
-}
-
-/// Twice the area vector of a polygon, in level-19 cells.
-fn area(corners: impl Iterator<Item = [u32; 3]>) -> [i64; 3] {
-    let corners: Vec<[i64; 3]> = corners.map(|c| c.map(i64::from)).collect();
-    let next = corners.iter().cycle().skip(1);
-    let mut area = [0; 3];
-    for (p, q) in corners.iter().zip(next) {
-        for a in 0..3 {
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            area[a] += p[b] * q[c] - p[c] * q[b];
-        }
-    }
-    area
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{in_root, on_disk, options};
+use crate::testing::{in_root, on_disk, options, whole};
 use contract::octant::Octant;
 use contract::testing::{random_words, words_with_sides};
 use contract::word::KEY_END;
@@ -25,7 +25,7 @@ fn plate() -> (Case, Vec<u64>) {
 fn the_gap_to_a_plate_is_the_height_above_it() {
     let (case, words) = plate();
     let (dir, mesh) = in_root(&words, 2, |i| i / 256, case.root);
-    let faces = front(&mesh, &Selection::default(), &options()).unwrap();
+    let faces = front(&whole(&mesh, &options())).unwrap();
     let gaps = gaps(&case, &faces, &options()).unwrap();
     assert_eq!(faces.len(), 128);
     for (face, gap) in faces.iter().zip(&gaps) {
@@ -35,7 +35,7 @@ fn the_gap_to_a_plate_is_the_height_above_it() {
     // Both sheets end at the root's boundary, along 32 edges each.
     let options = Options { case: Some(&case), ..options() };
     let path = dir.path().join("front.vtp");
-    let summary = vtp(&mesh, &Selection::default(), &path, &options).unwrap();
+    let summary = vtp(&whole(&mesh, &options), &path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!((summary.leaves, summary.bytes), (128, text.len() as u64));
     assert!(summary.notes[0].starts_with("a surface of area 128, open at 64 edges"), "{summary:?}");
@@ -43,7 +43,7 @@ fn the_gap_to_a_plate_is_the_height_above_it() {
         assert!(text.contains(&format!("Name=\"{array}\"")), "{array}");
     }
     let other = in_root(&words, 1, |_| 0, Root { edge: 4.0, ..case.root }).1;
-    let refused = vtp(&other, &Selection::default(), &path, &options).unwrap_err();
+    let refused = vtp(&whole(&other, &options), &path).unwrap_err();
     assert!(refused.to_string().contains("the mesh is not of the case"), "{refused}");
 }
 
@@ -56,7 +56,7 @@ fn the_triangles_of_a_file_are_as_closed_as_the_polygons() {
     );
     let (dir, mesh) = on_disk(&words, 1, |_| 0);
     let path = dir.path().join("front.stl");
-    let summary = stl(&mesh, &Selection::default(), &path, &options()).unwrap();
+    let summary = stl(&whole(&mesh, &options()), &path).unwrap();
     assert!(summary.notes[0].ends_with("closed"), "{summary:?}");
     let bytes = fs::read(path).unwrap();
     let number = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -83,7 +83,7 @@ const LEVEL: u8 = 4;
 
 fn faces(words: &[u64], parts: usize) -> Vec<Face> {
     let (_dir, mesh) = on_disk(words, parts, |i| i / 5);
-    front(&mesh, &Selection::default(), &options()).unwrap()
+    front(&whole(&mesh, &options())).unwrap()
 }
 
 /// A square of the finest level: its minimum corner in finest cells, and its axis.
@@ -187,7 +187,7 @@ fn closed_words() -> impl Strategy<Value = Vec<u64>> {
 
 fn front_of(words: &[u64]) -> (Vec<Face>, Polygons) {
     let (_dir, mesh) = on_disk(words, 1, |_| 0);
-    let faces = front(&mesh, &Selection::default(), &options()).unwrap();
+    let faces = front(&whole(&mesh, &options())).unwrap();
     let polygons = Polygons::new(&faces);
     (faces, polygons)
 }

@@ -4,10 +4,9 @@
 //! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
 //! number of threads.
 //!
-//! - `piece`: the arrays of a piece; `zlib`: their compression.
+//! - `piece`: the arrays of a piece, compressed.
 
 mod piece;
-mod zlib;
 
 use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
@@ -18,12 +17,10 @@ use contract::digest::Digest;
 use contract::files;
 use contract::lattice::Root;
 use contract::manifest::Sides;
-use contract::mesh::Mesh;
 
-use crate::options::{Options, Summary, Written};
-use crate::selection::Selection;
+use crate::options::{Export, Summary, Written};
 use contract::failure::Failure;
-use piece::{Encoder, Piece, Place};
+use piece::{Encoder, Piece};
 
 /// Maximum number of leaves in a piece.
 pub const PIECE: usize = 1 << 19;
@@ -60,43 +57,37 @@ struct Content {
 ///
 /// # Errors
 /// If no leaf is selected, if the mesh cannot be read or the file cannot be written, or if the user interrupts.
-pub fn write(
-    mesh: &Mesh,
-    selection: &Selection,
-    path: &Path,
-    options: &Options<'_>,
-) -> Result<Summary, Failure> {
-    let leaves = selection.count(mesh, &|| options.check())?;
+pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    let (mesh, leaves) = (export.mesh, export.count()?);
     let is_known = |(_, name, _): &Array| match *name {
-        "rank" => mesh.has_ranks(),
+        "rank" => mesh.tree_file.is_none(),
         "side" => mesh.manifest.sides == Sides::Known,
         _ => true,
     };
     let arrays: Vec<Array> = ARRAYS.into_iter().filter(is_known).collect();
-    let longest =
-        Place { points: u64::MAX, cells: u64::MAX, offsets: vec![u64::MAX; arrays.len()] };
+    let offsets = vec![u64::MAX; arrays.len()];
+    let mut longest = Piece { points: u64::MAX, offsets, ..Piece::default() };
+    longest.written.cells = u64::MAX;
     let content = Content { root: mesh.manifest.root, arrays };
     let named = |error| Failure::at(path, error);
-    let bytes = files::fill_atomically(path, named, |file| {
-        let (mut places, mut digest, mut data_bytes) = (Vec::new(), Digest::default(), 0);
+    let bytes = files::fill_atomically(path, |file| {
+        let (mut pieces, mut data_bytes) = (Vec::new(), 0);
         let longest = vec![longest; leaves.div_ceil(PIECE as u64) as usize];
-        let header_bytes = content.header(&longest, digest, 0).len();
+        let header_bytes = content.header(&longest, 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
-        encode(mesh, selection, leaves, &content, options, &mut |mut piece| {
+        encode(export, leaves, &content, &mut |mut piece| {
             // The user's interrupt waits for a flush to end, so none may have much to flush.
             file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
-            piece.place.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
-            places.push(piece.place);
+            piece.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
             data_bytes += piece.bytes.len() as u64;
-            digest.merge(piece.digest);
+            pieces.push(Piece { bytes: Vec::new(), ..piece });
             Ok(())
         })?;
-        let header = content.header(&places, digest, header_bytes);
+        let header = content.header(&pieces, header_bytes);
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
-        options.check()?;
-        Ok(header_bytes as u64 + data_bytes + END.len() as u64)
+        export.options.check()
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
@@ -104,16 +95,14 @@ pub fn write(
 /// Encodes the selected leaves, of which the number is known, and hands their pieces to `take` in order. As many pieces as there are threads are
 /// read one after the other and encoded together.
 fn encode(
-    mesh: &Mesh,
-    selection: &Selection,
+    export: &Export<'_>,
     leaves: u64,
     content: &Content,
-    options: &Options<'_>,
     take: &mut dyn FnMut(Piece) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let (mut written, check) = (Written::default(), || options.check());
+    let (mut written, options) = (Written::default(), export.options);
     let mut flush = |encoders: &mut [Encoder]| {
-        check()?;
+        options.check()?;
         let filled = encoders.iter_mut().filter(|encoder| !encoder.leaves.is_empty());
         let pieces: Vec<Piece> = thread::scope(|scope| {
             let threads: Vec<_> =
@@ -121,7 +110,7 @@ fn encode(
             threads.into_iter().map(|thread| thread.join().expect("it does not panic")).collect()
         });
         for piece in pieces {
-            check()?;
+            options.check()?;
             written.append(&piece.written);
             take(piece)?;
             options.watch.progress(written.cells, leaves);
@@ -131,7 +120,7 @@ fn encode(
     let jobs = options.jobs.get().min(leaves.div_ceil(PIECE as u64) as usize);
     let mut encoders: Vec<Encoder> = (0..jobs).map(|_| Encoder::default()).collect();
     let mut waiting = 0;
-    selection.visit(mesh, &check, &mut |leaf| {
+    export.visit(&mut |leaf| {
         if waiting == jobs * PIECE {
             flush(&mut encoders)?;
             waiting = 0;
@@ -141,14 +130,16 @@ fn encode(
         Ok(())
     })?;
     flush(&mut encoders)?;
-    written.check_invariants(mesh, selection, leaves);
+    written.check_invariants(export, leaves);
     Ok(())
 }
 
 impl Content {
-    /// The file up to the appended data, with the digest of its leaves, filled up with blanks to `length` bytes.
-    fn header(&self, places: &[Place], digest: Digest, length: usize) -> String {
+    /// The file up to the appended data, filled up with blanks to `length` bytes.
+    fn header(&self, pieces: &[Piece], length: usize) -> String {
         let Root { origin: [x, y, z], edge } = self.root;
+        let mut digest = Digest::default();
+        pieces.iter().for_each(|piece| digest.merge(piece.digest));
         // VTK reads text as the codes of its characters.
         let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
         let mut xml = format!(
@@ -160,15 +151,16 @@ impl Content {
              <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
              </FieldData>\n"
         );
-        for place in places {
-            self.piece(place, &mut xml);
+        for piece in pieces {
+            self.piece(piece, &mut xml);
         }
         let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
         let blanks = length.saturating_sub(xml.len() + end.len());
         xml + &" ".repeat(blanks) + end
     }
 
-    fn piece(&self, Place { points, cells, offsets }: &Place, xml: &mut String) {
+    fn piece(&self, Piece { points, written, offsets, .. }: &Piece, xml: &mut String) {
+        let cells = written.cells;
         *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
         let arrays: Vec<_> = self.arrays.iter().zip(offsets).collect();
         for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {

@@ -64,7 +64,7 @@ pub(super) fn words(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let cells = import::read(path, Format::LeafWords, &request);
     assert!(
         cells.is_err()
-            || words.is_some_and(|words| words.len() == cells.as_ref().map_or(0, |c| c.len()))
+            || words.is_some_and(|words| words.len() == cells.as_ref().map_or(0, |c| c.count()))
     );
     part.is_ok()
 }
@@ -89,7 +89,7 @@ pub(super) fn forest(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         ..Request::default()
     };
     let Ok(cells) = import::read(path, Format::P4est, &request) else { return false };
-    let count = cells.len();
+    let count = cells.count();
     let Ok(set) = import::leaf_set(&cells, request.root, None, "fuzz".to_owned()) else {
         return false;
     };

@@ -50,10 +50,7 @@ impl Request<'_> {
             let why = "the sides of this mesh are unknown: choose another colour";
             return Err(Failure::input(why.to_owned()));
         }
-        match self.colour == Colour::Rank && !mesh.has_ranks() {
-            true => Err(mesh.ranks_unknown()),
-            false => Ok(()),
-        }
+        if self.colour == Colour::Rank { mesh.require_ranks() } else { Ok(()) }
     }
 }
 

@@ -207,8 +207,8 @@ impl Engine {
         };
         if let Some(mesh) = written {
             // Limits apply to this number, so it must be one of leaves that exist.
-            if report.cells != mesh.len() {
-                let (stated, found) = (report.cells, mesh.len());
+            if report.cells != mesh.leaf_count() {
+                let (stated, found) = (report.cells, mesh.leaf_count());
                 return Err(format!("states {stated} cells, and its mesh has {found}"));
             }
             let digest = mesh.manifest.digest.to_string();

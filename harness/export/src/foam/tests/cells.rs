@@ -10,7 +10,7 @@ proptest! {
         prop_assume!(!words.is_empty());
         let (dir, mesh) = on_disk(&leaf_set(vec![words.clone()]));
         let target = dir.path().join("case/constant/polyMesh");
-        let summary = write(&mesh, &Selection::default(), &target, &options()).unwrap();
+        let summary = write(&whole(&mesh, &options()), &target).unwrap();
         let complex = complex_in(&target);
         complex.assert_ordered();
         complex.assert_closed(words.len());

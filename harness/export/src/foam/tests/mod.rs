@@ -14,9 +14,10 @@ use contract::testing::{leaf_set, random_words, words_with_sides};
 use proptest::prelude::*;
 
 use super::*;
-use crate::leaves::{Around, CUT, Square};
+use crate::leaves::{CUT, Square};
 use crate::options::Label;
-pub use crate::testing::options;
+use crate::selection::Selection;
+pub use crate::testing::{options, whole};
 use contract::mesh::Mesh as OnDisk;
 
 /// Faces with their points, and the cells on both sides of each.
@@ -77,21 +78,15 @@ fn leaves_of(words: &[u64], is_cut: impl Fn(u64) -> bool) -> Leaves {
 }
 
 /// The mesh of these leaves.
-pub fn mesh_of<'a>(
-    words: &[u64],
-    is_cut: impl Fn(u64) -> bool,
-    options: &'a Options<'a>,
-) -> Mesh<'a> {
+pub fn mesh_of(words: &[u64], is_cut: impl Fn(u64) -> bool, options: &Options<'_>) -> Mesh {
     let patches = Patches::new(None, true).unwrap();
     Mesh::new(leaves_of(words, is_cut), None, patches, options).unwrap()
 }
 
 impl Leaves {
-    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Around, &[Square])) {
-        let mut of_cell = Vec::new();
-        let visit = &mut |cell, around: &Around| {
-            squares(self, around, &mut of_cell);
-            each(cell, around, &of_cell);
+    fn visit_all(&self, options: &Options, mut each: impl FnMut(u32, &Octant, &[Square])) {
+        let visit = &mut |cell, octant: &Octant, squares: &[Square]| {
+            each(cell, octant, squares);
             Ok(())
         };
         self.walk(options, visit).unwrap();
@@ -216,7 +211,7 @@ proptest! {
         let label = if is_wide { Label::Bits64 } else { Label::Bits32 };
         let mut options = options();
         options.label = label;
-        let summary = write(&mesh, &Selection::default(), &target, &options).unwrap();
+        let summary = write(&whole(&mesh, &options), &target).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
     }

@@ -23,9 +23,9 @@ proptest! {
         let options = options();
         let mesh = mesh_of(&words, |word| has_cut && is_cut(word), &options);
         let mut expected: BTreeSet<Point> = BTreeSet::new();
-        mesh.leaves.visit_all(&options, |_, around, squares| {
-            let edge = around.octant.edge();
-            let corner = |digit: u32| std::array::from_fn(|a| around.octant.corner[a] + edge * (digit >> a & 1));
+        mesh.leaves.visit_all(&options, |_, octant, squares| {
+            let edge = octant.edge();
+            let corner = |digit: u32| std::array::from_fn(|a| octant.corner[a] + edge * (digit >> a & 1));
             expected.extend((0..8).map(corner));
             expected.extend(squares.iter().flat_map(|square| square.corners(true)));
         });
@@ -42,8 +42,8 @@ proptest! {
         let leaves = leaves_of(&words, is_cut);
         let cells = leaves.count() as usize;
         let (mut sets, mut volumes): (Vec<usize>, _) = ((0..cells).collect(), vec![0; cells]);
-        leaves.visit_all(&options, |cell, around, squares| {
-            volumes[cell as usize] = word::span(around.octant.level);
+        leaves.visit_all(&options, |cell, octant, squares| {
+            volumes[cell as usize] = word::span(octant.level);
             for across in squares.iter().filter_map(|square| square.across.as_cell()) {
                 let (a, b) = (sets[cell as usize], sets[across as usize]);
                 sets.iter_mut().filter(|set| **set == a).for_each(|set| *set = b);
