@@ -25,6 +25,7 @@ pub use rules::Rules;
 use rules::Selected;
 use run::engine::failure::Failure as Ended;
 use run::engine::interrupt;
+use run::engine::paths::Input;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
@@ -42,8 +43,8 @@ pub struct GateOptions {
     #[arg(long, value_name = "REVISION|FILE")]
     pub candidate: Option<String>,
     /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
-    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(input))]
-    pub rules: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    pub rules: Option<Input>,
     /// Only these cases of the rules
     #[arg(long, value_delimiter = ',')]
     pub case: Vec<String>,
@@ -74,11 +75,6 @@ impl GateOptions {
     }
 }
 
-/// A file that is read, and must not be written.
-fn input(path: PathBuf) -> std::io::Result<PathBuf> {
-    files::register_input(&path).map(|()| path)
-}
-
 /// The input of every layer.
 struct Bench<'a> {
     options: &'a GateOptions,
@@ -98,8 +94,8 @@ struct Bench<'a> {
 /// If the gate cannot start; later failures are in the report.
 pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Failure> {
     let start = Instant::now();
-    let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
-    let rules = Rules::read(&rules)?;
+    let default = programs.paths.engines.join("gate.toml");
+    let rules = Rules::read(options.rules.as_deref().unwrap_or(&default))?;
     let cases = rules.select(&options.case, programs)?;
     let engine = &programs.engine;
     let baseline = options.baseline.as_ref().map(|named| Subject::find(named, options, engine));

@@ -4,9 +4,8 @@ use crate::options::{EngineArguments, Input, whole_seconds};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::Failure;
-use run::engine::layout::{Layout, RunOptions};
+use run::engine::layout::Layout;
 use run::engine::programs::Programs;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -57,16 +56,9 @@ impl MeshArguments {
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
-        let (dir, logs) = (made.path().join("mesh"), made.path().join("logs"));
-        fs::create_dir(&logs).map_err(|error| Failure::at(&logs, error))?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
-        let options = RunOptions {
-            mesh: Some(&dir),
-            report: false,
-            ungraded,
-            ..RunOptions::new(&logs, Duration::from_secs(self.timeout))
-        };
-        engine.run(&prepared, layout, &options)?;
+        let limit = Duration::from_secs(self.timeout);
+        let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), limit))?;
         Ok(Meshed { dir, case: Some(case), _made: Some(made) })
     }
 }

@@ -17,7 +17,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{LazyLock, Mutex, MutexGuard, Once, OnceLock};
+use std::sync::{Mutex, MutexGuard, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
@@ -31,18 +31,12 @@ const OUT_OF_MEMORY_BYTE: u8 = b'm';
 
 static WAKE: OnceLock<UnixStream> = OnceLock::new();
 static REQUESTED: AtomicBool = AtomicBool::new(false);
-static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
+/// Directories that must not outlive the harness; those that were removed already may remain in the list.
+static LEFTOVERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// The directory of all temporary files, which is made under the lock of the others.
+static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
 
-/// What must not outlive the harness.
-#[derive(Default)]
-struct Leftovers {
-    /// Directories; those that were removed already may remain in the list.
-    directories: Vec<PathBuf>,
-    /// The directory of all temporary files.
-    temporary: Option<PathBuf>,
-}
-
-fn leftovers() -> MutexGuard<'static, Leftovers> {
+fn leftovers() -> MutexGuard<'static, Vec<PathBuf>> {
     LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
@@ -76,10 +70,9 @@ fn watch() -> io::Result<()> {
         pipe::register(signal, sent.try_clone()?)?;
     }
     // A signal after this thread has made the directory removes it.
-    let mut leftovers = leftovers();
+    let _leftovers = leftovers();
     let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
-    let _ = tempfile::env::override_temp_dir(&place);
-    leftovers.temporary = Some(place);
+    let _ = tempfile::env::override_temp_dir(TEMPORARY.get_or_init(|| place));
     Ok(())
 }
 
@@ -94,9 +87,7 @@ pub fn out_of_memory(code: i32) -> ! {
 
 /// Removes the directory of temporary files, unless a command has kept some, when the harness ends in the ordinary way.
 pub fn uninstall() {
-    if let Some(place) = leftovers().temporary.take() {
-        let _ = fs::remove_dir(place);
-    }
+    let _ = TEMPORARY.get().map(fs::remove_dir);
 }
 
 /// Whether the user has interrupted the harness.
@@ -106,18 +97,18 @@ pub fn requested() -> bool {
 
 /// Notes a directory that must not outlive the harness.
 pub fn note_directory(path: &Path) {
-    leftovers().directories.push(path.to_owned());
+    leftovers().push(path.to_owned());
 }
 
 /// Forgets a directory that is complete, and is kept.
 pub fn forget_directory(path: &Path) {
-    leftovers().directories.retain(|directory| directory != path);
+    leftovers().retain(|directory| directory != path);
 }
 
 /// Whether a directory will not outlive the harness.
 #[cfg(test)]
 pub fn has_directory(path: &Path) -> bool {
-    leftovers().directories.iter().any(|directory| directory == path)
+    leftovers().iter().any(|directory| directory == path)
 }
 
 /// Prints that the harness was interrupted. Once: a command may be about to say so when its time is over.
@@ -140,7 +131,7 @@ pub fn clean() {
     let staged = contract::files::publications();
     interrupt::abandon_unfinished();
     let kept = leftovers();
-    kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
+    kept.iter().chain(TEMPORARY.get()).chain(&*staged).for_each(|path| remove(path));
     std::mem::forget(staged);
 }
 

@@ -19,22 +19,17 @@ pub struct RunReport {
     /// Cells of the final mesh, or leaves of the base tree.
     pub cells: u64,
     /// The digest of the mesh: 32 hexadecimal digits.
-    #[serde(default)]
     pub digest: Option<String>,
     /// Number of ranks; `None` if it is not reported.
-    #[serde(default)]
     pub ranks: Option<usize>,
     /// Number of facets.
     #[serde(default)]
     pub facets: u64,
     /// The facets as the program read them.
-    #[serde(default)]
     pub geometry: Option<Geometry>,
     /// The partitioner that was used; `None` if it is not reported, or for a single rank.
-    #[serde(default)]
     pub partitioner: Option<String>,
     /// Wall time by the program's own clock, in seconds; `None` if it is not reported.
-    #[serde(default)]
     pub time_wall_s: Option<f64>,
     /// Peak resident memory, per rank or of the whole program.
     #[serde(default, deserialize_with = "one_or_many")]

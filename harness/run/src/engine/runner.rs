@@ -16,6 +16,7 @@ use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
@@ -190,6 +191,30 @@ impl Engine {
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
+    /// Meshes a case in a directory, which is made, without a run report; returns the leaf-set directory.
+    ///
+    /// # Errors
+    /// As [`Self::run`], or if the directory cannot be made.
+    pub fn mesh(
+        &self,
+        case: &Path,
+        layout: &Layout,
+        ungraded: bool,
+        (place, limit): (&Path, Duration),
+    ) -> Result<PathBuf, Failure> {
+        let failed = |error| self.unusable(format!("has no {}: {error}", place.display()));
+        fs::create_dir_all(place).map_err(failed)?;
+        let mesh = place.join("mesh");
+        let options = RunOptions {
+            mesh: Some(&mesh),
+            report: false,
+            ungraded,
+            ..RunOptions::new(place, limit)
+        };
+        self.run(case, layout, &options)?;
+        Ok(mesh)
+    }
+
     /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside where the program
     /// reported none, or that of rank 0 alone.
     fn report(
@@ -239,8 +264,8 @@ impl Engine {
     ///
     /// # Errors
     /// If there is none, or it cannot be read.
-    pub fn read_mesh(&self, completed: &Completed) -> Result<LeafSet, Failure> {
-        let mesh = completed.mesh.as_ref().ok_or_else(|| self.unusable("wrote no mesh".into()))?;
+    pub fn read_mesh(&self, mesh: Option<&Path>) -> Result<LeafSet, Failure> {
+        let mesh = mesh.ok_or_else(|| self.unusable("wrote no mesh".into()))?;
         let unreadable = |error| format!("wrote a mesh that cannot be read: {error}");
         leafset::read(mesh).map_err(|error| self.unusable(unreadable(error)))
     }
@@ -327,7 +352,6 @@ mod tests {
     use super::*;
     use crate::engine::layout::SERIAL;
     use crate::engine::programs::Programs;
-    use std::time::Duration;
 
     fn words(engine: &Engine, layout: &Layout, options: &RunOptions) -> String {
         let command = engine.command(Path::new("a.toml"), layout, options).unwrap();
@@ -343,7 +367,7 @@ mod tests {
 
     #[test]
     fn command_lines_of_our_programs() {
-        let programs = Programs::find(Default::default()).unwrap();
+        let programs = Programs::find("mesher", &Default::default()).unwrap();
         let mesher = programs.mesher.with_launcher(Launcher::parse("mpirun -n {ranks}").unwrap());
         let plain = RunOptions::new(Path::new("p"), Duration::from_secs(1));
         let files = RunOptions {

@@ -51,7 +51,7 @@ impl CaseRun<'_> {
         layout: &Layout,
     ) -> Result<Meshed, Failure> {
         let (run, completed) = self.run(case, name, program, Some(tree), layout)?;
-        let mesh = self.program(program).read_mesh(&completed)?;
+        let mesh = self.program(program).read_mesh(completed.mesh.as_deref())?;
         let Completed { report, mesh: place, .. } = completed;
         Ok(Meshed { run, ranks: report.ranks, mesh, place: place.unwrap_or_default() })
     }

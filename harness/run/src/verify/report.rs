@@ -127,17 +127,12 @@ pub struct Tally {
     pub left_out: usize,
 }
 
-impl<'a> FromIterator<&'a Check> for Tally {
-    fn from_iter<I: IntoIterator<Item = &'a Check>>(checks: I) -> Self {
-        let mut tally = Self::default();
-        for check in checks {
-            match check.outcome {
-                Outcome::Pass { .. } => tally.pass += 1,
-                Outcome::Fail { .. } => tally.fail += 1,
-                Outcome::LeftOut { .. } => tally.left_out += 1,
-            }
-        }
-        tally
+impl Tally {
+    /// Of these checks.
+    pub fn of<'a>(checks: impl Iterator<Item = &'a Check> + Clone) -> Self {
+        let count = |is: fn(&Outcome) -> bool| checks.clone().filter(|c| is(&c.outcome)).count();
+        let (pass, fail) = (count(Outcome::holds), count(Outcome::failed));
+        Self { pass, fail, left_out: checks.count() - pass - fail }
     }
 }
 
@@ -233,7 +228,7 @@ impl CaseReport {
 
     /// Numbers of its checks by outcome.
     pub fn tally(&self) -> Tally {
-        self.checks.iter().collect()
+        Tally::of(self.checks.iter())
     }
 
     /// Whether any check failed.
@@ -313,7 +308,7 @@ impl Report {
 
     /// Numbers of all checks by outcome.
     pub fn tally(&self) -> Tally {
-        self.cases.iter().flat_map(|case| &case.checks).collect()
+        Tally::of(self.cases.iter().flat_map(|case| &case.checks))
     }
 
     /// A one-line summary.

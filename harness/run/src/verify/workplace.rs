@@ -27,18 +27,19 @@ impl Workplace {
     /// # Errors
     /// If it cannot be made.
     pub(super) fn new(options: &Options) -> Result<Self, Failure> {
-        let wrong = |error: io::Error| {
-            Failure::input(format!("the directory for results cannot be made: {error}"))
+        let made = || match &options.out {
+            Some(out) => {
+                fs::create_dir_all(out)?;
+                Ok(Self { root: fs::canonicalize(out)?, temporary: None })
+            }
+            None => {
+                let temporary = tempfile::Builder::new().prefix("harness-verify-").tempdir()?;
+                Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary) })
+            }
         };
-        if let Some(out) = &options.out {
-            fs::create_dir_all(out).map_err(wrong)?;
-            let root = fs::canonicalize(out).map_err(wrong)?;
-            return Ok(Self { root, temporary: None });
-        }
-        let temporary =
-            tempfile::Builder::new().prefix("harness-verify-").tempdir().map_err(wrong)?;
-        let root = temporary.path().to_owned();
-        Ok(Self { root, temporary: Some(temporary) })
+        made().map_err(|error: io::Error| {
+            Failure::input(format!("the directory for results cannot be made: {error}"))
+        })
     }
 
     /// Makes the directory of a case, and replaces one that an earlier verification left.
