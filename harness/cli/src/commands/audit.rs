@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         None => {}
     }
     let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
-    if opened.is_imported() && case.is_none() && has_holes {
+    if opened.made.is_some() && case.is_none() && has_holes {
         eprintln!(
             "harness: without --case, an imported mesh is taken for one that fills its root, so every hole is a finding"
         );

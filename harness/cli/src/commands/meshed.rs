@@ -27,26 +27,25 @@ pub struct MeshArguments {
     engine: EngineArguments,
 }
 
-/// A leaf-set directory and the case of its mesh, if that is known. A directory that was made is deleted with it.
+/// A leaf-set directory. One that was made is deleted with this value.
 #[derive(Debug)]
 pub struct Meshed {
     /// The directory.
     pub dir: PathBuf,
-    /// The case.
-    pub case: Option<Case>,
-    _made: Option<TempDir>,
+    /// The temporary directory in which it was made.
+    pub made: Option<TempDir>,
 }
 
 impl MeshArguments {
-    /// The mesh. A case is meshed in a temporary directory, by ranks of this layout, as far as the base tree or to its end.
+    /// The mesh, and its case if that is known. A case is meshed in a temporary directory, by ranks of this layout, as far as the base tree or to its end.
     ///
     /// # Errors
     /// If the case cannot be read or meshed.
-    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<Meshed, Failure> {
+    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>), Failure> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
             let case = self.case.as_deref().map(Case::read).transpose()?;
-            return Ok(Meshed { dir: given.to_owned(), case, _made: None });
+            return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }
         if self.case.is_some() {
             let why = "is not a leaf-set directory, which --case requires";
@@ -59,6 +58,6 @@ impl MeshArguments {
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
         let limit = Duration::from_secs(self.timeout);
         let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), limit))?;
-        Ok(Meshed { dir, case: Some(case), _made: Some(made) })
+        Ok((Meshed { dir, made: Some(made) }, Some(case)))
     }
 }

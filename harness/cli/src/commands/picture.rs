@@ -66,21 +66,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
         None => SERIAL.clone(),
     };
-    let meshed = source.open(&layout, *ungraded)?;
+    let (meshed, case) = source.open(&layout, *ungraded)?;
     let mesh = Mesh::open(&meshed.dir)?;
-    if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
+    if let (Some(_), Some(case)) = (&source.case, &case) {
         mesh.require_case(case)?;
     }
     let request = Request {
         selection: arguments.selection.of(&mesh)?,
-        body: meshed.case.as_ref().map(|case| &case.facets[..]),
+        body: case.as_ref().map(|case| &case.facets[..]),
         colour: arguments.colour,
         zoom: arguments.zoom,
     };
     let picture = Picture::collect(&mesh, &request)?;
     write(out, &format.bytes(&picture.svg()).map_err(io::Error::other)?)?;
     println!("{}\n{}", picture.title(), out.display());
-    if meshed.case.is_none() {
+    if case.is_none() {
         println!("the geometry is not drawn: name its case with --case");
     }
     Ok(EXIT_HOLDS)

@@ -34,10 +34,10 @@ pub struct Arguments {
 /// # Errors
 /// If the mesh cannot be made or read, or the point is outside its root.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let made = arguments.source.open(&SERIAL, false)?;
+    let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    let body = made.case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
+    let body = case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
     print!("{}", mesh.at(arguments.point)?);

@@ -191,7 +191,7 @@ impl Engine {
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
-    /// Meshes a case in a directory, which is made, without a run report; returns the leaf-set directory.
+    /// Meshes a case in a directory, which is made; returns the leaf-set directory.
     ///
     /// # Errors
     /// As [`Self::run`], or if the directory cannot be made.
@@ -202,15 +202,11 @@ impl Engine {
         ungraded: bool,
         (place, limit): (&Path, Duration),
     ) -> Result<PathBuf, Failure> {
-        let failed = |error| self.unusable(format!("has no {}: {error}", place.display()));
+        let why = |error| format!("has no directory {}: {error}", place.display());
+        let failed = |error| self.failure(End::Missing(why(error)));
         fs::create_dir_all(place).map_err(failed)?;
         let mesh = place.join("mesh");
-        let options = RunOptions {
-            mesh: Some(&mesh),
-            report: false,
-            ungraded,
-            ..RunOptions::new(place, limit)
-        };
+        let options = RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(place, limit) };
         self.run(case, layout, &options)?;
         Ok(mesh)
     }

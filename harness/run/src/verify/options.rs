@@ -111,9 +111,9 @@ impl Options {
             #[command(flatten)]
             options: Options,
         }
-        let Defaults { options } = Defaults::parse_from(["verify"]);
-        let no = true;
-        Self { cases, no_mpi: no, no_oracles: no, no_p4est: no, no_proof: no, ..options }
+        let left_out = ["--no-mpi", "--no-oracles", "--no-p4est", "--no-proof"];
+        let words = ["verify"].into_iter().chain(left_out);
+        Self { cases, ..Defaults::parse_from(words).options }
     }
 
     /// Time limit of every single run.

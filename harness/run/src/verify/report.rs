@@ -293,16 +293,13 @@ impl Report {
 
     /// The exit code. An interrupt takes precedence, then a failed check, an input error, a missing prerequisite.
     pub fn exit_code(&self) -> u8 {
-        if self.interrupted {
-            EXIT_INTERRUPTED
-        } else if self.cases.iter().any(CaseReport::failed) {
-            EXIT_FAILED
-        } else if self.cases.iter().any(|case| case.input_error.is_some()) {
-            EXIT_INPUT
-        } else if self.missing.iter().any(|missing| missing.required) {
-            EXIT_MISSING
-        } else {
-            EXIT_HOLDS
+        let Self { cases, missing, .. } = self;
+        match () {
+            () if self.interrupted => EXIT_INTERRUPTED,
+            () if cases.iter().any(CaseReport::failed) => EXIT_FAILED,
+            () if cases.iter().any(|case| case.input_error.is_some()) => EXIT_INPUT,
+            () if missing.iter().any(|missing| missing.required) => EXIT_MISSING,
+            () => EXIT_HOLDS,
         }
     }
 
