@@ -43,25 +43,15 @@ impl Imported {
         }
     }
 
-    /// Writes leaf words as a new directory.
+    /// Writes a leaf-set directory. A tree may become a link, so the file that was imported must remain.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn create(&self, dir: &Path) -> io::Result<()> {
+    pub fn create(&self, dir: &Path, may_link: bool) -> io::Result<()> {
         match self {
             Self::Words { set, .. } => set.create(dir),
+            Self::Tree(tree) if may_link => fs::create_dir_all(dir).and_then(|()| tree.link(dir)),
             Self::Tree(tree) => tree.create(dir),
-        }
-    }
-
-    /// The same, but a tree becomes a link, so the file that was imported must remain.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
-    pub fn link(&self, dir: &Path) -> io::Result<()> {
-        match self {
-            Self::Words { set, .. } => set.create(dir),
-            Self::Tree(tree) => fs::create_dir_all(dir).and_then(|()| tree.link(dir)),
         }
     }
 }

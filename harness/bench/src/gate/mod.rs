@@ -58,21 +58,14 @@ pub struct GateOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    pub timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    pub timeout: Duration,
     /// Time for one case in the layer of time [default: from the rules]
     #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
-    pub budget: Option<u64>,
+    pub budget: Option<Duration>,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
-}
-
-impl GateOptions {
-    /// Time limit of every single run.
-    fn limit(&self) -> Duration {
-        Duration::from_secs(self.timeout)
-    }
 }
 
 /// The input of every layer.

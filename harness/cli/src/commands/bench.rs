@@ -133,10 +133,7 @@ pub(super) fn programs(given: &Given, study: &mut Study) -> Result<Programs, Fai
     // Our mesher chooses the spacings, also for other engines.
     let also = names.iter().any(|name| name != "reference").then_some(mesher);
     let mut required = also.into_iter().chain(engines);
-    if let Some(missing) = required.find(|engine| !engine.program().is_file()) {
-        let program = missing.program().display();
-        return Err(Failure::missing(format!("{program} is missing: build it or give its path")));
-    }
+    required.try_for_each(Engine::require)?;
     for name in study.series.iter_mut().flat_map(|series| &mut series.engines) {
         *name = found(name).label();
     }
@@ -166,17 +163,13 @@ fn publish(
     print!("{}", page::text(rows));
     if let Some(directory) = report {
         let path = directory.join(PAGE);
-        put(&path, &page::markdown(rows, &machine(lines))).map_err(unwritten(code))?;
+        let session = lines.iter().rev().find_map(Line::session);
+        let unknown = || "a machine that the record does not describe".to_owned();
+        let machine = session.map_or_else(unknown, |session| session.machine.to_string());
+        put(&path, &page::markdown(rows, &machine)).map_err(unwritten(code))?;
         println!("table: {}", path.display());
     }
     Ok(code)
-}
-
-/// Describes the machine of the last session.
-fn machine(lines: &[Line]) -> String {
-    let session = lines.iter().rev().find_map(Line::session);
-    let unknown = || "a machine that the record does not describe".to_owned();
-    session.map_or_else(unknown, |session| session.machine.to_string())
 }
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.

@@ -56,8 +56,8 @@ pub struct Source {
     #[arg(long, value_enum, default_value_t)]
     position: Position,
     /// Time limit of a reader in Python
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "3600", value_parser = whole_seconds)]
+    timeout: Duration,
 }
 
 impl Source {
@@ -109,8 +109,8 @@ impl Source {
             ..Request::default()
         };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let limit = Duration::from_secs(*timeout);
-        let mut imported = import(mesh, *format, &request, case, program, &Paths::find(), limit)?;
+        let mut imported =
+            import(mesh, *format, &request, case, program, &Paths::find(), *timeout)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(
@@ -129,7 +129,7 @@ impl Source {
             return Ok(Meshed { dir: mesh.to_owned(), made: None });
         }
         let made = tempfile::tempdir()?;
-        self.read(mesh, case)?.link(made.path())?;
+        self.read(mesh, case)?.create(made.path(), true)?;
         Ok(Meshed { dir: made.path().to_owned(), made: Some(made) })
     }
 }
@@ -145,7 +145,7 @@ fn has_manifest(mesh: &Path) -> bool {
 pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
     let case = source.read_case()?;
     let mut imported = source.read(mesh, case.as_ref())?;
-    imported.create(out)?;
+    imported.create(out, false)?;
     let Manifest { leaves, sides, .. } = imported.manifest();
     let known = if *sides == manifest::Sides::Known { "known" } else { "unknown" };
     println!("{}: {leaves} cells, sides {known}", out.display());

@@ -55,8 +55,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.vtp", value_parser = with_extension("vtp"))]
     vtk: Option<Output>,
     /// Time limit of every single run of the mesher
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    timeout: Duration,
     /// Paths of the programs.
     #[command(flatten)]
     programs: Given,
@@ -70,8 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let programs = Programs::find("mesher", &arguments.programs)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
-    let limit = Duration::from_secs(arguments.timeout);
-    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, limit)?;
+    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, arguments.timeout)?;
     let progress = Progress::new();
     let (mut first, leaked) = match (arguments.from, arguments.to) {
         (None, None) => {

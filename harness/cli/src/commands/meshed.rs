@@ -20,8 +20,8 @@ pub struct MeshArguments {
     #[arg(long, value_name = "CASE")]
     pub case: Option<Input>,
     /// Time limit for meshing a case
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    timeout: Duration,
     /// The program that meshes a case.
     #[command(flatten)]
     engine: EngineArguments,
@@ -56,8 +56,8 @@ impl MeshArguments {
         let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
-        let limit = Duration::from_secs(self.timeout);
-        let dir = engine.mesh(&prepared, layout, ungraded, (made.path(), limit))?;
+        let place = (made.path(), self.timeout);
+        let dir = engine.mesh(&prepared, layout, ungraded, place)?;
         Ok((Meshed { dir, made: Some(made) }, Some(case)))
     }
 }

@@ -29,12 +29,7 @@ pub struct Arguments {
 /// If a case cannot be meshed.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let programs = Programs::find("mesher", &arguments.programs)?;
-    if !programs.reference.program().is_file() {
-        let path = programs.reference.program().display();
-        return Err(Failure::missing(format!(
-            "the reference is missing: build {path}, or give another path with --reference"
-        )));
-    }
+    programs.reference.require()?;
     let scratch = tempfile::tempdir()?;
     let meshed = selftest::CASES.into_iter().map(|(name, text)| {
         let directory = scratch.path().join(name);

@@ -101,6 +101,27 @@ impl Engine {
         self.is_given.then_some(&self.program)
     }
 
+    /// Refuses to go on if the program is missing.
+    ///
+    /// # Errors
+    /// What to do about it.
+    pub fn require(&self) -> Result<(), contract::failure::Failure> {
+        if self.program.is_file() {
+            return Ok(());
+        }
+        let (name, path) = (self.name(), self.program.display());
+        let option = if name == "reference" { name } else { "mesher" };
+        let fix = match description::is_own(name) {
+            true => format!("build {path}, or give another path with --{option}"),
+            false => format!(
+                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {name}: correct it, \
+                 as in program = \"{{here}}/my-mesher\", or give --{option} PATH"
+            ),
+        };
+        let why = format!("the {option} is missing: {fix}");
+        Err(contract::failure::Failure::missing(why))
+    }
+
     /// Why no run on MPI can be started; `None` if one can.
     pub fn lacks_mpi(&self) -> Option<String> {
         let parallel = &self.description.run.parallel;

@@ -69,7 +69,7 @@ pub(super) fn complete(
         let (case, limit) = (read_case()?, options.limit);
         let mut imported = imported(engine, format, &written, &case, label, limit)?;
         imported.manifest().tree = tree;
-        imported.link(mesh).map_err(|error| unreadable(&error))?;
+        imported.create(mesh, true).map_err(|error| unreadable(&error))?;
     } else if !is_complete && description::is_own(&engine.name) {
         // Our programs write it last: without it their mesh is incomplete.
         return unusable(format!("wrote no {}", manifest::FILE));

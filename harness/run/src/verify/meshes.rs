@@ -76,7 +76,7 @@ impl CaseRun<'_> {
             ungraded: tree == Some(Tree::Base),
             sample_memory: true,
             services: Some(&self.all.needs.services),
-            ..RunOptions::new(&place, self.all.options.limit())
+            ..RunOptions::new(&place, self.all.options.timeout)
         };
         let completed = engine.run(case, layout, &options)?;
         let report = &completed.report;
