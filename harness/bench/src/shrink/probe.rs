@@ -8,7 +8,7 @@ use contract::failure::Failure;
 use contract::leafset::LeafSet;
 use contract::plain::PlainCase;
 use run::engine::failure::{self, End};
-use run::engine::layout::{Layout, Ranks};
+use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
 use run::verify::case::RUNS;
 use std::fmt;
@@ -175,8 +175,15 @@ impl Probe {
     ) -> Result<LeafSet, failure::Failure> {
         let place = self.place.path().join(name);
         let _ = std::fs::remove_dir_all(&place);
-        let mesh = engine.mesh(case, &Layout::on(ranks), ungraded, (&place, self.limit))?;
-        engine.read_mesh(Some(&mesh))
+        std::fs::create_dir_all(&place).map_err(|error| {
+            let why = format!("has no directory {}: {error}", place.display());
+            failure::Failure::new(engine.name(), End::Missing(why))
+        })?;
+        let mesh = place.join("mesh");
+        let options =
+            RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
+        let completed = engine.run(case, &Layout::on(ranks), &options)?;
+        engine.read_mesh(completed.mesh.as_deref())
     }
 }
 

@@ -8,6 +8,7 @@
 //! - output that is about to get its final names gets all of them first.
 
 use super::session::{PATIENCE, end_all};
+use contract::files::publications;
 use files::OUT_OF_MEMORY;
 use files::interrupt::{self, INTERRUPTED};
 use rustix::process::{getpid, set_child_subreaper};
@@ -17,7 +18,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, Once, OnceLock};
+use std::sync::{Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
@@ -31,14 +32,8 @@ const OUT_OF_MEMORY_BYTE: u8 = b'm';
 
 static WAKE: OnceLock<UnixStream> = OnceLock::new();
 static REQUESTED: AtomicBool = AtomicBool::new(false);
-/// Directories that must not outlive the harness; those that were removed already may remain in the list.
-static LEFTOVERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-/// The directory of all temporary files, which is made under the lock of the others.
+/// The directory of all temporary files. Until it is known, a signal waits.
 static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
-
-fn leftovers() -> MutexGuard<'static, Vec<PathBuf>> {
-    LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
 
 /// Makes signals a request to stop. Once per process, before anything makes a temporary file.
 pub fn install() {
@@ -70,7 +65,7 @@ fn watch() -> io::Result<()> {
         pipe::register(signal, sent.try_clone()?)?;
     }
     // A signal after this thread has made the directory removes it.
-    let _leftovers = leftovers();
+    let _unknown = publications();
     let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
     let _ = tempfile::env::override_temp_dir(TEMPORARY.get_or_init(|| place));
     Ok(())
@@ -95,22 +90,6 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Notes a directory that must not outlive the harness.
-pub fn note_directory(path: &Path) {
-    leftovers().push(path.to_owned());
-}
-
-/// Forgets a directory that is complete, and is kept.
-pub fn forget_directory(path: &Path) {
-    leftovers().retain(|directory| directory != path);
-}
-
-/// Whether a directory will not outlive the harness.
-#[cfg(test)]
-pub fn has_directory(path: &Path) -> bool {
-    leftovers().iter().any(|directory| directory == path)
-}
-
 /// Prints that the harness was interrupted. Once: a command may be about to say so when its time is over.
 pub fn announce() {
     static SAID: Once = Once::new();
@@ -128,10 +107,9 @@ fn end() -> ! {
 pub fn clean() {
     let _ended = end_all();
     // Until the process ends, nothing else is staged or published.
-    let staged = contract::files::publications();
+    let staged = publications();
     interrupt::abandon_unfinished();
-    let kept = leftovers();
-    kept.iter().chain(TEMPORARY.get()).chain(&*staged).for_each(|path| remove(path));
+    staged.iter().chain(TEMPORARY.get()).for_each(|path| remove(path));
     std::mem::forget(staged);
 }
 

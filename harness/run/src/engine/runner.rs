@@ -212,7 +212,7 @@ impl Engine {
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
-    /// Meshes a case in a directory, which is made; returns the leaf-set directory.
+    /// Meshes a case in a directory, which is made, without a run report; returns the leaf-set directory.
     ///
     /// # Errors
     /// As [`Self::run`], or if the directory cannot be made.
@@ -227,7 +227,12 @@ impl Engine {
         let failed = |error| self.failure(End::Missing(why(error)));
         fs::create_dir_all(place).map_err(failed)?;
         let mesh = place.join("mesh");
-        let options = RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(place, limit) };
+        let options = RunOptions {
+            mesh: Some(&mesh),
+            report: false,
+            ungraded,
+            ..RunOptions::new(place, limit)
+        };
         self.run(case, layout, &options)?;
         Ok(mesh)
     }
@@ -305,11 +310,10 @@ impl Engine {
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
-        if let Some(services) = options.services.filter(|_| self.serves()) {
+        if let Some((services, (name, start))) = options.services.zip(self.service(count)) {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
-            let (name, start) = (self.name_of_ranks(count), || self.ranks(count));
             services.send(&name, start, &words)?;
             let time_wall_s = services.answer(&name, &watch)?;
             let stdout = watch.log("stdout");
@@ -324,24 +328,21 @@ impl Engine {
     /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none. What fails is found by
     /// the first run.
     pub fn start_ranks(&self, count: usize, services: &Services) {
-        if self.serves() {
-            let _ = services.start(&self.name_of_ranks(count), || self.ranks(count));
+        if let Some((name, start)) = self.service(count) {
+            let _ = services.start(&name, start);
         }
     }
 
-    fn serves(&self) -> bool {
-        !self.description.run.serve.is_empty()
-    }
-
-    fn name_of_ranks(&self, count: usize) -> String {
-        format!("{} on {count} ranks", self.program.display())
-    }
-
-    fn ranks(&self, count: usize) -> service::Start {
-        let mut command = self.launcher.command(count, &self.program);
-        command.args(&self.description.run.serve);
-        let shared = self.launcher.prepare(&mut command);
-        (command, shared)
+    /// The ranks that stay: their name, and how they are started. `None` if the engine has none.
+    fn service(&self, count: usize) -> Option<(String, impl FnOnce() -> service::Start)> {
+        let serve = Some(&self.description.run.serve).filter(|serve| !serve.is_empty())?;
+        let start = move || {
+            let mut command = self.launcher.command(count, &self.program);
+            command.args(serve);
+            let shared = self.launcher.prepare(&mut command);
+            (command, shared)
+        };
+        Some((format!("{} on {count} ranks", self.program.display()), start))
     }
 
     fn failure(&self, end: End) -> Failure {
