@@ -210,16 +210,13 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     let row = |row: &Row| {
         let Value { run, quantity, found } = &row.expected;
         let verdict = match (row.verdict, &row.measured) {
-            (Verdict::Equal, _) => "equal",
-            (Verdict::Differs, _) => "DIFFERS",
-            (Verdict::Inside, _) => "inside",
-            (Verdict::Outside, _) => "OUTSIDE",
-            (Verdict::Missing, _) => "missing",
-            (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how,
-            (Verdict::NotCompared, _) => "",
+            (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how.clone(),
+            (Verdict::NotCompared, _) => String::new(),
+            (bad @ (Verdict::Differs | Verdict::Outside), _) => format!("{bad:?}").to_uppercase(),
+            (other, _) => format!("{other:?}").to_lowercase(),
         };
         let measured = row.measured.as_ref().map(shown).unwrap_or_default();
-        let (expected, verdict) = (shown(found), verdict.to_owned());
+        let expected = shown(found);
         vec![run.clone(), quantity.clone(), expected, band(found), measured, verdict]
     };
     let mut rows = Vec::new();

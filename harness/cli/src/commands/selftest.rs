@@ -49,17 +49,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 fn mesh_case(programs: &Programs, path: &Path, directory: &Path) -> Result<SelftestCase, Failure> {
     let case = Case::read(path)?;
     let failed = |why| Failure { code: EXIT_FAILED, why };
-    let mut meshes = Vec::new();
-    for (name, ungraded) in [("mesh", false), ("base", true)] {
+    let made = |name, ungraded| {
         let place = (&*directory.join(name), LIMIT);
         let meshed = programs.reference.mesh(path, &SERIAL, ungraded, place);
         let out = meshed.map_err(|failure| match &failure.end {
             End::Missing(_) | End::Interrupted => Failure::from(failure),
             _ => failed(format!("{failure}, on {}", path.display())),
         })?;
-        meshes.push(leafset::read(&out).map_err(|error| failed(error.to_string()))?);
-    }
-    let base = meshes.pop().expect("the loop reads two meshes");
-    let mesh = meshes.pop().expect("the loop reads two meshes");
-    Ok(SelftestCase { case, mesh, base })
+        leafset::read(&out).map_err(|error| failed(error.to_string()))
+    };
+    Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
 }

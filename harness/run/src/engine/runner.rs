@@ -140,8 +140,8 @@ impl Engine {
     /// The leaf-set directory of the mesh of a run, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let always = self.description.run.always_writes_mesh();
-        let unrequested = || always.then(|| options.place.join("mesh"));
-        options.mesh.map(Path::to_owned).or_else(unrequested)
+        let unrequested = always.then(|| options.place.join("mesh"));
+        options.mesh.map(Path::to_owned).or(unrequested)
     }
 
     /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file

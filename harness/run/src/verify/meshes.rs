@@ -170,14 +170,10 @@ impl CaseRun<'_> {
     fn make(&mut self, subject: &str, name: &str, program: &str, tree: Tree) -> Option<Meshed> {
         self.step(subject);
         let meshed = self.mesh(&self.file, name, program, tree, &SERIAL);
-        let meshed = self.ended(subject, meshed)?;
+        // The harness has read the case without an error, so an input error is the program's opinion only.
+        let meshed = meshed.map_err(|failure| self.add_failure(subject, None, &failure)).ok()?;
         self.add(Check::new(subject, RUNS, Outcome::held(2)), None);
         Some(meshed)
-    }
-
-    /// A run that ended well. The harness has read the case without an error, so an input error is the program's opinion only.
-    fn ended<T>(&mut self, subject: &str, run: Result<T, Failure>) -> Option<T> {
-        run.map_err(|failure| self.add_failure(subject, None, &failure)).ok()
     }
 
     /// A run for time and memory, which writes no mesh if the engine can do without.
@@ -192,7 +188,7 @@ impl CaseRun<'_> {
                 }
                 Ok(run)
             });
-        let timed = self.ended("serial", timed)?;
+        let timed = timed.map_err(|failure| self.add_failure("serial", None, &failure)).ok()?;
         self.report.cells = timed.cells;
         self.report.runs.push(timed.clone());
         Some(timed)
