@@ -118,7 +118,7 @@ fn invalid_input_is_refused_in_one_sentence() {
     };
     refused(&[], "give a start with --from X,Y,Z");
     refused(&["--to", "0,0,0"], "the case has no seeds: give a start with --from X,Y,Z");
-    refused(&["--from", "0,0"], "give three numbers");
+    refused(&["--from", "0,0"], "give finite numbers: X,Y,Z");
     refused(&["--from", "0,0,-2"], "the nearest centre of a free leaf is");
     refused(&["--from", "0,0,90"], "outside the root");
     refused(&["--from", "0,0,0", "--to", "0,-2,0"], "--to");

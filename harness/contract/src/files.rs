@@ -55,11 +55,11 @@ pub fn write_together(files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
     drafts.try_for_each(|((path, _), draft)| draft.publish().map_err(|error| failed(path, error)))
 }
 
-/// Directories that are being filled.
+/// Directories that an interrupt removes.
 static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Waits until no output is given its final names, and prevents that as long as the result exists. Returns the directories that are
-/// being filled; those that were published or removed may remain in the list.
+/// being filled, or must not outlive an interrupt for another reason; those that were published or removed may remain in the list.
 pub fn publications() -> MutexGuard<'static, Vec<PathBuf>> {
     STAGED.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }

@@ -39,7 +39,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
     let counts = rank_counts(case);
     let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
-    let of_case = case.checks.iter().filter(of_case).collect();
+    let of_case = Tally::of(case.checks.iter().filter(of_case));
     let sizes = [case.facets, case.leaves_base, case.cells];
     let mut first = vec![case.name.clone()];
     first.extend(sizes.map(|size| size.to_string()));
@@ -52,7 +52,7 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
         let runs = case.runs.iter().filter(with_ranks);
         // All layouts give the same mesh; the table has the time of the fastest.
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
-        let checks = case.checks.iter().filter(|check| check.ranks == Some(ranks)).collect();
+        let checks = Tally::of(case.checks.iter().filter(|check| check.ranks == Some(ranks)));
         let mut row = vec![String::new(); 4];
         row.push(ranks.to_string());
         row.extend(results(checks, fastest));

@@ -1,7 +1,7 @@
 //! The base tree of a case at any surface level, made by an engine.
 
 use crate::engine::failure::{End, Failure};
-use crate::engine::layout::{RunOptions, SERIAL};
+use crate::engine::layout::SERIAL;
 use crate::engine::runner::Engine;
 use contract::case::Case;
 use contract::leafset::LeafSet;
@@ -17,7 +17,6 @@ use toml::Value;
 #[derive(Debug)]
 pub struct BaseTrees<'a> {
     engine: &'a Engine,
-    /// The case without seeds.
     case: PlainCase,
     seeds: Option<Value>,
     edge: f64,
@@ -36,7 +35,7 @@ impl<'a> BaseTrees<'a> {
         case: &Case,
         limit: Duration,
     ) -> Result<Self, String> {
-        let place = tempfile::Builder::new().prefix("harness-base-").tempdir();
+        let place = tempfile::tempdir();
         let place =
             place.map_err(|error| format!("no temporary directory can be made: {error}"))?;
         let edge = case.root.edge;
@@ -46,37 +45,23 @@ impl<'a> BaseTrees<'a> {
         Ok(Self { engine, case, seeds, edge, place, limit })
     }
 
-    /// The base tree of the case, with the sides that its seeds give to leaves.
-    ///
-    /// # Errors
-    /// As [`Self::at`].
-    pub fn with_seeds(&mut self, level: u8) -> Result<LeafSet, Failure> {
-        self.case.table.extend(self.seeds.clone().map(|seeds| ("seeds".to_owned(), seeds)));
-        let tree = self.at(level);
-        self.case.table.remove("seeds");
-        tree
-    }
-
-    /// The base tree whose crossing leaves have at least this level.
+    /// The base tree whose crossing leaves have at least this level, with the sides that the seeds of the case give to leaves if these
+    /// are to be used.
     ///
     /// # Errors
     /// If the engine fails, or its mesh cannot be read.
-    pub fn at(&mut self, level: u8) -> Result<LeafSet, Failure> {
-        let spacing = self.edge / f64::from(1u32 << level);
-        self.case.table.insert("spacing_min".into(), Value::Float(spacing));
+    pub fn at(&mut self, level: u8, with_seeds: bool) -> Result<LeafSet, Failure> {
+        let spacing = Value::Float(self.edge / f64::from(1u32 << level));
+        let seeds = self.seeds.clone().filter(|_| with_seeds).map(|seeds| ("seeds".into(), seeds));
+        let table = &mut self.case.table;
+        table.remove("seeds");
+        table.extend(seeds.into_iter().chain([("spacing_min".into(), spacing)]));
         let place = self.place.path();
         let case = self.case.write(place, StlForm::Binary).map_err(|error| {
             Failure::new("the harness", End::Unusable(format!("cannot write a case: {error}")))
         })?;
-        let mesh = place.join("mesh");
-        let options = RunOptions {
-            mesh: Some(&mesh),
-            report: false,
-            ungraded: true,
-            ..RunOptions::new(place, self.limit)
-        };
-        let completed = self.engine.run(&case, &SERIAL, &options)?;
-        let tree = self.engine.read_mesh(&completed);
+        let mesh = self.engine.mesh(&case, &SERIAL, true, (place, self.limit))?;
+        let tree = self.engine.read_mesh(Some(&mesh));
         let _ = fs::remove_dir_all(&mesh);
         tree
     }

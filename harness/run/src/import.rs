@@ -1,7 +1,7 @@
 //! Meshes in the formats of other programs. Those that the crate `contract` does not read are read in Python;
 //! `harness/oracles/imports.py` describes how.
 
-use crate::engine::failure::End;
+use crate::engine::failure::{CODE_INPUT, End};
 use crate::engine::paths::Paths;
 use crate::python;
 use contract::case::Case;
@@ -13,14 +13,12 @@ use contract::import::{self, Format, Request};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::Manifest;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::json;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// Exit code of the script for a file that is not such a mesh.
-const CODE_INPUT: i32 = 2;
 
 /// A mesh that was read.
 #[derive(Debug)]
@@ -45,25 +43,15 @@ impl Imported {
         }
     }
 
-    /// Writes leaf words as a new directory.
+    /// Writes a leaf-set directory. A tree may become a link, so the file that was imported must remain.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn create(&self, dir: &Path) -> io::Result<()> {
+    pub fn create(&self, dir: &Path, may_link: bool) -> io::Result<()> {
         match self {
             Self::Words { set, .. } => set.create(dir),
+            Self::Tree(tree) if may_link => fs::create_dir_all(dir).and_then(|()| tree.link(dir)),
             Self::Tree(tree) => tree.create(dir),
-        }
-    }
-
-    /// The same, but a tree becomes a link, so the file that was imported must remain.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
-    pub fn link(&self, dir: &Path) -> io::Result<()> {
-        match self {
-            Self::Words { set, .. } => set.create(dir),
-            Self::Tree(tree) => fs::create_dir_all(dir).and_then(|()| tree.link(dir)),
         }
     }
 }
@@ -118,14 +106,6 @@ fn parts(path: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).chain(named.map(|name| beside.join(name))).collect()
 }
 
-/// What a script is asked for.
-#[derive(Serialize)]
-struct Asked<'a> {
-    format: Format,
-    #[serde(flatten)]
-    request: &'a Request,
-}
-
 /// What a file states besides corners and edges of its cells.
 #[derive(Deserialize)]
 struct Stated {
@@ -156,7 +136,9 @@ fn read(
     };
     let place = tempfile::tempdir().map_err(Failure::unreadable)?;
     let table = place.path().join("cells");
-    let asked = serde_json::to_string(&Asked { format, request }).expect("a request is JSON");
+    let mut asked = json!(request);
+    asked["format"] = json!(format);
+    let asked = asked.to_string();
     let arguments = [mesh.as_os_str(), table.as_os_str(), asked.as_ref()];
     let finished = python::run(name, script, arguments, paths, limit, place.path());
     let finished = finished.map_err(|failure| match &failure.end {

@@ -73,6 +73,7 @@ pub fn ask(
     paths: &Paths,
     limit: Duration,
 ) -> io::Result<Vec<Result<Answer, Failure>>> {
+    fs::create_dir_all(place)?;
     let [points_file, body_file] = ["points", "body.stl"].map(|name| place.join(name));
     let coordinates = points.as_flattened().iter().flat_map(|c| c.to_le_bytes());
     fs::write(&points_file, coordinates.collect::<Vec<u8>>())?;

@@ -236,7 +236,7 @@ mod tests {
         std::fs::write(&file, text).unwrap();
         let limit = Duration::from_secs(60);
         let file = file.to_str().unwrap();
-        let programs = Programs::find_with_engine(file, Given::default()).unwrap();
+        let programs = Programs::find(file, &Given::default()).unwrap();
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
         let runner = Runner { programs: &programs, launcher: &launcher, limit, place };
         let setup = crate::testing::run(comm, 1, &[("a", &[0.0, 0.0])]).setup;

@@ -26,6 +26,7 @@ use rules::GateCase;
 pub use rules::Rules;
 use run::engine::failure::Failure as Ended;
 use run::engine::interrupt;
+use run::engine::paths::Input;
 use run::engine::programs::Programs;
 use run::engine::runner::Engine;
 use run::verify::options::whole_seconds;
@@ -43,8 +44,8 @@ pub struct GateOptions {
     #[arg(long, value_name = "REVISION|FILE")]
     pub candidate: Option<String>,
     /// Cases, tolerances, rounds [default: harness/engines/gate.toml]
-    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(input))]
-    pub rules: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    pub rules: Option<Input>,
     /// Only these cases of the rules
     #[arg(long, value_delimiter = ',')]
     pub case: Vec<String>,
@@ -58,26 +59,14 @@ pub struct GateOptions {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    pub timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    pub timeout: Duration,
     /// Time for one case in the layer of time [default: from the rules]
     #[arg(long, value_name = "SECONDS", value_parser = whole_seconds)]
-    pub budget: Option<u64>,
+    pub budget: Option<Duration>,
     /// The repository of the revisions and of the working tree [default: that of the current directory]
     #[arg(long, value_name = "DIR", default_value = ".", hide_default_value = true, value_parser = PathBufValueParser::new().map(|path| top_level(&path)))]
     pub repository: PathBuf,
-}
-
-impl GateOptions {
-    /// Time limit of every single run.
-    fn limit(&self) -> Duration {
-        Duration::from_secs(self.timeout)
-    }
-}
-
-/// A file that is read, and must not be written.
-fn input(path: PathBuf) -> std::io::Result<PathBuf> {
-    files::register_input(&path).map(|()| path)
 }
 
 /// The input of every layer.
@@ -99,8 +88,8 @@ struct Bench<'a> {
 /// If the gate cannot start; later failures are in the report.
 pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Failure> {
     let start = Instant::now();
-    let rules = options.rules.clone().unwrap_or_else(|| programs.paths.engines.join("gate.toml"));
-    let rules = Rules::read(&rules)?;
+    let default = programs.paths.engines.join("gate.toml");
+    let rules = Rules::read(options.rules.as_deref().unwrap_or(&default))?;
     let cases = rules.select(&options.case, programs)?;
     let engine = &programs.engine;
     let baseline = options.baseline.as_ref().map(|named| Subject::find(named, options, engine));

@@ -158,7 +158,7 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
     for ranks in case.layouts() {
         let place = emptied(bench.place.join("counters/run"), engine)?;
         let options =
-            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.limit()) };
+            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.timeout) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
         let independent = engine.description().promises.is_independent_of(Independence::Ranks);
         // Of a report without a digest, the layer of correctness compares the mesh.
@@ -199,7 +199,7 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     let path = bench.prepare(engine, case, "instructions")?;
     let place = bench.place.join("instructions");
     // Without output files, the count is that of meshing alone.
-    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.limit()) };
+    let options = RunOptions { report: false, ..RunOptions::new(&place, bench.options.timeout) };
     let plain = engine.command(&path, &SERIAL, &options)?;
     let mut command = Command::new(VALGRIND);
     // The program may be started by a script, and may start others.
@@ -207,7 +207,7 @@ pub(super) fn instructions(bench: &Bench, engine: &Engine, case: &GateCase) -> C
     command.arg(format!("--callgrind-out-file={}.%p", place.join(PROFILE).display()));
     command.arg(plain.get_program()).args(plain.get_args());
     command.envs(plain.get_envs().filter_map(|(name, value)| Some((name, value?))));
-    let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.limit(), &place));
+    let counted = process::run(&mut command, &Watch::new(VALGRIND, bench.options.timeout, &place));
     // A program that fails without valgrind, too, states the cause.
     counted.or_else(|failure| engine.run(&path, &SERIAL, &options).and(Err(failure)))?;
     match counted_by_all(&place) {

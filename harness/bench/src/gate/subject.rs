@@ -66,12 +66,8 @@ impl Subject {
             return Self::find(named, options, engine);
         }
         let named = engine.program().display().to_string();
-        match engine.program().is_file() {
-            true => Ok(Self::new(engine.clone(), named, None)),
-            false => {
-                Err(Failure::missing(format!("{named} is missing: build it, or give its path")))
-            }
-        }
+        engine.require()?;
+        Ok(Self::new(engine.clone(), named, None))
     }
 
     /// The program of this name: a file, or else a revision.

@@ -103,13 +103,13 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
             _ => (baseline, Verdict::Missing),
         };
         let place = emptied(bench.place.join("time/run"), engine).map_err(|why| (verdict, why))?;
-        let options = RunOptions::new(&place, bench.options.limit());
+        let options = RunOptions::new(&place, bench.options.timeout);
         engine.run(&path, &Layout::on(ranks), &options).map_err(|why| (verdict, why))
     };
     // The first run reads program and geometry from disk and is not counted.
     let (first, also) = (run(0)?, run(CANDIDATE)?);
     let rules = &bench.rules.time;
-    let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget as f64);
+    let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget.as_secs_f64());
     let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let seed = bench.options.seed.wrapping_add(u64::from(again));

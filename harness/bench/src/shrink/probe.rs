@@ -176,7 +176,7 @@ impl Probe {
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
         let completed = engine.run(case, &Layout::on(ranks), &options)?;
-        engine.read_mesh(&completed)
+        engine.read_mesh(completed.mesh.as_deref())
     }
 }
 

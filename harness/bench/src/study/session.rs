@@ -41,8 +41,8 @@ pub struct SessionOptions {
     #[arg(long, value_name = "SECONDS,BYTES/S", value_parser = network::given)]
     pub network: Option<Network>,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 1800, value_parser = whole_seconds)]
-    pub timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "1800", value_parser = whole_seconds)]
+    pub timeout: Duration,
 }
 
 impl SessionOptions {
@@ -98,7 +98,7 @@ pub fn measure(
     progress: &dyn Fn(&str),
 ) -> Result<Outcome, Failure> {
     let place = tempfile::Builder::new().prefix("harness-bench-").tempdir()?;
-    let (launcher, limit) = (&options.launcher, Duration::from_secs(options.timeout));
+    let (launcher, limit) = (&options.launcher, options.timeout);
     let mut session = Session {
         study,
         options,

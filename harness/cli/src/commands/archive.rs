@@ -2,7 +2,7 @@
 
 use super::bench::programs;
 use super::report::{read, records_in};
-use crate::options::{Input, ProgramArguments};
+use crate::options::Input;
 use crate::output::put;
 use bench::experiments::entry::{Entry, Line, Session};
 use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
@@ -16,6 +16,7 @@ use report::json::pretty;
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
+use run::engine::programs::Given;
 use run::engine::runner::Engine;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -131,7 +132,7 @@ pub struct ReplayArguments {
     #[command(flatten)]
     session: SessionOptions,
     #[command(flatten)]
-    programs: ProgramArguments,
+    programs: Given,
 }
 
 /// Repeats the runs and prints expected values beside measured ones; returns the exit code.
@@ -151,7 +152,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
     let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };
     leave_out_missing(&mut study)?;
-    let programs = programs(arguments.programs.given(), &mut study)?;
+    let programs = programs(&arguments.programs, &mut study)?;
     let place = tempfile::tempdir()?;
     let temporary = place.path().join("replay.jsonl");
     let record = record.as_deref().unwrap_or(&temporary);
@@ -209,16 +210,13 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     let row = |row: &Row| {
         let Value { run, quantity, found } = &row.expected;
         let verdict = match (row.verdict, &row.measured) {
-            (Verdict::Equal, _) => "equal",
-            (Verdict::Differs, _) => "DIFFERS",
-            (Verdict::Inside, _) => "inside",
-            (Verdict::Outside, _) => "OUTSIDE",
-            (Verdict::Missing, _) => "missing",
-            (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how,
-            (Verdict::NotCompared, _) => "",
+            (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how.clone(),
+            (Verdict::NotCompared, _) => String::new(),
+            (bad @ (Verdict::Differs | Verdict::Outside), _) => format!("{bad:?}").to_uppercase(),
+            (other, _) => format!("{other:?}").to_lowercase(),
         };
         let measured = row.measured.as_ref().map(shown).unwrap_or_default();
-        let (expected, verdict) = (shown(found), verdict.to_owned());
+        let expected = shown(found);
         vec![run.clone(), quantity.clone(), expected, band(found), measured, verdict]
     };
     let mut rows = Vec::new();

@@ -10,7 +10,6 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::proof;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
@@ -59,7 +58,7 @@ pub struct Arguments {
 /// # Errors
 /// If the mesh cannot be read, or the engine does not support the case.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let Arguments { mesh, promises, balance, proved, require_checks, json, source } = arguments;
+    let Arguments { mesh, promises, balance, proved, source, .. } = arguments;
     let start = Instant::now();
     if promises.is_none()
         && proved.is_none()
@@ -72,8 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         }
         let touching = balance.unwrap_or(Touching::Corner);
         let report = forest::audit(&forest, touching, start);
-        print(&report, json.as_deref())?;
-        return Ok(verdict(&report, *require_checks));
+        return publish(&report, arguments);
     }
     let engine = promises.as_deref().map(promising).transpose()?;
     let case = source.read_case()?;
@@ -102,40 +100,35 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             Err(failure) => unproven = Some(Failure::from(failure)),
         }
     }
-    print(&report, json.as_deref())?;
+    let code = publish(&report, arguments)?;
     match unproven {
         Some(failure) if report.holds() => return Err(failure),
         Some(failure) => println!("left out: proof: {}", failure.why),
         None => {}
     }
     let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
-    if opened.is_imported() && case.is_none() && has_holes {
+    if opened.made.is_some() && case.is_none() && has_holes {
         eprintln!(
             "harness: without --case, an imported mesh is taken for one that fills its root, so every hole is a finding"
         );
     }
-    Ok(verdict(&report, *require_checks))
+    Ok(code)
 }
 
-/// Prints the report, and writes it if `json` asks for that.
-fn print(report: &AuditReport, json: Option<&Path>) -> Result<(), Failure> {
+/// Prints the report, and writes it if that is asked for; returns the exit code.
+fn publish(report: &AuditReport, arguments: &Arguments) -> Result<u8, Failure> {
     report.check_invariants();
     println!("{report}");
-    if let Some(path) = json {
+    if let Some(path) = &arguments.json {
         report.write(path).map_err(|error| Failure::at(path, error))?;
     }
-    Ok(())
-}
-
-/// The exit code.
-fn verdict(report: &AuditReport, require_checks: bool) -> u8 {
     let not_run = || report.not_run().next().is_some();
-    match report.holds() {
-        false => EXIT_FAILED,
-        true if !report.checked_anything() || report.exceeds_memory() => EXIT_MISSING,
-        true if require_checks && not_run() => EXIT_MISSING,
-        true => EXIT_HOLDS,
-    }
+    let is_incomplete = !report.checked_anything() || report.exceeds_memory();
+    Ok(match () {
+        () if !report.holds() => EXIT_FAILED,
+        () if is_incomplete || arguments.require_checks && not_run() => EXIT_MISSING,
+        () => EXIT_HOLDS,
+    })
 }
 
 /// What an engine promises, or what the text itself states, as a table `[promises]` would.

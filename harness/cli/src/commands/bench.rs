@@ -1,10 +1,8 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
-use crate::options::ProgramArguments;
 use crate::output::{put, unwritten};
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
-use bench::experiments::record;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, SessionOptions, Study};
 use clap::Args;
@@ -17,7 +15,6 @@ use run::engine::description::is_own;
 use run::engine::paths::Paths;
 use run::engine::programs::{Given, Programs};
 use run::engine::runner::Engine;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -48,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     #[command(flatten)]
-    programs: ProgramArguments,
+    programs: Given,
 }
 
 /// Measures, or reads an existing record with `--show`, and prints; returns the exit code.
@@ -56,8 +53,18 @@ pub struct Arguments {
 /// # Errors
 /// If the study or the record is invalid, a program is missing, or a report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let code = if arguments.show { show(arguments)? } else { measure(arguments)? };
-    if let Some(directory) = &arguments.report {
+    let (study, report) = (read(arguments)?, arguments.report.as_deref());
+    let in_report = report.map(|directory| directory.join("record.jsonl"));
+    let record = arguments.record.clone().or(in_report);
+    let record = record.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"));
+    let code = match arguments.show {
+        true => {
+            let lines = super::report::read(&[record])?;
+            publish(&study, &study::judged(&study, &lines), &lines, report)?
+        }
+        false => measure(arguments, study, &record)?,
+    };
+    if let Some(directory) = report {
         super::report::write(directory, &[]).map_err(|why| unwritten(code)(why.into()))?;
     }
     Ok(code)
@@ -75,18 +82,16 @@ fn read(arguments: &Arguments) -> Result<Study, String> {
     Ok(study)
 }
 
-fn measure(arguments: &Arguments) -> Result<u8, Failure> {
+fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8, Failure> {
     if let Some(directory) = &arguments.report {
         // A report that could not be written is refused before the runs.
         fs::create_dir_all(directory).map_err(|error| Failure::at(directory, error))?;
         files::check_writable(&directory.join(PAGE))?;
     }
-    let mut study = read(arguments)?;
-    let programs = programs(arguments.programs.given(), &mut study)?;
-    let record = record_path(arguments);
+    let programs = programs(&arguments.programs, &mut study)?;
     let start = Instant::now();
     let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&arguments.session, &record, &study, &programs, &progress)?;
+    let outcome = study::measure(&arguments.session, record, &study, &programs, &progress)?;
     let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", record.display());
     if outcome.interrupted {
@@ -103,60 +108,36 @@ fn measure(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Finds the programs, and replaces the names in the series by those of the results.
-pub(super) fn programs(given: Given, study: &mut Study) -> Result<Programs, Failure> {
+pub(super) fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
     let names = study.engines();
-    let mut foreign = names.iter().filter(|name| !is_own(name));
     if names.len() > 1 && given.mesher.is_some() {
         return Err(Failure::input("--mesher replaces the program of one engine: name one"));
     }
-    let first = foreign.next().map_or("mesher", String::as_str);
-    let mut programs = Programs::find_with_engine(first, given)?;
+    let mut foreign = names.iter().filter(|name| !is_own(name));
+    let mut programs = Programs::find(foreign.next().map_or("mesher", String::as_str), given)?;
     for name in foreign {
         programs.others.push(Engine::find(name, None, &programs.paths)?);
     }
-    let mut labels: BTreeMap<&str, String> = BTreeMap::new();
-    // Our mesher chooses the spacings, also for other engines.
-    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
-    let mut required: Vec<&Engine> = also.into_iter().collect();
-    for name in &names {
-        let known = [&programs.mesher, &programs.reference, &programs.engine];
-        let engine = known.into_iter().chain(&programs.others).find(|engine| engine.name() == name);
-        let engine = engine.expect("every engine was found");
-        required.push(engine);
-        let label = engine.label();
-        if labels.values().any(|other| *other == label) {
-            return Err(Failure::input(format!(
-                "two programs of one name, {label}: rename a file"
-            )));
+    let Programs { engine, others, mesher, reference, .. } = &programs;
+    let found = |name: &String| {
+        let mut all = [mesher, reference, engine].into_iter().chain(others);
+        all.find(|engine| engine.name() == name).expect("every engine was found")
+    };
+    let engines: Vec<&Engine> = names.iter().map(found).collect();
+    for (index, label) in engines.iter().map(|engine| engine.label()).enumerate() {
+        if engines[..index].iter().any(|other| other.label() == label) {
+            let why = format!("two programs of one name, {label}: rename a file");
+            return Err(Failure::input(why));
         }
-        labels.insert(name, label);
     }
-    if let Some(missing) = required.iter().find(|engine| !engine.program().is_file()) {
-        let program = missing.program().display();
-        return Err(Failure::missing(format!("{program} is missing: build it or give its path")));
-    }
-    for engine in study.series.iter_mut().flat_map(|series| &mut series.engines) {
-        engine.clone_from(&labels[engine.as_str()]);
+    // Our mesher chooses the spacings, also for other engines.
+    let also = names.iter().any(|name| name != "reference").then_some(mesher);
+    let mut required = also.into_iter().chain(engines);
+    required.try_for_each(Engine::require)?;
+    for name in study.series.iter_mut().flat_map(|series| &mut series.engines) {
+        *name = found(name).label();
     }
     Ok(programs)
-}
-
-/// Returns the record to append to.
-fn record_path(arguments: &Arguments) -> PathBuf {
-    let in_report = arguments.report.as_ref().map(|directory| directory.join("record.jsonl"));
-    let given = arguments.record.clone().or(in_report);
-    given.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"))
-}
-
-fn show(arguments: &Arguments) -> Result<u8, Failure> {
-    let study = read(arguments)?;
-    let path = record_path(arguments);
-    let (lines, broken) = record::read(&path).map_err(|error| Failure::at(&path, error))?;
-    for (line, why) in &broken {
-        eprintln!("harness: line {line} is skipped: {why}");
-    }
-    let rows = study::judged(&study, &lines);
-    publish(&study, &rows, &lines, arguments.report.as_deref())
 }
 
 /// Prints the tables of runs and targets, and writes that of the targets into the report's directory if one is given; returns the exit
@@ -182,17 +163,13 @@ fn publish(
     print!("{}", page::text(rows));
     if let Some(directory) = report {
         let path = directory.join(PAGE);
-        put(&path, &page::markdown(rows, &machine(lines))).map_err(unwritten(code))?;
+        let session = lines.iter().rev().find_map(Line::session);
+        let unknown = || "a machine that the record does not describe".to_owned();
+        let machine = session.map_or_else(unknown, |session| session.machine.to_string());
+        put(&path, &page::markdown(rows, &machine)).map_err(unwritten(code))?;
         println!("table: {}", path.display());
     }
     Ok(code)
-}
-
-/// Describes the machine of the last session.
-fn machine(lines: &[Line]) -> String {
-    let session = lines.iter().rev().find_map(Line::session);
-    let unknown = || "a machine that the record does not describe".to_owned();
-    session.map_or_else(unknown, |session| session.machine.to_string())
 }
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.

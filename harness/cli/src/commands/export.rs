@@ -88,9 +88,8 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
         ("--label", label.is_some()),
         ("--regions", regions.is_some()),
     ];
-    let has_no_effect =
-        |(name, is_given): &&(&str, bool)| *is_given && !format.options.contains(name);
-    if let Some((name, _)) = given.iter().find(has_no_effect) {
+    let of_format = |name| format.options.contains(name);
+    if let Some((name, _)) = given.iter().find(|(name, is_given)| *is_given && !of_format(name)) {
         let ending = format.ending;
         return Err(Failure::input(format!("{name} has no effect on {ending}: omit it")));
     }

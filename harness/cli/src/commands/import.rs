@@ -1,5 +1,6 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
+use super::meshed::Meshed;
 use crate::options::{Input, read_case, root, whole_seconds};
 use clap::Args;
 use contract::case::Case;
@@ -12,7 +13,6 @@ use run::engine::paths::Paths;
 use run::import::{Imported, import};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tempfile::TempDir;
 
 /// `harness import`.
 #[derive(Args, Debug)]
@@ -56,8 +56,8 @@ pub struct Source {
     #[arg(long, value_enum, default_value_t)]
     position: Position,
     /// Time limit of a reader in Python
-    #[arg(long, value_name = "SECONDS", default_value_t = 3600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "3600", value_parser = whole_seconds)]
+    timeout: Duration,
 }
 
 impl Source {
@@ -109,8 +109,8 @@ impl Source {
             ..Request::default()
         };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let limit = Duration::from_secs(*timeout);
-        let mut imported = import(mesh, *format, &request, case, program, &Paths::find(), limit)?;
+        let mut imported =
+            import(mesh, *format, &request, case, program, &Paths::find(), *timeout)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(
@@ -124,32 +124,18 @@ impl Source {
     ///
     /// # Errors
     /// If it is not a usable mesh, or if Python or VTK is missing.
-    pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Opened, Failure> {
+    pub fn open(&self, mesh: &Path, case: Option<&Case>) -> Result<Meshed, Failure> {
         if has_manifest(mesh) {
-            return Ok(Opened { dir: mesh.to_owned(), made: None });
+            return Ok(Meshed { dir: mesh.to_owned(), made: None });
         }
         let made = tempfile::tempdir()?;
-        self.read(mesh, case)?.link(made.path())?;
-        Ok(Opened { dir: made.path().to_owned(), made: Some(made) })
+        self.read(mesh, case)?.create(made.path(), true)?;
+        Ok(Meshed { dir: made.path().to_owned(), made: Some(made) })
     }
 }
 
 fn has_manifest(mesh: &Path) -> bool {
     mesh.join(manifest::FILE).exists()
-}
-
-/// A leaf-set directory. One that was made is deleted with this value.
-pub struct Opened {
-    /// The directory.
-    pub dir: PathBuf,
-    made: Option<TempDir>,
-}
-
-impl Opened {
-    /// Whether it was made of another program's mesh, whose requirements are unknown.
-    pub fn is_imported(&self) -> bool {
-        self.made.is_some()
-    }
 }
 
 /// Reads and writes; returns the exit code.
@@ -159,7 +145,7 @@ impl Opened {
 pub fn run(Arguments { mesh, out, source }: &Arguments) -> Result<u8, Failure> {
     let case = source.read_case()?;
     let mut imported = source.read(mesh, case.as_ref())?;
-    imported.create(out)?;
+    imported.create(out, false)?;
     let Manifest { leaves, sides, .. } = imported.manifest();
     let known = if *sides == manifest::Sides::Known { "known" } else { "unknown" };
     println!("{}: {leaves} cells, sides {known}", out.display());

@@ -1,6 +1,6 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
-use crate::options::{Output, Point, ProgramArguments, whole_seconds, with_extension};
+use crate::options::{Output, point, whole_seconds, with_extension};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
@@ -15,7 +15,7 @@ use geometry::leak::report::{Answers, Passage};
 use report::json::pretty;
 use run::base_tree::BaseTrees;
 use run::engine::interrupt;
-use run::engine::programs::Programs;
+use run::engine::programs::{Given, Programs};
 use run::progress::Progress;
 use std::path::Path;
 use std::time::Duration;
@@ -43,8 +43,8 @@ pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
     /// Start of the path [default: a point of every region that leaked between a coarser spacing and the case's]
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    from: Option<Point>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    from: Option<[f64; 3]>,
     /// End of the path: a point, or `far` for the root's boundary [default: far, or a seed from what leaked into the flow of seeds]
     #[arg(long, value_name = "X,Y,Z|far", value_parser = target, allow_hyphen_values = true)]
     to: Option<Target>,
@@ -52,14 +52,14 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
     /// Write the paths as VTK polylines with the free width at each point
-    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension(&["vtp"]))]
+    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension("vtp"))]
     vtk: Option<Output>,
     /// Time limit of every single run of the mesher
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    timeout: Duration,
     /// Paths of the programs.
     #[command(flatten)]
-    programs: ProgramArguments,
+    programs: Given,
 }
 
 /// Searches, prints and writes; returns the exit code.
@@ -67,16 +67,15 @@ pub struct Arguments {
 /// # Errors
 /// If the case cannot be read or meshed, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let programs = Programs::find(arguments.programs.given())?;
+    let programs = Programs::find("mesher", &arguments.programs)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
-    let limit = Duration::from_secs(arguments.timeout);
-    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, limit)?;
+    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, arguments.timeout)?;
     let progress = Progress::new();
     let (mut first, leaked) = match (arguments.from, arguments.to) {
         (None, None) => {
             progress.step("meshing the base tree of the case");
-            let tree = trees.with_seeds(case.level_surface)?;
+            let tree = trees.at(case.level_surface, true)?;
             let leaked = leaked(&case, &tree)?;
             (Some(tree.words), leaked)
         }
@@ -84,23 +83,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let make = |level| match first.take_if(|_| level == case.level_surface) {
         Some(words) => Ok(words),
-        None => Ok(trees.at(level)?.words),
+        None => Ok(trees.at(level, false)?.words),
     };
     let mut leaks = Leaks::new(&case, make, &progress)?;
     let ends = match (arguments.from, arguments.to) {
-        (Some(Point(from)), to) => vec![(from, to.unwrap_or(Target::Far))],
+        (Some(from), to) => vec![(from, to.unwrap_or(Target::Far))],
         (None, Some(to)) => {
             let seed = leaks.seed(to)?.ok_or_else(|| format!("the case has no seeds: {START}"))?;
             vec![(seed, to)]
         }
         (None, None) => {
-            let mut ends = Vec::new();
-            for from in leaks.regions(&leaked)? {
-                // Seeds lie in the flow, into which the region leaked.
-                let seed = leaks.seed(Target::Point(from))?;
-                ends.push((from, seed.map_or(Target::Far, Target::Point)));
-            }
-            ends
+            let regions = leaks.regions(&leaked)?.into_iter();
+            // Seeds lie in the flow, into which the region leaked.
+            let seed = |from| Ok((from, leaks.seed(Target::Point(from))?));
+            let ends = regions.map(seed).collect::<Result<Vec<_>, Failure>>()?.into_iter();
+            ends.map(|(from, seed)| (from, seed.map_or(Target::Far, Target::Point))).collect()
         }
     };
     let answers = leaks.answers(&ends)?;
@@ -159,10 +156,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
 fn target(text: &str) -> Result<Target, String> {
     match text {
         "far" => Ok(Target::Far),
-        _ => match text.parse() {
-            Ok(Point(point)) => Ok(Target::Point(point)),
-            Err(why) => Err(format!("{why}, or far")),
-        },
+        _ => point(text).map(Target::Point).map_err(|why| format!("{why}, or far")),
     }
 }
 

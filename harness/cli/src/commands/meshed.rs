@@ -4,9 +4,8 @@ use crate::options::{EngineArguments, Input, whole_seconds};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::Failure;
-use run::engine::layout::{Layout, RunOptions};
+use run::engine::layout::Layout;
 use run::engine::programs::Programs;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -21,33 +20,32 @@ pub struct MeshArguments {
     #[arg(long, value_name = "CASE")]
     pub case: Option<Input>,
     /// Time limit for meshing a case
-    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
+    timeout: Duration,
     /// The program that meshes a case.
     #[command(flatten)]
     engine: EngineArguments,
 }
 
-/// A leaf-set directory and the case of its mesh, if that is known. A directory that was made is deleted with it.
+/// A leaf-set directory. One that was made is deleted with this value.
 #[derive(Debug)]
 pub struct Meshed {
     /// The directory.
     pub dir: PathBuf,
-    /// The case.
-    pub case: Option<Case>,
-    _made: Option<TempDir>,
+    /// The temporary directory in which it was made.
+    pub made: Option<TempDir>,
 }
 
 impl MeshArguments {
-    /// The mesh. A case is meshed in a temporary directory, by ranks of this layout, as far as the base tree or to its end.
+    /// The mesh, and its case if that is known. A case is meshed in a temporary directory, by ranks of this layout, as far as the base tree or to its end.
     ///
     /// # Errors
     /// If the case cannot be read or meshed.
-    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<Meshed, Failure> {
+    pub fn open(&self, layout: &Layout, ungraded: bool) -> Result<(Meshed, Option<Case>), Failure> {
         let given = Path::new(&self.mesh);
         if given.is_dir() {
             let case = self.case.as_deref().map(Case::read).transpose()?;
-            return Ok(Meshed { dir: given.to_owned(), case, _made: None });
+            return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }
         if self.case.is_some() {
             let why = "is not a leaf-set directory, which --case requires";
@@ -57,16 +55,9 @@ impl MeshArguments {
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         let case = Case::read(&path)?;
         let made = tempfile::Builder::new().prefix("harness-mesh-").tempdir()?;
-        let (dir, logs) = (made.path().join("mesh"), made.path().join("logs"));
-        fs::create_dir(&logs).map_err(|error| Failure::at(&logs, error))?;
         let prepared = engine.prepare(&path, &made.path().join("case"))?;
-        let options = RunOptions {
-            mesh: Some(&dir),
-            report: false,
-            ungraded,
-            ..RunOptions::new(&logs, Duration::from_secs(self.timeout))
-        };
-        engine.run(&prepared, layout, &options)?;
-        Ok(Meshed { dir, case: Some(case), _made: Some(made) })
+        let place = (made.path(), self.timeout);
+        let dir = engine.mesh(&prepared, layout, ungraded, place)?;
+        Ok((Meshed { dir, made: Some(made) }, Some(case)))
     }
 }

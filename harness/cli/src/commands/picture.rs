@@ -1,7 +1,7 @@
 //! `harness picture`: draws a slice of a mesh.
 
 use super::meshed::MeshArguments;
-use crate::options::{SelectionArguments, number_in};
+use crate::options::{Output, SelectionArguments, number_in};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
@@ -9,7 +9,7 @@ use report::picture::colour::Colour;
 use report::picture::{Format, Picture, Request, write};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const EXAMPLES: &str = "\
 A slice is drawn at page width with the section of the geometry, axes and a legend; cells too small to be seen \
@@ -32,7 +32,7 @@ pub struct Arguments {
     source: MeshArguments,
     /// The picture: .svg, .png or .pdf
     #[arg(short, long, value_name = "FILE")]
-    out: PathBuf,
+    out: Output,
     /// What colours show
     #[arg(long, value_enum, default_value = "level")]
     colour: Colour,
@@ -56,7 +56,7 @@ pub struct Arguments {
 /// If the mesh cannot be made or read, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
-    let format = requested(out)?;
+    let format = Format::of(out)?;
     if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
         let why =
             "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
@@ -66,32 +66,22 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         Some(ranks) => Layout::on(Ranks::Simulated { ranks: ranks.into(), seed: 1 }),
         None => SERIAL.clone(),
     };
-    let meshed = source.open(&layout, *ungraded)?;
+    let (meshed, case) = source.open(&layout, *ungraded)?;
     let mesh = Mesh::open(&meshed.dir)?;
-    if let (Some(_), Some(case)) = (&source.case, &meshed.case) {
+    if let (Some(_), Some(case)) = (&source.case, &case) {
         mesh.require_case(case)?;
     }
     let request = Request {
         selection: arguments.selection.of(&mesh)?,
-        body: meshed.case.as_ref().map(|case| &case.facets[..]),
+        body: case.as_ref().map(|case| &case.facets[..]),
         colour: arguments.colour,
         zoom: arguments.zoom,
     };
     let picture = Picture::collect(&mesh, &request)?;
     write(out, &format.bytes(&picture.svg()).map_err(io::Error::other)?)?;
     println!("{}\n{}", picture.title(), out.display());
-    if meshed.case.is_none() {
+    if case.is_none() {
         println!("the geometry is not drawn: name its case with --case");
     }
     Ok(EXIT_HOLDS)
-}
-
-/// The format of the file, if its directory exists.
-fn requested(out: &Path) -> Result<Format, String> {
-    let format = Format::of(out)?;
-    let directory = out.parent().filter(|d| !d.as_os_str().is_empty());
-    match directory.filter(|d| !d.is_dir()) {
-        Some(missing) => Err(format!("{} is not a directory: create it", missing.display())),
-        None => Ok(format),
-    }
 }

@@ -81,22 +81,18 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
 pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
     let (mut lines, mut known) = (Vec::new(), HashSet::new());
     for path in records {
-        let (read, broken) =
-            record::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let shown = path.display();
+        let (mut read, broken) = record::read(path).map_err(|error| format!("{shown}: {error}"))?;
         for (line, why) in broken {
-            eprintln!("harness: {}, line {line} is skipped: {why}", path.display());
+            eprintln!("harness: {shown}, line {line} is skipped: {why}");
         }
         let count = read.len();
-        let new = read.into_iter().filter(|line| known.insert(format!("{line:?}")));
-        let before = lines.len();
-        lines.extend(new);
-        let repeated = count - (lines.len() - before);
+        read.retain(|line| known.insert(format!("{line:?}")));
+        let repeated = count - read.len();
         if repeated > 0 {
-            eprintln!(
-                "harness: {}: {repeated} lines repeat earlier ones and are skipped",
-                path.display()
-            );
+            eprintln!("harness: {shown}: {repeated} lines repeat earlier ones and are skipped");
         }
+        lines.extend(read);
     }
     Ok(lines)
 }

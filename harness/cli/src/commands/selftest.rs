@@ -1,14 +1,13 @@
 //! `harness selftest`: corrupts correct meshes and prints what no check detects.
 
-use crate::options::ProgramArguments;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::leafset;
 use run::engine::failure::End;
-use run::engine::layout::{RunOptions, SERIAL};
-use run::engine::programs::Programs;
+use run::engine::layout::SERIAL;
+use run::engine::programs::{Given, Programs};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -21,7 +20,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 pub struct Arguments {
     /// Paths of the programs.
     #[command(flatten)]
-    pub programs: ProgramArguments,
+    pub programs: Given,
 }
 
 /// Meshes the built-in cases, corrupts the meshes and prints what survives; returns the exit code.
@@ -29,13 +28,8 @@ pub struct Arguments {
 /// # Errors
 /// If a case cannot be meshed.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let programs = Programs::find(arguments.programs.given())?;
-    if !programs.reference.program().is_file() {
-        let path = programs.reference.program().display();
-        return Err(Failure::missing(format!(
-            "the reference is missing: build {path}, or give another path with --reference"
-        )));
-    }
+    let programs = Programs::find("mesher", &arguments.programs)?;
+    programs.reference.require()?;
     let scratch = tempfile::tempdir()?;
     let meshed = selftest::CASES.into_iter().map(|(name, text)| {
         let directory = scratch.path().join(name);
@@ -55,24 +49,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 fn mesh_case(programs: &Programs, path: &Path, directory: &Path) -> Result<SelftestCase, Failure> {
     let case = Case::read(path)?;
     let failed = |why| Failure { code: EXIT_FAILED, why };
-    let mut meshes = Vec::new();
-    for (name, ungraded) in [("mesh", false), ("base", true)] {
-        let logs = directory.join(format!("{name}-logs"));
-        fs::create_dir_all(&logs)?;
-        let out = directory.join(name);
-        let options = RunOptions {
-            mesh: Some(&out),
-            report: false,
-            ungraded,
-            ..RunOptions::new(&logs, LIMIT)
-        };
-        programs.reference.run(path, &SERIAL, &options).map_err(|failure| match &failure.end {
+    let made = |name, ungraded| {
+        let place = (&*directory.join(name), LIMIT);
+        let meshed = programs.reference.mesh(path, &SERIAL, ungraded, place);
+        let out = meshed.map_err(|failure| match &failure.end {
             End::Missing(_) | End::Interrupted => Failure::from(failure),
             _ => failed(format!("{failure}, on {}", path.display())),
         })?;
-        meshes.push(leafset::read(&out).map_err(|error| failed(error.to_string()))?);
-    }
-    let base = meshes.pop().expect("the loop reads two meshes");
-    let mesh = meshes.pop().expect("the loop reads two meshes");
-    Ok(SelftestCase { case, mesh, base })
+        leafset::read(&out).map_err(|error| failed(error.to_string()))
+    };
+    Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
 }

@@ -40,8 +40,8 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 900)]
     budget: u64,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = whole_seconds)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = whole_seconds)]
+    timeout: Duration,
     #[command(flatten)]
     engine: EngineArguments,
 }
@@ -53,7 +53,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let EngineArguments { engine, programs: given } = &arguments.engine;
     let programs = arguments.engine.find()?;
-    let limit = Duration::from_secs(arguments.timeout);
     let ranks = match arguments.ranks {
         None => Ranks::Serial,
         Some(ranks) if arguments.mpi => Ranks::Mpi(ranks as usize),
@@ -69,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             format!("{exists} would be replaced: remove it, or give another directory with --out");
         return Err(Failure::input(why));
     }
-    let probe = Probe::new(programs.engine, programs.reference, limit)?;
+    let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::read(&path)?, ranks };
     let judged = probe.judge(&trial)?;
     let Some(first) = fault(&judged, arguments.check.as_deref())? else {

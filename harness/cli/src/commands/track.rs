@@ -3,8 +3,8 @@
 use crate::options::{Input, Output, number_in};
 use crate::output::put_forms;
 use bench::jsonl;
-use bench::track::analyse;
 use bench::track::history::{self, History, Record};
+use bench::track::{Series, analyse};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::json::pretty;
@@ -53,13 +53,12 @@ pub struct Arguments {
 }
 
 fn named_number(text: &str) -> Result<(String, f64), String> {
-    let (name, number) = text.split_once('=').ok_or("give CASE/METRIC=NUMBER")?;
-    let is_named =
-        name.rsplit_once('/').is_some_and(|(case, of)| !case.is_empty() && !of.is_empty());
-    let number = number.parse().ok().filter(|number: &f64| is_named && number.is_finite());
-    number
-        .map(|number| (name.to_owned(), number))
-        .ok_or_else(|| "give CASE/METRIC=NUMBER".to_owned())
+    let parsed = text.split_once('=').and_then(|(name, number)| {
+        let (case, metric) = name.rsplit_once('/')?;
+        let number = number.parse().ok().filter(|number: &f64| number.is_finite())?;
+        (!case.is_empty() && !metric.is_empty()).then(|| (name.to_owned(), number))
+    });
+    parsed.ok_or_else(|| "give CASE/METRIC=NUMBER".to_owned())
 }
 
 /// Appends, analyses, prints and writes; returns the exit code.
@@ -98,11 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     print!("{}", summary(&all));
     let (link, recent) = (arguments.link.as_deref(), arguments.fail_recent);
-    let worse: Vec<&str> = all
-        .iter()
-        .filter(|series| series.worse_recently(recent).is_some())
-        .map(|series| series.name.as_str())
-        .collect();
+    let is_worse = |series: &&Series| series.worse_recently(recent).is_some();
+    let worse: Vec<&str> = all.iter().filter(is_worse).map(|series| &*series.name).collect();
     if !worse.is_empty() {
         println!("FAILED: worse within the last {recent} values: {}", worse.join(", "));
     }
@@ -123,9 +119,8 @@ fn append(arguments: &Arguments) -> Result<(), Failure> {
     let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
     let mut record = Record::of_commit(&arguments.commit, repository)?;
     for file in &arguments.add {
-        let wrong = |why: String| format!("{}: {why}", file.display());
-        let text = contract::files::read(file).map_err(|error| wrong(error.to_string()))?;
-        record.add(&text).map_err(wrong)?;
+        let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
+        record.add(&text).map_err(|why| Failure::about(file, why))?;
     }
     record.metrics.extend(arguments.value.iter().cloned());
     if record.metrics.is_empty() {

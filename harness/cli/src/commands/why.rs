@@ -1,7 +1,7 @@
 //! `harness why`: explains the leaf at a point.
 
 use super::meshed::MeshArguments;
-use crate::options::Point;
+use crate::options::point;
 use check::why::{Body, Mesh};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
@@ -25,8 +25,8 @@ pub struct Arguments {
     #[command(flatten)]
     source: MeshArguments,
     /// The point to explain, in the user's units
-    #[arg(value_name = "X,Y,Z", allow_hyphen_values = true)]
-    point: Point,
+    #[arg(value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    point: [f64; 3],
 }
 
 /// Explains and prints; returns the exit code.
@@ -34,14 +34,12 @@ pub struct Arguments {
 /// # Errors
 /// If the mesh cannot be made or read, or the point is outside its root.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let made = arguments.source.open(&SERIAL, false)?;
+    let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    let body = made.case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
+    let body = case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
-    let Point(point) = arguments.point;
-    let answer = mesh.at(point)?;
-    print!("{answer}");
+    print!("{}", mesh.at(arguments.point)?);
     Ok(EXIT_HOLDS)
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 use thiserror::Error;
 
-/// Exit code of mesher and reference for an error in the user's input.
+/// Exit code of mesher, reference and the readers in Python for an error in the user's input.
 pub const CODE_INPUT: i32 = 2;
 
 /// How a program failed.

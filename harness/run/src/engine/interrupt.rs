@@ -8,6 +8,7 @@
 //! - output that is about to get its final names gets all of them first.
 
 use super::session::{PATIENCE, end_all};
+use contract::files::publications;
 use files::OUT_OF_MEMORY;
 use files::interrupt::{self, INTERRUPTED};
 use rustix::process::{getpid, set_child_subreaper};
@@ -17,7 +18,7 @@ use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{LazyLock, Mutex, MutexGuard, Once, OnceLock};
+use std::sync::{Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
@@ -31,20 +32,8 @@ const OUT_OF_MEMORY_BYTE: u8 = b'm';
 
 static WAKE: OnceLock<UnixStream> = OnceLock::new();
 static REQUESTED: AtomicBool = AtomicBool::new(false);
-static LEFTOVERS: LazyLock<Mutex<Leftovers>> = LazyLock::new(Mutex::default);
-
-/// What must not outlive the harness.
-#[derive(Default)]
-struct Leftovers {
-    /// Directories; those that were removed already may remain in the list.
-    directories: Vec<PathBuf>,
-    /// The directory of all temporary files.
-    temporary: Option<PathBuf>,
-}
-
-fn leftovers() -> MutexGuard<'static, Leftovers> {
-    LEFTOVERS.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
+/// The directory of all temporary files. Until it is known, a signal waits.
+static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
 
 /// Makes signals a request to stop. Once per process, before anything makes a temporary file.
 pub fn install() {
@@ -76,10 +65,9 @@ fn watch() -> io::Result<()> {
         pipe::register(signal, sent.try_clone()?)?;
     }
     // A signal after this thread has made the directory removes it.
-    let mut leftovers = leftovers();
+    let _unknown = publications();
     let place = tempfile::Builder::new().prefix("harness-").tempdir()?.keep();
-    let _ = tempfile::env::override_temp_dir(&place);
-    leftovers.temporary = Some(place);
+    let _ = tempfile::env::override_temp_dir(TEMPORARY.get_or_init(|| place));
     Ok(())
 }
 
@@ -94,30 +82,12 @@ pub fn out_of_memory(code: i32) -> ! {
 
 /// Removes the directory of temporary files, unless a command has kept some, when the harness ends in the ordinary way.
 pub fn uninstall() {
-    if let Some(place) = leftovers().temporary.take() {
-        let _ = fs::remove_dir(place);
-    }
+    let _ = TEMPORARY.get().map(fs::remove_dir);
 }
 
 /// Whether the user has interrupted the harness.
 pub fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
-}
-
-/// Notes a directory that must not outlive the harness.
-pub fn note_directory(path: &Path) {
-    leftovers().directories.push(path.to_owned());
-}
-
-/// Forgets a directory that is complete, and is kept.
-pub fn forget_directory(path: &Path) {
-    leftovers().directories.retain(|directory| directory != path);
-}
-
-/// Whether a directory will not outlive the harness.
-#[cfg(test)]
-pub fn has_directory(path: &Path) -> bool {
-    leftovers().directories.iter().any(|directory| directory == path)
 }
 
 /// Prints that the harness was interrupted. Once: a command may be about to say so when its time is over.
@@ -137,10 +107,9 @@ fn end() -> ! {
 pub fn clean() {
     let _ended = end_all();
     // Until the process ends, nothing else is staged or published.
-    let staged = contract::files::publications();
+    let staged = publications();
     interrupt::abandon(false);
-    let kept = leftovers();
-    kept.directories.iter().chain(&kept.temporary).chain(&*staged).for_each(|path| remove(path));
+    staged.iter().chain(TEMPORARY.get()).for_each(|path| remove(path));
     std::mem::forget(staged);
 }
 

@@ -3,8 +3,8 @@
 //! Invariant: the shared memory of a run on one machine lies in a directory of its own, so that cleaning up after a
 //! killed run cannot affect another run.
 
-use super::interrupt;
 use super::paths::on_path;
+use contract::files::publications;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -46,10 +46,7 @@ impl Launcher {
 
     /// Whether that program exists, at its path or on the `PATH`.
     pub fn is_found(&self) -> bool {
-        match self.program().components().count() {
-            1 => on_path(&self.words[0]).is_some(),
-            _ => self.program().is_file(),
-        }
+        self.program().is_file() || on_path(&self.words[0]).is_some()
     }
 
     /// The words that start a program on `ranks` ranks.
@@ -84,7 +81,7 @@ impl Launcher {
 /// `/dev/shm`.
 pub fn own_directory(command: &mut Command) -> Option<TempDir> {
     let made = tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok()?;
-    interrupt::note_directory(made.path());
+    publications().push(made.path().to_owned());
     command.env("OMPI_MCA_btl_vader_backing_directory", made.path());
     command.env("OMPI_MCA_orte_tmpdir_base", made.path());
     Some(made)

@@ -1,8 +1,51 @@
-//! Paths of programs and data on this machine.
+//! Paths of programs and data on this machine, and those of the command line.
 
+use clap::builder::{PathBufValueParser, TypedValueParser, ValueParser, ValueParserFactory};
 use contract::catalogue::Catalogue;
 use std::env;
+use std::io;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
+
+/// A file or a directory that the command writes or reads. It is checked when the command line is parsed, before any work: what is written
+/// can be written, and is nothing that the command reads. Files of a directory are inputs when they are opened.
+#[derive(Clone, Debug)]
+pub struct Place<const WRITTEN: bool>(PathBuf);
+
+/// A file that the command writes.
+pub type Output = Place<true>;
+/// A file or a directory that the command reads.
+pub type Input = Place<false>;
+
+impl<const WRITTEN: bool> Place<WRITTEN> {
+    /// Checks a path.
+    ///
+    /// # Errors
+    /// If it cannot be written, or is read and written.
+    pub fn new(path: PathBuf) -> io::Result<Self> {
+        match WRITTEN {
+            true => files::name_output(&path).and_then(|()| files::check_writable(&path))?,
+            false => files::register_input(&path)?,
+        }
+        Ok(Self(path))
+    }
+}
+
+impl<const WRITTEN: bool> Deref for Place<WRITTEN> {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl<const WRITTEN: bool> ValueParserFactory for Place<WRITTEN> {
+    type Parser = ValueParser;
+
+    fn value_parser() -> ValueParser {
+        PathBufValueParser::new().try_map(Self::new).into()
+    }
+}
 
 /// Paths of programs and data. A path need not exist: the code that needs the file reports that it is missing.
 #[derive(Clone, Debug)]

@@ -183,13 +183,10 @@ pub(super) fn last_lines(text: &str) -> String {
         !of_mpirun && line.contains(char::is_alphabetic)
     };
     let lines: Vec<&str> = text.lines().map(str::trim).filter(is_own).collect();
-    match lines.len() {
-        0 => "it printed no error".to_owned(),
-        count => lines[count.saturating_sub(LINES_SHOWN)..]
-            .iter()
-            .map(start_of)
-            .collect::<Vec<_>>()
-            .join(" | "),
+    let last = &lines[lines.len().saturating_sub(LINES_SHOWN)..];
+    match last.is_empty() {
+        true => "it printed no error".to_owned(),
+        false => last.iter().map(start_of).collect::<Vec<_>>().join(" | "),
     }
 }
 
@@ -211,9 +208,7 @@ fn activity(directory: &Path) -> String {
     let texts: BTreeSet<String> = texts.map(|text| text.trim().to_owned()).collect();
     match texts.is_empty() {
         true => "no rank had reported its phase".to_owned(),
-        false => {
-            format!("its ranks were in {}", texts.into_iter().collect::<Vec<_>>().join(", "))
-        }
+        false => format!("its ranks were in {}", Vec::from_iter(texts).join(", ")),
     }
 }
 

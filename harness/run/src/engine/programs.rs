@@ -1,16 +1,18 @@
 //! The programs of a session: the engine under test, our mesher, the reference.
 
-use super::paths::Paths;
+use super::paths::{Input, Paths};
 use super::runner::Engine;
-use std::path::PathBuf;
+use clap::Args;
 
 /// Programs that the command line names.
-#[derive(Clone, Debug, Default)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct Given {
-    /// `--mesher`: the program of the engine under test.
-    pub mesher: Option<PathBuf>,
-    /// `--reference`.
-    pub reference: Option<PathBuf>,
+    /// The mesher [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    pub mesher: Option<Input>,
+    /// The reference [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    pub reference: Option<Input>,
 }
 
 /// The programs of a session.
@@ -29,19 +31,11 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Finds the programs, with the mesher as the engine under test.
-    ///
-    /// # Errors
-    /// One sentence, if an engine file is missing or wrong.
-    pub fn find(given: Given) -> Result<Self, String> {
-        Self::find_with_engine("mesher", given)
-    }
-
     /// Finds the programs, with the engine of this name or path under test.
     ///
     /// # Errors
     /// One sentence, if an engine file is missing or wrong.
-    pub fn find_with_engine(name: &str, given: Given) -> Result<Self, String> {
+    pub fn find(name: &str, given: &Given) -> Result<Self, String> {
         let paths = Paths::find();
         let engine = Engine::find(name, given.mesher.as_deref(), &paths)?;
         let mesher = match name {

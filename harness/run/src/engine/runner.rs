@@ -16,6 +16,7 @@ use contract::plain::{PlainCase, StlForm};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
@@ -100,6 +101,27 @@ impl Engine {
         self.is_given.then_some(&self.program)
     }
 
+    /// Refuses to go on if the program is missing.
+    ///
+    /// # Errors
+    /// What to do about it.
+    pub fn require(&self) -> Result<(), contract::failure::Failure> {
+        if self.program.is_file() {
+            return Ok(());
+        }
+        let (name, path) = (self.name(), self.program.display());
+        let option = if name == "reference" { name } else { "mesher" };
+        let fix = match description::is_own(name) {
+            true => format!("build {path}, or give another path with --{option}"),
+            false => format!(
+                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {name}: correct it, \
+                 as in program = \"{{here}}/my-mesher\", or give --{option} PATH"
+            ),
+        };
+        let why = format!("the {option} is missing: {fix}");
+        Err(contract::failure::Failure::missing(why))
+    }
+
     /// Why no run on MPI can be started; `None` if one can.
     pub fn lacks_mpi(&self) -> Option<String> {
         let parallel = &self.description.run.parallel;
@@ -118,8 +140,8 @@ impl Engine {
     /// The leaf-set directory of the mesh of a run, if it writes one.
     fn mesh_path(&self, options: &RunOptions) -> Option<PathBuf> {
         let always = self.description.run.always_writes_mesh();
-        let unrequested = || always.then(|| options.place.join("mesh"));
-        options.mesh.map(Path::to_owned).or_else(unrequested)
+        let unrequested = always.then(|| options.place.join("mesh"));
+        options.mesh.map(Path::to_owned).or(unrequested)
     }
 
     /// A case file equivalent to `case` that the engine can read: `case` itself, or one with an STL file
@@ -190,6 +212,31 @@ impl Engine {
         Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
     }
 
+    /// Meshes a case in a directory, which is made, without a run report; returns the leaf-set directory.
+    ///
+    /// # Errors
+    /// As [`Self::run`], or if the directory cannot be made.
+    pub fn mesh(
+        &self,
+        case: &Path,
+        layout: &Layout,
+        ungraded: bool,
+        (place, limit): (&Path, Duration),
+    ) -> Result<PathBuf, Failure> {
+        let why = |error| format!("has no directory {}: {error}", place.display());
+        let failed = |error| self.failure(End::Missing(why(error)));
+        fs::create_dir_all(place).map_err(failed)?;
+        let mesh = place.join("mesh");
+        let options = RunOptions {
+            mesh: Some(&mesh),
+            report: false,
+            ungraded,
+            ..RunOptions::new(place, limit)
+        };
+        self.run(case, layout, &options)?;
+        Ok(mesh)
+    }
+
     /// The report of a run on so many ranks, of which the mesh was written, with the memory that was measured from outside where the program
     /// reported none, or that of rank 0 alone.
     fn report(
@@ -239,8 +286,8 @@ impl Engine {
     ///
     /// # Errors
     /// If there is none, or it cannot be read.
-    pub fn read_mesh(&self, completed: &Completed) -> Result<LeafSet, Failure> {
-        let mesh = completed.mesh.as_ref().ok_or_else(|| self.unusable("wrote no mesh".into()))?;
+    pub fn read_mesh(&self, mesh: Option<&Path>) -> Result<LeafSet, Failure> {
+        let mesh = mesh.ok_or_else(|| self.unusable("wrote no mesh".into()))?;
         let unreadable = |error| format!("wrote a mesh that cannot be read: {error}");
         leafset::read(mesh).map_err(|error| self.unusable(unreadable(error)))
     }
@@ -263,11 +310,10 @@ impl Engine {
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };
-        if let Some(services) = options.services.filter(|_| self.serves()) {
+        if let Some((services, (name, start))) = options.services.zip(self.service(count)) {
             let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
             let of_program = |word: &String| Path::new(word) != self.program;
             let words: Vec<String> = words.skip_while(of_program).skip(1).collect();
-            let (name, start) = (self.name_of_ranks(count), || self.ranks(count));
             services.send(&name, start, &words)?;
             let time_wall_s = services.answer(&name, &watch)?;
             let stdout = watch.log("stdout");
@@ -282,24 +328,21 @@ impl Engine {
     /// Starts the ranks that stay for all runs on this number of ranks, unless they run or the engine has none. What fails is found by
     /// the first run.
     pub fn start_ranks(&self, count: usize, services: &Services) {
-        if self.serves() {
-            let _ = services.start(&self.name_of_ranks(count), || self.ranks(count));
+        if let Some((name, start)) = self.service(count) {
+            let _ = services.start(&name, start);
         }
     }
 
-    fn serves(&self) -> bool {
-        !self.description.run.serve.is_empty()
-    }
-
-    fn name_of_ranks(&self, count: usize) -> String {
-        format!("{} on {count} ranks", self.program.display())
-    }
-
-    fn ranks(&self, count: usize) -> service::Start {
-        let mut command = self.launcher.command(count, &self.program);
-        command.args(&self.description.run.serve);
-        let shared = self.launcher.prepare(&mut command);
-        (command, shared)
+    /// The ranks that stay: their name, and how they are started. `None` if the engine has none.
+    fn service(&self, count: usize) -> Option<(String, impl FnOnce() -> service::Start)> {
+        let serve = Some(&self.description.run.serve).filter(|serve| !serve.is_empty())?;
+        let start = move || {
+            let mut command = self.launcher.command(count, &self.program);
+            command.args(serve);
+            let shared = self.launcher.prepare(&mut command);
+            (command, shared)
+        };
+        Some((format!("{} on {count} ranks", self.program.display()), start))
     }
 
     fn failure(&self, end: End) -> Failure {
@@ -327,7 +370,6 @@ mod tests {
     use super::*;
     use crate::engine::layout::SERIAL;
     use crate::engine::programs::Programs;
-    use std::time::Duration;
 
     fn words(engine: &Engine, layout: &Layout, options: &RunOptions) -> String {
         let command = engine.command(Path::new("a.toml"), layout, options).unwrap();
@@ -343,7 +385,7 @@ mod tests {
 
     #[test]
     fn command_lines_of_our_programs() {
-        let programs = Programs::find(Default::default()).unwrap();
+        let programs = Programs::find("mesher", &Default::default()).unwrap();
         let mesher = programs.mesher.with_launcher(Launcher::parse("mpirun -n {ranks}").unwrap());
         let plain = RunOptions::new(Path::new("p"), Duration::from_secs(1));
         let files = RunOptions {

@@ -55,22 +55,20 @@ impl Services {
     /// # Errors
     /// [`End::Missing`] if it cannot be started; another end if it has failed since the last answer.
     pub fn start(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), Failure> {
-        self.started(name, start).map_err(|end| Failure::new(name, end))
-    }
-
-    fn started(&self, name: &str, start: impl FnOnce() -> Start) -> Result<(), End> {
+        let failure = |end| Failure::new(name, end);
         let mut services = self.0.borrow_mut();
         if let Some(service) = services.get_mut(name) {
-            let Some((status, _)) = service.session.wait(Duration::ZERO)? else { return Ok(()) };
+            let ended = service.session.wait(Duration::ZERO).map_err(failure)?;
+            let Some((status, _)) = ended else { return Ok(()) };
             let end = process::judge(status, &service.errors);
             services.remove(name);
             // A program that has ended well between two requests is started again.
-            end?;
+            end.map_err(failure)?;
         }
         let (mut command, shared) = start();
         let service = Service::start(&mut command, shared);
-        let service = service.map_err(|error| process::cannot_be_started(&command, &error))?;
-        services.insert(name.to_owned(), service);
+        let missing = |error| failure(process::cannot_be_started(&command, &error));
+        services.insert(name.to_owned(), service.map_err(missing)?);
         Ok(())
     }
 

@@ -162,7 +162,7 @@ fn members(leader: u32) -> Vec<Pid> {
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
     let of_session = ids.filter(|&id| session(id) == Some(leader)).filter(|&id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
-        session_and_liveness(&stat) == Some((leader, true))
+        is_alive(&stat)
     });
     of_session.filter_map(pid_of).collect()
 }
@@ -189,12 +189,10 @@ fn session(id: u32) -> Option<u32> {
     u32::try_from(unsafe { libc::getsid(id) }).ok()
 }
 
-/// The session of a process and whether it is alive (not a zombie), from the text of `/proc/ID/stat`.
-fn session_and_liveness(stat: &str) -> Option<(u32, bool)> {
+/// Whether a process is alive (not a zombie), by the text of `/proc/ID/stat`.
+fn is_alive(stat: &str) -> bool {
     // The name, in parentheses, may itself contain spaces and parentheses.
-    let (_, rest) = stat.rsplit_once(") ")?;
-    let fields: Vec<&str> = rest.split(' ').collect();
-    Some((fields.get(3)?.parse().ok()?, !matches!(*fields.first()?, "Z" | "X")))
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }
 
 /// Samples the memory of all processes of a session, for programs that do not report it.
@@ -256,10 +254,9 @@ mod tests {
     }
 
     #[test]
-    fn the_session_is_found_after_a_name_with_parentheses() {
-        assert_eq!(session_and_liveness("12 (a) b) S 1 12 77 0 -1"), Some((77, true)));
-        assert_eq!(session_and_liveness("12 (x) Z 1 12 77 0 -1"), Some((77, false)));
-        assert_eq!(session_and_liveness(""), None);
+    fn the_state_is_found_after_a_name_with_parentheses() {
+        assert!(is_alive("12 (a) Z) S 1 12 77 0 -1"));
+        assert!(!is_alive("12 (x) Z 1 12 77 0 -1") && !is_alive(""));
     }
 
     #[test]

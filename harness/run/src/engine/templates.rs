@@ -97,21 +97,19 @@ impl Templates {
                     .to_owned(),
             );
         }
-        let ranks = !self.parallel.is_empty() || !self.simulated.is_empty();
-        let choices = !self.partitioner.is_empty() || !self.level_base.is_empty();
-        for (of, has, what) in [
-            (Independence::Ranks, ranks, "ranks, but [run] has neither `parallel` nor `simulated`"),
-            (
-                Independence::Partitioner,
-                choices,
-                "partitioner, but [run] has neither `partitioner` nor `level_base`",
-            ),
-        ] {
-            if promises.independent_of.contains(&of) && !has {
-                return Err(format!("`independent_of` names {what} with which to vary it"));
+        let lacks = |of, keys: [&[String]; 2]| {
+            promises.independent_of.contains(&of) && keys.concat().is_empty()
+        };
+        let what = match () {
+            () if lacks(Independence::Ranks, [&self.parallel, &self.simulated]) => {
+                "ranks, but [run] has neither `parallel` nor `simulated`"
             }
-        }
-        Ok(())
+            () if lacks(Independence::Partitioner, [&self.partitioner, &self.level_base]) => {
+                "partitioner, but [run] has neither `partitioner` nor `level_base`"
+            }
+            () => return Ok(()),
+        };
+        Err(format!("`independent_of` names {what} with which to vary it"))
     }
 
     /// Refuses placeholders that have no value in the template that contains them, and commands that write no mesh.
@@ -155,18 +153,17 @@ impl Templates {
             let why = format!("cannot be {what}: its engine file has no `{key}` in [run]");
             Err(End::Missing(why))
         };
-        let template = match layout.ranks {
-            Ranks::Simulated { .. } if self.simulated.is_empty() => {
-                return lacks("run on simulated ranks", "simulated");
-            }
-            Ranks::Mpi(_) if self.parallel.is_empty() => return lacks("run on MPI", "parallel"),
-            Ranks::Serial => &self.serial,
-            Ranks::Simulated { seed, .. } => {
-                values.insert("seed", seed.to_string());
-                &self.simulated
-            }
-            Ranks::Mpi(_) => &self.parallel,
+        let (template, what, key) = match layout.ranks {
+            Ranks::Serial => (&self.serial, "run", "serial"),
+            Ranks::Simulated { .. } => (&self.simulated, "run on simulated ranks", "simulated"),
+            Ranks::Mpi(_) => (&self.parallel, "run on MPI", "parallel"),
         };
+        if template.is_empty() {
+            return lacks(what, key);
+        }
+        if let Ranks::Simulated { seed, .. } = layout.ranks {
+            values.insert("seed", seed.to_string());
+        }
         if options.ungraded && self.ungraded.is_empty() {
             return lacks("stopped at the base tree", "ungraded");
         }

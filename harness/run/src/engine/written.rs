@@ -15,6 +15,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 /// What ends a path within a command of a shell.
 const ENDS: [char; 6] = [' ', '\'', '"', ';', '&', '|'];
@@ -53,6 +54,8 @@ pub(super) fn complete(
     let unusable = |why: String| Err(End::Unusable(why));
     let unreadable =
         |why: &dyn Display| End::Unusable(format!("wrote a mesh that cannot be read: {why}"));
+    let read_case = || Case::read(case).map_err(|error| End::Unusable(error.to_string()));
+    let tree = if options.ungraded { Tree::Base } else { Tree::Final };
     let is_complete = mesh.join(manifest::FILE).exists();
     if let Some(format) = engine.run.format {
         let written = path_in(command, &foreign(options.place));
@@ -63,8 +66,10 @@ pub(super) fn complete(
                 engine.name
             ));
         }
-        let imported = imported(engine, format, &written, case, label, options)?;
-        imported.link(mesh).map_err(|error| unreadable(&error))?;
+        let (case, limit) = (read_case()?, options.limit);
+        let mut imported = imported(engine, format, &written, &case, label, limit)?;
+        imported.manifest().tree = tree;
+        imported.create(mesh, true).map_err(|error| unreadable(&error))?;
     } else if !is_complete && description::is_own(&engine.name) {
         // Our programs write it last: without it their mesh is incomplete.
         return unusable(format!("wrote no {}", manifest::FILE));
@@ -78,7 +83,7 @@ pub(super) fn complete(
     } else if !is_complete {
         let parts = leafset::read_parts(mesh).map_err(|error| unreadable(&error))?;
         let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
-        let empty = read_case(case)?.manifest(tree_of(options), label);
+        let empty = read_case()?.manifest(tree, label);
         let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
         set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
         let written = set.manifest.write(mesh);
@@ -87,37 +92,26 @@ pub(super) fn complete(
     Mesh::open(mesh).map_err(|error| unreadable(&error))
 }
 
-fn tree_of(options: &RunOptions) -> Tree {
-    if options.ungraded { Tree::Base } else { Tree::Final }
-}
-
-fn read_case(case: &Path) -> Result<Case, End> {
-    Case::read(case).map_err(|error| End::Unusable(error.to_string()))
-}
-
+/// The mesh that a run has written in a format of another program.
 fn imported(
     engine: &Description,
     format: Format,
     written: &Path,
-    case: &Path,
+    case: &Case,
     label: String,
-    options: &RunOptions,
+    limit: Duration,
 ) -> Result<Imported, End> {
-    let case = read_case(case)?;
     let (sides, position) = (engine.run.sides.clone(), engine.run.position);
     let request = Request { sides, position, root: Some(case.root), ..Request::default() };
-    let (paths, limit) = (Paths::find(), options.limit);
-    let read = import(written, Some(format), &request, Some(&case), label, &paths, limit);
-    let mut imported = read.map_err(|failure| {
+    let read = import(written, Some(format), &request, Some(case), label, &Paths::find(), limit);
+    read.map_err(|failure| {
         let why = format!("wrote a mesh that cannot be imported: {failure}");
         match failure.code {
             EXIT_INTERRUPTED => End::Interrupted,
             EXIT_MISSING => End::Missing(why),
             _ => End::Unusable(why),
         }
-    })?;
-    imported.manifest().tree = tree_of(options);
-    Ok(imported)
+    })
 }
 
 #[cfg(test)]

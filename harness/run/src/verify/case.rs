@@ -162,8 +162,9 @@ impl<'a> CaseRun<'a> {
         {
             engine.program_given().into_iter().for_each(|program| add(option, full(program)));
         }
-        if options.timeout != TIMEOUT_S {
-            add("--timeout", options.timeout.to_string());
+        let timeout = options.timeout.as_secs().to_string();
+        if timeout != TIMEOUT_S {
+            add("--timeout", timeout);
         }
         if let Some(layout) = layout {
             add("--ranks", layout.ranks.count().to_string());

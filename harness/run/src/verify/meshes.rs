@@ -51,7 +51,7 @@ impl CaseRun<'_> {
         layout: &Layout,
     ) -> Result<Meshed, Failure> {
         let (run, completed) = self.run(case, name, program, Some(tree), layout)?;
-        let mesh = self.program(program).read_mesh(&completed)?;
+        let mesh = self.program(program).read_mesh(completed.mesh.as_deref())?;
         let Completed { report, mesh: place, .. } = completed;
         Ok(Meshed { run, ranks: report.ranks, mesh, place: place.unwrap_or_default() })
     }
@@ -76,7 +76,7 @@ impl CaseRun<'_> {
             ungraded: tree == Some(Tree::Base),
             sample_memory: true,
             services: Some(&self.all.needs.services),
-            ..RunOptions::new(&place, self.all.options.limit())
+            ..RunOptions::new(&place, self.all.options.timeout)
         };
         let completed = engine.run(case, layout, &options)?;
         let report = &completed.report;
@@ -170,14 +170,10 @@ impl CaseRun<'_> {
     fn make(&mut self, subject: &str, name: &str, program: &str, tree: Tree) -> Option<Meshed> {
         self.step(subject);
         let meshed = self.mesh(&self.file, name, program, tree, &SERIAL);
-        let meshed = self.ended(subject, meshed)?;
+        // The harness has read the case without an error, so an input error is the program's opinion only.
+        let meshed = meshed.map_err(|failure| self.add_failure(subject, None, &failure)).ok()?;
         self.add(Check::new(subject, RUNS, Outcome::held(2)), None);
         Some(meshed)
-    }
-
-    /// A run that ended well. The harness has read the case without an error, so an input error is the program's opinion only.
-    fn ended<T>(&mut self, subject: &str, run: Result<T, Failure>) -> Option<T> {
-        run.map_err(|failure| self.add_failure(subject, None, &failure)).ok()
     }
 
     /// A run for time and memory, which writes no mesh if the engine can do without.
@@ -192,7 +188,7 @@ impl CaseRun<'_> {
                 }
                 Ok(run)
             });
-        let timed = self.ended("serial", timed)?;
+        let timed = timed.map_err(|failure| self.add_failure("serial", None, &failure)).ok()?;
         self.report.cells = timed.cells;
         self.report.runs.push(timed.clone());
         Some(timed)

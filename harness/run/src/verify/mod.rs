@@ -11,7 +11,6 @@ mod ranks;
 pub mod report;
 mod workplace;
 
-use crate::engine::description;
 use crate::engine::interrupt;
 use crate::engine::programs::Programs;
 use crate::progress::Progress;
@@ -31,7 +30,11 @@ use workplace::Workplace;
 /// If the verification could not begin. Failures after that are in the report.
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure> {
     let start = Instant::now();
-    require_programs(programs)?;
+    programs.engine.require()?;
+    if programs.engine.description().promises.definition {
+        // Only the definition is compared with it.
+        programs.reference.require()?;
+    }
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     if selected.is_empty() {
         let why = format!("no case in {} has this size", programs.paths.catalogue.path().display());
@@ -73,25 +76,6 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
     };
     report.check_invariants();
     Ok(report)
-}
-
-/// Refuses a missing mesher, or reference, with which only the definition is compared.
-fn require_programs(programs: &Programs) -> Result<(), Failure> {
-    let engine = &programs.engine;
-    let used = [("mesher", engine), ("reference", &programs.reference)];
-    let used = &used[..1 + usize::from(engine.description().promises.definition)];
-    let mut absent = used.iter().filter(|(_, engine)| !engine.program().is_file());
-    let Some((program, engine)) = absent.next() else { return Ok(()) };
-    let path = engine.program().display();
-    let fix = match description::is_own(engine.name()) {
-        true => format!("build {path}, or give another path with --{program}"),
-        false => format!(
-            "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {}: correct it, as in \
-             program = \"{{here}}/my-mesher\", or give --{program} PATH",
-            engine.name()
-        ),
-    };
-    Err(Failure::missing(format!("the {program} is missing: {fix}")))
 }
 
 /// What the verifications of all cases share.

@@ -64,8 +64,8 @@ pub struct Options {
     #[arg(long)]
     pub keep: bool,
     /// Time limit of every single run
-    #[arg(long, value_name = "SECONDS", default_value_t = TIMEOUT_S, value_parser = whole_seconds)]
-    pub timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = TIMEOUT_S, value_parser = whole_seconds)]
+    pub timeout: Duration,
     /// Leave out the runs on MPI
     #[arg(long)]
     pub no_mpi: bool,
@@ -84,7 +84,7 @@ pub struct Options {
 }
 
 /// Time limit without `--timeout`, in seconds.
-pub(super) const TIMEOUT_S: u64 = 600;
+pub(super) const TIMEOUT_S: &str = "600";
 /// Rank counts without `--ranks`.
 const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
 
@@ -97,10 +97,11 @@ fn rank_count(text: &str) -> Result<usize, String> {
 }
 
 /// Parses a whole number of seconds: at least 1, and at most a week.
-pub fn whole_seconds(text: &str) -> Result<u64, String> {
+pub fn whole_seconds(text: &str) -> Result<Duration, String> {
     const WEEK: u64 = 7 * 86_400;
     let number = text.trim().parse().ok().filter(|n| (1..=WEEK).contains(n));
-    number.ok_or_else(|| format!("give a whole number of seconds from 1 to {WEEK}"))
+    let limit = number.map(Duration::from_secs);
+    limit.ok_or_else(|| format!("give a whole number of seconds from 1 to {WEEK}"))
 }
 
 impl Options {
@@ -111,14 +112,9 @@ impl Options {
             #[command(flatten)]
             options: Options,
         }
-        let Defaults { options } = Defaults::parse_from(["verify"]);
-        let no = true;
-        Self { cases, no_mpi: no, no_oracles: no, no_p4est: no, no_proof: no, ..options }
-    }
-
-    /// Time limit of every single run.
-    pub(super) fn limit(&self) -> Duration {
-        Duration::from_secs(self.timeout)
+        let left_out = ["--no-mpi", "--no-oracles", "--no-p4est", "--no-proof"];
+        let words = ["verify"].into_iter().chain(left_out);
+        Self { cases, ..Defaults::parse_from(words).options }
     }
 
     /// Rank counts of the runs on MPI, each once: a run has one directory. They are those that were asked for, or all of which the

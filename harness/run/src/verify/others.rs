@@ -77,7 +77,7 @@ impl CaseRun<'_> {
         let options = self.all.options;
         let checker = &self.all.programs.paths.proven_checker;
         let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
-        match proof::check(checker, places, leaves, options.limit()) {
+        match proof::check(checker, places, leaves, options.timeout) {
             Ok(proof) => Ok(Check::of_result(subject, CheckResult { name, ..proof })),
             // The files of another program may lack what the proof needs.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
@@ -100,7 +100,12 @@ impl CaseRun<'_> {
         let (gone, asked): (Vec<&str>, Vec<&str>) =
             ORACLES.into_iter().partition(|of| needs.lacks_oracle(of).is_some());
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
-        for answer in self.ask(case, &sample, &asked) {
+        let (paths, limit) = (&self.all.programs.paths, self.all.options.timeout);
+        let (question, place) = ((&*sample.points, &*case.facets), self.place.join("oracles"));
+        let answered = ask(&asked, question, &place, &needs.services, paths, limit);
+        let unusable = |error| End::Unusable(format!("have no input files: {error}"));
+        let answered = answered.map_err(|error| Failure::new("the oracles", unusable(error)));
+        for answer in answered.unwrap_or_else(|failure| vec![Err(failure)]) {
             match answer {
                 Ok(answer) => answers.push(answer),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
@@ -120,18 +125,6 @@ impl CaseRun<'_> {
         };
         check.notes.extend(failures.iter().map(|failure| format!("no answer: {failure}")));
         Ok(check)
-    }
-
-    fn ask(&self, case: &Case, sample: &Sample, oracles: &[&str]) -> Vec<Result<Answer, Failure>> {
-        let place = self.place.join("oracles");
-        let (services, paths) = (&self.all.needs.services, &self.all.programs.paths);
-        let (question, limit) = ((&*sample.points, &*case.facets), self.all.options.limit());
-        let answers = fs::create_dir_all(&place)
-            .and_then(|()| ask(oracles, question, &place, services, paths, limit));
-        answers.unwrap_or_else(|error| {
-            let end = End::Unusable(format!("have no input files: {error}"));
-            vec![Err(Failure::new("the oracles", end))]
-        })
     }
 
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
@@ -173,7 +166,7 @@ impl CaseRun<'_> {
         command.arg(base).arg(&out);
         launcher::set_environment(&mut command);
         let _files = launcher::own_directory(&mut command);
-        process::run(&mut command, &Watch::new("p4est", self.all.options.limit(), &out))?;
+        process::run(&mut command, &Watch::new("p4est", self.all.options.timeout, &out))?;
         let part = PartFile::open(&out.join("leaves-00000.npy"));
         part.map_err(|error| unusable(&error))?.read_all().map_err(|error| unusable(&error))
     }

@@ -24,9 +24,7 @@ impl CaseRun<'_> {
     /// Runs every layout on MPI and checks its mesh.
     pub(super) fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
         match self.all.needs.lacks(Need::Mpi) {
-            Some(why) if self.all.options.no_mpi => {
-                self.leave_out(("ranks", RUNS), why);
-            }
+            Some(why) if self.all.options.no_mpi => self.leave_out(("ranks", RUNS), why),
             Some(why) => self.leave_out_ranks(why),
             None => self.verify_layouts(case, serial),
         }

@@ -127,17 +127,12 @@ pub struct Tally {
     pub left_out: usize,
 }
 
-impl<'a> FromIterator<&'a Check> for Tally {
-    fn from_iter<I: IntoIterator<Item = &'a Check>>(checks: I) -> Self {
-        let mut tally = Self::default();
-        for check in checks {
-            match check.outcome {
-                Outcome::Pass { .. } => tally.pass += 1,
-                Outcome::Fail { .. } => tally.fail += 1,
-                Outcome::LeftOut { .. } => tally.left_out += 1,
-            }
-        }
-        tally
+impl Tally {
+    /// Of these checks.
+    pub fn of<'a>(checks: impl Iterator<Item = &'a Check> + Clone) -> Self {
+        let count = |is: fn(&Outcome) -> bool| checks.clone().filter(|c| is(&c.outcome)).count();
+        let (pass, fail) = (count(Outcome::holds), count(Outcome::failed));
+        Self { pass, fail, left_out: checks.count() - pass - fail }
     }
 }
 
@@ -233,7 +228,7 @@ impl CaseReport {
 
     /// Numbers of its checks by outcome.
     pub fn tally(&self) -> Tally {
-        self.checks.iter().collect()
+        Tally::of(self.checks.iter())
     }
 
     /// Whether any check failed.
@@ -298,22 +293,19 @@ impl Report {
 
     /// The exit code. An interrupt takes precedence, then a failed check, an input error, a missing prerequisite.
     pub fn exit_code(&self) -> u8 {
-        if self.interrupted {
-            EXIT_INTERRUPTED
-        } else if self.cases.iter().any(CaseReport::failed) {
-            EXIT_FAILED
-        } else if self.cases.iter().any(|case| case.input_error.is_some()) {
-            EXIT_INPUT
-        } else if self.missing.iter().any(|missing| missing.required) {
-            EXIT_MISSING
-        } else {
-            EXIT_HOLDS
+        let Self { cases, missing, .. } = self;
+        match () {
+            () if self.interrupted => EXIT_INTERRUPTED,
+            () if cases.iter().any(CaseReport::failed) => EXIT_FAILED,
+            () if cases.iter().any(|case| case.input_error.is_some()) => EXIT_INPUT,
+            () if missing.iter().any(|missing| missing.required) => EXIT_MISSING,
+            () => EXIT_HOLDS,
         }
     }
 
     /// Numbers of all checks by outcome.
     pub fn tally(&self) -> Tally {
-        self.cases.iter().flat_map(|case| &case.checks).collect()
+        Tally::of(self.cases.iter().flat_map(|case| &case.checks))
     }
 
     /// A one-line summary.

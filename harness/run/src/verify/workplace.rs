@@ -4,8 +4,8 @@
 //! `--keep`, only the directories of failed cases are kept; that of a case under way does not outlive an interrupt.
 
 use super::options::Options;
-use crate::engine::interrupt;
 use contract::failure::Failure;
+use contract::files::publications;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,18 +27,19 @@ impl Workplace {
     /// # Errors
     /// If it cannot be made.
     pub(super) fn new(options: &Options) -> Result<Self, Failure> {
-        let wrong = |error: io::Error| {
-            Failure::input(format!("the directory for results cannot be made: {error}"))
+        let made = || match &options.out {
+            Some(out) => {
+                fs::create_dir_all(out)?;
+                Ok(Self { root: fs::canonicalize(out)?, temporary: None })
+            }
+            None => {
+                let temporary = tempfile::Builder::new().prefix("harness-verify-").tempdir()?;
+                Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary) })
+            }
         };
-        if let Some(out) = &options.out {
-            fs::create_dir_all(out).map_err(wrong)?;
-            let root = fs::canonicalize(out).map_err(wrong)?;
-            return Ok(Self { root, temporary: None });
-        }
-        let temporary =
-            tempfile::Builder::new().prefix("harness-verify-").tempdir().map_err(wrong)?;
-        let root = temporary.path().to_owned();
-        Ok(Self { root, temporary: Some(temporary) })
+        made().map_err(|error: io::Error| {
+            Failure::input(format!("the directory for results cannot be made: {error}"))
+        })
     }
 
     /// Makes the directory of a case, and replaces one that an earlier verification left.
@@ -53,7 +54,7 @@ impl Workplace {
                 .map_err(|error| Failure::input(format!("{shown} cannot be replaced: {error}")))?;
         }
         let mark = |()| {
-            interrupt::note_directory(&place);
+            publications().push(place.clone());
             fs::write(place.join(MARKER), "")
         };
         let made = fs::create_dir(&place).and_then(mark);
@@ -64,7 +65,7 @@ impl Workplace {
     /// Removes the directory of a case, or keeps and returns it.
     pub(super) fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
         if keep {
-            interrupt::forget_directory(place);
+            publications().retain(|other| other != place);
             return Some(place.to_owned());
         }
         // Failing to remove a directory is no reason to lose the report.
@@ -103,11 +104,11 @@ mod tests {
         let workplace = Workplace::new(&options).unwrap();
         let [failed, under_way] = ["failed", "under-way"].map(|case| {
             let place = workplace.enter(case).unwrap();
-            assert!(interrupt::has_directory(&place));
+            assert!(publications().contains(&place));
             place
         });
         workplace.leave(&failed, true);
-        assert!(!interrupt::has_directory(&failed) && interrupt::has_directory(&under_way));
+        assert!(!publications().contains(&failed) && publications().contains(&under_way));
     }
 
     #[test]
