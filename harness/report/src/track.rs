@@ -2,7 +2,7 @@
 
 use crate::figure::svg::svg;
 use crate::figure::{
-    Axis, Figure, Mark, Point, Provenance, Series as Plotted, file_name, tick_label,
+    Axis, Figure, Kind, Point, Provenance, Series as Plotted, file_name, tick_label,
 };
 use crate::junit::{suite, test, to_text, unsuccessful};
 use crate::page::{figure, page as whole_page, table};
@@ -147,6 +147,7 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
         format!("{} {value} {}\n{}", short_commit(&record.commit), series.unit, record.subject)
     };
     let x = |at: usize| series.points[at].0 as f64;
+    let (low, high) = range(series);
     let mark = |change: &Change| {
         let (name, style) = match (series.is_worse(change), change.accepted) {
             (None, _) => ("change", 3),
@@ -155,9 +156,8 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             (Some(false), false) => ("better", 2),
         };
         // Between the last commit with the old value and the first with the new one.
-        Mark { name: name.to_owned(), x: x(change.at - 1).midpoint(x(change.at)), style }
+        Plotted::vertical(name, style, x(change.at - 1).midpoint(x(change.at)), (low, high))
     };
-    let (low, high) = range(series);
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
     let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
@@ -165,17 +165,17 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
         let notes = shown.iter().map(|point| note(point)).collect();
         let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
-        Plotted { notes, ..plotted.not_joined() }
+        Plotted { notes, ..plotted.drawn_as(Kind::Scattered) }
     };
     let mut lines = vec![plotted(case_and_metric(series).1, Provenance::Measured, 0, &inside)];
     if !outside.is_empty() {
         let name = "beyond the axis, drawn at its end";
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
     }
+    lines.extend(series.changes.iter().map(mark));
     let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
     Figure {
         height: HEIGHT,
-        marks: series.changes.iter().map(mark).collect(),
         ..Figure::new(
             file_name(&format!("metric-{}", series.name)),
             series.name.clone(),
@@ -285,8 +285,8 @@ mod tests {
         let records = bench::testing::history();
         let all = analyse(&records, &Rules::default());
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
-        let Figure { series, marks, .. } = of_metric(&records, words);
-        assert_eq!(marks, [Mark { name: "worse".into(), x: 19.5, style: 1 }]);
+        let Figure { series, y, .. } = of_metric(&records, words);
+        assert_eq!(series[1..], [Plotted::vertical("worse", 1, 19.5, y.range.unwrap())]);
         assert!(series[0].notes[20].ends_with("\n<b>"), "{:?}", series[0].notes[20]);
     }
 }

@@ -79,11 +79,12 @@ fn no_text_of_a_figure_is_cut_or_lies_on_another() {
     drawn.series[0].points.truncate(1);
     assert_legible(&svg(&drawn));
     let mut stacked = bars();
-    for count in [2, 11, 64] {
-        let all = stacked.bars.as_mut().expect("bars");
-        all.names =
+    for count in [2u32, 11, 64] {
+        stacked.y.names =
             (0..count).map(|i| format!("morton rebalance W={}", 10_i32.pow(i % 5))).collect();
-        all.segments.iter_mut().for_each(|(_, values)| values.resize(count as usize, 98_765.4));
+        for s in &mut stacked.series {
+            s.points = (0..count).map(|i| Point::exact(98_765.4, i.into())).collect();
+        }
         assert_legible(&svg(&stacked));
     }
     let (x, y) = (Axis::linear("rank"), Axis::linear("a longer name of a quantity / s"));
