@@ -56,11 +56,7 @@ fn linked(commit: &str, link: Option<&str>) -> Markup {
 
 /// All steps, the latest first. The class of a change is that of its cell in the style sheet.
 fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
-    let of_series = |series| -> Vec<(&Series, &Change)> {
-        let series: &Series = series;
-        series.changes.iter().map(|change| (series, change)).collect()
-    };
-    let mut found: Vec<(&Series, &Change)> = all.iter().flat_map(of_series).collect();
+    let mut found = steps(all);
     if found.is_empty() {
         return html! { p { "No change points." } };
     }
@@ -96,6 +92,13 @@ fn values(series: &Series, change: &Change) -> [String; 3] {
     [value(change.before), value(change.after), by]
 }
 
+/// All steps with their series.
+fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
+    all.iter()
+        .flat_map(|series| series.changes.iter().map(move |change| (series, change)))
+        .collect()
+}
+
 /// A step per line.
 pub fn summary(all: &[Series]) -> String {
     let line = |series: &Series, change: &Change| {
@@ -109,11 +112,8 @@ pub fn summary(all: &[Series]) -> String {
             change.p
         )
     };
-    let lines = |series| -> Vec<String> {
-        let series: &Series = series;
-        series.changes.iter().map(|change| line(series, change)).collect()
-    };
-    let text: String = all.iter().flat_map(lines).collect();
+    let text: String =
+        steps(all).into_iter().map(|(series, change)| line(series, change)).collect();
     if text.is_empty() { "no change points\n".to_owned() } else { text }
 }
 
@@ -134,10 +134,6 @@ pub fn junit(all: &[Series], recent: usize) -> String {
 
 /// Height of the figure of a metric.
 const HEIGHT: u32 = 560;
-
-fn case_and_metric(series: &Series) -> (&str, &str) {
-    series.name.rsplit_once('/').unwrap_or(("", &series.name))
-}
 
 /// The figure of one metric, with its steps as vertical lines. Outliers do not widen the
 /// axis: they are drawn at its ends.
@@ -167,7 +163,8 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
         let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
         Plotted { notes, ..plotted.drawn_as(Kind::Scattered) }
     };
-    let mut lines = vec![plotted(case_and_metric(series).1, Provenance::Measured, 0, &inside)];
+    let metric = series.name.rsplit('/').next().unwrap_or_default();
+    let mut lines = vec![plotted(metric, Provenance::Measured, 0, &inside)];
     if !outside.is_empty() {
         let name = "beyond the axis, drawn at its end";
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));

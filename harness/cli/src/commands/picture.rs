@@ -6,7 +6,7 @@ use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
 use report::picture::colour::Colour;
-use report::picture::{Format, Picture, Request, write};
+use report::picture::{Picture, Request, format_of, write};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,8 @@ pub struct Arguments {
 /// If the mesh cannot be made or read, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
-    let format = requested(out)?;
+    let format = format_of(out)?;
+    require_directory(out)?;
     if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
         let why =
             "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
@@ -78,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         zoom: arguments.zoom,
     };
     let picture = Picture::collect(&mesh, &request)?;
-    write(out, &format.bytes(&picture.svg()).map_err(io::Error::other)?)?;
+    write(out, &format(&picture.svg()).map_err(io::Error::other)?)?;
     println!("{}\n{}", picture.title(), out.display());
     if meshed.case.is_none() {
         println!("the geometry is not drawn: name its case with --case");
@@ -86,12 +87,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(EXIT_HOLDS)
 }
 
-/// The format of the file, if its directory exists.
-fn requested(out: &Path) -> Result<Format, String> {
-    let format = Format::of(out)?;
+/// Returns an error if the directory of the file does not exist.
+fn require_directory(out: &Path) -> Result<(), String> {
     let directory = out.parent().filter(|d| !d.as_os_str().is_empty());
     match directory.filter(|d| !d.is_dir()) {
         Some(missing) => Err(format!("{} is not a directory: create it", missing.display())),
-        None => Ok(format),
+        None => Ok(()),
     }
 }

@@ -1,7 +1,6 @@
 //! Drawings as PNG and PDF, and the place of their text, measured with the typeface that PNG and PDF have.
 
-use super::format::Format;
-use super::format::rendered::tree;
+use super::format::rendered::{pdf, png, tree};
 use super::samples::{bars, figure, series};
 use super::svg::svg;
 use super::{Axis, Figure, Point, Provenance};
@@ -46,11 +45,11 @@ pub(crate) fn assert_legible(svg: &str) {
 #[test]
 fn png_and_pdf_contain_the_text() {
     let drawn = svg(&figure(vec![series(Provenance::Measured)]));
-    let image = Format::Png.bytes(&drawn).unwrap();
+    let image = png(&drawn).unwrap();
     assert_eq!(&image[1..4], b"PNG");
     let textless = drawn.replace(">speedup<", "><").replace(">ranks<", "><");
-    assert_ne!(image, Format::Png.bytes(&textless).unwrap());
-    let page = Format::Pdf.bytes(&drawn).unwrap();
+    assert_ne!(image, png(&textless).unwrap());
+    let page = pdf(&drawn).unwrap();
     assert!(page.starts_with(b"%PDF"));
     assert!(page.windows(10).any(|w| w == b"DejaVuSans"), "the typeface is in the file");
 }
