@@ -10,8 +10,10 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 
 /// One facet at an edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Use {
+    /// The vertices of the edge, lower first.
+    pub ends: [u32; 2],
     /// The facet.
     pub facet: u32,
     /// Whether the facet traverses the edge from its higher to its lower vertex.
@@ -44,46 +46,39 @@ pub struct Edges {
     pub corners: Vec<[u32; 3]>,
     /// Coordinates of the vertices, in the user's units.
     pub points: Vec<[f64; 3]>,
-    /// Packed (lower vertex, higher vertex, facet, direction), sorted.
-    packed: Vec<u128>,
+    /// Sorted.
+    uses: Vec<Use>,
 }
 
 impl Edges {
     /// Numbers the vertices and sorts the edges of at most 2^31 / 3 finite facets.
     pub fn new(facets: &[Facet]) -> Self {
         let (corners, points) = number(facets);
-        let mut packed = Vec::with_capacity(3 * corners.len());
-        for (facet, &[a, b, c]) in corners.iter().enumerate() {
+        let mut uses = Vec::with_capacity(3 * corners.len());
+        for (&[a, b, c], facet) in corners.iter().zip(0..) {
             if a == b || b == c || c == a {
                 continue;
             }
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                let (low, high) = (from.min(to), from.max(to));
-                let word = (facet as u32) << 1 | u32::from(from > to);
-                packed.push(u128::from(low) << 64 | u128::from(high) << 32 | u128::from(word));
+                let ends = [from.min(to), from.max(to)];
+                uses.push(Use { ends, facet, is_down: from > to });
             }
         }
-        packed.sort_unstable();
-        Self { corners, points, packed }
+        uses.sort_unstable();
+        Self { corners, points, uses }
     }
 
-    /// Every edge: its vertices, lower first, and its facets.
-    pub fn iter(
-        &self,
-    ) -> impl Iterator<Item = ([u32; 2], impl ExactSizeIterator<Item = Use> + '_)> {
-        self.packed.chunk_by(|a, b| a >> 32 == b >> 32).map(|uses| {
-            let ends = [(uses[0] >> 64) as u32, (uses[0] >> 32) as u32];
-            let facet = |&word: &u128| Use { facet: word as u32 >> 1, is_down: word & 1 == 1 };
-            (ends, uses.iter().map(facet))
-        })
+    /// The facets at every edge.
+    pub fn iter(&self) -> impl Iterator<Item = &[Use]> {
+        self.uses.chunk_by(|a, b| a.ends == b.ends)
     }
 
     /// The edges by the number of their facets.
     pub fn counts(&self) -> EdgeCounts {
         let mut counts = EdgeCounts::default();
-        for (_, uses) in self.iter() {
+        for uses in self.iter() {
             let facets = uses.len();
-            let down = uses.filter(|facet| facet.is_down).count();
+            let down = uses.iter().filter(|facet| facet.is_down).count();
             counts.all += 1;
             *match facets {
                 1 => &mut counts.open,
@@ -117,15 +112,14 @@ fn number(facets: &[Facet]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
 /// Edges with an odd number of facets, more than one, and pairs of neighbours with inconsistent winding.
 pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
     let mut findings = [Kind::NonManifoldOdd, Kind::Winding].map(Finding::new);
-    for (ends, uses) in edges.iter() {
-        let uses: Vec<Use> = uses.collect();
-        let at = match uses[..] {
+    for uses in edges.iter() {
+        let at = match uses {
             [a, b] if a.is_down == b.is_down => 1,
             [_, _, _, ..] if uses.len() % 2 == 1 => 0,
             _ => continue,
         };
         findings[at].add(first, || {
-            let [p, q] = ends.map(|v| edges.points[v as usize]);
+            let [p, q] = uses[0].ends.map(|v| edges.points[v as usize]);
             let middle = std::array::from_fn(|a| (p[a] + q[a]) / 2.0);
             Place::new(uses.iter().map(|u| u.facet).take(Place::FACETS_MAX).collect(), middle)
         });
@@ -135,17 +129,17 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
 
 /// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.
 pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let key = |(facet, corners): (usize, &[u32; 3])| {
+    let sorted = |corners: &[u32; 3]| {
         let mut sorted = *corners;
         sorted.sort_unstable();
-        let [a, b, c] = sorted.map(u128::from);
-        (a != b && b != c).then_some(a << 96 | b << 64 | c << 32 | facet as u128)
+        sorted
     };
-    let mut keys: Vec<u128> = edges.corners.iter().enumerate().filter_map(key).collect();
-    keys.sort_unstable();
+    let all = edges.corners.iter().map(sorted).zip(0u32..);
+    let mut facets: Vec<_> = all.filter(|([a, b, c], _)| a != b && b != c).collect();
+    facets.sort_unstable();
     let mut pairs: Vec<(u32, u32)> = Vec::new();
-    for same in keys.chunk_by(|a, b| a >> 32 == b >> 32) {
-        pairs.extend(same[1..].iter().map(|&copy| (copy as u32, same[0] as u32)));
+    for same in facets.chunk_by(|a, b| a.0 == b.0) {
+        pairs.extend(same[1..].iter().map(|copy| (copy.1, same[0].1)));
     }
     pairs.sort_unstable();
     let mut finding = Finding::new(Kind::Duplicates);
@@ -165,7 +159,7 @@ mod tests {
     const D: [f32; 3] = [0.0, 0.0, 1.0];
 
     fn sizes(facets: &[Facet]) -> Vec<usize> {
-        let mut sizes: Vec<usize> = Edges::new(facets).iter().map(|(_, uses)| uses.len()).collect();
+        let mut sizes: Vec<usize> = Edges::new(facets).iter().map(<[Use]>::len).collect();
         sizes.sort_unstable();
         sizes
     }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
+use super::tree::{Aabb, Point, bounds};
 
 /// The bounding box and its distances from the root's faces.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -19,17 +20,10 @@ pub struct Extent {
 
 /// The extent of at least one facet.
 pub fn extent(input: &Input) -> Extent {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for vertex in input.facets.as_flattened() {
-        for a in 0..3 {
-            low[a] = low[a].min(vertex[a].into());
-            high[a] = high[a].max(vertex[a].into());
-        }
-    }
-    let root = &input.root;
-    let margin = |a: usize| (low[a] - root.origin[a]).min(root.origin[a] + root.edge - high[a]);
-    let margin = (0..3).map(margin).fold(f64::INFINITY, f64::min);
-    Extent { low, high, margin }
+    let Aabb { mins, maxs } = bounds(&input.facets);
+    let origin = Point::from(input.root.origin);
+    let margin = (mins - origin).min(origin + Point::splat(input.root.edge) - maxs).min_element();
+    Extent { low: mins.to_array(), high: maxs.to_array(), margin }
 }
 
 /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.

@@ -4,7 +4,7 @@
 //! of finitely many planes does: with the normal of a triangle, or normal to an edge of each; in a common plane,
 //! normal to an edge of either.
 
-use contract::lattice::{FacetLattice, normal};
+use contract::lattice::{FacetLattice, cross, difference, dot, normal};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -49,27 +49,27 @@ fn is_degenerate(facet: &FacetLattice) -> bool {
 
 /// Whether the interiors of two triangles with area, as sets of their planes, have a common point.
 pub fn intersect(a: &FacetLattice, b: &FacetLattice) -> bool {
-    axes(a, b).all(|axis| {
-        let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
-        low_a < high_b && low_b < high_a
-    })
+    axes(a, b).all(|axis| overlap(a, b, axis) > 0)
 }
 
 /// An upper bound on the length of the least shift that separates the interiors of two intersecting triangles, in
 /// lattice units; 0 in one plane, where the smallest shift along the normal does.
 fn depth(a: &FacetLattice, b: &FacetLattice) -> f64 {
-    let along = |axis: [i64; 3]| {
-        let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
-        let length = axis.map(|x| (x as f64).powi(2)).iter().sum::<f64>().sqrt();
-        (high_a - low_b).min(high_b - low_a) as f64 / length
-    };
+    let along = |axis: [i64; 3]| overlap(a, b, axis) as f64 / (dot(axis, axis) as f64).sqrt();
     axes(a, b).chain([normal(a)]).map(along).fold(f64::INFINITY, f64::min)
+}
+
+/// The length in which the projections of two triangles on an axis (up to 2^59) overlap, times that of the axis; not positive if they
+/// have no interior point in common.
+fn overlap(a: &FacetLattice, b: &FacetLattice, axis: [i64; 3]) -> i128 {
+    let ((low_a, high_a), (low_b, high_b)) = (range(a, a[0], axis), range(b, a[0], axis));
+    (high_a - low_b).min(high_b - low_a)
 }
 
 /// The normals of the planes that can separate two triangles with area, none of them zero.
 fn axes(a: &FacetLattice, b: &FacetLattice) -> impl Iterator<Item = [i64; 3]> {
     let (n, m) = (normal(a), normal(b));
-    let edges = |f: &FacetLattice| [sub(f[1], f[0]), sub(f[2], f[1]), sub(f[0], f[2])];
+    let edges = |f: &FacetLattice| [0, 1, 2].map(|i| difference(f[(i + 1) % 3], f[i]));
     let (of_a, of_b) = (edges(a), edges(b));
     let is_coplanar = range(b, a[0], n) == (0, 0);
     // In one plane: the projection along an axis that is not parallel to the plane.
@@ -87,20 +87,8 @@ fn axes(a: &FacetLattice, b: &FacetLattice) -> impl Iterator<Item = [i64; 3]> {
 
 /// Least and greatest product of an axis (up to 2^59) with the corners' offsets from a point.
 fn range(facet: &FacetLattice, from: [i64; 3], axis: [i64; 3]) -> (i128, i128) {
-    let heights = facet
-        .map(|v| (0..3).map(|a| i128::from(axis[a]) * i128::from(v[a] - from[a])).sum::<i128>());
+    let heights = facet.map(|v| dot(axis, difference(v, from)));
     (heights[0].min(heights[1]).min(heights[2]), heights[0].max(heights[1]).max(heights[2]))
-}
-
-fn sub(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
-    std::array::from_fn(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        u[b] * v[c] - u[c] * v[b]
-    })
 }
 
 /// The centre of the common part of the bounding boxes.
@@ -232,7 +220,7 @@ mod tests {
 
     fn within(at: [i64; 3], g: &FacetLattice, n: [i64; 3]) -> bool {
         let side = |i: usize| {
-            let c = cross(sub(g[(i + 1) % 3], g[i]), sub(at, g[i]));
+            let c = cross(difference(g[(i + 1) % 3], g[i]), difference(at, g[i]));
             (0..3).map(|a| i128::from(c[a]) * i128::from(n[a])).sum::<i128>().signum()
         };
         (0..3).all(|i| side(i) >= 0)
@@ -240,7 +228,7 @@ mod tests {
 
     fn segment_in_plane_meets(p: [i64; 3], q: [i64; 3], g: &FacetLattice, n: [i64; 3]) -> bool {
         let turn = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {
-            let k = cross(sub(b, a), sub(c, a));
+            let k = cross(difference(b, a), difference(c, a));
             (0..3).map(|x| k[x] * n[x]).sum::<i64>().signum()
         };
         let between = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {

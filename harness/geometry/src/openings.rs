@@ -8,7 +8,7 @@ use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::CELLS_PER_EDGE;
 use contract::sets::Sets;
 
-use super::edges::Edges;
+use super::edges::{Edges, Use};
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::Point;
@@ -19,77 +19,53 @@ const TOLERANCE: f64 = 2.0;
 
 /// All openings, widest first: a hole, the rim of a sheet, or several that share a vertex.
 pub fn openings(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let open = edges.iter().filter_map(|(ends, mut uses)| {
-        let is_open = uses.len() == 1;
-        uses.next().filter(|_| is_open).map(|u| Segment { ends, facet: u.facet })
-    });
+    let open = edges.iter().filter(|uses| uses.len() == 1).map(|uses| uses[0]);
     let tolerance = TOLERANCE * input.root.edge / UNITS_PER_EDGE as f64;
     let rims = uncancelled(open.collect(), &edges.points, tolerance);
-    let mut places: Vec<Place> = components(&rims, edges.points.len())
-        .iter()
-        .map(|component| place(&edges.points, component))
-        .collect();
+    let mut places = places(&rims, &edges.points);
     let width = |place: &Place| place.width.unwrap_or(0.0);
     places.sort_by(|a, b| width(b).total_cmp(&width(a)).then(a.facets.cmp(&b.facets)));
-    let mut finding = Finding::new(Kind::Openings);
-    finding.count = places.len() as u64;
-    finding.count_changing = places.iter().filter(|p| is_leak(input, p)).count() as u64;
-    places.truncate(first);
-    finding.places = places;
-    finding
-}
-
-/// Whether cells may fit through the opening.
-fn is_leak(input: &Input, place: &Place) -> bool {
     // Without a spacing, any may be chosen, up to the finest.
     let cell = input.cell.unwrap_or(input.root.edge / f64::from(CELLS_PER_EDGE));
-    place.width.is_some_and(|width| width >= cell)
-}
-
-/// The segments by component.
-fn components(rims: &[Segment], vertices: usize) -> Vec<Vec<Segment>> {
-    let mut sets = Sets::new(vertices);
-    for segment in rims {
-        sets.union(segment.ends[0], segment.ends[1]);
+    Finding {
+        count: places.len() as u64,
+        count_changing: places.iter().filter(|place| width(place) >= cell).count() as u64,
+        places: places.into_iter().take(first).collect(),
+        ..Finding::new(Kind::Openings)
     }
-    let mut labelled: Vec<(u32, Segment)> =
+}
+
+/// The places of connected segments.
+fn places(rims: &[Use], points: &[[f64; 3]]) -> Vec<Place> {
+    let mut sets = Sets::new(points.len());
+    rims.iter().for_each(|segment| sets.union(segment.ends[0], segment.ends[1]));
+    let mut labelled: Vec<(u32, Use)> =
         rims.iter().map(|segment| (sets.root(segment.ends[0]), *segment)).collect();
-    labelled.sort_by_key(|(label, segment)| (*label, segment.ends));
-    let component = |same: &[(u32, Segment)]| same.iter().map(|(_, segment)| *segment).collect();
-    labelled.chunk_by(|a, b| a.0 == b.0).map(component).collect()
-}
-
-fn place(points: &[[f64; 3]], component: &[Segment]) -> Place {
-    let ends = |segment: &Segment| segment.ends.map(|v| points[v as usize]);
-    let points: Vec<[f64; 3]> = component.iter().flat_map(ends).collect();
-    let centre =
-        std::array::from_fn(|a| points.iter().map(|p| p[a]).sum::<f64>() / points.len() as f64);
-    let mut facets: Vec<u32> = component.iter().map(|s| s.facet).collect();
-    facets.sort_unstable();
-    facets.dedup();
-    facets.truncate(Place::FACETS_MAX);
-    Place { width: Some(width::width(&points)), ..Place::new(facets, centre) }
-}
-
-/// A segment between two vertices at the boundary of a facet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Segment {
-    /// Both ends.
-    pub ends: [u32; 2],
-    /// The facet.
-    pub facet: u32,
+    labelled.sort_unstable();
+    let place = |component: &[(u32, Use)]| {
+        let ends = component.iter().flat_map(|(_, segment)| segment.ends);
+        let ends: Vec<[f64; 3]> = ends.map(|v| points[v as usize]).collect();
+        let sum = |a: usize| ends.iter().map(|p| p[a]).sum::<f64>();
+        let mut facets: Vec<u32> = component.iter().map(|(_, segment)| segment.facet).collect();
+        facets.sort_unstable();
+        facets.dedup();
+        facets.truncate(Place::FACETS_MAX);
+        let centre = std::array::from_fn(|a| sum(a) / ends.len() as f64);
+        Place { width: Some(width::width(&ends)), ..Place::new(facets, centre) }
+    };
+    labelled.chunk_by(|a, b| a.0 == b.0).map(place).collect()
 }
 
 /// A vertex with more segments is left unchanged.
 const SEGMENTS_MAX: usize = 256;
 
 /// The segments that remain after cancellation. A vertex lies on a segment if it is within `tolerance` of it.
-pub fn uncancelled(segments: Vec<Segment>, points: &[[f64; 3]], tolerance: f64) -> Vec<Segment> {
+pub fn uncancelled(segments: Vec<Use>, points: &[[f64; 3]], tolerance: f64) -> Vec<Use> {
     let mut at: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
     for (i, segment) in segments.iter().enumerate() {
         segment.ends.iter().for_each(|&v| at[v as usize].push(i as u32));
     }
-    let mut segments: Vec<Option<Segment>> = segments.into_iter().map(Some).collect();
+    let mut segments: Vec<Option<Use>> = segments.into_iter().map(Some).collect();
     let mut waiting: Vec<u32> = (0..points.len() as u32).rev().collect();
     while let Some(v) = waiting.pop() {
         at[v as usize].retain(|&i| segments[i as usize].is_some_and(|s| s.ends.contains(&v)));
@@ -100,7 +76,7 @@ pub fn uncancelled(segments: Vec<Segment>, points: &[[f64; 3]], tolerance: f64) 
         let (far, near) = (end(long), end(short));
         segments[short as usize] = None;
         let rest = segments[long as usize].filter(|_| far != near);
-        segments[long as usize] = rest.map(|s| Segment { ends: [near, far], ..s });
+        segments[long as usize] = rest.map(|s| Use { ends: [near, far], ..s });
         at[near as usize].push(long);
         waiting.extend([v, near, far]);
     }
@@ -111,7 +87,7 @@ pub fn uncancelled(segments: Vec<Segment>, points: &[[f64; 3]], tolerance: f64) 
 fn overlap(
     v: u32,
     at: &[u32],
-    segments: &[Option<Segment>],
+    segments: &[Option<Use>],
     points: &[[f64; 3]],
     tolerance: f64,
 ) -> Option<(u32, u32)> {
@@ -134,7 +110,7 @@ fn overlap(
     None
 }
 
-fn other(segment: Segment, v: u32) -> u32 {
+fn other(segment: Use, v: u32) -> u32 {
     segment.ends[usize::from(segment.ends[0] == v)]
 }
 
@@ -153,8 +129,8 @@ mod tests {
     ];
 
     fn rest(ends: &[[u32; 2]]) -> Vec<[u32; 2]> {
-        let sorted = |s: &Segment| [s.ends[0].min(s.ends[1]), s.ends[0].max(s.ends[1])];
-        let segments = ends.iter().map(|&ends| Segment { ends, facet: 0 }).collect();
+        let sorted = |s: &Use| [s.ends[0].min(s.ends[1]), s.ends[0].max(s.ends[1])];
+        let segments = ends.iter().map(|&ends| Use { ends, facet: 0, is_down: false }).collect();
         uncancelled(segments, &POINTS, 1e-9).iter().map(sorted).collect()
     }
 
@@ -172,7 +148,7 @@ mod tests {
         // Opposite directions at vertex 2.
         assert_eq!(rest(&[[0, 2], [2, 4]]).len(), 2);
         // An edge across another one is no part of it, however short it is.
-        let across = [[0, 1], [0, 5]].map(|ends| Segment { ends, facet: 0 });
+        let across = [[0, 1], [0, 5]].map(|ends| Use { ends, facet: 0, is_down: false });
         assert_eq!(uncancelled(across.to_vec(), &POINTS, 1.5).len(), 2);
     }
 }

@@ -1,6 +1,6 @@
 //! Shells: components of facets that are connected by shared edges.
 
-use contract::lattice::FacetLattice;
+use contract::lattice::{FacetLattice, dot, normal};
 use contract::manifest::Keep;
 use contract::parity::Parity;
 use contract::sets::Sets;
@@ -29,19 +29,9 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// A shell without facets yet.
-    fn new(facet_first: u32) -> Self {
-        let bounds = Aabb::new_invalid();
-        let (is_closed, is_oriented) = (true, true);
-        Self { facet_first, facets: 0, is_closed, is_oriented, volume_sixfold: 0, bounds }
-    }
-
     fn add(&mut self, facet: &FacetLattice) {
         self.facets += 1;
-        // Coordinates are below 2^29 and facets below 2^31.
-        let [p, q, r] = facet.map(|v| v.map(i128::from));
-        let along = |a: usize, b: usize, c: usize| p[a] * (q[b] * r[c] - q[c] * r[b]);
-        self.volume_sixfold += along(0, 1, 2) + along(1, 2, 0) + along(2, 0, 1);
+        self.volume_sixfold += dot(facet[0], normal(facet));
         for vertex in facet {
             self.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
         }
@@ -71,9 +61,8 @@ impl Shells {
     /// Connects the facets that share edges.
     pub fn new(edges: &Edges, lattice: &[FacetLattice]) -> Self {
         let mut sets = Sets::new(edges.corners.len());
-        for (_, mut uses) in edges.iter() {
-            let Some(first) = uses.next() else { continue };
-            uses.for_each(|other| sets.union(first.facet, other.facet));
+        for uses in edges.iter() {
+            uses[1..].iter().for_each(|other| sets.union(uses[0].facet, other.facet));
         }
         let mut all: Vec<Shell> = Vec::new();
         let mut of = vec![u32::MAX; edges.corners.len()];
@@ -85,21 +74,23 @@ impl Shells {
             let first = sets.root(facet as u32);
             if first as usize == facet {
                 of[facet] = all.len() as u32;
-                all.push(Shell::new(first));
+                all.push(Shell {
+                    facet_first: first,
+                    facets: 0,
+                    is_closed: true,
+                    is_oriented: true,
+                    volume_sixfold: 0,
+                    bounds: Aabb::new_invalid(),
+                });
             }
             of[facet] = of[first as usize];
             all[of[facet] as usize].add(&lattice[facet]);
         }
-        for (_, uses) in edges.iter() {
-            let count = uses.len();
-            let (mut facet, mut down) = (0, 0);
-            for one in uses {
-                facet = one.facet as usize;
-                down += usize::from(one.is_down);
-            }
-            let shell = &mut all[of[facet] as usize];
-            shell.is_closed &= count % 2 == 0;
-            shell.is_oriented &= 2 * down == count;
+        for uses in edges.iter() {
+            let down = uses.iter().filter(|one| one.is_down).count();
+            let shell = &mut all[of[uses[0].facet as usize] as usize];
+            shell.is_closed &= uses.len() % 2 == 0;
+            shell.is_oriented &= 2 * down == uses.len();
         }
         Self { all, of }
     }

@@ -73,10 +73,11 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let sessions = by_key(lines, |line| line.session.as_str());
     let action = |(name, of): &(&str, Vec<&Line>)| {
         let opening = of.iter().find_map(|line| line.session())?;
-        let used = programs.iter().filter(|(_, digest)| {
-            of.iter().any(|l| matches!(&l.entry, Entry::Run(run) if run.program == *digest))
-        });
-        let used = one_or_many(used.map(|(_, digest)| id(&program_id(digest))).collect());
+        let is_used = |digest: &str| {
+            of.iter().any(|l| matches!(&l.entry, Entry::Run(run) if run.program == digest))
+        };
+        let used = programs.iter().filter(|(_, digest)| is_used(digest));
+        let used: Vec<Value> = used.map(|(_, digest)| id(&program_id(digest))).collect();
         Some(json!({
             "@id": format!("#session-{name}"), "@type": "CreateAction",
             "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
@@ -86,7 +87,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         }))
     };
     let actions: Vec<Value> = sessions.iter().filter_map(action).collect();
-    let ids = |of: &[Value]| one_or_many(of.iter().map(|e| json!({"@id": e["@id"]})).collect());
+    let ids = |of: &[Value]| of.iter().map(|e| json!({"@id": e["@id"]})).collect::<Vec<_>>();
     let root = json!({
         "@id": "./", "@type": "Dataset", "name": about.title, "datePublished": about.day, "license": id(&licence),
         "description": "Benchmarks of oct-tree meshers: the record, its figures, the study that made it, and what a repetition must give",
@@ -108,11 +109,6 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         .chain(actions)
         .collect();
     json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
-}
-
-/// A single value stands alone.
-fn one_or_many(mut values: Vec<Value>) -> Value {
-    if values.len() == 1 { values.remove(0) } else { Value::Array(values) }
 }
 
 /// The page for whoever opens the archive.
@@ -141,10 +137,9 @@ pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
 
 /// A path as a relative address: bytes other than `A` to `Z`, `a` to `z`, digits and `/._-` are escaped.
 fn address(path: &str) -> String {
-    let escape = |byte: u8| match byte {
-        b'/' | b'.' | b'_' | b'-' => (byte as char).to_string(),
-        _ if byte.is_ascii_alphanumeric() => (byte as char).to_string(),
-        _ => format!("%{byte:02X}"),
+    let escape = |byte: u8| match byte.is_ascii_alphanumeric() || b"/._-".contains(&byte) {
+        true => char::from(byte).to_string(),
+        false => format!("%{byte:02X}"),
     };
     path.bytes().map(escape).collect()
 }
@@ -186,7 +181,7 @@ mod tests {
         }
         let action = graph.last().unwrap();
         assert_eq!(action["name"], "harness bench 'my study.toml'");
-        assert_eq!(action["instrument"]["@id"], format!("#program-{}", "7".repeat(32)));
+        assert_eq!(action["instrument"][0]["@id"], format!("#program-{}", "7".repeat(32)));
         let text = readme(&about, &lines, &Expected::of(&lines).unwrap());
         assert!(text.contains("at commit abc:") && text.contains("chip"), "{text}");
     }

@@ -2,7 +2,7 @@
 
 use crate::figure::svg::svg;
 use crate::figure::{
-    Axis, Figure, Mark, Point, Provenance, Series as Plotted, file_name, tick_label,
+    Axis, Figure, Kind, Point, Provenance, Series as Plotted, file_name, tick_label,
 };
 use crate::junit::{suite, test, to_text, unsuccessful};
 use crate::page::{figure, page as whole_page, table};
@@ -56,11 +56,7 @@ fn linked(commit: &str, link: Option<&str>) -> Markup {
 
 /// All steps, the latest first. The class of a change is that of its cell in the style sheet.
 fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
-    let of_series = |series| -> Vec<(&Series, &Change)> {
-        let series: &Series = series;
-        series.changes.iter().map(|change| (series, change)).collect()
-    };
-    let mut found: Vec<(&Series, &Change)> = all.iter().flat_map(of_series).collect();
+    let mut found = steps(all);
     if found.is_empty() {
         return html! { p { "No change points." } };
     }
@@ -96,6 +92,13 @@ fn values(series: &Series, change: &Change) -> [String; 3] {
     [value(change.before), value(change.after), by]
 }
 
+/// All steps with their series.
+fn steps(all: &[Series]) -> Vec<(&Series, &Change)> {
+    all.iter()
+        .flat_map(|series| series.changes.iter().map(move |change| (series, change)))
+        .collect()
+}
+
 /// A step per line.
 pub fn summary(all: &[Series]) -> String {
     let line = |series: &Series, change: &Change| {
@@ -109,11 +112,8 @@ pub fn summary(all: &[Series]) -> String {
             change.p
         )
     };
-    let lines = |series| -> Vec<String> {
-        let series: &Series = series;
-        series.changes.iter().map(|change| line(series, change)).collect()
-    };
-    let text: String = all.iter().flat_map(lines).collect();
+    let text: String =
+        steps(all).into_iter().map(|(series, change)| line(series, change)).collect();
     if text.is_empty() { "no change points\n".to_owned() } else { text }
 }
 
@@ -135,10 +135,6 @@ pub fn junit(all: &[Series], recent: usize) -> String {
 /// Height of the figure of a metric.
 const HEIGHT: u32 = 560;
 
-fn case_and_metric(series: &Series) -> (&str, &str) {
-    series.name.rsplit_once('/').unwrap_or(("", &series.name))
-}
-
 /// The figure of one metric, with its steps as vertical lines. Outliers do not widen the
 /// axis: they are drawn at its ends.
 fn of_metric(records: &[Record], series: &Series) -> Figure {
@@ -147,6 +143,7 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
         format!("{} {value} {}\n{}", short_commit(&record.commit), series.unit, record.subject)
     };
     let x = |at: usize| series.points[at].0 as f64;
+    let (low, high) = range(series);
     let mark = |change: &Change| {
         let (name, style) = match (series.is_worse(change), change.accepted) {
             (None, _) => ("change", 3),
@@ -155,9 +152,8 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             (Some(false), false) => ("better", 2),
         };
         // Between the last commit with the old value and the first with the new one.
-        Mark { name: name.to_owned(), x: x(change.at - 1).midpoint(x(change.at)), style }
+        Plotted::vertical(name, style, x(change.at - 1).midpoint(x(change.at)), (low, high))
     };
-    let (low, high) = range(series);
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
     let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
@@ -165,17 +161,18 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
         let notes = shown.iter().map(|point| note(point)).collect();
         let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
-        Plotted { notes, ..plotted.not_joined() }
+        Plotted { notes, ..plotted.drawn_as(Kind::Scattered) }
     };
-    let mut lines = vec![plotted(case_and_metric(series).1, Provenance::Measured, 0, &inside)];
+    let metric = series.name.rsplit('/').next().unwrap_or_default();
+    let mut lines = vec![plotted(metric, Provenance::Measured, 0, &inside)];
     if !outside.is_empty() {
         let name = "beyond the axis, drawn at its end";
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
     }
+    lines.extend(series.changes.iter().map(mark));
     let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
     Figure {
         height: HEIGHT,
-        marks: series.changes.iter().map(mark).collect(),
         ..Figure::new(
             file_name(&format!("metric-{}", series.name)),
             series.name.clone(),
@@ -285,8 +282,8 @@ mod tests {
         let records = bench::testing::history();
         let all = analyse(&records, &Rules::default());
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
-        let Figure { series, marks, .. } = of_metric(&records, words);
-        assert_eq!(marks, [Mark { name: "worse".into(), x: 19.5, style: 1 }]);
+        let Figure { series, y, .. } = of_metric(&records, words);
+        assert_eq!(series[1..], [Plotted::vertical("worse", 1, 19.5, y.range.unwrap())]);
         assert!(series[0].notes[20].ends_with("\n<b>"), "{:?}", series[0].notes[20]);
     }
 }

@@ -9,6 +9,7 @@ use quick_junit::NonSuccessKind::{Error, Failure};
 use quick_junit::{TestCase, TestCaseStatus};
 use run::verify::case::PROOF;
 use run::verify::report::{CaseReport, Check, Outcome, Report, Run, Tally};
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// The report as plain text.
@@ -39,25 +40,20 @@ fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
     let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
     let counts = rank_counts(case);
     let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
-    let of_case = Tally::of(case.checks.iter().filter(of_case));
-    let sizes = [case.facets, case.leaves_base, case.cells];
-    let mut first = vec![case.name.clone()];
-    first.extend(sizes.map(|size| size.to_string()));
-    first.push("serial".to_owned());
-    first.extend(results(of_case, serial));
-    let mut rows = vec![first];
-    for ranks in counts {
+    let [facets, base, cells] =
+        [case.facets, case.leaves_base, case.cells].map(|size| size.to_string());
+    let head = [case.name.clone(), facets, base, cells, "serial".to_owned()];
+    let mut rows = vec![row(head, Tally::of(case.checks.iter().filter(of_case)), serial)];
+    rows.extend(counts.iter().map(|&ranks| {
         let with_ranks =
             |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks.count() == ranks);
         let runs = case.runs.iter().filter(with_ranks);
         // All layouts give the same mesh; the table has the time of the fastest.
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
         let checks = Tally::of(case.checks.iter().filter(|check| check.ranks == Some(ranks)));
-        let mut row = vec![String::new(); 4];
-        row.push(ranks.to_string());
-        row.extend(results(checks, fastest));
-        rows.push(row);
-    }
+        let head = std::array::from_fn(|i| if i == 4 { ranks.to_string() } else { String::new() });
+        row(head, checks, fastest)
+    }));
     rows
 }
 
@@ -70,23 +66,20 @@ fn check_rows(rows: &[Vec<String>], report: &Report) {
 }
 
 /// The rank counts on which anything was run.
-fn rank_counts(case: &CaseReport) -> Vec<usize> {
+fn rank_counts(case: &CaseReport) -> BTreeSet<usize> {
     let run = case.checks.iter().filter(|c| !matches!(c.outcome, Outcome::LeftOut { .. }));
-    let mut counts: Vec<usize> = run.filter_map(|check| check.ranks).collect();
-    counts.sort_unstable();
-    counts.dedup();
-    counts
+    run.filter_map(|check| check.ranks).collect()
 }
 
-fn results(tally: Tally, run: Option<&Run>) -> Vec<String> {
-    let Tally { pass, fail, left_out } = tally;
-    let measured = |run: &Run| {
+fn row(head: [String; 5], Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<String> {
+    let measured = run.map(|run| {
         let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
         let rate = format!("{:.3}", run.cells_per_s() / 1e6);
         [time_s.unwrap_or("-".to_owned()), rate, format!("{:.1}", run.bytes_per_cell())]
-    };
-    let measured = run.map_or_else(|| ["-"; 3].map(str::to_owned), measured);
-    [pass, fail, left_out].map(|n| n.to_string()).into_iter().chain(measured).collect()
+    });
+    let measured = measured.unwrap_or(["-"; 3].map(str::to_owned));
+    let counts = [pass, fail, left_out].map(|n| n.to_string());
+    head.into_iter().chain(counts).chain(measured).collect()
 }
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.

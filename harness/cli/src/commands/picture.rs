@@ -6,7 +6,7 @@ use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
 use report::picture::colour::Colour;
-use report::picture::{Format, Picture, Request, write};
+use report::picture::{Picture, Request, format_of, write};
 use run::engine::layout::{Layout, Ranks, SERIAL};
 use std::io;
 use std::path::Path;
@@ -56,7 +56,7 @@ pub struct Arguments {
 /// If the mesh cannot be made or read, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { source, out, ranks, ungraded, .. } = arguments;
-    let format = Format::of(out)?;
+    let format = format_of(out)?;
     if Path::new(&source.mesh).is_dir() && (ranks.is_some() || *ungraded) {
         let why =
             "--ranks and --ungraded are for a case: a mesh on disk has its ranks and its tree";
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         zoom: arguments.zoom,
     };
     let picture = Picture::collect(&mesh, &request)?;
-    write(out, &format.bytes(&picture.svg()).map_err(io::Error::other)?)?;
+    write(out, &format(&picture.svg()).map_err(io::Error::other)?)?;
     println!("{}\n{}", picture.title(), out.display());
     if case.is_none() {
         println!("the geometry is not drawn: name its case with --case");

@@ -23,7 +23,7 @@ use contract::failure::Failure;
 use contract::watch::Watch;
 use ends::Target;
 use report::{Answers, Closes, Report, SCHEMA, Spacing};
-use space::{Goal, Space};
+use space::Space;
 
 /// The ends of a path on the lattice; the second is `None` for the far field.
 type Ends = (Point, Option<Point>);
@@ -87,9 +87,9 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
             let open = report.closes.map_or(0, |closes| closes.spacing.level + 1);
             let measured = level.min(open + DEEPER);
             self.watch.step("measuring the width");
-            let stop = || self.watch.is_interrupted();
             let tree = (measured, &self.trees[&measured][..]);
-            report.passage = Some(passage::widest((self.case, &self.facets), tree, ends, &stop)?);
+            report.passage =
+                Some(passage::widest((self.case, &self.facets), tree, ends, self.watch)?);
             report.check_invariants(self.case, &self.trees[&measured]);
         }
         Ok(report)
@@ -113,13 +113,11 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     }
 
     /// Whether free leaves of a base tree join the ends, which lie in some. The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, (from, to): Ends) -> Result<bool, Failure> {
+    fn search(&self, level: u8, ends: Ends) -> Result<bool, Failure> {
         self.watch.step(&format!("searching the base tree of level {level}"));
         let mut space = Space::new(&self.trees[&level], &self.facets)?;
-        let stop = || self.watch.is_interrupted();
-        let (start, goal) = (space.locate(from), to.map_or(Goal::Far, Goal::At));
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
-        Ok(space.widest(start, goal, f32::INFINITY, edge, &stop)?.is_some())
+        Ok(space.widest(ends, f32::INFINITY, edge, self.watch)?.is_some())
     }
 
     /// Coarsens the surface until the ends are not joined.

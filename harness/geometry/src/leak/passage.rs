@@ -11,13 +11,15 @@
 //! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
 //! the width counts from there.
 
+use super::Ends;
 use super::ends::to_user;
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
-use super::space::{Goal, Space};
+use super::space::Space;
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
+use contract::watch::Watch;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
 
@@ -69,29 +71,27 @@ fn passing(from: &Place, to: &Place) -> f64 {
 struct Search<'a> {
     facets: &'a FacetTree,
     space: Space<'a>,
-    from: Point,
-    /// `None` for the far field.
-    to: Option<Point>,
+    ends: Ends,
     /// Number of searches so far.
     searches: usize,
-    stop: &'a dyn Fn() -> bool,
+    watch: &'a dyn Watch,
 }
 
 /// The widest path between two points, or to the far field, which free leaves of the base tree of this level join.
 ///
 /// # Errors
-/// If `stop` returns true.
+/// If `watch` is interrupted.
 pub fn widest(
     (case, facets): (&Case, &FacetTree),
     (level, words): (u8, &[u64]),
-    (from, to): (Point, Option<Point>),
-    stop: &dyn Fn() -> bool,
+    (from, to): Ends,
+    watch: &dyn Watch,
 ) -> Result<Passage, Failure> {
     let space = Space::new(words, facets).expect("the tree was searched before");
     let before = approach(&space, from);
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
-    let (from, to) = (before[before.len() - 1], after.last().copied());
-    let mut search = Search { facets, space, from, to, searches: 0, stop };
+    let ends = (before[before.len() - 1], after.last().copied());
+    let mut search = Search { facets, space, ends, searches: 0, watch };
     let leaf = UNITS_PER_EDGE as f64 / f64::from(1u32 << level);
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
@@ -137,11 +137,9 @@ fn is_in_root(at: Point) -> bool {
 impl Search<'_> {
     /// The widest path.
     fn converge(&mut self) -> Result<Way, Failure> {
-        let goal = self.to.map_or(Goal::Far, Goal::At);
         let mut cap = f32::INFINITY;
         loop {
-            let first = self.space.locate(self.from);
-            let found = self.space.widest(first, goal, cap, Space::radius, self.stop)?;
+            let found = self.space.widest(self.ends, cap, Space::radius, self.watch)?;
             let (cells, width) = found.expect("free leaves join the ends");
             if width < cap {
                 // The shortest of the paths that are as wide is searched next.
@@ -159,14 +157,14 @@ impl Search<'_> {
     /// The points of a path through cells.
     fn points(&self, cells: &[u32]) -> Vec<Place> {
         let centre = |cell: u32| self.space.cells[cell as usize].centre();
-        let mut points = vec![(self.from, cells[0])];
+        let mut points = vec![(self.ends.0, cells[0])];
         for (i, &cell) in cells.iter().enumerate() {
             points.push((centre(cell), cell));
             let next = cells.get(i + 1);
             points.extend(next.map(|&next| (self.space.between(cell, next), next)));
         }
         let end = cells[cells.len() - 1];
-        points.push((self.to.unwrap_or_else(|| at_boundary(centre(end))), end));
+        points.push((self.ends.1.unwrap_or_else(|| at_boundary(centre(end))), end));
         points.dedup_by_key(|(at, _)| *at);
         let place = |(at, cell)| Place { at, clearance: self.facets.distance(at), cell };
         points.into_iter().map(place).collect()

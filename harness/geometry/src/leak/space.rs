@@ -6,10 +6,12 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use super::Ends;
 use crate::tree::{FacetTree, Point};
 use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
+use contract::watch::Watch;
 use contract::word::{self, KEY_END, Side};
 
 /// A cell; lengths are in lattice units.
@@ -52,15 +54,6 @@ pub struct Space<'a> {
     order: BTreeMap<u128, u32>,
     /// The facets of the case.
     pub facets: &'a FacetTree,
-}
-
-/// The end of a path.
-#[derive(Clone, Copy, Debug)]
-pub enum Goal {
-    /// The cell that contains a point.
-    At(Point),
-    /// Any cell at the root's boundary.
-    Far,
 }
 
 impl<'a> Space<'a> {
@@ -172,23 +165,19 @@ impl<'a> Space<'a> {
         (self.clearance(cell) + self.cells[cell as usize].half_diagonal()) * (1.0 + 1e-6)
     }
 
-    /// The path between open cells whose least width is greatest, widths above `cap` being equal, and this width. Of paths that are
+    /// The path between the cells of two ends, through open ones, whose least width is greatest, widths above `cap` being equal, and this width. Of paths that are
     /// wider than `cap` throughout, it is a short one that keeps away from facets. `None` if no path exists.
     ///
     /// # Errors
-    /// If `stop` returns true.
+    /// If `watch` is interrupted.
     pub fn widest(
         &mut self,
-        start: u32,
-        goal: Goal,
+        (from, to): Ends,
         cap: f32,
         width: fn(&mut Self, u32) -> f64,
-        stop: &dyn Fn() -> bool,
+        watch: &dyn Watch,
     ) -> Result<Option<(Vec<u32>, f32)>, Failure> {
-        let end = match goal {
-            Goal::At(at) => Some(self.locate(at)),
-            Goal::Far => None,
-        };
+        let (start, end) = (self.locate(from), to.map(|to| self.locate(to)));
         let mut via = vec![start; self.cells.len()];
         let mut labels = vec![(-1f32, f32::INFINITY); self.cells.len()];
         let mut queue = BinaryHeap::new();
@@ -211,7 +200,7 @@ impl<'a> Space<'a> {
                 path.reverse();
                 return Ok(Some((path, label.0)));
             }
-            if stop() {
+            if watch.is_interrupted() {
                 return Err(Failure::interrupted());
             }
             joined.clear();

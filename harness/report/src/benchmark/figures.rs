@@ -8,6 +8,7 @@ use bench::experiments::group::{Group, Groups};
 use bench::order::{by_key, distinct};
 use contract::paper::number;
 use statistics::Median;
+use std::collections::BTreeSet;
 
 /// All figures for which the record has runs.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
@@ -33,27 +34,48 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     all
 }
 
-/// The paper's runs of which the text states cells, ranks and time, by a value of them, and a sentence on them.
-fn paper(value: impl Fn(f64, f64, f64) -> f64) -> (Series, String) {
-    let run =
-        |cells: &str, ranks: f64, time_s: f64| (number(cells), value(number(cells), ranks, time_s));
-    let [ranks, most] = ["second_ranks", "largest_ranks"].map(number);
-    let runs = [
-        run("serial_cells", 1.0, 60.0 * number("serial_min")),
-        run("second_cells", ranks, 60.0 * number("second_min")),
-        run("serial_cells", number("parallel_ranks"), number("parallel_s")),
-        run("largest_cells", most, 60.0 * number("largest_min")),
-    ];
-    let text = format!(
-        " The points of the paper are from its text (sections IV.B and V), not from its figures: around another UAV, on Intel X5355 CPUs; of n, nothing is \
-         stated. The time on {ranks} ranks is a lower bound, that on {most} an upper bound."
-    );
-    let name = format!("the paper: 1, {ranks}, {} and {most} ranks", number("parallel_ranks"));
-    (cited(&name, runs), text)
+/// The figure with a sentence on the paper, if it is of the counterpart of the paper's case; and with the runs of which the paper's text
+/// states cells, ranks and time, if a value of them is given.
+fn with_paper(figure: Figure, subject: &Subject, sentence: &str, value: Option<Value>) -> Figure {
+    if !is_counterpart(subject.case) {
+        return figure;
+    }
+    let (mut series, mut caption) = (figure.series, figure.caption + sentence);
+    if let Some(value) = value {
+        let run = |cells: &str, ranks: f64, time_s: f64| {
+            (number(cells), value(number(cells), ranks, time_s))
+        };
+        let [second, parallel, most] =
+            ["second_ranks", "parallel_ranks", "largest_ranks"].map(number);
+        let runs = [
+            run("serial_cells", 1.0, 60.0 * number("serial_min")),
+            run("second_cells", second, 60.0 * number("second_min")),
+            run("serial_cells", parallel, number("parallel_s")),
+            run("largest_cells", most, 60.0 * number("largest_min")),
+        ];
+        let name = format!("the paper: 1, {second}, {parallel} and {most} ranks");
+        series.push(cited(&name, runs));
+        caption += &format!(
+            " The points of the paper are from its text (sections IV.B and V), not from its figures: around another UAV, on Intel X5355 CPUs; of n, nothing is \
+             stated. The time on {second} ranks is a lower bound, that on {most} an upper bound."
+        );
+    }
+    Figure { series, caption, ..figure }
 }
 
-fn over_cells([id, title]: [String; 2], caption: String, y: &str, series: Vec<Series>) -> Figure {
-    Figure::new(id, title, caption, [Axis::log("cells"), Axis::log(y)], series)
+/// A value of cells, ranks and time in seconds.
+type Value = fn(f64, f64, f64) -> f64;
+
+/// A value of all groups over their cells. The names are those of its file, of its title and of the vertical axis.
+fn over_cells(
+    subject: &Subject,
+    all: &[&Group],
+    [id, title, y]: [&str; 3],
+    caption: String,
+    value: impl Fn(&Group) -> Median,
+) -> Figure {
+    let (id, title) = (format!("{id}-{}", subject.file()), format!("{title}: {}", subject.mesh()));
+    Figure::new(id, title, caption, [Axis::log("cells"), Axis::log(y)], series(all, value))
 }
 
 /// A value of every group over its cells: a series per program, number and kind of ranks. Programs stay in the order of the record.
@@ -82,70 +104,55 @@ fn engines(groups: &[&Group]) -> String {
 
 /// The counterpart of the paper's Figure 17.
 fn by_spacing(subject: &Subject, all: &[&Group]) -> Figure {
-    let case = subject.mesh();
-    let mut caption = format!(
-        "Run time of {} over the number of cells of {case} at n = {}. The spacing is halved from point to point; lines join meshes of one \
+    let caption = format!(
+        "Run time of {} over the number of cells of {} at n = {}. The spacing is halved from point to point; lines join meshes of one \
          family of spacings. {}",
         engines(all),
+        subject.mesh(),
         all[0].setup.layer_cells_min,
         repetitions(all)
     );
-    let mut series = series(all, |group| group.time_s);
-    if is_counterpart(subject.case) {
-        let (points, text) = paper(|_, _, time_s| time_s);
-        series.push(points);
-        caption += &format!(" The paper's Figure 17, which is linear, is the counterpart.{text}");
-    }
-    let id = format!("time-over-cells-{}", subject.file());
-    let title = format!("Run time over cells, by spacing: {case}");
-    over_cells([id, title], caption, "run time / s", series)
+    let names = ["time-over-cells", "Run time over cells, by spacing", "run time / s"];
+    let figure = over_cells(subject, all, names, caption, |group| group.time_s);
+    let sentence = " The paper's Figure 17, which is linear, is the counterpart.";
+    with_paper(figure, subject, sentence, Some(|_, _, time_s| time_s))
 }
 
 /// Rate and memory of meshes of several sizes or programs.
 fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
     let (case, engines, repetitions) = (subject.mesh(), engines(all), repetitions(all));
     let of = format!("of {engines} over the number of cells of {case}. {repetitions}");
-    let rate = |cells: f64, ranks: f64, time_s: f64| cells / time_s / ranks / 1e6;
-    let mut rates = series(all, |g| {
+    let rate: Value = |cells, ranks, time_s| cells / time_s / ranks / 1e6;
+    let rates = |g: &Group| {
         let (cells, ranks) = (g.cells() as f64, g.setup.ranks as f64);
         g.time_s.falling(|time_s| rate(cells, ranks, time_s))
-    });
-    let mut of_rates = format!("Cells per second and core {of} Rates are cells over median times.");
-    if is_counterpart(subject.case) {
-        let (points, text) = paper(rate);
-        rates.push(points);
-        of_rates += &text;
-    }
+    };
+    let of_rates = format!("Cells per second and core {of} Rates are cells over median times.");
     let of_memory = format!("Peak resident memory of all ranks, program and facets included, {of}");
-    let memory = series(all, Group::bytes_per_cell);
-    let names =
-        |id: &str, title: &str| [format!("{id}-{}", subject.file()), format!("{title}: {case}")];
-    let of_rate = names("rate", "Cells per second and core");
-    let of_peak = names("memory", "Peak memory per cell");
+    let names = ["rate", "Cells per second and core", "million cells / (s core)"];
+    let figure = over_cells(subject, all, names, of_rates, rates);
+    let names = ["memory", "Peak memory per cell", "bytes per cell"];
     [
-        over_cells(of_rate, of_rates, "million cells / (s core)", rates),
-        over_cells(of_peak, of_memory, "bytes per cell", memory),
+        with_paper(figure, subject, "", Some(rate)),
+        over_cells(subject, all, names, of_memory, Group::bytes_per_cell),
     ]
 }
 
 /// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: it has no number of ranks.
 fn by_layers(subject: &Subject, all: &[&Group]) -> Figure {
-    let case = subject.mesh();
-    let mut layers: Vec<u32> = all.iter().map(|g| g.setup.layer_cells_min).collect();
-    layers.sort_unstable();
-    let layers = distinct(layers).into_iter().map(|n| n.to_string());
-    let mut caption = format!(
-        "Run time of {} over the number of cells of {case} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to right; \
+    let layers: BTreeSet<u32> = all.iter().map(|g| g.setup.layer_cells_min).collect();
+    let layers: Vec<String> = layers.iter().map(u32::to_string).collect();
+    let caption = format!(
+        "Run time of {} over the number of cells of {} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to right; \
          lines join consecutive values of n. {}",
         engines(all),
+        subject.mesh(),
         all[0].setup.spacing_min,
-        layers.collect::<Vec<_>>().join(", "),
+        layers.join(", "),
         repetitions(all)
     );
-    if is_counterpart(subject.case) {
-        caption += " The paper's Figure 18, which \"does not scale linearly\", is the counterpart.";
-    }
-    let id = format!("time-over-layers-{}", subject.file());
-    let title = format!("Run time over cells, by layer thickness: {case}");
-    over_cells([id, title], caption, "run time / s", series(all, |group| group.time_s))
+    let names = ["time-over-layers", "Run time over cells, by layer thickness", "run time / s"];
+    let figure = over_cells(subject, all, names, caption, |group| group.time_s);
+    let sentence = " The paper's Figure 18, which \"does not scale linearly\", is the counterpart.";
+    with_paper(figure, subject, sentence, None)
 }

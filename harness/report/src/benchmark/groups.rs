@@ -1,6 +1,6 @@
 //! Groups of runs in the form that figures and tables need: by case, as points, with provenance and labels.
 
-use crate::figure::{Point, Provenance, Series};
+use crate::figure::{Kind, Point, Provenance, Series};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
@@ -136,5 +136,5 @@ pub fn is_counterpart(case: &str) -> bool {
 /// Values of the paper, which are not joined.
 pub fn cited(name: &str, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
     let points = points.into_iter().map(|(x, y)| Point::exact(x, y)).collect();
-    Series::new(name, Provenance::Cited, 5, points).not_joined()
+    Series::new(name, Provenance::Cited, 5, points).drawn_as(Kind::Scattered)
 }

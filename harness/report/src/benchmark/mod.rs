@@ -7,7 +7,7 @@ mod page;
 mod scaling;
 pub mod tables;
 
-use crate::figure::format::Format;
+use crate::figure::format::FORMATS;
 use crate::figure::{Figure, check_invariants, file_name, latex, name_apart, svg};
 use bench::experiments::entry::Line;
 use bench::experiments::group::Groups;
@@ -62,8 +62,8 @@ fn write_figure<'a>(directory: &Path, figure: &'a Figure) -> io::Result<(&'a Fig
     let path = |extension: &str| directory.join(format!("{}.{extension}", figure.id));
     write(&path("csv"), latex::csv(figure))?;
     write(&path("tex"), latex::tex(figure))?;
-    for (extension, format) in Format::ALL {
-        write(&path(extension), format.bytes(&svg).map_err(io::Error::other)?)?;
+    for (extension, format) in FORMATS {
+        write(&path(extension), format(&svg).map_err(io::Error::other)?)?;
     }
     Ok((figure, svg))
 }

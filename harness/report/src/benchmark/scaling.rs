@@ -4,7 +4,7 @@ use super::groups::{
     Subject, by_subject, cells_label, cited, is_counterpart, point, provenance, range, rank_times,
     repetitions,
 };
-use crate::figure::{Axis, Bars, Figure, Mark, Point, Provenance, Series};
+use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
@@ -179,7 +179,7 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
     let mean = run.useful_s.sum / ranks as f64;
     let mean = [0.0, last].map(|rank| Point::exact(rank, mean)).to_vec();
     let series = vec![
-        Series::new("useful time", Provenance::Projected, 0, points).not_joined(),
+        Series::new("useful time", Provenance::Projected, 0, points).drawn_as(Kind::Scattered),
         Series::new(&format!("mean; λ = {lambda:.2}"), Provenance::Bound, 0, mean),
     ];
     let margin = 0.02 * last;
@@ -215,15 +215,17 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
     let mut names: Vec<&str> = last.typical.phases.iter().map(|p| p.name.as_str()).collect();
     let time_max = |name: &str| simulated.iter().map(|g| time(g, name)).fold(0.0, f64::max);
     names.sort_by(|a, b| time_max(b).total_cmp(&time_max(a)));
-    let segment = |label: &str, names: &[&str]| {
-        let value = |g: &&Group| {
+    let segment = |(style, (label, names)): (usize, (&str, &[&str]))| {
+        let length = |g: &&Group| {
             let sum: f64 = names.iter().map(|name| time(g, name)).sum();
             if is_weak { sum / (g.cells() as f64 / 1e6) } else { sum }
         };
-        (format!("{}: {label}", subject.engine), simulated.iter().map(value).collect())
+        let name = format!("{}: {label}", subject.engine);
+        bars(&name, Provenance::Projected, style, simulated.iter().map(length))
     };
     let (shown, rest) = names.split_at(names.len().min(PHASES_SHOWN));
-    let others = (!rest.is_empty()).then(|| segment("others", rest));
+    let others = (!rest.is_empty()).then_some(("others", rest));
+    let labelled = shown.iter().map(|name| (*name, std::slice::from_ref(name))).chain(others);
     let unit = if is_weak { "rank seconds per million cells" } else { "rank seconds" };
     let caption = format!(
         "Critical path of each phase times the number of ranks, in {unit}, in {experiment} scaling of {subject} ({} cells on {} ranks), projected from \
@@ -232,15 +234,17 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
         last.setup.ranks,
         rank_times(simulated)
     );
-    let bars = Bars {
-        names: simulated.iter().map(|g| g.setup.ranks.to_string()).collect(),
-        segments: shown.iter().map(|name| segment(name, &[name])).chain(others).collect(),
-        provenance: Provenance::Projected,
-    };
     let title = format!("Time by phase in {experiment} scaling: {subject}");
-    let axes = [Axis::linear(unit), Axis::linear("ranks")];
-    let figure = Figure::new(format!("phases-{experiment}-{file}"), title, caption, axes, vec![]);
-    Some(Figure { bars: Some(bars), ..figure })
+    let names = simulated.iter().map(|g| g.setup.ranks.to_string()).collect();
+    let axes = [Axis::linear(unit), Axis { names, ..Axis::linear("ranks") }];
+    let series = labelled.enumerate().map(segment).collect();
+    Some(Figure::new(format!("phases-{experiment}-{file}"), title, caption, axes, series))
+}
+
+/// Segments of bars with these lengths, from top to bottom.
+fn bars(name: &str, how: Provenance, style: usize, lengths: impl Iterator<Item = f64>) -> Series {
+    let points = lengths.enumerate().map(|(i, length)| Point::exact(length, i as f64)).collect();
+    Series::new(name, how, style, points).drawn_as(Kind::Bars)
 }
 
 /// Load imbalance of cells of one mesh for weights and partitioners; `None` if some run did not count them.
@@ -248,12 +252,16 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let (cells, ranks) = (of[0].cells(), of[0].setup.ranks);
     let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
-    let mut marks = vec![Mark { name: "target, 1.10".to_owned(), x: 1.1, style: 1 }];
+    let ends = (-0.5, of.len() as f64 - 0.5);
+    let name = format!("{}: cells", subject.engine);
+    let mut series = vec![
+        bars(&name, Provenance::Measured, 0, lambdas.into_iter()),
+        Series::vertical("target, 1.10", 1, 1.1, ends),
+    ];
     // A base leaf is never divided, so no partition beats a rank that has only the largest one.
     let largest = of.iter().filter_map(|g| heaviest_base_leaf(&g.typical)).reduce(f64::min);
     let bound = largest.map(|fraction| (fraction * ranks as f64).max(1.0));
-    let mark = |x| Mark { name: format!("lower bound, {x:.2}"), x, style: 6 };
-    marks.extend(bound.map(mark));
+    series.extend(bound.map(|x| Series::vertical(&format!("lower bound, {x:.2}"), 6, x, ends)));
     let baseline = match of.iter().any(|g| g.setup.partitioner == "paper") {
         true => {
             "The baseline is the paper's partition (paper) in the root of this case, which is ours; other depths are automatic."
@@ -265,16 +273,12 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
          tree and the weights of its leaves. {baseline} The counts repeat exactly."
     );
-    let bars = Bars {
-        names: of.iter().map(|g| g.setup.division()).collect(),
-        segments: vec![(format!("{}: cells", subject.engine), lambdas)],
-        provenance: Provenance::Measured,
-    };
     let id = format!("balance-{}-{millions:.0}M-{ranks}", subject.file());
     let title = format!(
         "Load imbalance of cells by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
     );
-    let axes = [Axis::linear("λ = max/mean over ranks"), Axis::linear("partitioner and weights")];
-    let figure = Figure::new(id, title, caption, axes, vec![]);
-    Some(Figure { bars: Some(bars), marks, ..figure })
+    let names = of.iter().map(|g| g.setup.division()).collect();
+    let y = Axis { names, ..Axis::linear("partitioner and weights") };
+    let axes = [Axis::linear("λ = max/mean over ranks"), y];
+    Some(Figure::new(id, title, caption, axes, series))
 }

@@ -12,30 +12,47 @@ const BESIDE_TICKS: f64 = 100.0;
 /// Space below the data, for ticks and label.
 pub const BELOW: f64 = 140.0;
 
+/// Greatest number of names that have labels.
+const NAMES_SHOWN: usize = 12;
 /// The digits as exponents.
 pub const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// An axis with its ends, and its ticks with their labels.
 pub struct Scale {
+    pub log: bool,
     pub ends: Range<f64>,
     pub ticks: Vec<f64>,
     pub labels: Vec<String>,
 }
 
 impl Scale {
-    /// That of an axis which shows all `values`.
+    /// That of an axis which shows all `values`, or of names, of which some have labels if they are many.
     pub fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Self {
+        if !axis.names.is_empty() {
+            let every = axis.names.len().div_ceil(NAMES_SHOWN);
+            let named = (0..).zip(&axis.names).step_by(every);
+            let (ticks, labels) = named.map(|(i, name)| (f64::from(i), name.clone())).unzip();
+            return Self { log: false, ends: axis.names.len() as f64 - 0.5..-0.5, ticks, labels };
+        }
         let ends = range(axis, values);
         let ticks = ticks(axis, &ends);
-        Self { labels: tick_labels(&ticks), ends, ticks }
+        Self { log: axis.log, labels: tick_labels(&ticks), ends, ticks }
     }
 
-    /// That of categories, from top to bottom, as many of which have labels as there are lines.
-    pub fn of_names(names: &[String], lines: usize) -> Self {
-        let every = names.len().div_ceil(lines).max(1);
-        let (ticks, labels) =
-            (0..).zip(names).step_by(every).map(|(i, name)| (f64::from(i), name.clone())).unzip();
-        Self { ends: names.len() as f64 - 0.5..-0.5, ticks, labels }
+    /// The place of a value, which is linear on the page.
+    pub fn place(&self, value: f64) -> f64 {
+        if self.log { value.log10() } else { value }
+    }
+
+    /// The places of the ends.
+    pub fn places(&self) -> Range<f64> {
+        self.place(self.ends.start)..self.place(self.ends.end)
+    }
+
+    /// The label of the tick at a place.
+    pub fn label(&self, place: f64) -> String {
+        let index = self.ticks.iter().position(|tick| self.place(*tick) == place);
+        index.map_or_else(String::new, |index| self.labels[index].clone())
     }
 
     /// Space at the left of data, if this is the vertical axis.
@@ -43,11 +60,12 @@ impl Scale {
         self.labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
     }
 
-    /// Clears the labels that have no room beside others, if this is the horizontal axis, whose values are at these places on the page.
-    pub fn clear_labels(&mut self, place: impl Fn(f64) -> f64) {
+    /// Clears the labels that have no room beside others, if this is the horizontal axis, whose places are these on the page.
+    pub fn clear_labels(&mut self, on_page: impl Fn(f64) -> f64) {
         let mut taken = 0.0;
-        for (tick, label) in self.ticks.iter().zip(&mut self.labels) {
-            let (middle, half) = (place(*tick), width(label) / 2.0);
+        for i in 0..self.ticks.len() {
+            let (middle, label) = (on_page(self.place(self.ticks[i])), &mut self.labels[i]);
+            let half = width(label) / 2.0;
             if middle - half < taken || middle + half > WIDTH {
                 label.clear();
             } else {

@@ -2,57 +2,31 @@
 
 use std::path::Path;
 
-/// A format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Scalable vector graphics.
-    Svg,
-    /// On white, with one pixel per unit of the SVG's coordinates.
-    Png,
-    /// Text remains text.
-    Pdf,
-}
+/// Makes a file of a format from an SVG document; fails if it is none.
+pub type Format = fn(&str) -> Result<Vec<u8>, String>;
 
-impl Format {
-    /// The formats that were compiled, with the ends of their files' names.
-    pub const ALL: &[(&str, Self)] = &[
-        ("svg", Self::Svg),
-        #[cfg(feature = "figures")]
-        ("png", Self::Png),
-        #[cfg(feature = "figures")]
-        ("pdf", Self::Pdf),
-    ];
+/// The formats that were compiled, with the ends of their files' names: scalable vector graphics; an image on white, with one pixel per unit
+/// of the SVG's coordinates; a page whose text remains text.
+pub const FORMATS: &[(&str, Format)] = &[
+    ("svg", |svg| Ok(svg.into())),
+    #[cfg(feature = "figures")]
+    ("png", rendered::png),
+    #[cfg(feature = "figures")]
+    ("pdf", rendered::pdf),
+];
 
-    /// The format that a file name states.
-    ///
-    /// # Errors
-    /// One sentence, if it states none that was compiled.
-    pub fn of(path: &Path) -> Result<Self, String> {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        let extension = extension.to_ascii_lowercase();
-        let known = Self::ALL.iter().find(|(name, _)| *name == extension);
-        let why = match cfg!(feature = "figures") {
-            true => "the file name of a picture must end in .svg, .png or .pdf",
-            false => "a harness without the feature figures draws .svg only",
-        };
-        known.map(|(_, format)| *format).ok_or_else(|| format!("{}: {why}", path.display()))
-    }
-
-    /// The drawing in this format.
-    ///
-    /// # Errors
-    /// If `svg` is not an SVG document.
-    pub fn bytes(self, svg: &str) -> Result<Vec<u8>, String> {
-        match self {
-            Self::Svg => Ok(svg.as_bytes().to_vec()),
-            #[cfg(feature = "figures")]
-            Self::Png => rendered::png(svg),
-            #[cfg(feature = "figures")]
-            Self::Pdf => rendered::pdf(svg),
-            #[cfg(not(feature = "figures"))]
-            Self::Png | Self::Pdf => unreachable!("a format that was not compiled"),
-        }
-    }
+/// The format that a file name states.
+///
+/// # Errors
+/// One sentence, if it states none that was compiled.
+pub fn format_of(path: &Path) -> Result<Format, String> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let known = FORMATS.iter().find(|(name, _)| extension.eq_ignore_ascii_case(name));
+    let why = match cfg!(feature = "figures") {
+        true => "the file name of a picture must end in .svg, .png or .pdf",
+        false => "a harness without the feature figures draws .svg only",
+    };
+    known.map(|(_, format)| *format).ok_or_else(|| format!("{}: {why}", path.display()))
 }
 
 #[cfg(feature = "figures")]

@@ -3,7 +3,7 @@
 use super::axes::{SUPERSCRIPTS, Scale};
 use super::canvas::COLOURS;
 use super::svg::MARKERS;
-use super::{Axis, Bars, Figure, Point, Provenance, Series};
+use super::{Axis, Figure, Kind, Point, Provenance, Series};
 use std::fmt::Write;
 
 /// What a document needs before it can include figures.
@@ -19,54 +19,39 @@ const MARKS: [(&str, &str); MARKERS.len()] = [
     ("pentagon*", "pentagon"),
 ];
 
-/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes. Rows of one series have the same
-/// number `plot`, and so have those of one segment of bars. Numbers come first and text has no commas, so that `pgfplots` can read it.
-pub fn csv(figure: &Figure) -> String {
-    let head = format!("# {}\n# x: {}; y: {}\n", figure.title, figure.x.label, figure.y.label);
-    if let Some(bars) = &figure.bars {
-        return head + &bars_csv(figure, bars);
-    }
-    let columns = ["plot", "x", "y", "low", "high", "series", "how"];
-    let point = |plot: usize, s: &Series, p: &Point| {
-        let numbers = [plot as f64, p.x, p.y, p.low, p.high];
-        let numbers = numbers.iter().map(f64::to_string);
-        numbers.chain([plain(&s.name), s.provenance.word().to_owned()]).collect()
-    };
-    let series = figure.series.iter().enumerate();
-    let rows = series.flat_map(|(plot, s)| s.points.iter().map(move |p| point(plot, s, p)));
-    head + &table(&columns, rows)
-}
+/// The intervals of points.
+const ERRORS: &str = ", y error plus expr=\\thisrow{high}-\\thisrow{y}, y error minus expr=\\thisrow{y}-\\thisrow{low}";
 
-/// The segments of every bar, and the vertical lines between them.
-fn bars_csv(figure: &Figure, bars: &Bars) -> String {
-    let row = |plot: usize, at: [f64; 2], text: [&str; 3]| {
-        let numbers = [plot as f64, at[0], at[1]].map(|number| number.to_string());
-        numbers.into_iter().chain(text.map(plain)).collect()
+/// The values as CSV, one per line. Comments at the head, starting with `#`, name the title and the axes. Rows of one series have the same
+/// number `plot`. Numbers come first and text has no commas, so that `pgfplots` can read it.
+pub fn csv(figure: &Figure) -> String {
+    let Figure { title, x, y, series, .. } = figure;
+    let columns = match y.names.is_empty() {
+        true => "plot,x,y,low,high,series,how",
+        false => "plot,x,y,bar,part,how",
     };
-    let mut rows = Vec::new();
-    for (plot, (part, values)) in bars.segments.iter().enumerate() {
-        for (i, name) in bars.names.iter().enumerate() {
-            let text = [name, part, bars.provenance.word()];
-            rows.push(row(plot, [values[i], i as f64], text));
-        }
-    }
-    for (plot, mark) in (bars.segments.len()..).zip(&figure.marks) {
-        let ends = [-0.5, bars.names.len() as f64 - 0.5];
-        rows.extend(ends.map(|y| row(plot, [mark.x, y], ["", &mark.name, "bound"])));
-    }
-    table(&["plot", "x", "y", "bar", "part", "how"], rows)
+    let row = |plot: usize, s: &Series, p: &Point| {
+        let between = match y.names.is_empty() {
+            true => format!("{},{}", p.low, p.high),
+            // A line begins and ends beside the bars.
+            false => y
+                .names
+                .get(p.y as usize)
+                .filter(|_| s.kind == Kind::Bars)
+                .map_or("".into(), |n| plain(n)),
+        };
+        let (name, how) = (plain(&s.name), s.provenance.word());
+        format!("{plot},{},{},{between},{name},{how}\n", p.x, p.y)
+    };
+    let series = series.iter().enumerate();
+    let rows = series.flat_map(|(plot, s)| s.points.iter().map(move |p| row(plot, s, p)));
+    format!("# {title}\n# x: {}; y: {}\n{columns}\n{}", x.label, y.label, rows.collect::<String>())
 }
 
 /// A name without what ends a field or means something to TeX.
 fn plain(text: &str) -> String {
     text.replace(", ", "; ")
         .replace([',', '"', '%', '#', '\\', '{', '}', '$', '&', '~', '^', '\n', '\r'], " ")
-}
-
-/// A CSV table with its head. No field has to be quoted.
-fn table(columns: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let lines = rows.into_iter().map(|row| row.join(",") + "\n");
-    format!("{}\n{}", columns.join(","), lines.collect::<String>())
 }
 
 /// The figure as a `tikzpicture`. `\figures` is the directory of its other files.
@@ -79,9 +64,9 @@ pub fn tex(figure: &Figure) -> String {
         let _ = writeln!(out, "\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}");
     }
     let [x, y] = figure.scales();
-    let kind = match figure.bars {
-        Some(_) => "xbar stacked, bar width=8pt, ",
-        None => "",
+    let (kind, errors) = match figure.y.names.is_empty() {
+        true => ("", ERRORS),
+        false => ("xbar stacked, bar width=8pt, ", ""),
     };
     let _ = writeln!(
         out,
@@ -90,45 +75,22 @@ pub fn tex(figure: &Figure) -> String {
         axis_options("x", &figure.x, &x),
         axis_options("y", &figure.y, &y)
     );
-    for (plot, (name, _)) in figure.bars.iter().flat_map(|bars| &bars.segments).enumerate() {
-        let style = plot % COLOURS.len();
-        let tint = if plot % 2 == 1 { "!35" } else { "" };
-        let _ = writeln!(
-            out,
-            "\\addplot+[fill=style{style}{tint}, draw=style{style}] table[{}, x=x, y=y] {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
-            rows(plot),
-            figure.id,
-            escape(name)
-        );
-    }
-    for mark in &figure.marks {
-        let (style, x) = (mark.style % COLOURS.len(), mark.x);
-        let _ = writeln!(
-            out,
-            "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
-             \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{}}}",
-            escape(&mark.name)
-        );
-    }
     for (plot, s) in figure.series.iter().enumerate() {
-        let (style, (filled, hollow)) = (s.style % COLOURS.len(), MARKS[s.style % MARKS.len()]);
-        let (line, mark) = match s.provenance {
-            Provenance::Measured => ("solid", filled),
-            _ => ("dashed", hollow),
-        };
-        let line = if s.joined { line } else { "only marks" };
-        let options = match s.provenance {
-            Provenance::Bound => "black, densely dotted, no marks".to_owned(),
-            _ => format!(
-                "style{style}, {line}, mark={mark}, error bars/.cd, y dir=both, y explicit, error bar style={{solid}}"
-            ),
-        };
+        if s.kind == Kind::Line {
+            let (style, x) = (s.style % COLOURS.len(), s.points[0].x);
+            let _ = writeln!(
+                out,
+                "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
+                 \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{}}}",
+                escape(&s.name)
+            );
+            continue;
+        }
         let _ = writeln!(
             out,
-            "\\addplot[{options}] table[{}, x=x, y=y, \
-             y error plus expr=\\thisrow{{high}}-\\thisrow{{y}}, y error minus expr=\\thisrow{{y}}-\\thisrow{{low}}] \
-             {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
-            rows(plot),
+            "\\addplot[{}] table[col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, \
+             x=x, y=y{errors}] {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
+            plot_options(s),
             figure.id,
             escape(&s.name)
         );
@@ -136,11 +98,24 @@ pub fn tex(figure: &Figure) -> String {
     out + "\\end{axis}\n\\end{tikzpicture}\n"
 }
 
-/// The rows of a plot in the CSV file.
-fn rows(plot: usize) -> String {
-    format!(
-        "col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}"
-    )
+/// Colour, line and markers of a plot.
+fn plot_options(s: &Series) -> String {
+    let (style, (filled, hollow)) = (s.style % COLOURS.len(), MARKS[s.style % MARKS.len()]);
+    let (line, mark) = match s.provenance {
+        Provenance::Measured => ("solid", filled),
+        _ => ("dashed", hollow),
+    };
+    let line = if s.kind == Kind::Scattered { "only marks" } else { line };
+    match (s.kind, s.provenance) {
+        (Kind::Bars, _) => {
+            let tint = if s.style % 2 == 1 { "!35" } else { "" };
+            format!("fill=style{style}{tint}, draw=style{style}")
+        }
+        (_, Provenance::Bound) => "black, densely dotted, no marks".to_owned(),
+        _ => format!(
+            "style{style}, {line}, mark={mark}, error bars/.cd, y dir=both, y explicit, error bar style={{solid}}"
+        ),
+    }
 }
 
 /// Label, kind, ends and ticks of an axis. Names of bars are from top to bottom.

@@ -1,4 +1,4 @@
-//! The model of a figure: axes, series of points, stacked bars or cells of a map, vertical lines. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
+//! The model of a figure: axes, series of points, of lines and of stacked bars, or cells of a map. SVG ([`svg`], by `plotters`) is drawn from it, PNG and PDF from the SVG
 //! ([`format`](mod@format)), and for LaTeX the values as CSV and an axis of `pgfplots` that reads them ([`latex`]).
 //!
 //! Points are joined only where interpolation between them is meaningful; captions state the confidence intervals. The rest of the invariants is asserted before
@@ -34,6 +34,8 @@ pub struct Axis {
     pub ticks: Vec<f64>,
     /// Lower and upper end; chosen from the data if absent.
     pub range: Option<(f64, f64)>,
+    /// Names of bars, from top to bottom; empty for an axis of numbers.
+    pub names: Vec<String>,
 }
 
 impl Axis {
@@ -43,7 +45,13 @@ impl Axis {
 
     /// A linear axis that starts at zero.
     pub fn linear(label: &str) -> Self {
-        Self { label: label.to_owned(), log: false, ticks: Vec::new(), range: None }
+        Self {
+            label: label.to_owned(),
+            log: false,
+            ticks: Vec::new(),
+            range: None,
+            names: Vec::new(),
+        }
     }
 
     pub fn with_ticks(self, ticks: Vec<f64>) -> Self {
@@ -102,13 +110,25 @@ impl Point {
     }
 }
 
+/// How the points of a series are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// With markers, and lines between consecutive points.
+    Joined,
+    /// With markers only.
+    Scattered,
+    /// As a line without markers, such as a change point.
+    Line,
+    /// As the segments of stacked bars: `x` is a length, and `y` the index of the bar's name on the axis.
+    Bars,
+}
+
 /// Points with one name in the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub name: String,
     pub provenance: Provenance,
-    /// Whether consecutive points are joined by a line.
-    pub joined: bool,
+    pub kind: Kind,
     /// The points in ascending `x`.
     pub points: Vec<Point>,
     /// A description of each point, shown under the pointer; empty for none.
@@ -120,35 +140,20 @@ pub struct Series {
 impl Series {
     /// A joined series without notes.
     pub fn new(name: &str, provenance: Provenance, style: usize, points: Vec<Point>) -> Self {
-        Self { name: name.to_owned(), provenance, joined: true, points, notes: Vec::new(), style }
+        let (name, kind, notes) = (name.to_owned(), Kind::Joined, Vec::new());
+        Self { name, provenance, kind, points, notes, style }
     }
 
-    pub fn not_joined(self) -> Self {
-        Self { joined: false, ..self }
+    /// A vertical line between these ends of an axis.
+    pub fn vertical(name: &str, style: usize, x: f64, (low, high): (f64, f64)) -> Self {
+        let points = [low, high].map(|y| Point::exact(x, y)).to_vec();
+        Self::new(name, Provenance::Bound, style, points).drawn_as(Kind::Line)
+    }
+
+    pub fn drawn_as(self, kind: Kind) -> Self {
+        Self { kind, ..self }
     }
 }
-
-/// Stacked bars from left to right, one below the other.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Bars {
-    /// Names of the bars, from top to bottom.
-    pub names: Vec<String>,
-    /// Segments from left to right: name, and one value per bar.
-    pub segments: Vec<(String, Vec<f64>)>,
-    pub provenance: Provenance,
-}
-
-/// A vertical line, such as a change point. Those of the same name have one entry in the legend.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
-    pub name: String,
-    pub x: f64,
-    /// Index of the colour.
-    pub style: usize,
-}
-
-/// Greatest number of bars that have names.
-const LINES: usize = 12;
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,16 +166,15 @@ pub struct Figure {
     pub caption: String,
     pub x: Axis,
     pub y: Axis,
+    /// Those of one name have one entry in the legend.
     pub series: Vec<Series>,
-    pub bars: Option<Bars>,
-    pub marks: Vec<Mark>,
     pub map: Option<Map>,
     /// Height in units of which the width has [`canvas::WIDTH`]; without effect on a map.
     pub height: u32,
 }
 
 impl Figure {
-    /// A figure of the usual height without vertical lines.
+    /// A figure of the usual height.
     pub fn new(
         id: String,
         title: String,
@@ -178,21 +182,17 @@ impl Figure {
         [x, y]: [Axis; 2],
         series: Vec<Series>,
     ) -> Self {
-        let (bars, marks, map) = (None, Vec::new(), None);
-        Self { id, title, caption, x, y, series, bars, marks, map, height: 1040 }
+        Self { id, title, caption, x, y, series, map: None, height: 1040 }
     }
 
     /// The axes with their ends and ticks.
     fn scales(&self) -> [Scale; 2] {
-        let marks = self.marks.iter().map(|mark| mark.x);
-        if let Some(bars) = &self.bars {
-            let total = |i: usize| bars.segments.iter().map(|(_, values)| values[i]).sum();
-            let ends = (0..bars.names.len()).map(total).chain(marks);
-            return [Scale::of(&self.x, ends), Scale::of_names(&bars.names, LINES)];
-        }
-        let all = || self.series.iter().flat_map(|s| &s.points);
-        let values = all().flat_map(|p| [p.y, p.low, p.high]);
-        [Scale::of(&self.x, all().map(|p| p.x).chain(marks)), Scale::of(&self.y, values)]
+        let all = || self.series.iter().flat_map(|s| s.points.iter().map(move |p| (s.kind, p)));
+        let (bars, others): (Vec<_>, Vec<_>) = all().partition(|(kind, _)| *kind == Kind::Bars);
+        let total = |bar: f64| bars.iter().filter(|(_, p)| p.y == bar).map(|(_, p)| p.x).sum();
+        let totals = (0..self.y.names.len()).map(|i| total(i as f64));
+        let x = Scale::of(&self.x, others.iter().map(|(_, p)| p.x).chain(totals));
+        [x, Scale::of(&self.y, others.iter().flat_map(|(_, p)| [p.y, p.low, p.high]))]
     }
 
     /// The figure without the points at which a logarithmic axis is not defined, such as a time that was measured as 0. The caption states
@@ -244,15 +244,7 @@ pub fn check_invariants(figures: &[Figure]) {
         for axis in [&figure.x, &figure.y] {
             assert!(!axis.label.is_empty(), "figure {id}: an axis has no label");
         }
-        assert!(figure.marks.iter().all(|m| m.x.is_finite()), "figure {id}: a mark is nowhere");
         figure.series.iter().for_each(|s| check_series(figure, s));
-        if let Some(bars) = &figure.bars {
-            let values = bars.segments.iter().flat_map(|(_, values)| values);
-            let is_length = |v: &f64| v.is_finite() && *v >= 0.0;
-            assert!({ values }.all(is_length), "figure {id}: a bar has no length");
-            let is_complete = |(_, values): &(String, Vec<f64>)| values.len() == bars.names.len();
-            assert!(bars.segments.iter().all(is_complete), "figure {id}: a bar lacks a segment");
-        }
         check_ideal(figure);
     }
 }
@@ -264,7 +256,10 @@ fn check_series(figure: &Figure, s: &Series) {
         let is_finite = p.low.is_finite() && p.high.is_finite();
         assert!(is_shown && is_finite, "{name}: the axes cannot show {p:?}");
         assert!(p.low <= p.y && p.y <= p.high, "{name}: {p:?} is outside of its interval");
+        assert!(s.kind != Kind::Bars || p.x >= 0.0, "{name}: {p:?} has no length");
     }
+    let is_complete = s.kind != Kind::Bars || s.points.len() == figure.y.names.len();
+    assert!(is_complete, "{name}: a bar lacks a segment");
 }
 
 /// A line through the two ends of the ideal, straight on logarithmic axes.
@@ -297,12 +292,15 @@ pub mod samples {
     }
 
     pub(crate) fn bars() -> Figure {
-        let segments = vec![("read".into(), vec![1.0, 2.0]), ("grade".into(), vec![3.0, 0.0])];
         let names = vec!["1".into(), "2".into()];
-        let bars = Bars { names, segments, provenance: Provenance::Projected };
-        let marks = vec![Mark { name: "mean, 3".into(), x: 3.0, style: 6 }];
+        let segment = |name: &str, style: usize, lengths: [f64; 2]| {
+            let points = [0, 1].map(|i| Point::exact(lengths[i], i as f64)).to_vec();
+            Series::new(name, Provenance::Projected, style, points).drawn_as(Kind::Bars)
+        };
+        let mean = Series::vertical("mean, 3", 6, 3.0, (-0.5, 1.5));
+        let series = vec![segment("read", 0, [1.0, 2.0]), segment("grade", 1, [3.0, 0.0]), mean];
         let [x, y] = ["s", "ranks"].map(Axis::linear);
-        Figure { bars: Some(bars), marks, x, y, ..figure(Vec::new()) }
+        Figure { x, y: Axis { names, ..y }, ..figure(series) }
     }
 
     pub(crate) fn series(provenance: Provenance) -> Series {
@@ -340,19 +338,18 @@ mod invariants {
         assert_noticed("cannot show", |f| f.series[0].points[1].y = f64::NAN);
         assert_noticed("cannot show", |f| f.series[1].points[0] = Point::exact(1.0, 0.0));
         assert_noticed("outside of its interval", |f| f.series[0].points[1].y = 9.0);
-        assert_noticed("nowhere", |f| {
-            f.marks.push(Mark { name: "m".into(), x: f64::NAN, style: 0 })
+        assert_noticed("cannot show", |f| {
+            f.series.push(Series::vertical("m", 0, f64::NAN, (1.0, 2.0)))
         });
-        let change = |of: fn(&mut Vec<f64>)| {
+        check_invariants(&[samples::bars()]);
+        let wrong_bars = |change: fn(&mut Vec<Point>)| {
             move |f: &mut Figure| {
-                let mut bars = samples::bars().bars;
-                bars.iter_mut().for_each(|bars| of(&mut bars.segments[0].1));
-                f.bars = bars;
+                *f = samples::bars();
+                change(&mut f.series[0].points);
             }
         };
-        check_invariants(&[samples::bars()]);
-        assert_noticed("no length", change(|values| values[1] = -1.0));
-        assert_noticed("lacks a segment", change(|values| values.truncate(1)));
+        assert_noticed("no length", wrong_bars(|points| points[1].x = -1.0));
+        assert_noticed("lacks a segment", wrong_bars(|points| points.truncate(1)));
         assert_noticed("gives no reason", |f| {
             let ends = [1.0, 4.0].map(|x| Point::exact(x, x / 2.0)).to_vec();
             f.series.push(Series::new("ideal", Provenance::Bound, 0, ends));

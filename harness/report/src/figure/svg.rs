@@ -6,10 +6,9 @@
 use super::axes::{BELOW, Scale};
 use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
 use super::map::{CAPTION, outline, paint, size};
-use super::{Bars, Figure, Provenance, Series};
+use super::{Figure, Kind, Provenance, Series};
 use maud::html;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -42,8 +41,6 @@ type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// What is beside a name in the legend.
 enum Symbol<'a> {
     Series(&'a Series),
-    Bar(usize),
-    Mark(usize),
     Cell([u8; 3]),
     Section,
     Nothing,
@@ -70,7 +67,7 @@ pub fn svg(figure: &Figure) -> String {
     if let Some(map) = &figure.map {
         put(&page, &text(&map.caption, (y.left() as i32, height as i32 - CAPTION as i32 / 2)));
     }
-    let above = chart_of_kind(figure, (&page, top, right), [x, y]);
+    let above = chart(figure, (&page, top, right), [x, y]);
     drop(page);
     let (_, elements) = drawn.split_once('\n').expect("an element begins the document");
     let elements = elements.trim_end().strip_suffix("</svg>").expect("it ends the document");
@@ -83,21 +80,18 @@ pub fn svg(figure: &Figure) -> String {
     document(&figure.title, height, lines.trim_end())
 }
 
-/// Names and symbols of the legend. Marks of one name have one entry.
+/// Names and symbols of the legend. Series of one name have one entry.
 fn entries(figure: &Figure) -> Vec<(&str, Symbol<'_>)> {
-    let Figure { series, bars, marks, map, .. } = figure;
+    let Figure { series, map, .. } = figure;
     let mut all = Vec::new();
     if let Some(map) = map {
         all.push((map.title.as_str(), Symbol::Nothing));
         all.extend(map.key.iter().map(|(name, fill)| (name.as_str(), Symbol::Cell(*fill))));
         all.extend(map.section.iter().map(|_| ("geometry", Symbol::Section)));
     }
-    all.extend(series.iter().map(|s| (s.name.as_str(), Symbol::Series(s))));
-    let segments = bars.iter().flat_map(|bars| &bars.segments).enumerate();
-    all.extend(segments.map(|(style, (name, _))| (name.as_str(), Symbol::Bar(style))));
-    let is_first = |i: usize| marks[..i].iter().all(|other| other.name != marks[i].name);
-    let firsts = marks.iter().enumerate().filter(|(i, _)| is_first(*i));
-    all.extend(firsts.map(|(_, mark)| (mark.name.as_str(), Symbol::Mark(mark.style))));
+    let is_first = |i: &usize| series[..*i].iter().all(|other| other.name != series[*i].name);
+    let firsts = (0..series.len()).filter(is_first).map(|i| &series[i]);
+    all.extend(firsts.map(|s| (s.name.as_str(), Symbol::Series(s))));
     all
 }
 
@@ -106,13 +100,15 @@ fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
     let (right, middle) = (x + LENGTH, x + LENGTH / 2);
     let corners = [(x, y - 16), (right, y + 16)];
     match symbol {
+        Symbol::Series(s) if s.kind == Kind::Bars => {
+            bar(corners, s.style).iter().for_each(|part| put(page, part));
+        }
+        Symbol::Series(s) if s.kind == Kind::Line => {
+            put(page, &PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(s.style)));
+        }
         Symbol::Series(s) => {
             put(page, &path(vec![(x, y), (right, y)], s));
             marker(page, (middle, y), s);
-        }
-        Symbol::Bar(style) => bar(corners, *style).iter().for_each(|part| put(page, part)),
-        Symbol::Mark(style) => {
-            put(page, &PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(*style)));
         }
         Symbol::Cell(fill) => {
             put(page, &Rectangle::new(corners, rgb(*fill).filled()));
@@ -125,34 +121,18 @@ fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
     }
 }
 
-/// Draws the chart on axes of the figure's kind, and returns the elements that belong over it.
-fn chart_of_kind(figure: &Figure, place: (&Page, f64, f64), [x, y]: [Scale; 2]) -> Vec<String> {
-    // The axis is not partial, but what plotters makes of a linear one with key points has no labels.
-    let linear = |scale: &Scale| {
-        scale.ends.clone().with_key_points(scale.ticks.clone()).partial_axis(scale.ends.clone())
-    };
-    let log = |scale: &Scale| scale.ends.clone().log_scale().with_key_points(scale.ticks.clone());
-    match (figure.x.log, figure.y.log) {
-        (false, false) => chart(figure, place, linear(&x), linear(&y), [x, y]),
-        (false, true) => chart(figure, place, linear(&x), log(&y), [x, y]),
-        (true, false) => chart(figure, place, log(&x), linear(&y), [x, y]),
-        (true, true) => chart(figure, place, log(&x), log(&y), [x, y]),
-    }
-}
-
 /// Draws the chart of a figure below the legend, and returns the elements over it: cells of a map, and notes that are shown while the
-/// pointer is near a point.
-fn chart<X, Y>(
+/// pointer is near a point. The axes of `plotters` are linear in the places of values.
+fn chart(
     figure: &Figure,
     (page, top, right): (&Page, f64, f64),
-    of_x: X,
-    of_y: Y,
     [mut x, y]: [Scale; 2],
-) -> Vec<String>
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
+) -> Vec<String> {
+    // The axis is not partial, but what plotters makes of one with key points has no labels.
+    let axis = |scale: &Scale| {
+        let ticks = scale.ticks.iter().map(|tick| scale.place(*tick));
+        scale.places().with_key_points(ticks.collect()).partial_axis(scale.places())
+    };
     let edge = BESIDE[1];
     let mut chart = ChartBuilder::on(page)
         .margin_top(top)
@@ -161,14 +141,11 @@ where
         .margin_bottom(if figure.map.is_some() { CAPTION } else { 0.0 })
         .x_label_area_size(BELOW)
         .y_label_area_size(y.left() - edge)
-        .build_cartesian_2d(of_x, of_y)
+        .build_cartesian_2d(axis(&x), axis(&y))
         .expect("the chart is smaller than the page");
-    x.clear_labels(|tick| f64::from(chart.backend_coord(&(tick, y.ends.start)).0));
-    let label = |scale: &Scale, value: &f64| {
-        let index = scale.ticks.iter().position(|tick| tick == value);
-        index.map_or_else(String::new, |index| scale.labels[index].clone())
-    };
-    let (label_x, label_y) = (|value: &f64| label(&x, value), |value: &f64| label(&y, value));
+    let (across, up) = (x.places(), y.places());
+    x.clear_labels(|place| f64::from(chart.backend_coord(&(place, up.start)).0));
+    let (label_x, label_y) = (|place: &f64| x.label(*place), |place: &f64| y.label(*place));
     let mut mesh = chart.configure_mesh();
     mesh.light_line_style(TRANSPARENT).bold_line_style(FAINT).axis_style(BLACK.stroke_width(2));
     mesh.label_style(font()).axis_desc_style(font()).set_all_tick_mark_size(TICK);
@@ -177,31 +154,27 @@ where
         mesh.disable_mesh();
     }
     mesh.x_desc(&figure.x.label).y_desc(&figure.y.label).draw().expect(DRAWN);
-    if let Some(bars) = &figure.bars {
-        chart.draw_series(stacked(bars)).expect(DRAWN);
-    }
-    let vertical = |x: f64, low: f64, high: f64, style: usize| {
-        PathElement::new(vec![(x, low), (x, high)], line(style))
-    };
-    let marks = figure.marks.iter().map(|m| vertical(m.x, y.ends.start, y.ends.end, m.style));
-    chart.draw_series(marks).expect(DRAWN);
-    let (least, most) = (y.ends.start.min(y.ends.end), y.ends.start.max(y.ends.end));
+    let (least, most) = (up.start.min(up.end), up.start.max(up.end));
+    let at = |x_of: f64, y_of: f64| (x.place(x_of), y.place(y_of).clamp(least, most));
     let mut above = Vec::new();
     if let Some(map) = &figure.map {
-        above = paint(map, [&x.ends, &y.ends], chart.plotting_area().get_pixel_range());
+        above = paint(map, [&across, &up], chart.plotting_area().get_pixel_range());
     }
+    let mut begins = vec![0.0; figure.y.names.len()];
     for s in &figure.series {
-        let at = |p: &super::Point| (p.x, p.y.clamp(least, most));
-        let points: Vec<(f64, f64)> = s.points.iter().map(at).collect();
+        let points: Vec<(f64, f64)> = s.points.iter().map(|p| at(p.x, p.y)).collect();
+        if s.kind == Kind::Bars {
+            chart.draw_series(segments(&points, &mut begins, s.style)).expect(DRAWN);
+            continue;
+        }
         chart.draw_series([path(points.clone(), s)]).expect(DRAWN);
         for p in s.points.iter().filter(|p| p.low < p.high) {
-            let [low, high] = [p.low, p.high].map(|value| value.clamp(least, most));
-            chart.draw_series([vertical(p.x, low, high, s.style)]).expect(DRAWN);
-            let cap = |y| {
-                EmptyElement::at((p.x, y))
-                    + PathElement::new(vec![(-10, 0), (10, 0)], line(s.style))
+            let ends = [p.low, p.high].map(|value| at(p.x, value));
+            chart.draw_series([PathElement::new(ends.to_vec(), line(s.style))]).expect(DRAWN);
+            let cap = |end| {
+                EmptyElement::at(end) + PathElement::new(vec![(-10, 0), (10, 0)], line(s.style))
             };
-            chart.draw_series([low, high].map(cap)).expect(DRAWN);
+            chart.draw_series(ends.map(cap)).expect(DRAWN);
         }
         let places: Vec<_> = points.iter().map(|point| chart.backend_coord(point)).collect();
         places.iter().for_each(|at| marker(page, *at, s));
@@ -250,13 +223,13 @@ fn path<'a, C: Clone + 'static>(
     points: Vec<C>,
     s: &Series,
 ) -> DynElement<'static, SVGBackend<'a>, C> {
-    let (style, dashes) = match s.provenance {
-        Provenance::Bound => (BLACK.stroke_width(3), Some((14, 10))),
-        Provenance::Measured => (line(s.style), None),
+    let (style, dashes) = match (s.kind, s.provenance) {
+        (Kind::Line, _) | (_, Provenance::Measured) => (line(s.style), None),
+        (_, Provenance::Bound) => (BLACK.stroke_width(3), Some((14, 10))),
         _ => (line(s.style), Some((22, 15))),
     };
     match dashes {
-        _ if !s.joined => PathElement::new(Vec::new(), style).into_dyn(),
+        _ if s.kind == Kind::Scattered => PathElement::new(Vec::new(), style).into_dyn(),
         None => PathElement::new(points, style).into_dyn(),
         Some((dash, gap)) => DashedPathElement::new(points, dash, gap, style).into_dyn(),
     }
@@ -289,23 +262,23 @@ fn bar<C: Clone>(corners: [C; 2], style: usize) -> [Rectangle<C>; 2] {
     [Rectangle::new(corners.clone(), fill), Rectangle::new(corners, outline)]
 }
 
-fn stacked(bars: &Bars) -> Vec<Rectangle<(f64, f64)>> {
-    let mut begins = vec![0.0; bars.names.len()];
+/// The segments of bars that begin where the ones before them end.
+fn segments(
+    lengths: &[(f64, f64)],
+    begins: &mut [f64],
+    style: usize,
+) -> Vec<Rectangle<(f64, f64)>> {
+    let half = (1.0 - GAP) / 2.0;
     let mut drawn = Vec::new();
-    for (style, (_, values)) in bars.segments.iter().enumerate() {
-        for (i, value) in values.iter().enumerate().filter(|(_, value)| **value > 0.0) {
-            let (begin, half) = (begins[i], (1.0 - GAP) / 2.0);
-            begins[i] += value;
-            let corners = [(begin, i as f64 - half), (begins[i], i as f64 + half)];
-            drawn.extend(bar(corners, style));
-        }
+    for ((length, middle), begin) in lengths.iter().zip(begins).filter(|(of, _)| of.0 > 0.0) {
+        drawn.extend(bar([(*begin, middle - half), (*begin + length, middle + half)], style));
+        *begin += length;
     }
     drawn
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Mark;
     use super::super::samples::{bars, figure, series};
     use super::*;
 
@@ -338,10 +311,9 @@ mod tests {
     }
 
     #[test]
-    fn marks_of_one_name_share_an_entry_of_the_legend() {
-        let mark = |x| Mark { name: "increase".into(), x, style: 1 };
-        let shown = figure(vec![series(Provenance::Measured)]);
-        let svg = svg(&Figure { marks: vec![mark(1.5), mark(3.0)], ..shown });
+    fn lines_of_one_name_share_an_entry_of_the_legend() {
+        let mark = |x| Series::vertical("increase", 1, x, (1.0, 4.0));
+        let svg = svg(&figure(vec![series(Provenance::Measured), mark(1.5), mark(3.0)]));
         assert_eq!(svg.matches("increase").count(), 1);
         assert_eq!(svg.matches("stroke=\"#D55E00\"").count(), 3);
     }

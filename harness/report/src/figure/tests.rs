@@ -1,7 +1,6 @@
 //! Drawings as PNG and PDF, and the place of their text, measured with the typeface that PNG and PDF have.
 
-use super::format::Format;
-use super::format::rendered::tree;
+use super::format::rendered::{pdf, png, tree};
 use super::samples::{bars, figure, series};
 use super::svg::svg;
 use super::{Axis, Figure, Point, Provenance};
@@ -46,11 +45,11 @@ pub(crate) fn assert_legible(svg: &str) {
 #[test]
 fn png_and_pdf_contain_the_text() {
     let drawn = svg(&figure(vec![series(Provenance::Measured)]));
-    let image = Format::Png.bytes(&drawn).unwrap();
+    let image = png(&drawn).unwrap();
     assert_eq!(&image[1..4], b"PNG");
     let textless = drawn.replace(">speedup<", "><").replace(">ranks<", "><");
-    assert_ne!(image, Format::Png.bytes(&textless).unwrap());
-    let page = Format::Pdf.bytes(&drawn).unwrap();
+    assert_ne!(image, png(&textless).unwrap());
+    let page = pdf(&drawn).unwrap();
     assert!(page.starts_with(b"%PDF"));
     assert!(page.windows(10).any(|w| w == b"DejaVuSans"), "the typeface is in the file");
 }
@@ -79,11 +78,12 @@ fn no_text_of_a_figure_is_cut_or_lies_on_another() {
     drawn.series[0].points.truncate(1);
     assert_legible(&svg(&drawn));
     let mut stacked = bars();
-    for count in [2, 11, 64] {
-        let all = stacked.bars.as_mut().expect("bars");
-        all.names =
+    for count in [2u32, 11, 64] {
+        stacked.y.names =
             (0..count).map(|i| format!("morton rebalance W={}", 10_i32.pow(i % 5))).collect();
-        all.segments.iter_mut().for_each(|(_, values)| values.resize(count as usize, 98_765.4));
+        for s in &mut stacked.series {
+            s.points = (0..count).map(|i| Point::exact(98_765.4, i.into())).collect();
+        }
         assert_legible(&svg(&stacked));
     }
     let (x, y) = (Axis::linear("rank"), Axis::linear("a longer name of a quantity / s"));

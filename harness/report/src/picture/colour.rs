@@ -67,23 +67,17 @@ impl Colour {
 
     /// The colours of the values that occur, in ascending order of the values.
     pub fn key(self, values: &BTreeSet<u32>) -> Vec<Entry> {
-        let count = values.len();
-        let entry = |(i, &value): (usize, &u32)| match self {
-            Self::Level => Entry {
-                value,
-                fill: of_level(i as f64 / (count - 1).max(1) as f64),
-                name: value.to_string(),
-            },
-            Self::Rank => Entry { value, fill: of_rank(value), name: value.to_string() },
-            Self::Side => {
-                let side = Side::ALL[value as usize % 3];
-                let fill = match side {
-                    Side::Outside => tint(COLOURS[4], 0.5),
-                    Side::Inside => tint(COLOURS[5], 0.3),
-                    Side::Crossing => COLOURS[6],
-                };
-                Entry { value, fill, name: side.to_string() }
-            }
+        let finest = (values.len() - 1).max(1) as f64;
+        let entry = |(i, &value): (usize, &u32)| {
+            let side = Side::ALL[value as usize % 3];
+            let (fill, name) = match (self, side) {
+                (Self::Level, _) => (of_level(i as f64 / finest), value.to_string()),
+                (Self::Rank, _) => (of_rank(value), value.to_string()),
+                (Self::Side, Side::Outside) => (tint(COLOURS[4], 0.5), side.to_string()),
+                (Self::Side, Side::Inside) => (tint(COLOURS[5], 0.3), side.to_string()),
+                (Self::Side, Side::Crossing) => (COLOURS[6], side.to_string()),
+            };
+            Entry { value, fill, name }
         };
         values.iter().enumerate().map(entry).collect()
     }

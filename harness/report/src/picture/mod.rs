@@ -17,13 +17,13 @@ use contract::manifest::Sides;
 use contract::mesh::Mesh;
 use contract::octant::UNITS_PER_CELL;
 use export::selection::{Selection, Slice};
-use geometry::tree::{Aabb, Point};
+use geometry::tree::{Aabb, Point, bounds};
 use run::engine::interrupt;
 use squares::{SQUARES_MAX, Square, Squares};
 use std::io::{self, Write};
 use std::path::Path;
 
-pub use crate::figure::format::Format;
+pub use crate::figure::format::format_of;
 use crate::figure::map::{Fill, Map};
 use crate::figure::{Axis, Figure, svg};
 
@@ -46,11 +46,13 @@ pub struct Request<'a> {
 impl Request<'_> {
     /// Returns an error if the mesh does not have what colours show.
     fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
-        if self.colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
-            let why = "the sides of this mesh are unknown: choose another colour";
-            return Err(Failure::input(why.to_owned()));
+        match self.colour {
+            Colour::Side if mesh.manifest.sides == Sides::Unknown => {
+                Err(Failure::input("the sides of this mesh are unknown: choose another colour"))
+            }
+            Colour::Rank => mesh.require_ranks(),
+            _ => Ok(()),
         }
-        if self.colour == Colour::Rank { mesh.require_ranks() } else { Ok(()) }
     }
 }
 
@@ -60,8 +62,8 @@ pub struct Picture {
     root: Root,
     slice: Slice,
     colour: Colour,
-    /// Minimum and maximum corner of what is shown, in the user's units.
-    window: [[f64; 3]; 2],
+    /// Minimum and maximum corner of what is shown, in the plane and in the user's units.
+    window: [Planar; 2],
     squares: Squares,
     /// The colours of their values.
     key: Vec<Entry>,
@@ -78,15 +80,15 @@ const NO_LEAF: &str =
 /// The plane normal to the shortest extent of the body that halves the area of its surface; without a body, normal to z through the root's
 /// centre. A plane through the middle of the bounding box would miss the wings of an aircraft with a tail.
 fn middle(root: &Root, body: Option<&[Facet]>) -> Slice {
-    let [low, high] = extent(root, body);
-    let length = |a: usize| high[a] - low[a];
+    let extent = extent(root, body);
+    let lengths = extent.extents();
     // Of equal extents the last one, so that a cube is seen from above. A plane within a flat body has no section.
-    let axes = (0..3).rev().filter(|&a| length(a) > 0.0);
-    let axis = axes.min_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(2);
+    let axes = (0..3).rev().filter(|&a| lengths[a] > 0.0);
+    let axis = axes.min_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(2);
     let middle = body.and_then(|facets| median(facets, axis));
-    let middle = middle.unwrap_or((low[axis] + high[axis]) / 2.0);
+    let middle = middle.unwrap_or(extent.center()[axis]);
     // A thousandth of the extent is not visible, and a short coordinate can be entered again.
-    let step = 10f64.powf(length(axis).log10().floor() - 3.0);
+    let step = 10f64.powf(lengths[axis].log10().floor() - 3.0);
     let middle = if step > 0.0 { (middle / step).round() * step } else { middle };
     let within = middle.clamp(root.origin[axis], root.origin[axis] + root.edge);
     Slice::new(root, axis, within).expect("a coordinate in the root")
@@ -114,23 +116,16 @@ fn median(facets: &[Facet], axis: usize) -> Option<f64> {
 }
 
 /// The bounding box of the body, or the root.
-fn extent(root: &Root, body: Option<&[Facet]>) -> [[f64; 3]; 2] {
-    let Some(facets) = body.filter(|facets| !facets.is_empty()) else {
-        return [root.origin, root.origin.map(|c| c + root.edge)];
-    };
-    let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    facets.iter().flatten().fold(empty, |[low, high], at| {
-        let at = at.map(f64::from);
-        [std::array::from_fn(|a| low[a].min(at[a])), std::array::from_fn(|a| high[a].max(at[a]))]
-    })
+fn extent(root: &Root, body: Option<&[Facet]>) -> Aabb {
+    let origin = Point::from(root.origin);
+    let whole = Aabb::new(origin, origin + Point::splat(root.edge));
+    body.filter(|facets| !facets.is_empty()).map_or(whole, bounds)
 }
 
 /// The cube of the window, moved into the root, on the lattice.
 fn zoomed(root: &Root, body: Option<&[Facet]>, zoom: f64) -> [[i64; 3]; 2] {
-    let [low, high] = extent(root, body);
     let edge = ((UNITS_PER_EDGE as f64 / zoom) as i64).clamp(UNITS_PER_CELL, UNITS_PER_EDGE);
-    let centre = std::array::from_fn(|a| (low[a] + high[a]) / 2.0);
-    let centre = root.quantise_clamped(centre);
+    let centre = root.quantise_clamped(extent(root, body).center().to_array());
     let corner = centre.map(|c| (c - edge / 2).clamp(0, UNITS_PER_EDGE - edge));
     [corner, corner.map(|c| c + edge)]
 }
@@ -150,19 +145,18 @@ impl Picture {
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let axes = plane_axes(slice.axis);
         let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
-        let window = clip.map(|corner| root.to_user(corner));
-        if axes.iter().any(|&a| window[0][a] >= window[1][a]) {
+        let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
+        if (0..2).any(|i| window[0][i] >= window[1][i]) {
             let why = "the clip box has no area in the plane of the slice: give a larger one";
-            return Err(Failure::input(why.to_owned()));
+            return Err(Failure::input(why));
         }
-        let corners = window.map(|corner| axes.map(|a| corner[a]));
-        let section = request.body.map(|facets| section(&root, slice, &corners, facets));
+        let section = request.body.map(|facets| section(&root, slice, &window, facets));
         let colour = request.colour;
         // The window may end within the root, but the plane need not be in the box.
         (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
         let selection =
             Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
-        let scales = [0, 1].map(|i| PAGE[i] / (corners[1][i] - corners[0][i]));
+        let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));
         let levels = squares::deepest(root.edge * scales[0].min(scales[1]));
         let squares = Squares::collect(mesh, &selection, colour, levels, squares_max)?;
         if squares.squares.is_empty() {
@@ -179,21 +173,20 @@ impl Picture {
     fn check_invariants(&self) {
         let (root, [low, high]) = (&self.root, self.window);
         let (slack, axes) = (root.edge * 1e-6, plane_axes(self.slice.axis));
-        for a in axes {
+        for (i, a) in axes.into_iter().enumerate() {
             let (from, until) = (root.origin[a] - slack, root.origin[a] + root.edge + slack);
-            let is_inside = from <= low[a] && low[a] < high[a] && high[a] <= until;
+            let is_inside = from <= low[i] && low[i] < high[i] && high[i] <= until;
             assert!(is_inside, "the window {:?} is not within the root", self.window);
         }
         for square in &self.squares.squares {
             let [from, to] = self.corners(square);
-            let is_shown = |a: usize| from[a] < high[a] + slack && to[a] > low[a] - slack;
-            assert!(axes.into_iter().all(is_shown), "{square:?} is outside of {:?}", self.window);
+            let is_shown = |i: usize| from[i] < high[i] + slack && to[i] > low[i] - slack;
+            assert!((0..2).all(is_shown), "{square:?} is outside of {:?}", self.window);
             assert!(self.key.iter().any(|e| e.value == square.value), "{square:?} has no colour");
         }
-        let within =
-            |p: &Planar, i: usize| (low[axes[i]] - slack..=high[axes[i]] + slack).contains(&p[i]);
-        let mut ends = self.section.iter().flatten().flatten();
-        let beyond = ends.find(|p| !(within(p, 0) && within(p, 1)));
+        let is_within =
+            |p: &Planar| (0..2).all(|i| (low[i] - slack..=high[i] + slack).contains(&p[i]));
+        let beyond = self.section.iter().flatten().flatten().find(|p| !is_within(p));
         assert!(beyond.is_none(), "the section leaves {:?} at {beyond:?}", self.window);
     }
 
@@ -201,19 +194,23 @@ impl Picture {
     pub fn svg(&self) -> String {
         let axes = plane_axes(self.slice.axis);
         let axis = |i: usize| {
-            let [low, high] = self.window.map(|corner| corner[axes[i]]);
-            Axis { range: Some((low, high)), ..Axis::linear(["x", "y", "z"][axes[i]]) }
+            let range = Some((self.window[0][i], self.window[1][i]));
+            Axis { range, ..Axis::linear(["x", "y", "z"][axes[i]]) }
         };
         // Where there is no leaf, the page is white, on a dark one too: the colours are chosen for it.
-        let window = self.window.map(|corner| axes.map(|a| corner[a]));
-        let mut fills = vec![Fill { colour: [255; 3], is_outlined: false, cells: vec![window] }];
+        let cells = vec![self.window];
+        let mut fills = vec![Fill { colour: [255; 3], is_outlined: false, cells }];
         // Outlined squares are last, so that no fill covers half of an outline.
         for is_outlined in [false, true] {
             fills.extend(self.key.iter().map(|entry| self.fill(entry, is_outlined)));
         }
         fills.retain(|fill| !fill.cells.is_empty());
         let (key, title) = self.colour.legend(&self.key);
-        let (section, caption) = (self.section.clone(), self.caption());
+        let (plane, Squares { leaves, squares, .. }) = (self.plane_name(), &self.squares);
+        let is_merged = *leaves > squares.len() as u64;
+        let merged = if is_merged { ", the smallest merged" } else { "" };
+        let caption = format!("{plane}; cells in the plane: {leaves}{merged}");
+        let section = self.section.clone();
         let map = Some(Map { title, key, fills, section, caption });
         let axes = [axis(0), axis(1)];
         svg::svg(&Figure {
@@ -224,14 +221,12 @@ impl Picture {
 
     /// The visible parts of the squares of one value, with or without outlines.
     fn fill(&self, entry: &Entry, is_outlined: bool) -> Fill {
-        let axes = plane_axes(self.slice.axis);
         let is_shown = |s: &&Square| {
             s.value == entry.value && (s.level <= self.squares.level_outlined) == is_outlined
         };
         let visible = |square: &Square| {
-            let within = |corner: [f64; 3]| {
-                axes.map(|a| corner[a].clamp(self.window[0][a], self.window[1][a]))
-            };
+            let within =
+                |at: Planar| [0, 1].map(|i| at[i].clamp(self.window[0][i], self.window[1][i]));
             let [low, high] = self.corners(square).map(within);
             (low[0] < high[0] && low[1] < high[1]).then_some([low, high])
         };
@@ -245,21 +240,12 @@ impl Picture {
         format!("Slice {plane} of a mesh, {cells} cells by {}", self.colour)
     }
 
-    /// The plane and the number of cells.
-    fn caption(&self) -> String {
-        let (plane, Squares { leaves, is_merged, .. }) = (self.plane_name(), &self.squares);
-        let merged = if *is_merged { ", the smallest merged" } else { "" };
-        format!("{plane}; cells in the plane: {leaves}{merged}")
-    }
-
-    /// The minimum and the maximum corner of a square, in the user's units.
-    fn corners(&self, square: &Square) -> [[f64; 3]; 2] {
+    /// The minimum and the maximum corner of a square.
+    fn corners(&self, square: &Square) -> [Planar; 2] {
+        let axes = plane_axes(self.slice.axis);
         [0, square.edge()].map(|beyond| {
-            let mut at = [self.slice.at; 3];
-            for (axis, cells) in plane_axes(self.slice.axis).into_iter().zip(square.corner) {
-                at[axis] = i64::from(cells + beyond) * UNITS_PER_CELL;
-            }
-            self.root.to_user(at)
+            let at = |i: usize| i64::from(square.corner[i] + beyond) * UNITS_PER_CELL;
+            [0, 1].map(|i| self.root.to_user([at(i); 3])[axes[i]])
         })
     }
 

@@ -48,8 +48,6 @@ pub struct Squares {
     pub level_outlined: u8,
     /// Deepest level of a square; deeper leaves are merged.
     pub level_drawn: u8,
-    /// Whether leaves that are too small for the page were merged.
-    pub is_merged: bool,
     /// Number of leaves that the plane cuts.
     pub leaves: u64,
 }
@@ -119,7 +117,6 @@ impl Squares {
     /// Adds the next square in Morton order, merged into the last one if both are too small to be drawn.
     fn add(&mut self, square: Square) {
         self.leaves += square.leaves;
-        self.is_merged |= square.level > self.level_drawn;
         let level = square.level.min(self.level_drawn);
         let mask = !((CELLS_PER_EDGE >> level) - 1);
         let square = Square { corner: square.corner.map(|c| c & mask), level, ..square };

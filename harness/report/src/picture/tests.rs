@@ -147,7 +147,7 @@ fn a_clip_box_is_the_window() {
     let selection = Selection { clip: Some(clip), ..at(2, 1.0) };
     let shown = Request { selection, ..request(Colour::Level) };
     let picture = Picture::collect(&mesh, &shown).unwrap();
-    assert_eq!(picture.window, [[0.0, 0.0, 7.0], [4.0, 2.0, 8.0]]);
+    assert_eq!(picture.window, [[0.0, 0.0], [4.0, 2.0]]);
     assert_eq!((picture.squares.leaves, picture.key[0].name.as_str()), (2, "2"));
 }
 
@@ -184,15 +184,15 @@ fn a_picture_is_written_in_the_format_of_its_name() {
     let (place, mesh) = on_disk(vec![eight_and_seven()]);
     let svg = Picture::collect(&mesh, &request(Colour::Level)).unwrap().svg();
     let path = place.path().join("a.svg");
-    write(&path, &Format::of(&path).unwrap().bytes(&svg).unwrap()).unwrap();
+    write(&path, &format_of(&path).unwrap()(&svg).unwrap()).unwrap();
     assert_eq!(std::fs::read_to_string(path).unwrap(), svg);
     let error = write(&place.path().join("no/a.svg"), b"").unwrap_err();
     assert!(error.to_string().contains("no/a.svg"), "{error}");
     for name in ["a.vtk", "a", ".svg", "a.html"] {
-        assert!(Format::of(name.as_ref()).unwrap_err().contains(".svg"), "{name}");
+        assert!(format_of(name.as_ref()).unwrap_err().contains(".svg"), "{name}");
     }
     if cfg!(feature = "figures") {
-        let bytes = |name: &str| Format::of(name.as_ref()).unwrap().bytes(&svg).unwrap();
+        let bytes = |name: &str| format_of(name.as_ref()).unwrap()(&svg).unwrap();
         assert_eq!(&bytes("a.PNG")[1..4], b"PNG");
         assert!(bytes("a.pdf").starts_with(b"%PDF"));
     }
@@ -248,7 +248,7 @@ fn assert_noticed(why: &str, change: impl Fn(&mut Picture)) {
 #[test]
 fn planted_wrong_pictures_are_noticed() {
     assert_noticed("not within the root", |p| p.window[1][0] = 9.0);
-    assert_noticed("is outside of", |p| p.window = [[6.0; 3], [8.0; 3]]);
+    assert_noticed("is outside of", |p| p.window = [[6.0; 2], [8.0; 2]]);
     assert_noticed("has no colour", |p| p.key.truncate(1));
     assert_noticed("leaves [", |p| {
         p.section.as_mut().expect("the body is known")[0][0][1] = -5.0;
