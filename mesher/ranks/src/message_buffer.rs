@@ -31,18 +31,6 @@ impl MessageBuffer {
         entries.into_iter().collect()
     }
 
-    /// A message of each given length, zero at first, to be written in place; the lengths are by rank.
-    pub fn with_lengths(lengths: impl Iterator<Item = usize>) -> Self {
-        let mut message_buffer = Self::default();
-        let mut end = 0;
-        for (rank, words) in lengths.enumerate().filter(|l| l.1 > 0) {
-            end += words;
-            message_buffer.messages.push(Message { rank, end });
-        }
-        message_buffer.words = vec![0; end];
-        message_buffer
-    }
-
     /// Appends words to the last message if that is for `rank`, else starts a new message.
     pub fn write(&mut self, rank: usize, words: impl IntoIterator<Item = u64>) {
         self.append(rank, |all| all.extend(words));
@@ -64,11 +52,15 @@ impl MessageBuffer {
     /// or more.
     pub fn write_values<T: Pod>(&mut self, rank: usize, values: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.append(rank, |words| {
-            let start = words.len();
-            words.resize(start + bytes.len().div_ceil(size_of::<u64>()), 0);
-            bytemuck::cast_slice_mut(&mut words[start..])[..bytes.len()].copy_from_slice(bytes);
-        });
+        let words = self.room(rank, bytes.len().div_ceil(size_of::<u64>()));
+        bytemuck::cast_slice_mut(words)[..bytes.len()].copy_from_slice(bytes);
+    }
+
+    /// The same for a number of words that are to be written in place; they are zero at first.
+    pub fn room(&mut self, rank: usize, words: usize) -> &mut [u64] {
+        let start = self.words.len();
+        self.append(rank, |all| all.resize(start + words, 0));
+        &mut self.words[start..]
     }
 
     /// The values of all messages.
@@ -122,9 +114,9 @@ mod tests {
         message_buffer.write(3, []);
         message_buffer.write(7, [1, 2]);
         message_buffer.write(7, []);
-        message_buffer.append(7, |words| words.extend([0, 5]));
-        message_buffer.append(0, |_| ());
-        message_buffer.write_values(4, &[9u64]);
+        message_buffer.room(7, 2)[1] = 5;
+        assert!(message_buffer.room(0, 0).is_empty());
+        message_buffer.room(4, 1)[0] = 9;
         assert_eq!(contents(&message_buffer), [(7, vec![1, 2, 0, 5]), (4, vec![9])]);
         assert_eq!(message_buffer.words(), [1, 2, 0, 5, 9]);
         assert_eq!(message_buffer, contents(&message_buffer).into_iter().collect());

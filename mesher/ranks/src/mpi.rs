@@ -90,7 +90,10 @@ impl Comm for Mpi {
                 complete(watch, self.world.immediate_all_gather_into(scope, &length, all));
             }),
         }
-        let mut all = MessageBuffer::with_lengths(lengths.iter().map(|&n| n as usize));
+        let mut all = MessageBuffer::default();
+        for (rank, &words) in lengths.iter().enumerate() {
+            all.room(rank, words as usize);
+        }
         i32::try_from(all.words().len()).expect(TOO_LONG);
         let starts: Vec<i32> =
             lengths.iter().scan(0, |s, &n| Some(std::mem::replace(s, *s + n))).collect();
@@ -144,11 +147,8 @@ impl Comm for Mpi {
                     self.world.any_process().immediate_matched_probe_with_tag(tag)
                 {
                     let words = status.count(u64::equivalent_datatype()) as usize;
-                    received.append(status.source_rank() as usize, |all| {
-                        let start = all.len();
-                        all.resize(start + words, 0);
-                        message.matched_receive_into(&mut all[start..]);
-                    });
+                    let from = status.source_rank() as usize;
+                    message.matched_receive_into(received.room(from, words));
                 }
                 sends = sends.into_iter().filter_map(|send| send.test().err()).collect();
                 if sends.is_empty() {
