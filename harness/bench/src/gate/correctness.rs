@@ -26,12 +26,12 @@ pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
     for case in bench.cases_of(LayerName::Correctness) {
         let report = verified(bench, &bench.candidate.engine, case)?;
         let is_plain = report.checks.iter().all(|check| !check.failed() && !is_unchecked(check));
-        let baseline = bench.baseline.as_ref().map(|subject| match is_plain {
+        let baseline = match &bench.baseline {
             // Nothing of the baseline can be better.
-            true => Ok(report.clone()),
-            false => verified(bench, &subject.engine, case),
-        });
-        let baseline = baseline.transpose()?;
+            Some(_) if is_plain => Some(report.clone()),
+            Some(subject) => Some(verified(bench, &subject.engine, case)?),
+            None => None,
+        };
         layer.findings.extend(findings(&case.name, &case.mpi, &report, baseline.as_ref()));
     }
     Ok(())

@@ -269,12 +269,10 @@ impl Study {
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
         for Series { case, .. } in &self.series {
-            let other = cases.insert(stem(case), case).filter(|other| *other != case);
-            if let Some(other) = other {
-                return Err(format!(
-                    "the cases {other} and {case} have the same name in results: rename one"
-                ));
-            }
+            let other = *cases.entry(stem(case)).or_insert(case);
+            let why =
+                format!("the cases {other} and {case} have the same name in results: rename one");
+            refuse(&[(other != case, &why)])?;
         }
         for (name, Mesh { spacing_min, cells, .. }) in &self.mesh {
             refuse(&[

@@ -152,13 +152,10 @@ fn beyond(run: &Group, coarse: &Group) -> Result<f64, String> {
 
 /// The greatest ratio of a time per cell to the least before it.
 fn growth(runs: &[&Group]) -> f64 {
-    let (mut least, mut worst) = (f64::INFINITY, 0.0f64);
-    for run in runs {
-        let time = run.time_s.value / run.cells().max(1) as f64;
-        worst = worst.max(time / least);
-        least = least.min(time);
-    }
-    worst
+    let per_cell = |run: &&Group| run.time_s.value / run.cells().max(1) as f64;
+    let times: Vec<f64> = runs.iter().map(per_cell).collect();
+    let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+    (1..times.len()).map(|i| times[i] / least(&times[..i])).fold(0.0, f64::max)
 }
 
 /// The fraction of the time that the named phases take. Missing phases count as zero, but at least one must exist.

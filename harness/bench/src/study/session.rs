@@ -406,3 +406,37 @@ impl Session<'_> {
         other.map_or(Ok(()), |why| Err(Failure::input(why)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use run::engine::programs::Given;
+
+    /// A mesh of the first series is known in the second, and is declined again.
+    #[test]
+    fn a_mesh_that_a_program_declines_is_left_out_of_every_series() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let put = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
+        let generator = "[generator]\nshape = 'cube'\nfacets = 12\n";
+        put("cube.toml", &format!("spacing_min = 0.5\nroot_scale = 2.0\n{generator}"));
+        let run = "[run]\nserial = ['{program}']\nout = ['{out}']\n[limits]\nfacets_max = 1\n";
+        put("few.toml", &format!("about = 'x'\nprogram = '{{here}}/none'\n{run}"));
+        let series = "[[series]]\nexperiment = 'strong'\ncase = 'cube.toml'\nengines = ['few']\n";
+        put("study.toml", &series.repeat(2));
+        let study = Study::read(&at("study.toml")).unwrap();
+        let engine = at("few.toml").display().to_string();
+        let programs = Programs::find_with_engine(&engine, Given::default()).unwrap();
+        let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
+        let (no_mpi, repeat, network, timeout) = (true, None, None, 60);
+        let options = SessionOptions { no_mpi, repeat, launcher, network, timeout };
+        let record = at("record.jsonl");
+        let outcome = measure(&options, &record, &study, &programs, &|_| ()).unwrap();
+        let is_left_out = |line: &Line| match &line.entry {
+            Entry::LeftOut(left) => left.why.contains("12 facets"),
+            _ => false,
+        };
+        let kinds: Vec<bool> = outcome.lines.iter().map(is_left_out).collect();
+        assert_eq!(kinds, [false, true, true], "a session, and each series: {:?}", outcome.lines);
+    }
+}

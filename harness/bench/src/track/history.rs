@@ -218,17 +218,10 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
 pub fn accept(path: &Path, commit: &str) -> Result<(), String> {
     let wrong = |why: &str| format!("{}: {why}", path.display());
     let records = read(path)?.records;
-    let matching: Vec<&Record> =
-        records.iter().filter(|record| record.commit.starts_with(commit)).collect();
-    let [record] = matching[..] else {
-        let what = if matching.is_empty() {
-            "no values of commit"
-        } else {
-            "several commits that begin with"
-        };
-        return Err(wrong(&format!(
-            "has {what} {commit}: give the whole hash of the first commit with the new values"
-        )));
+    let matching = records.iter().filter(|record| record.commit.starts_with(commit));
+    let [record] = matching.collect::<Vec<_>>()[..] else {
+        let why = "give the whole hash of the first commit with the new values";
+        return Err(wrong(&format!("has not exactly one commit that begins with {commit}: {why}")));
     };
     let record = Record { metrics: BTreeMap::new(), accepted: true, ..record.clone() };
     jsonl::append(path, &record).map_err(|error| wrong(&error.to_string()))
@@ -322,8 +315,10 @@ mod tests {
         let accepted: Vec<bool> = read(&path).unwrap().records.iter().map(|r| r.accepted).collect();
         assert_eq!(accepted, [false, true, false]);
         assert_eq!(read(&path).unwrap().records[1].metrics["x"], 1.0);
-        assert!(accept(&path, "abc").unwrap_err().contains("several"));
-        assert!(accept(&path, "f00").unwrap_err().contains("no values of commit f00"));
+        for commit in ["abc", "f00"] {
+            let why = accept(&path, commit).unwrap_err();
+            assert!(why.contains(&format!("not exactly one commit that begins with {commit}")));
+        }
     }
 
     /// Cut anywhere, a history keeps all its lines but the last, and the next record follows them.

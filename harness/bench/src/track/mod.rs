@@ -129,34 +129,32 @@ pub fn unit(name: &str) -> &'static str {
 pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
     let names: BTreeSet<&String> =
         records.iter().flat_map(|record| record.metrics.keys()).collect();
-    let all: Vec<Vec<(usize, f64)>> = names.iter().map(|name| points(name, records)).collect();
-    let values = |points: &Vec<(usize, f64)>| points.iter().map(|p| p.1).collect::<Vec<f64>>();
-    let mut found: Vec<Vec<Found>> =
-        all.iter().map(|points| change_points(&values(points), rules)).collect();
-    control(&mut found, rules.alpha);
-    let both = names.into_iter().zip(all).zip(found);
-    let all: Vec<Series> =
-        both.map(|((name, points), found)| series(name, points, found, records)).collect();
-    all.iter().for_each(|series| series.check_invariants(records));
-    all
+    let of_metric = |name: &String| {
+        let value = |(i, record): (usize, &Record)| Some((i, *record.metrics.get(name)?));
+        let points: Vec<(usize, f64)> = records.iter().enumerate().filter_map(value).collect();
+        let values: Vec<f64> = points.iter().map(|point| point.1).collect();
+        (name.clone(), points, change_points(&values, rules))
+    };
+    let all: Vec<_> = names.into_iter().map(of_metric).collect();
+    // A metric is one test: its smallest p-value counts, and 1 if nothing was found.
+    let least = |found: &[Found]| found.iter().map(|change| change.p).fold(1.0, f64::min);
+    let p_values: Vec<f64> = all.iter().map(|(.., found)| least(found)).collect();
+    let both = all.into_iter().zip(adjusted(&p_values));
+    let of_discovery = |((name, points, found), p): ((String, _, Vec<Found>), f64)| {
+        let found = if p > rules.alpha { Vec::new() } else { found };
+        let series = series(name, points, found, records);
+        series.check_invariants(records);
+        series
+    };
+    both.map(of_discovery).collect()
 }
 
-/// Removes the changes of all metrics that are not discoveries among all metrics. A metric is one test: its smallest p-value
-/// counts, and 1 if nothing was found.
-fn control(found: &mut [Vec<Found>], alpha: f64) {
-    let least = |changes: &Vec<Found>| changes.iter().map(|c| c.p).fold(1.0, f64::min);
-    let p_values: Vec<f64> = found.iter().map(least).collect();
-    for (changes, _) in found.iter_mut().zip(adjusted(&p_values)).filter(|(_, p)| *p > alpha) {
-        changes.clear();
-    }
-}
-
-fn points(name: &str, records: &[Record]) -> Vec<(usize, f64)> {
-    let value = |record: &Record| record.metrics.get(name).copied();
-    records.iter().enumerate().filter_map(|(i, record)| Some((i, value(record)?))).collect()
-}
-
-fn series(name: &str, points: Vec<(usize, f64)>, found: Vec<Found>, records: &[Record]) -> Series {
+fn series(
+    name: String,
+    points: Vec<(usize, f64)>,
+    found: Vec<Found>,
+    records: &[Record],
+) -> Series {
     let commit = |at: usize| records[points[at].0].commit.clone();
     let change = |Found { at, before, after, p }| Change {
         at,
@@ -169,7 +167,7 @@ fn series(name: &str, points: Vec<(usize, f64)>, found: Vec<Found>, records: &[R
         accepted: is_accepted(at, &points, records),
     };
     let changes = found.into_iter().map(change).collect();
-    Series { name: name.to_owned(), unit: unit(name), changes, points }
+    Series { unit: unit(&name), name, changes, points }
 }
 
 /// Whether a commit near a step was accepted.
