@@ -58,7 +58,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
             }
             out.add(index, &window.compress(&shape, &mut deflater)).map_err(named)?;
         }
-        Ok(drop(out.finish().map_err(named)?))
+        out.finish().map(drop).map_err(named)
     })?;
     Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
 }
