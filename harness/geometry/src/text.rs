@@ -5,10 +5,11 @@ use std::fmt;
 use super::finding::{Finding, Kind, Place};
 use super::report::Diagnosis;
 use contract::number::number;
+use contract::stl::Solid;
 
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.header(f)?;
+        self.head().iter().try_for_each(|(name, text)| writeln!(f, "{name:<10}{text}"))?;
         for finding in self.findings.iter().filter(|finding| finding.count > 0) {
             self.details(finding, f)?;
         }
@@ -21,39 +22,26 @@ impl fmt::Display for Diagnosis {
 }
 
 impl Diagnosis {
-    fn header(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { facets, vertices, shells, extent, root, .. } = self;
-        writeln!(f, "facets    {facets}, with {vertices} distinct vertices")?;
-        let names = self.solids.iter().filter_map(|s| s.name.as_ref().map(|name| (name, s)));
-        if !self.solids.is_empty() {
-            writeln!(f, "solids    {}", self.solids.len())?;
+    fn head(&self) -> Vec<(&str, String)> {
+        let Self { facets, vertices, solids, shells, extent, root, cell, .. } = self;
+        let mut rows = vec![("facets", format!("{facets}, with {vertices} distinct vertices"))];
+        if !solids.is_empty() {
+            rows.push(("solids", solids.len().to_string()));
         }
-        for (name, solid) in names {
-            writeln!(
-                f,
-                "          {name:?}: {} facets from number {}",
-                solid.facets, solid.facet_first
-            )?;
+        for Solid { name, facets, facet_first } in solids {
+            let row = |name| ("", format!("{name:?}: {facets} facets from number {facet_first}"));
+            rows.extend(name.as_ref().map(row));
         }
-        writeln!(f, "shells    {}, {} closed", shells.count, shells.closed)?;
-        writeln!(f, "extent    {} to {}", point(&extent.low), point(&extent.high))?;
-        let cells = |length: f64| in_cells(self.cell.map(|cell| length / cell));
-        writeln!(
-            f,
-            "root      {} with edge {}{}; least distance to a face {}{}",
-            point(&root.origin),
-            number(root.edge),
-            cells(root.edge),
-            number(extent.margin),
-            cells(extent.margin)
-        )?;
-        match self.cell {
-            Some(cell) => writeln!(f, "cell      {} at the surface", number(cell)),
-            None => writeln!(
-                f,
-                "cell      not known; --spacing-min reports sizes in cells and thin sheets"
-            ),
-        }
+        rows.push(("shells", format!("{}, {} closed", shells.count, shells.closed)));
+        rows.push(("extent", format!("{} to {}", point(&extent.low), point(&extent.high))));
+        let (edge, margin) = (self.with_cells("", root.edge), self.with_cells("", extent.margin));
+        let origin = point(&root.origin);
+        let root = format!("{origin} with edge {edge}; least distance to a face {margin}");
+        rows.push(("root", root));
+        let unknown = "not known; --spacing-min reports sizes in cells and thin sheets";
+        let cell = cell.map(|cell| format!("{} at the surface", number(cell)));
+        rows.push(("cell", cell.unwrap_or(unknown.to_owned())));
+        rows
     }
 
     fn details(&self, finding: &Finding, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -64,30 +52,27 @@ impl Diagnosis {
             changing => format!("; {changing} can change the mesh's region"),
         };
         writeln!(f, "\n{}: {least}{count}{effect}\n  {meaning}", kind.title())?;
-        places.iter().try_for_each(|place| writeln!(f, "  {}", self.line(place)))?;
-        match count - places.len() as u64 {
-            // Two facets of a thin sheet are listed once.
-            more if more > 0 && !matches!(kind, Kind::ThinWalls | Kind::ThinGaps) => {
-                writeln!(f, "  and {more} more (--limit)")
-            }
+        for Place { facets, at, width } in places {
+            let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
+            let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
+            let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
+            let (at, width, facets) = (point(at), width.unwrap_or_default(), facets.join(", "));
+            writeln!(f, "  at {at}{width}; facets {facets}{dots}")?;
+        }
+        let more = count - places.len() as u64;
+        // Two facets of a thin sheet are listed once.
+        match kind {
+            Kind::ThinWalls | Kind::ThinGaps => Ok(()),
+            _ if more > 0 => writeln!(f, "  and {more} more (--limit)"),
             _ => Ok(()),
         }
     }
 
-    fn line(&self, place: &Place) -> String {
-        let mut text = format!("at {}", point(&place.at));
-        if let Some(width) = place.width {
-            let cells = in_cells(self.cell.map(|cell| width / cell));
-            text += &format!(": {} wide{cells}", number(width));
-        }
-        let facets: Vec<String> = place.facets.iter().map(ToString::to_string).collect();
-        let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
-        format!("{text}; facets {}{dots}", facets.join(", "))
+    /// A length with a word after it, and in cells if their size is known.
+    fn with_cells(&self, word: &str, length: f64) -> String {
+        let cells = self.cell.map(|cell| format!(" ({} cells)", number(length / cell)));
+        format!("{}{word}{}", number(length), cells.unwrap_or_default())
     }
-}
-
-fn in_cells(cells: Option<f64>) -> String {
-    cells.map_or(String::new(), |cells| format!(" ({} cells)", number(cells)))
 }
 
 fn point(at: &[f64; 3]) -> String {
@@ -105,7 +90,6 @@ mod tests {
     use crate::extent::Extent;
     use crate::report::Shells;
     use contract::lattice::Root;
-    use contract::stl::Solid;
 
     fn finding(kind: Kind, count: u64, count_changing: u64, places: Vec<Place>) -> Finding {
         let meaning = format!("Meaning of {kind:?}.");

@@ -116,17 +116,16 @@ pub struct Answers {
 
 /// Facets at the rim that are printed.
 const FACETS_MAX: usize = 24;
+/// What follows a spacing that closes an opening.
+const CLOSE: &str =
+    "close it wherever the lattice lies; a finer one may close it on this lattice only.";
+const END: &str = "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends.\n";
 const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
 
 impl fmt::Display for Answers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, report) in self.examined.iter().enumerate() {
-            if i > 0 {
-                writeln!(f)?;
-            }
-            report.fmt(f)?;
-        }
-        Ok(())
+        let examined: Vec<String> = self.examined.iter().map(Report::to_string).collect();
+        f.write_str(&examined.join("\n"))
     }
 }
 
@@ -136,62 +135,49 @@ impl fmt::Display for Report {
             Target::Point(at) => point(at),
             Target::Far => "the far field".to_owned(),
         };
-        writeln!(f, "from      {}", point(&self.from))?;
-        writeln!(f, "to        {to}")?;
-        writeln!(f, "spacing   {}", spacing(&self.spacing))?;
-        match (&self.passage, &self.closes) {
-            (None, _) => writeln!(f, "\nno leak at this spacing"),
-            (Some(passage), closes) => {
-                let verdict = match passage.narrowest.is_end {
-                    true => {
-                        "JOINED: start and end lie in one space, or one of them within the opening"
-                    }
-                    false => "LEAK: free leaves join start and end",
-                };
-                let closed = match closes {
-                    None => ", at every spacing".to_owned(),
-                    Some(Closes { spacing: at, is_end_crossed }) => {
-                        let crossed = if *is_end_crossed { ENDS_CROSSED } else { "" };
-                        format!("; closed at spacing {}{crossed}", spacing(at))
-                    }
-                };
-                writeln!(f, "\n{verdict}{closed}")?;
-                describe(passage, f)
+        let (from, at) = (point(&self.from), spacing(&self.spacing));
+        writeln!(f, "from      {from}\nto        {to}\nspacing   {at}\n")?;
+        let Some(passage) = &self.passage else {
+            return writeln!(f, "no leak at this spacing");
+        };
+        let verdict = match passage.narrowest.is_end {
+            true => "JOINED: start and end lie in one space, or one of them within the opening",
+            false => "LEAK: free leaves join start and end",
+        };
+        let closed = match &self.closes {
+            None => ", at every spacing".to_owned(),
+            Some(Closes { spacing: at, is_end_crossed }) => {
+                let crossed = if *is_end_crossed { ENDS_CROSSED } else { "" };
+                format!("; closed at spacing {}{crossed}", spacing(at))
             }
-        }
+        };
+        writeln!(f, "{verdict}{closed}")?;
+        describe(passage, f)
     }
 }
 
+/// What is printed of a widest path.
 fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let narrowest = &passage.narrowest;
-    let [min, width, max] = [narrowest.width_min, narrowest.width, narrowest.width_max].map(number);
-    let cells = number(narrowest.width_cells);
-    writeln!(f, "\nThe narrowest place of the widest path")?;
-    writeln!(
-        f,
-        "width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}"
-    )?;
-    if !narrowest.is_end {
-        writeln!(
-            f,
-            "          Spacings above {max} close it wherever the lattice lies; a finer one may close it on this lattice only."
-        )?;
-    }
-    writeln!(f, "at        {}", point(&narrowest.at))?;
-    let listed = narrowest.facets.iter().take(FACETS_MAX).map(ToString::to_string);
-    let listed: Vec<String> = listed.collect();
-    let more = match narrowest.facets.len().saturating_sub(FACETS_MAX) {
+    let Narrowest { at, facets, is_end, .. } = &passage.narrowest;
+    let n = &passage.narrowest;
+    let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
+    let (closing, end) = match is_end {
+        true => (String::new(), END),
+        false => (format!("          Spacings above {max} {CLOSE}\n"), ""),
+    };
+    let listed: Vec<String> = facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
+    let more = match facets.len().saturating_sub(FACETS_MAX) {
         0 => String::new(),
         more => format!(" and {more} more (--json)"),
     };
-    writeln!(f, "facets    {}{more}", listed.join(", "))?;
-    if narrowest.is_end {
-        writeln!(
-            f,
-            "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends."
-        )?;
-    }
-    Ok(())
+    write!(
+        f,
+        "\nThe narrowest place of the widest path\n\
+         width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}\n\
+         {closing}at        {}\nfacets    {}{more}\n{end}",
+        point(at),
+        listed.join(", ")
+    )
 }
 
 fn spacing(spacing: &Spacing) -> String {

@@ -1,7 +1,7 @@
 //! A figure as SVG, by `plotters`: a chart with its mesh and its series.
 //!
 //! The legend is ours, above the data in as many rows as it needs, because that of `plotters` is within the chart, where it hides data.
-//! Logarithmic axes are given their key points, because `plotters` drops the lowest tick.
+//! Logarithmic axes are linear in the logarithm and are given their key points, because those of `plotters` drop the lowest tick.
 
 use super::axes::{BELOW, Scale};
 use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
