@@ -10,7 +10,7 @@
 
 use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
-use crate::partition::ownership::{Ownership, Placement};
+use crate::partition::ownership::Ownership;
 use bricks::brick;
 use bricks::brickset::{Cursor, ones};
 use bricks::octant::{Level, Side, start57};
@@ -120,7 +120,6 @@ struct Loaded {
     /// Sides of the leaves; split octants pass theirs on to their descendants.
     crossing: u64,
     inside: u64,
-    placement: Placement,
 }
 
 struct Walk<'a, S> {
@@ -136,18 +135,15 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (ownership, cursors) = (self.ownership, &mut self.levels[l as usize]);
-        let placement =
-            if ownership.owns(l, key) { Placement::Local } else { ownership.placement(l, key) };
         let Octants { split, crossing, inside, deleted } = cursors.read(key, crossing, inside);
         let split = split & exists;
-        let is_local = placement == Placement::Local;
-        let leaves = if is_local { exists & !split & !deleted } else { 0 };
+        let leaves = if ownership.owns(l, key) { exists & !split & !deleted } else { 0 };
         let counts = &mut self.counts.by_level[l as usize];
         let count = |side: u64| u64::from((leaves & side).count_ones());
         counts[Side::Crossing as usize] += count(crossing);
         counts[Side::Inside as usize] += count(inside);
         counts[Side::Outside as usize] += count(!(crossing | inside));
-        Loaded { key, leaves, split, crossing, inside, placement }
+        Loaded { key, leaves, split, crossing, inside }
     }
 
     /// Emits eight siblings and their descendants.
@@ -166,14 +162,13 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
             below(brick.crossing),
             below(brick.inside),
         );
-        let remote = matches!(child.placement, Placement::Remote(_));
         for o in 0..8 {
             if split >> o & 1 == 0 {
                 self.put(l, parent, brick, j, 1 << o);
             } else if child.split == 0 {
                 // The usual case at the finest level: saves a call per group.
                 self.put(l + 1, parent << 3 | o, &child, o, 0xff);
-            } else if !remote {
+            } else {
                 self.group(l + 1, &child, o)?;
             }
         }

@@ -10,7 +10,7 @@ use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use std::ops::Range;
 
-/// Fractions of a finest cell's face that areas are counted in: sums of integers do not depend on their order.
+/// Fractions of a leaf that leaves are counted in: sums of integers do not depend on their order.
 pub const FRACTIONS: u64 = 1024;
 
 /// Estimated leaves of the mesh per face of a finest cell: the layers on the kept side, a third of them being coarser.
@@ -28,14 +28,13 @@ fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
     rules.boxes.iter().map(leaves).max().unwrap_or(0)
 }
 
-/// Adds the leaves that the boxes ask for within an interval of the curve, with weight `each`: by octants of `level`, or larger ones
+/// Adds the leaves that the boxes ask for within an interval of the curve, in [`FRACTIONS`]: by octants of `level`, or larger ones
 /// that hold no more than `light` leaves.
 pub fn add_boxes(
     bins: &mut Vec<Bin>,
     rules: &Rules,
     level: Level,
     light: u64,
-    each: u64,
     within: &Range<u64>,
 ) {
     if rules.boxes.is_empty() {
@@ -50,7 +49,7 @@ pub fn add_boxes(
         }
         let inside = within.start <= span.start && span.end <= within.end;
         if l >= level || inside && leaves <= light {
-            bins.push((span.start, leaves.saturating_mul(each)));
+            bins.push((span.start, leaves.saturating_mul(FRACTIONS)));
         } else {
             open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
         }
@@ -69,14 +68,17 @@ fn norm(f: &Facet) -> f64 {
 /// Number of facets in the sample, if there are many small ones.
 const SAMPLE: usize = 2048;
 
-/// The areas of some facets by octants of a level, in [`FRACTIONS`] of a finest cell's face. Of many facets that are smaller than such an
+/// Estimated leaves of the mesh near some facets, in [`FRACTIONS`], by octants of a level. Of many facets that are smaller than such an
 /// octant, a sample is measured.
 pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let (cell, size) = (edge(rules.level_surface) as f64, edge(level));
     let (shift, scale) = (3 * (LEVEL_MAX - level), FRACTIONS as f64 / (cell * cell));
     let mut bins: Vec<Bin> = Vec::new();
-    let mut add =
-        |start: u64, area: f64| bins.push((start >> shift << shift, (area * scale) as u64));
+    let each = leaves_per_surface_cell(rules);
+    let mut add = |start: u64, area: f64| {
+        let leaves = ((area * scale) as u64).saturating_mul(each);
+        bins.push((start >> shift << shift, leaves));
+    };
     // Odd, as facets come in pairs.
     let every = (facets.len() / SAMPLE) | 1;
     for some in facets.chunks(every) {
@@ -140,7 +142,8 @@ mod tests {
         let bins = of(&[f], &rules(6), 4);
         let cells = |l: Level, code: u64| {
             let span = start57(l, code)..start57(l, code + 1);
-            bins.iter().filter(|b| span.contains(&b.0)).map(|b| b.1).sum::<u64>() / FRACTIONS
+            let inside = bins.iter().filter(|b| span.contains(&b.0));
+            inside.map(|b| b.1).sum::<u64>() / FRACTIONS / leaves_per_surface_cell(&rules(6))
         };
         // 32 x 32 finest cells, half of them covered.
         assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
@@ -197,19 +200,19 @@ mod tests {
         let rules = Rules { level_surface: 6, boxes, ..plain_rules() };
         let weights = |level: Level, light: u64, within: &Range<u64>| {
             let mut bins = Vec::new();
-            add_boxes(&mut bins, &rules, level, light, 10, within);
+            add_boxes(&mut bins, &rules, level, light, within);
             curve::merge(&mut bins);
             bins
         };
         let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
         for (level, light) in [(2, 0), (5, 0), (6, 0), (5, 100), (5, 3300)] {
             let bins = weights(level, light, &curve::ALL);
-            assert_eq!(sum(&bins), 10 * 5 * 20 * 33, "level {level}, light {light}");
+            assert_eq!(sum(&bins), FRACTIONS * 5 * 20 * 33, "level {level}, light {light}");
             assert!(bins.iter().all(|b| b.0.trailing_zeros() >= 3 * (LEVEL_MAX - level)));
             let middle = start57(5, 12_345);
             let halves =
                 [0..middle, middle..curve::ALL.end].map(|half| sum(&weights(5, light, &half)));
-            assert_eq!(halves[0] + halves[1], 33_000, "each bin belongs to one interval");
+            assert_eq!(halves[0] + halves[1], FRACTIONS * 3300, "each bin belongs to one interval");
         }
         assert_eq!(weights(5, 3300, &curve::ALL).len(), 1, "light octants are not divided");
     }

@@ -95,7 +95,8 @@ impl Estimate<'_> {
         level: Level,
     ) -> Result<(Ownership, Partitioner), Error> {
         let comm = self.comm;
-        let (mut leaves, _) = self.all_bins(&self.bins(level), level, FINE_PER_RANK);
+        let (mut leaves, _) =
+            self.all_bins(&area::of(self.facets, self.rules, level), level, FINE_PER_RANK);
         if division.weights == Weights::Unit {
             leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
         }
@@ -111,7 +112,7 @@ impl Estimate<'_> {
 
     /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
-        let (comm, local) = (self.comm, self.bins(fine));
+        let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
         let (bins, light) = self.all_bins(&local, coarse, 1);
         let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
@@ -121,19 +122,11 @@ impl Estimate<'_> {
         let mut bins: Vec<Bin> =
             received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
         for interval in rough.intervals() {
-            area::add_boxes(&mut bins, self.rules, fine, light, FRACTIONS, &interval);
+            area::add_boxes(&mut bins, self.rules, fine, light, &interval);
         }
         curve::merge(&mut bins);
         let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
         Ownership::along(comm.rank(), comm.size(), boundaries)
-    }
-
-    /// Estimated leaves of the mesh near this rank's facets, in [`FRACTIONS`], by octants of a level.
-    fn bins(&self, level: Level) -> Vec<Bin> {
-        let mut bins = area::of(self.facets, self.rules, level);
-        let each = area::leaves_per_surface_cell(self.rules);
-        bins.iter_mut().for_each(|b| b.1 = b.1.saturating_mul(each));
-        bins
     }
 
     /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
@@ -146,7 +139,7 @@ impl Estimate<'_> {
         let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
         let light = leaves(&bins) / (comm.size() as u64 * per_rank);
-        area::add_boxes(&mut bins, self.rules, level, light, FRACTIONS, &curve::ALL);
+        area::add_boxes(&mut bins, self.rules, level, light, &curve::ALL);
         curve::merge(&mut bins);
         let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
         (bins, light)
@@ -178,7 +171,7 @@ mod tests {
     use super::*;
     use crate::tests::rules as plain_rules;
     use bricks::octant::{ROOT_EDGE, start57};
-    use ranks::{Solo, sim};
+    use ranks::sim;
 
     const RANKS: usize = 9;
     const FINE: Level = 7;
@@ -218,8 +211,8 @@ mod tests {
 
     /// Estimated leaves on each rank.
     fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
-        let mut bins = Estimate { facets: &sheet(), rules, comm: &Solo }.bins(FINE);
-        area::add_boxes(&mut bins, rules, FINE, 0, FRACTIONS, &curve::ALL);
+        let mut bins = area::of(&sheet(), rules, FINE);
+        area::add_boxes(&mut bins, rules, FINE, 0, &curve::ALL);
         let mut sums = vec![0; RANKS];
         for (start, weight) in bins {
             sums[owners[(start / start57(FINE, 1)) as usize]] += weight;

@@ -13,6 +13,7 @@
 mod redistribute;
 
 use crate::partition::curve::Boundary;
+use bricks::brick::Brick;
 use bricks::octant::{LEVEL_MAX, Level, morton, position, start57};
 use bricks::tree::Tree;
 use std::ops::Range;
@@ -203,33 +204,22 @@ impl Ownership {
         for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
             for l in 0..=self.level_fully_replicated {
                 let bricks = from[l as usize].bricks();
-                let bricks = bricks.filter(|b| self.is_fully_replicated(l, b.key));
-                bricks.for_each(|b| to[l as usize].push(b.key, b.bits));
+                let is_everywhere =
+                    |b: &Brick| self.placement(l, b.key) == Placement::FullyReplicated;
+                bricks.filter(is_everywhere).for_each(|b| to[l as usize].push(b.key, b.bits));
             }
         }
         top
     }
 
-    /// Whether all ranks hold brick `key` of level `l`.
-    fn is_fully_replicated(&self, l: Level, key: u64) -> bool {
-        l < 2
-            || l <= self.level_fully_replicated
-                && self.intervals.of_brick(l, key).len() >= OWNERS_MANY
-    }
-
     /// Which ranks hold brick `key` of level `l`.
     #[inline]
     pub fn placement(&self, l: Level, key: u64) -> Placement {
-        if l < 2 {
-            return Placement::FullyReplicated;
+        match () {
+            () if l < 2 => Placement::FullyReplicated,
+            () if self.ranks == 1 || self.is_within(l, key) => Placement::Local,
+            () => self.placement_among(l, self.owners_of(l, key)),
         }
-        if self.ranks == 1 || self.is_within(l, key) {
-            return Placement::Local;
-        }
-        if l > self.level_replicated {
-            return self.placement_of(self.owner(l, key));
-        }
-        self.placement_among(l, self.owners_of(l, key))
     }
 
     /// Whether brick `key` of level `l`, which is 2 or more, lies within this rank's longest interval.
@@ -248,17 +238,14 @@ impl Ownership {
     fn placement_among(&self, l: Level, owners: &[usize]) -> Placement {
         match owners.len() {
             _ if l < 2 => Placement::FullyReplicated,
-            1 => self.placement_of(owners[0]),
+            1 if Some(owners[0]) == self.rank => Placement::Local,
+            1 => Placement::Remote(owners[0]),
             OWNERS_MANY.. => Placement::FullyReplicated,
             _ if self.rank.is_some_and(|rank| owners.contains(&rank)) => {
                 Placement::PartiallyReplicated
             }
             _ => Placement::Remote(owners[0]),
         }
-    }
-
-    fn placement_of(&self, owner: usize) -> Placement {
-        if Some(owner) == self.rank { Placement::Local } else { Placement::Remote(owner) }
     }
 
     /// The rank that owns brick `key` of level `l`.
@@ -275,6 +262,12 @@ impl Ownership {
             || l > self.level_replicated + 1
             || self.own.contains(&brick_start(l, key))
             || Some(self.owner(l, key)) == self.rank
+    }
+
+    /// Whether this rank holds a brick.
+    #[inline]
+    pub fn holds(&self, l: Level, key: u64) -> bool {
+        self.owns(l, key) || !matches!(self.placement(l, key), Placement::Remote(_))
     }
 
     /// Whether several ranks hold a brick of level `l`.

@@ -168,7 +168,8 @@ impl Voxeliser<'_> {
         let (min_corner, allowed) = (brick::min_corner(l, key), self.allowed(l, key));
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let crossing = (self.test(&facets, l, min_corner)
+        let straddling = facets.straddling.clone();
+        let crossing = (straddling.fold(0, |all, i| all | self.test(self.lists[i], l, min_corner))
             | self.bin_contained(&facets.contained, l, min_corner, &mut runs))
             & allowed;
         let near: Vec<ExtentBox> = boxes
@@ -223,19 +224,15 @@ impl Voxeliser<'_> {
         brick::children(split)
     }
 
-    /// Tests the straddling facets of a brick; returns the octants that they cross.
-    fn test(&mut self, facets: &BrickFacets, l: Level, min_corner: [i64; 3]) -> u64 {
-        let mut crossing = 0;
-        for i in facets.straddling.clone() {
-            let f = self.lists[i];
-            let mask = crossed(&self.binned.facets[f as usize], min_corner, l);
-            if mask != 0 {
-                self.pairs.push((f, mask));
-                crossing |= mask;
-            }
+    /// Tests a facet against a brick; returns the octants that it crosses.
+    #[inline]
+    fn test(&mut self, f: u32, l: Level, min_corner: [i64; 3]) -> u64 {
+        self.counters.facet_brick_tests += 1;
+        let mask = crossed(&self.binned.facets[f as usize], min_corner, l);
+        if mask != 0 {
+            self.pairs.push((f, mask));
         }
-        self.counters.facet_brick_tests += facets.straddling.len() as u64;
-        crossing
+        mask
     }
 
     /// Bins the contained facets of a brick by octant, into `runs`, and tests those that no octant of the
@@ -252,32 +249,20 @@ impl Voxeliser<'_> {
         while i < contained.end {
             let octant = self.binned.containing[i];
             if octant.level() < l {
-                let mask = crossed(&self.binned.facets[i], min_corner, l);
-                self.pairs.push((i as u32, mask));
-                self.counters.facet_brick_tests += 1;
-                crossing |= mask;
+                crossing |= self.test(i as u32, l, min_corner);
                 i += 1;
                 continue;
             }
             let code = octant.start() >> (3 * (LEVEL_MAX - l));
             let end = ContainingOctant::first_in((code + 1) << (3 * (LEVEL_MAX - l)));
-            let run = i + run_length(&self.binned.containing[i..contained.end], end);
+            let after = &self.binned.containing[i..contained.end];
+            let run = i + after.partition_point(|octant| *octant < end);
             runs[(code & 63) as usize] = (i as u32, run as u32);
             crossing |= 1 << (code & 63);
             i = run;
         }
         crossing
     }
-}
-
-/// Number of leading octants before `end`. Galloping search: runs are short at fine levels, long at coarse ones.
-fn run_length(containing: &[ContainingOctant], end: ContainingOctant) -> usize {
-    let mut step = 1;
-    while containing.get(step).is_some_and(|h| *h < end) {
-        step *= 2;
-    }
-    let near = &containing[step / 2..containing.len().min(step)];
-    step / 2 + near.partition_point(|h| *h < end)
 }
 
 #[cfg(test)]
@@ -301,18 +286,6 @@ mod tests {
         let mut binned = BinnedFacets::new(&[facet(9000), facet(100)]);
         binned.facets[1] = facet(20_000);
         binned.check_invariants();
-    }
-
-    #[test]
-    fn runs_of_every_length_end_before_their_end() {
-        let all: Vec<ContainingOctant> = (0..40).map(|i| ContainingOctant(i / 2)).collect();
-        for length in 0..all.len() {
-            for end in 0..22 {
-                let containing = &all[..length];
-                let want = containing.iter().take_while(|h| h.0 < end).count();
-                assert_eq!(run_length(containing, ContainingOctant(end)), want, "{length}, {end}");
-            }
-        }
     }
 
     #[test]

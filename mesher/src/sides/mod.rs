@@ -30,6 +30,7 @@ use bricks::brick::Brick;
 use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
+use components::LocalMerge;
 use global::Label;
 use nodes::{Component, Nodes};
 use ranks::Comm;
@@ -134,10 +135,8 @@ impl Components {
     /// Finds the components of a tree's leaves that do not cross. Collective.
     fn new(base: &Base) -> Self {
         let nodes = Nodes::new(base.tree, base.ownership);
-        let mut local = components::merge(&nodes, base.ownership);
-        let faces = std::mem::take(&mut local.faces);
-        let at_boundary = std::mem::take(&mut local.at_boundary);
-        let merged = local.merged.numbered();
+        let LocalMerge { merged, faces, at_boundary } = components::merge(&nodes, base.ownership);
+        let merged = merged.numbered();
         let labels = global::labels(base, &nodes, faces, &merged);
         let candidates = vote::candidates(base, &nodes, &merged, &labels);
         let all = vote::all_components(&candidates, base.comm);

@@ -7,7 +7,7 @@
 //!   are connected over faces within the brick.
 
 use crate::partition::ownership::{Ownership, Placement};
-use bricks::brick;
+use bricks::brick::{self, Brick};
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 
@@ -34,7 +34,7 @@ struct LevelNodes {
     placements: Vec<Placement>,
 }
 
-/// A brick and its non-crossing leaves.
+/// A brick and its non-crossing leaves. Of a brick that this rank does not hold, no octants are known.
 pub struct OpenBrick {
     /// Its key.
     pub key: u64,
@@ -42,8 +42,8 @@ pub struct OpenBrick {
     pub split: u64,
     /// Its non-crossing leaves.
     pub open: u64,
-    /// The owner, if this rank does not hold the brick; then no octants are known.
-    pub remote: Option<usize>,
+    /// Whether this rank holds it.
+    pub is_held: bool,
 }
 
 /// The bricks of a level in Morton order: one for each node.
@@ -54,21 +54,11 @@ pub fn open_bricks<'a>(
 ) -> impl Iterator<Item = OpenBrick> + 'a {
     let mut split = tree.split[l as usize].cursor();
     let mut crossing = tree.crossing[l as usize].cursor();
-    Tree::exists(&tree.split, l).map(move |b| {
-        let placement =
-            if ownership.owns(l, b.key) { Placement::Local } else { ownership.placement(l, b.key) };
-        match placement {
-            Placement::Remote(r) => OpenBrick { key: b.key, split: 0, open: 0, remote: Some(r) },
-            _ => {
-                let split = split.get(b.key);
-                OpenBrick {
-                    key: b.key,
-                    split,
-                    open: b.bits & !split & !crossing.get(b.key),
-                    remote: None,
-                }
-            }
-        }
+    Tree::exists(&tree.split, l).map(move |Brick { key, bits }| {
+        let is_held = ownership.holds(l, key);
+        let split = if is_held { split.get(key) } else { 0 };
+        let open = if is_held { bits & !split & !crossing.get(key) } else { 0 };
+        OpenBrick { key, split, open, is_held }
     })
 }
 
@@ -114,11 +104,7 @@ impl Nodes {
                 out.first_child.push(children);
                 children += brick::parents(b.split).count_ones();
             }
-            if l < 2
-                || ownership.is_replicated(l)
-                || b.remote.is_some()
-                || !out.placements.is_empty()
-            {
+            if l < 2 || ownership.is_replicated(l) || !b.is_held || !out.placements.is_empty() {
                 out.placements.resize(n, Placement::Local);
                 out.placements.push(ownership.placement(l, b.key));
             }

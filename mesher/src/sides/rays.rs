@@ -27,33 +27,17 @@ struct Grid {
     axis: usize,
     /// Squares per side, as a power of two.
     side_log2: u32,
-    /// First entry of each square in `members`, and the end: one entry more than squares.
-    starts: Vec<u32>,
-    members: Vec<u32>,
+    /// The points, each after its square, sorted.
+    members: Vec<(usize, u32)>,
 }
 
 impl Grid {
     fn new(points: &[[i64; 3]], axis: usize) -> Self {
         let side_log2 = (points.len().max(1).ilog2() / 2).min(10);
-        let mut grid = Self {
-            axis,
-            side_log2,
-            starts: vec![0; (1 << (2 * side_log2)) + 1],
-            members: vec![0; points.len()],
-        };
-        for p in points {
-            let s = grid.square_of(p);
-            grid.starts[s + 1] += 1;
-        }
-        for s in 1..grid.starts.len() {
-            grid.starts[s] += grid.starts[s - 1];
-        }
-        let mut next = grid.starts.clone();
-        for (i, p) in (0..).zip(points) {
-            let s = grid.square_of(p);
-            grid.members[next[s] as usize] = i;
-            next[s] += 1;
-        }
+        let mut grid = Self { axis, side_log2, members: Vec::new() };
+        let mut members: Vec<_> = points.iter().map(|p| grid.square_of(p)).zip(0..).collect();
+        members.sort_unstable();
+        grid.members = members;
         grid
     }
 
@@ -76,8 +60,9 @@ impl Grid {
         }
         for row in self.index(w0)..=self.index(w1) {
             let base = row << self.side_log2;
-            let range = self.starts[base + self.index(u0)]..self.starts[base + self.index(u1) + 1];
-            for &i in &self.members[range.start as usize..range.end as usize] {
+            let (first, last) = (base + self.index(u0), base + self.index(u1));
+            let from = self.members.partition_point(|m| m.0 < first);
+            for &(_, i) in self.members[from..].iter().take_while(|m| m.0 <= last) {
                 let p = &points[i as usize];
                 let near = (u0..=u1).contains(&p[u]) && (w0..=w1).contains(&p[w]);
                 if near && let Some(up) = meets(f, p, self.axis) {

@@ -61,7 +61,6 @@ proptest! {
                 };
                 prop_assert_eq!(ownership.placement(l, key), want, "level {} key {}", l, key);
                 prop_assert_eq!(ownership.owner(l, key), owners[0]);
-                prop_assert_eq!(ownership.is_fully_replicated(l, key), many);
                 let holds = !matches!(want, Placement::Remote(_));
                 prop_assert!(!holds || ownership.owns(l, key) == (owners[0] == rank));
             }
