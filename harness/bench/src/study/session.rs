@@ -426,9 +426,10 @@ mod tests {
         put("study.toml", &series.repeat(2));
         let study = Study::read(&at("study.toml")).unwrap();
         let engine = at("few.toml").display().to_string();
-        let programs = Programs::find_with_engine(&engine, Given::default()).unwrap();
+        let programs = Programs::find(&engine, &Given::default()).unwrap();
         let launcher = Launcher::parse("mpirun -n {ranks}").unwrap();
-        let (no_mpi, repeat, network, timeout) = (true, None, None, 60);
+        let (no_mpi, repeat, network) = (true, None, None);
+        let timeout = Duration::from_secs(60);
         let options = SessionOptions { no_mpi, repeat, launcher, network, timeout };
         let record = at("record.jsonl");
         let outcome = measure(&options, &record, &study, &programs, &|_| ()).unwrap();
