@@ -28,9 +28,13 @@ pub(crate) fn differing(a: Owned, b: Owned) -> Vec<String> {
 /// The differences of these keys, one line each.
 pub(crate) fn compare(keys: &[&str], (owner_a, a): Owned, (owner_b, b): Owned) -> Vec<String> {
     let (a, b) = (stated(a), stated(b));
+    let text = |value: &Value| match value {
+        Value::Null => "not stated".to_owned(),
+        value => value.to_string(),
+    };
     let line = |key: &&str| {
         let (x, y) = (&a[*key], &b[*key]);
-        (x != y).then(|| format!("{key}: {x} in {owner_a}; {y} in {owner_b}"))
+        (x != y).then(|| format!("{key}: {} in {owner_a}; {} in {owner_b}", text(x), text(y)))
     };
     keys.iter().filter_map(line).collect()
 }

@@ -14,7 +14,7 @@ impl fmt::Display for Diagnosis {
             self.details(finding, f)?;
         }
         let verdict = match self.changes_region {
-            true => "findings that can change the mesh's region",
+            true => "at least one finding can change the mesh's region",
             false => "no finding that changes the mesh's region",
         };
         write!(f, "\n{verdict}")
@@ -145,7 +145,7 @@ mod tests {
             facets of thin walls: 4; 4 can change the mesh's region\n  Meaning of ThinWalls.\n  \
             at (0.1, 2.0, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
             closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
-            findings that can change the mesh's region";
+            at least one finding can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
     }
 

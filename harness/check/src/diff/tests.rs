@@ -12,6 +12,18 @@ fn written(words: Vec<u64>) -> tempfile::TempDir {
 }
 
 #[test]
+fn what_a_manifest_does_not_state_is_named_as_such() {
+    let [a, b] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut set = leaf_set(vec![words_of(|o| o.level < 1)]);
+    set.manifest.components = Some(Default::default());
+    set.write(a.path()).unwrap();
+    set.manifest.components = None;
+    set.write(b.path()).unwrap();
+    let fields = diff(a.path(), b.path(), None).unwrap().fields;
+    assert!(fields.iter().any(|f| f.ends_with("in A; not stated in B")), "{fields:?}");
+}
+
+#[test]
 fn without_the_sides_of_one_mesh_the_cells_are_compared() {
     let words = words_of(|o| o.level < 2);
     let with_sides = words.iter().map(|word| word | 1).collect();
