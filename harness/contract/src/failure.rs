@@ -1,6 +1,5 @@
 //! Why a command has no result: the exit code and the one sentence that `harness` prints.
 
-use crate::files::named;
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
 use std::path::Path;
@@ -22,6 +21,11 @@ pub const EXIT_INTERRUPTED: u8 = 130;
 pub fn exit_first(a: u8, b: u8) -> u8 {
     let order = [EXIT_INTERRUPTED, EXIT_FAILED, EXIT_INPUT, EXIT_MISSING];
     order.into_iter().find(|code| [a, b].contains(code)).unwrap_or(EXIT_HOLDS)
+}
+
+/// An error that names the file.
+pub fn named(path: &Path, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
 /// Why a command has no result, or why a file cannot be used: one sentence, or the predicate of one whose subject is the file.

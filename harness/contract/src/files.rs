@@ -11,11 +11,6 @@ use tempfile::TempDir;
 
 pub use ::files::{append_log, read, read_log, read_text, write_atomically};
 
-/// An error that names the file.
-pub fn named(path: &Path, error: &io::Error) -> io::Error {
-    io::Error::new(error.kind(), format!("{}: {error}", path.display()))
-}
-
 /// Like [`write_atomically`], for files that are not written from the beginning to the end. Returns the number of bytes.
 ///
 /// # Errors

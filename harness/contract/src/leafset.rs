@@ -2,8 +2,7 @@
 //! directories of any size.
 
 use crate::digest::Digest;
-use crate::failure::Failure;
-use crate::files::named;
+use crate::failure::{Failure, named};
 use crate::manifest::{self, Manifest, Part};
 use crate::mesh::{Mesh, part_names};
 use crate::npy::{self, PartFile};

@@ -10,8 +10,8 @@ mod tests;
 
 use colour::{Colour, Entry};
 use contract::case::Facet;
-use contract::failure::Failure;
-use contract::files::{named, write_atomically};
+use contract::failure::{Failure, named};
+use contract::files::write_atomically;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::mesh::Mesh;
