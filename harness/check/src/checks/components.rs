@@ -150,7 +150,7 @@ fn crossing(word: u64) -> bool {
 /// The leaves across a face that are at least as coarse. Finer neighbours find this leaf themselves, and so do siblings that
 /// precede it: the search among all leaves dominates the time of an audit without a case.
 fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usize> {
-    let precedes = |face: usize| face % 2 == 0 && octant.digit() >> (face / 2) & 1 == 1;
+    let precedes = |face: usize| face.is_multiple_of(2) && octant.digit() >> (face / 2) & 1 == 1;
     let across = (0..6).filter(move |&face| !precedes(face)).filter_map(|face| {
         let mut offset = [0; 3];
         offset[face / 2] = if face % 2 == 0 { -1 } else { 1 };
