@@ -111,10 +111,10 @@ fn quaternion() -> impl Strategy<Value = [f64; 4]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(5))]
 
-    /// Invariants are checked by the answer itself.
+    /// Invariants are checked by the answer itself. Along a slit, a search at level 8 takes over a minute.
     #[test]
     fn the_width_of_an_opening_is_within_its_bounds(
-        body in torn(), rotation in quaternion(), shift in prop::array::uniform3(0.0f64..0.25), level in 5u8..9
+        body in torn(), rotation in quaternion(), shift in prop::array::uniform3(0.0f64..0.25), level in 5u8..8
     ) {
         let body = body.rotated(rotation);
         let what = format!("{} of {}, {rotation:?}", body.name, body.width);
