@@ -31,7 +31,7 @@ impl Points {
         self.numbers.clear();
     }
 
-    /// Numbers the points anew, in the order of a key.
+    /// Renumbers the points, in the order of a key.
     pub fn sort_by<K: Ord>(&mut self, key: impl Fn(&Point) -> K) {
         self.all.sort_by_cached_key(key);
         self.numbers.extend(self.all.iter().copied().zip(0..));

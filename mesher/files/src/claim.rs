@@ -7,8 +7,8 @@
 //! - a run removes files only in the directory that it opened, and only under the names that it gave when it claimed.
 
 use crate::draft::Draft;
-use crate::unfinished::{Output, Unfinished, open_file};
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, renameat, unlinkat};
+use crate::unfinished::{Output, Unfinished, open_file, rename_to_new};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, RawDir, fsync, mkdirat, openat, unlinkat};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
 use std::fs::File;
@@ -117,7 +117,7 @@ impl Claim {
         fill(&mut out)?;
         out.into_inner()?.sync_all()?;
         self.unfinished.publish(|Output { dir, names, .. }| {
-            renameat(dir, &names[0], dir, &names[1])?;
+            rename_to_new(dir, names)?;
             match fsync(dir) {
                 // Some network file systems cannot.
                 Err(Errno::INVAL) => Ok(()),

@@ -1,6 +1,6 @@
 //! Single files.
 
-use crate::unfinished::{Output, Unfinished, locked, open_file};
+use crate::unfinished::{Output, Unfinished, locked, open_file, rename_to_new};
 use crate::uses::register_output;
 use rustix::fs::{CWD, Mode, OFlags, openat, renameat};
 use std::ffi::CString;
@@ -89,9 +89,7 @@ impl Draft {
         self.synchronise()?;
         match self.place {
             Place::Through => {}
-            Place::Claimed { dir, names: [from, to] } => {
-                locked(|| renameat(&dir, &from, &dir, &to))?
-            }
+            Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
             Place::Beside(unfinished) => {
                 unfinished.publish(|Output { dir, names: [from, to], .. }| {
                     renameat(dir, from, dir, to)

@@ -7,7 +7,8 @@
 //! - output is complete once its final name belongs to the file that was begun. Of several processes of a run, the file system decides
 //!   between a rename to the final name and a removal, of which one succeeds.
 
-use rustix::fs::{AtFlags, CWD, Mode, OFlags, fstat, openat, statat, unlinkat};
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, RenameFlags, fstat, openat, statat, unlinkat};
+use rustix::fs::{renameat, renameat_with};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
 use std::io;
@@ -164,4 +165,13 @@ pub fn open_file(
     let file = openat(dir, name, always | flags, Mode::from(0o666))?;
     let found = fstat(&file)?;
     Ok((file, (found.st_dev, found.st_ino)))
+}
+
+/// Gives a file its final name, which no other file has: one that somebody else put there during the run stays.
+pub fn rename_to_new(dir: &OwnedFd, [from, to]: &[CString; 2]) -> Result<(), Errno> {
+    match renameat_with(dir, from, dir, to, RenameFlags::NOREPLACE) {
+        // Some network file systems cannot. The claim excludes other runs.
+        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => renameat(dir, from, dir, to),
+        result => result,
+    }
 }

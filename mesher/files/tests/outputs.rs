@@ -212,6 +212,22 @@ fn a_run_that_fails_removes_its_files_and_no_others() {
     assert_eq!(names(&path), [LAST, "part"]);
 }
 
+#[test]
+fn a_file_that_somebody_puts_into_the_directory_during_a_run_is_not_replaced() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("out");
+    let run = claim(&path).unwrap();
+    let part = run.draft("part").unwrap();
+    for name in ["part", LAST] {
+        fs::write(path.join(name), "theirs").unwrap();
+    }
+    assert!(part.publish().is_err());
+    assert!(run.commit(|out| out.write_all(b"ours")).is_err());
+    for name in ["part", LAST] {
+        assert_eq!(fs::read_to_string(path.join(name)).unwrap(), "theirs");
+    }
+}
+
 fn fill_part(claim: &Claim, name: &str) {
     claim.draft(name).unwrap().publish().unwrap();
 }

@@ -112,7 +112,7 @@ fn wait_for(child: u32) -> Option<Ended> {
     Some((ExitStatus::from_raw(status), seconds(usage.ru_utime) + seconds(usage.ru_stime)))
 }
 
-/// Ends all sessions, at the same time, and what they left behind. None is started as long as the result exists.
+/// Ends all sessions at the same time, and removes what they left. None is started as long as the result exists.
 pub(super) fn end_all() -> MutexGuard<'static, Vec<u32>> {
     let running = running();
     end(&running, &running);
