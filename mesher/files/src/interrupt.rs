@@ -10,11 +10,11 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::stdio::stderr;
 use signal_hook::low_level::{pipe, register};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::mem::MaybeUninit;
 use std::os::unix::net::UnixStream;
 use std::ptr::null;
-use std::sync::{Arc, Barrier};
+use std::sync::{Barrier, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 use std::{env, fmt};
@@ -32,8 +32,14 @@ const SIGNALS: [i32; 13] = [
     SIGIO, SIGPWR, SIGSTKFLT,
 ];
 
-/// Time for the thread that handles signals after the process was stopped at a point.
-const HANDLING: Duration = Duration::from_millis(300);
+/// What the thread that handles signals is sent in place of a signal by whoever waits for it.
+const WAITING: u8 = 0;
+
+/// Reaches the thread that handles signals: it takes part in the barrier when it starts, and when it reads [WAITING].
+static HANDLER: OnceLock<(UnixStream, Barrier)> = OnceLock::new();
+
+/// Time for threads of MPI or of other ranks to take a signal after the process was stopped at a point.
+const TAKING: Duration = Duration::from_millis(300);
 
 /// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130,
 /// after the time `linger`. If output is complete or the outcome [decided], the first signal is ignored, as the process is about to end.
@@ -43,12 +49,16 @@ const HANDLING: Duration = Duration::from_millis(300);
 /// If a handler cannot be installed; its signal then ends the process the default way.
 pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
     let (mut received, sent) = UnixStream::pair()?;
-    let start = Arc::new(Barrier::new(2));
-    let started = start.clone();
+    let (sent, barrier) = HANDLER.get_or_init(|| (sent, Barrier::new(2)));
     let handle = move || {
-        started.wait();
+        barrier.wait();
         let mut is_first = true;
-        while received.read_exact(&mut [0]).is_ok() {
+        let mut byte = [0];
+        while received.read_exact(&mut byte).is_ok() {
+            if byte == [WAITING] {
+                barrier.wait();
+                continue;
+            }
             if !(abandon(true) && is_first) {
                 print(message);
                 sleep(linger);
@@ -59,7 +69,7 @@ pub fn install(message: &'static str, linger: Duration) -> io::Result<()> {
     };
     thread::Builder::new().name("signals".into()).stack_size(64 << 10).spawn(handle)?;
     // Afterwards the thread allocates nothing, so the number of allocations is the same in all runs.
-    start.wait();
+    barrier.wait();
     for signal in signals()? {
         pipe::register(signal, sent.try_clone()?)?;
     }
@@ -88,12 +98,27 @@ pub fn begin() {
     complete(false);
 }
 
-/// Stops the process, as SIGSTOP does, if the environment variable `STOP_AT` is this point. Tests then send signals, and let it
-/// continue: what happens at a point does not depend on the speed of the machine.
+/// Stops the process, as SIGSTOP does, where it first reaches the point that the environment variable `STOP_AT` names. Tests then send
+/// signals, and let it continue: what happens at a point does not depend on the speed of the machine.
 pub fn stop_at(point: fmt::Arguments) {
+    static STOP: Once = Once::new();
     if env::var_os("STOP_AT").is_some_and(|at| *at == *point.to_string()) {
-        let _ = kill_process(getpid(), Signal::STOP);
-        sleep(HANDLING);
+        STOP.call_once(|| {
+            let _ = kill_process(getpid(), Signal::STOP);
+            sleep(TAKING);
+            // A signal that the handling thread itself took comes after what it is sent meanwhile, but before what it is sent then.
+            wait_for_handler();
+            wait_for_handler();
+        });
+    }
+}
+
+/// Waits until the signals that were taken before are handled; they may end the process.
+fn wait_for_handler() {
+    if let Some((sent, barrier)) = HANDLER.get() {
+        let mut sent = sent;
+        sent.write_all(&[WAITING]).expect("the thread reads until the process ends");
+        barrier.wait();
     }
 }
 

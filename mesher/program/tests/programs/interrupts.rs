@@ -104,7 +104,8 @@ fn a_signal_at_any_point_leaves_no_files_or_a_complete_mesh() {
 #[test]
 fn signals_of_writing_do_not_end_a_run() {
     let workspace = workspace();
-    let mut run = start(stopping(&workspace, "leaves:0", &[]));
+    // A phase of two parts, of which only the first one stops.
+    let mut run = start(stopping(&workspace, "leaks:0", &[]));
     signal(&["PIPE", "XFSZ"], run.stopped());
     run.finish().succeeds();
     assert!(workspace.path().join("run.json").exists());
