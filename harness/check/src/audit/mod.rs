@@ -201,8 +201,8 @@ fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
         })
     });
     match read {
-        Err(error) => result.report(error.to_string()),
-        Ok(()) if digest != manifest.digest => result.report(format!(
+        Err(error) => result.report(error),
+        Ok(()) if digest != manifest.digest => result.report(format_args!(
             "the leaves of the tree have the digest {digest}, but those of the manifest {}",
             manifest.digest
         )),

@@ -128,8 +128,8 @@ fn a_promise_of_sides_is_broken_by_a_mesh_without() {
         assert_eq!((check.was_run(), check.holds()), (true, known), "{report}");
         let claims = report.checks.iter().find(|check| check.name == "manifest").unwrap();
         let claims: Vec<&str> = claims.findings.iter().map(|f| f.as_str()).collect();
-        let level = "level_surface: 0 in the manifest, but 2 in fact";
-        assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
+        let level = "level_surface: 0 in the manifest; 2 in fact";
+        assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest; 4 in fact"]);
         // Leaves near the facet are not judged, and are not counted.
         assert!(!known || check.examined > 0 && check.examined < 64, "{report}");
     }

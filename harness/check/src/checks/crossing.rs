@@ -30,12 +30,10 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let (Some(facets), Some(truth)) = (subject.facets(), subject.truth()) else {
         return result.lacks(super::NO_GEOMETRY);
     };
-    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: &Octant| {
-        result.report_with(|| {
-            let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
-            let (given, leaf) = (contact::name(kinds), subject.terms.root.describe(octant));
-            format!("{prefix}{what} the {given} leaf {leaf}")
-        });
+    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: Octant| {
+        let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
+        let (given, leaf) = (contact::name(kinds), subject.terms.root.place(octant));
+        result.report(format_args!("{prefix}{what} the {given} leaf {leaf}"));
     };
     if !subject.promises.definition {
         return by_itself(subject, facets, &mut report);
@@ -45,7 +43,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         truth.mislabelled(pass.tree(), &mut |found, side| {
             let is_crossed = side == Side::Crossing;
             if is_crossed || found.kinds == 1 << CROSSING {
-                report(prefix, is_crossed, found.kinds, &found.octant);
+                report(prefix, is_crossed, found.kinds, found.octant);
             }
         });
     }
@@ -55,7 +53,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 fn by_itself(
     subject: &Subject,
     facets: &Facets,
-    report: &mut dyn FnMut(&str, bool, Kinds, &Octant),
+    report: &mut dyn FnMut(&str, bool, Kinds, Octant),
 ) {
     let surface = subject.terms.level_surface;
     // The leaves of an octant follow each other.
@@ -75,7 +73,7 @@ fn by_itself(
             true => kind != CROSSING || octant.level > surface && inherits(),
         };
         if !is_right {
-            report("", !near.is_empty(), 1 << kind, &octant);
+            report("", !near.is_empty(), 1 << kind, octant);
         }
     });
 }

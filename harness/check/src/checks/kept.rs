@@ -8,7 +8,6 @@
 mod alone;
 
 use super::components::Component;
-use super::manifest::same_components;
 use super::truth::Truth;
 use super::{Check, CheckResult, Subject, for_definition, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
@@ -38,11 +37,11 @@ fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
         let example = leaves.clone().find(|leaf| subject.tree().at(leaf) != Handle::HOLE);
         kept_or_deleted(component, example, &subject.terms, result);
     }
-    let counts = count(&truth.components, &subject.inputs);
+    let components = Some(count(&truth.components, &subject.inputs));
+    let expected = Manifest { components, ..subject.inputs.clone() };
     for (prefix, manifest, _) in subject.meshes() {
-        if let Some(counted) = &manifest.components {
-            same_components(prefix, counted, &counts, &subject.terms, result);
-        }
+        let claimed = (prefix, manifest);
+        super::manifest::components(claimed, ("T0", &expected), &["components"], result);
     }
 }
 
@@ -60,11 +59,9 @@ fn kept_or_deleted(
         (true, None) => ("must be kept, but the mesh has no leaf in it:", *first),
         _ => return,
     };
-    result.report_with(|| {
-        let why = if enclosed { "enclosed".to_owned() } else { side.to_string() };
-        let (total, octant) = (leaves.len(), terms.root.describe(&octant));
-        format!("a component of {total} leaves of T0 is {why} and {what} {octant}")
-    });
+    let why = if enclosed { "enclosed".to_owned() } else { side.to_string() };
+    let (total, octant) = (leaves.len(), terms.root.place(octant));
+    result.report(format_args!("a component of {total} leaves of T0 is {why} and {what} {octant}"));
 }
 
 /// The components by side, as a manifest states them.

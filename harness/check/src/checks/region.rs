@@ -74,7 +74,7 @@ impl<'a> Survey<'a> {
         check(&survey, result);
         if result.examined == 0 {
             let band = survey.band_cells;
-            result.lacks(&format!("nothing lies beyond {band} cells from the geometry"));
+            result.lacks(format_args!("nothing lies beyond {band} cells from the geometry"));
         }
     }
 
@@ -94,25 +94,22 @@ impl<'a> Survey<'a> {
 
     /// Checks that every leaf beyond the band has its side.
     pub fn check_sides(&self, result: &mut CheckResult) {
-        let mut undecided = 0u64;
+        let (mut undecided, has_band) = (0u64, self.band_cells > 0.0);
         self.visit(&mut |octant, kind, position| {
             let Some(kind) = kind else { return };
             let why = match position {
+                Position::Near { .. } if has_band => return,
+                Position::Undecided if kind != CROSSING => return undecided += 1,
+                Position::Near { .. } if kind != CROSSING => "is crossed by a facet".to_owned(),
+                Position::Undecided => "is crossed by no facet".to_owned(),
                 Position::On(side, _) if kind != side as Kind => {
                     format!("is in a component that is {side}")
                 }
-                Position::Undecided if kind == CROSSING => "is crossed by no facet".to_owned(),
-                Position::Near { .. } if self.band_cells == 0.0 && kind != CROSSING => {
-                    "is crossed by a facet".to_owned()
-                }
-                Position::Undecided => return undecided += 1,
-                Position::Near { .. } if self.band_cells > 0.0 => return,
                 _ => return result.examined += 1,
             };
             result.examined += 1;
-            result.report_with(|| {
-                format!("the {} leaf {} {why}", contact::name(1 << kind), self.describe(&octant))
-            });
+            let (given, leaf) = (contact::name(1 << kind), self.terms.root.place(octant));
+            result.report(format_args!("the {given} leaf {leaf} {why}"));
         });
         result.note = format!(
             "leaves beyond {} cells from the geometry; {undecided} are not judged, because their rays disagree",
@@ -134,13 +131,9 @@ impl<'a> Survey<'a> {
             result.examined += 1;
             if wanted != kind.is_some() {
                 let what = if wanted { "the mesh has a hole" } else { "a leaf must be deleted" };
-                result.report_with(|| format!("{what}: {}", self.describe(&octant)));
+                result.report(format_args!("{what}: {}", self.terms.root.place(octant)));
             }
         });
-    }
-
-    fn describe(&self, octant: &Octant) -> String {
-        self.terms.root.describe(octant)
     }
 
     /// Visits every leaf, and every hole in the largest octants that have one position. Holes near the geometry are

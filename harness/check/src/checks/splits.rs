@@ -32,13 +32,13 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     };
     let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
     if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
-        return result.lacks(&why);
+        return result.lacks(why);
     }
     let inputs = Manifest { tree: subject.manifest.tree, ..subject.inputs.clone() };
     let mesh = Mesh::new(subject.tree(), inputs, Some(body));
     let found = match mesh.least(FINDINGS_LISTED) {
         Ok(found) => found,
-        Err(why) => return result.lacks(&why),
+        Err(why) => return result.lacks(why),
     };
     result.examined = found.splits + found.leaves;
     let faults = [
@@ -48,7 +48,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     for (what, octant) in
         faults.iter().flat_map(|(what, faults)| faults.first.iter().map(move |o| (what, o)))
     {
-        result.report(format!("{what} {}", subject.terms.root.describe(octant)));
+        result.report(format_args!("{what} {}", subject.terms.root.place(*octant)));
     }
     result.findings_total = found.missing.total + found.unneeded.total;
 }

@@ -41,13 +41,6 @@ pub struct Found {
     pub is_finer: bool,
 }
 
-impl Found {
-    /// Whether it has no leaf.
-    pub fn is_hole(&self) -> bool {
-        self.kinds == HOLES
-    }
-}
-
 impl Truth {
     /// Maximum number of leaves. One needs about 40 bytes.
     pub const LEAVES_MAX: usize = 1 << 26;
@@ -109,7 +102,7 @@ impl Truth {
     /// Visits the parts of a mesh whose leaves do not have the side of the leaf of T0 that contains them, with that side.
     pub fn mislabelled(&self, mesh: &Tree, visit: &mut dyn FnMut(&Found, Side)) {
         self.compare(mesh, &mut |found| {
-            let side = found.base.filter(|_| !found.is_hole()).map(Self::side);
+            let side = found.base.filter(|_| found.kinds != HOLES).map(Self::side);
             if let Some(side) = side.filter(|&side| found.kinds != 1 << side as u8) {
                 visit(&found, side);
             }

@@ -150,7 +150,7 @@ impl Split {
                     "section 6 (extra layer): it touches the deleted crossing leaf".to_owned()
                 }
             };
-            clauses.push(format!("{subject}by {near} {}", root.describe(leaf)));
+            clauses.push(format!("{subject}by {near} {}", root.place(*leaf)));
             (octant, subject) = (parent(leaf), "its parent is split ");
         }
         let end = match self.links.last() {
@@ -179,7 +179,7 @@ fn that_cross(facets: &[u32]) -> String {
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let place = |octant: &Octant| self.root.describe(octant);
+        let place = |octant: &Octant| self.root.place(*octant);
         let Self { point, leaf, base_leaf, side_decided_by, deleted_by, split, .. } = self;
         match leaf {
             Some(leaf) => {
@@ -325,7 +325,7 @@ impl Mesh<'_> {
             Decision::NoSeed => "no seed lies in its component".to_owned(),
             Decision::Rays(candidate) => {
                 let parity = if component.side == Side::Inside { "an odd" } else { "an even" };
-                let candidate = self.inputs.root.describe(&candidate);
+                let candidate = self.inputs.root.place(candidate);
                 format!(
                     "each of the six rays of the candidate {candidate} intersects {parity} number of facets"
                 )

@@ -15,8 +15,8 @@ use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
 use crate::checks::facets::Facets;
+use crate::checks::manifest::differing_inputs;
 use crate::checks::truth::Truth;
-use crate::inputs;
 
 pub mod answer;
 mod gradation;
@@ -37,7 +37,7 @@ impl Body {
     pub fn of(case: &Case, of_mesh: &Manifest) -> Result<Self, String> {
         let geometry = Some(Geometry::of(&case.facets_lattice));
         let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
-        let mut differing = inputs::differing(("the mesh", of_mesh), ("the case", &inputs));
+        let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
         if of_mesh.sides == manifest::Sides::Unknown {
             differing.push("the sides of the mesh are unknown".to_owned());
         }

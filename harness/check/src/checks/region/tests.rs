@@ -104,7 +104,7 @@ fn places_within_the_band_are_not_judged() {
         let findings = result.findings;
         assert!(!findings.is_empty(), "{band_cells}");
         for detail in &findings {
-            let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
+            let names = |&w: &u64| detail.ends_with(&terms.root.place(word::octant(w)).to_string());
             assert!(words.iter().any(names), "{detail}");
         }
     }
@@ -176,7 +176,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         assert_eq!((result.findings_total, result.examined, &result.note), (0, judged, &note));
         let far = words.iter().position(|w| matches!(position(w), Position::On(..))).unwrap();
         words[far] ^= 1;
-        let (result, leaf) = (check(&words), case.root.describe(&word::octant(words[far])));
+        let (result, leaf) = (check(&words), case.root.place(word::octant(words[far])).to_string());
         let expected = format!("the inside leaf {leaf} is in a component that is outside");
         assert_eq!((result.findings_total, &result.findings[0]), (1, &expected));
         // A label of its own: a crossing leaf where no facet is, even if the rays disagree, and a crossed leaf without it.
@@ -220,7 +220,7 @@ fn crossed_leaves_are_kept_or_deleted_as_the_case_says_unless_the_band_hides_the
                 words.sort_unstable();
             }
             let what = if keep_crossing { "the mesh has a hole" } else { "a leaf must be deleted" };
-            let octant = case.root.describe(&word::octant(wrong[0]));
+            let octant = case.root.place(word::octant(wrong[0])).to_string();
             for band_cells in [0.0, 1.0] {
                 let result = check(&words, band_cells, true);
                 assert_eq!(result.findings_total, wrong.len() as u64, "{result}");
