@@ -100,11 +100,15 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
         && mesh.words == reference.words
     {
-        let keys = ["components", "components_ambiguous", "leaks"];
-        let expected = ("the reference", &reference.manifest);
-        components(("", subject.manifest), expected, &keys, result);
+        let (claimed, expected) = (("", subject.manifest), ("the reference", &reference.manifest));
+        components(claimed, expected, &["components_ambiguous", "leaks"], result);
+        components(claimed, expected, &COMPONENTS, result);
     }
 }
+
+/// The entries about components of T0.
+pub(super) const COMPONENTS: [&str; 3] =
+    ["components/outside", "components/inside", "components/enclosed"];
 
 /// The manifest has these entries about components as another one, if both have them. Places may be rounded.
 pub(super) fn components(

@@ -12,7 +12,6 @@
 mod tests;
 
 use super::components::Component;
-use super::facets::Facets;
 use super::truth::Truth;
 use super::{CheckResult, NO_GEOMETRY, Subject, contact};
 use contract::lattice::UNITS_PER_EDGE;
@@ -40,7 +39,6 @@ pub struct Survey<'a> {
     terms: &'a Manifest,
     tree: &'a Tree,
     truth: &'a Truth,
-    facets: &'a Facets,
     parity: Parity,
     /// Half the width of the band, in cells of the surface level.
     band_cells: f64,
@@ -56,9 +54,7 @@ type Visit<'v> = &'v mut dyn FnMut(Octant, Option<Kind>, Position);
 impl<'a> Survey<'a> {
     /// Runs a check of a subject, if its geometry is known.
     pub fn of(subject: &'a Subject, result: &mut CheckResult, check: fn(&Self, &mut CheckResult)) {
-        let (Some(case), Some(truth), Some(facets)) =
-            (subject.case, subject.truth(), subject.facets())
-        else {
+        let Some((case, truth)) = subject.case.zip(subject.truth()) else {
             return result.lacks(NO_GEOMETRY);
         };
         let band_cells = subject.promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells);
@@ -66,7 +62,6 @@ impl<'a> Survey<'a> {
             terms: &subject.terms,
             tree: subject.tree(),
             truth,
-            facets,
             parity: Parity::new(&case.facets_lattice),
             band_cells,
             knows_crossing: subject.promises.crossing || band_cells == 0.0,
@@ -140,7 +135,7 @@ impl<'a> Survey<'a> {
     /// divided down to the level of the surface.
     fn visit(&self, visit: Visit) {
         let surface = self.terms.level_surface;
-        self.facets.walk(self.band(), &mut |octant, near| {
+        self.truth.facets.walk(self.band(), &mut |octant, near| {
             let handle = self.tree.at(&octant);
             let kind = handle.as_leaf();
             if near.is_empty() {
@@ -156,7 +151,7 @@ impl<'a> Survey<'a> {
             let is_whole = kind.is_some() || handle == Handle::HOLE && octant.level >= surface;
             if is_whole {
                 let (low, high) = octant.bounds();
-                let crossed = self.facets.first_meeting(near, low, high).is_some();
+                let crossed = self.truth.facets.first_meeting(near, low, high).is_some();
                 let may_be_coarse = !crossed && octant.level < surface;
                 let beyond = may_be_coarse.then(|| self.beyond_band(octant, near)).flatten();
                 visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
@@ -173,7 +168,8 @@ impl<'a> Survey<'a> {
     /// The position of a part beyond the band of an octant that no facet crosses. All of it lies on one side.
     fn beyond_band(&self, octant: Octant, candidates: &[u32]) -> Option<Position> {
         let ((low, high), band) = (octant.bounds(), self.band());
-        let near = self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
+        let near =
+            self.truth.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
         if near.is_empty() {
             return Some(self.position(octant));
         }

@@ -10,7 +10,6 @@
 
 use super::components::{self, Component};
 use super::contact;
-use super::facets::Facets;
 use super::region::Survey;
 use super::truth::Truth;
 use super::{Check, CheckResult, Subject, some_leaves};
@@ -102,26 +101,21 @@ fn ambiguous(claimed: Option<[f64; 3]>, truth: &Truth, terms: &Manifest) -> Ambi
 
 /// The leaks of a case with this T0: regions that are closed at a coarser spacing and open at that of the mesh.
 fn leaks(subject: &Subject, truth: &Truth) -> Vec<Leak> {
-    let body = subject.case.zip(subject.facets()).expect("T0 is that of a case");
+    let case = subject.case.expect("T0 is that of a case");
     let terms = &subject.inputs;
-    if !terms.seeds.is_empty() && is_watertight(&body.0.facets_lattice) {
+    if !terms.seeds.is_empty() && is_watertight(&case.facets_lattice) {
         return Vec::new();
     }
     let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
-    levels.flat_map(|level| between(body, terms, truth, level)).collect()
+    levels.flat_map(|level| between(case, terms, truth, level)).collect()
 }
 
 /// The leaks between T0 cut at a level, and T0.
-fn between(
-    (case, facets): (&Case, &Facets),
-    terms: &Manifest,
-    truth: &Truth,
-    level: u8,
-) -> Vec<Leak> {
+fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
     let mut cut = Manifest { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
     let make = |terms: &Manifest| {
-        let coarse = Truth::new(facets, &case.facets_lattice, terms);
+        let coarse = Truth::new(truth.facets.clone(), &case.facets_lattice, terms);
         coarse.expect("T0 that is cut has no more leaves than T0")
     };
     let mut coarse = make(&cut);

@@ -107,7 +107,7 @@ impl<'a> Crossed<'a> {
     /// The facets of a subject with the tolerance that it promises, if they are known.
     pub fn of(subject: &'a Subject) -> Option<Self> {
         let cells = subject.promises.surface.map_or(0.0, |surface| surface.tolerance_cells);
-        Some(Self::new(subject.facets()?, &subject.terms, cells))
+        Some(Self::new(&subject.truth()?.facets, &subject.terms, cells))
     }
 
     fn new(facets: &'a Facets, terms: &'a Manifest, tolerance_cells: f64) -> Self {

@@ -6,11 +6,13 @@
 
 use super::components::{self, Component};
 use super::facets::Facets;
+use contract::case::Case;
 use contract::lattice::FacetLattice;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};
 use contract::word::{self, Leaf, Side};
+use std::rc::Rc;
 
 /// The kind, in T0's tree, of an outside leaf that is deleted because its component is enclosed.
 const ENCLOSED: Kind = 3;
@@ -18,6 +20,8 @@ const ENCLOSED: Kind = 3;
 /// T0 of a case.
 #[derive(Debug)]
 pub struct Truth {
+    /// The facets of the case.
+    pub facets: Rc<Facets>,
     /// Its leaf words.
     pub words: Vec<u64>,
     /// The components of the leaves that no facet crosses.
@@ -45,8 +49,13 @@ impl Truth {
     /// Maximum number of leaves. One needs about 40 bytes.
     pub const LEAVES_MAX: usize = 1 << 26;
 
-    /// T0 of the inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
-    pub fn new(facets: &Facets, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
+    /// T0 of a case with these inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
+    pub fn of(case: &Case, terms: &Manifest) -> Option<Self> {
+        Self::new(Rc::new(Facets::new(&case.facets_lattice)), &case.facets_lattice, terms)
+    }
+
+    /// The same, with the facets prepared.
+    pub fn new(facets: Rc<Facets>, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
         let mut words = Vec::new();
         facets.walk(0, &mut |octant, near| {
             let by_surface = !near.is_empty() && octant.level < terms.level_surface;
@@ -75,7 +84,7 @@ impl Truth {
             let pushed = builder.push_leaf(word::key(w), word::level(w), kind);
             pushed.expect("the leaves of T0 are in order and do not overlap");
         }
-        Some(Self { words, components, component_of, tree: builder.finish() })
+        Some(Self { facets, words, components, component_of, tree: builder.finish() })
     }
 
     /// The side of a leaf of T0 of this kind.
@@ -92,6 +101,11 @@ impl Truth {
     pub fn component_at(&self, octant: &Octant) -> Option<&Component> {
         let leaf = components::leaf_at(&self.words, octant.bounds().0)?;
         self.component_of[leaf].map(|index| &self.components[index as usize])
+    }
+
+    /// Whether a facet crosses an octant that is a leaf of T0 or contains some.
+    pub fn is_crossed(&self, octant: &Octant) -> bool {
+        self.tree.kinds(self.tree.at(octant)) & 1 << Side::Crossing as u8 != 0
     }
 
     /// Visits the parts of a mesh, in Morton order.

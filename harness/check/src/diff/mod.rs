@@ -17,7 +17,7 @@ use std::path::Path;
 use crate::checks::identical::Named;
 use crate::checks::manifest::{differing, differing_inputs};
 
-use crate::why::{self, Body};
+use crate::why;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::manifest::{Manifest, Sides};
@@ -146,7 +146,7 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
     if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
-    let (body, caveat) = match case.map(|case| Body::of(case, &a.manifest)).transpose() {
+    let (body, caveat) = match case.map(|case| why::body(case, &a.manifest)).transpose() {
         Ok(body) => (body, String::new()),
         Err(why) => (None, format!("without the case, because {why}: ")),
     };

@@ -23,8 +23,8 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
         possible(tree, counted, manifest.tree, terms, result);
     }
     let Some(octants) = uniform_octants(tree) else {
-        result.note =
-            format!("components are not known: over {OCTANTS_MAX} octants have leaves of one side");
+        let why = format!("over {OCTANTS_MAX} octants have leaves of one side");
+        result.note = format!("components are not known: {why}");
         return;
     };
     let found = components::stated(&octants, terms);
