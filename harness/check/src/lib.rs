@@ -17,7 +17,6 @@ pub mod audit;
 pub mod checks;
 pub mod diff;
 pub mod forest;
-mod inputs;
 pub mod oracle;
 pub mod promises;
 pub mod selftest;

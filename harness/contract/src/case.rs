@@ -157,7 +157,7 @@ impl Case {
     fn refuse_crossing_seeds(&self) -> Result<(), String> {
         for (i, (&seed, at)) in self.rules.seeds.iter().zip(&self.seeds).enumerate() {
             if let (leaf, Some(facet)) = self.base_leaf_at(seed, &self.facets_lattice) {
-                let leaf = self.root.describe(&leaf);
+                let leaf = self.root.place(leaf);
                 return Err(format!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
                      from the surface",

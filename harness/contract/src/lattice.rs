@@ -107,10 +107,21 @@ impl Root {
     }
 
     /// An octant as text: path, level, and bounds in the user's units.
-    pub fn describe(&self, octant: &Octant) -> String {
+    pub fn place(&self, octant: Octant) -> Place {
+        Place(*self, octant)
+    }
+}
+
+/// An octant in a root, as text. The text takes a while, and is made only if it is shown.
+#[derive(Clone, Copy, Debug)]
+pub struct Place(Root, Octant);
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(root, octant) = self;
         let (low, high) = octant.bounds();
-        let (from, to) = (self.rounded(self.to_user(low)), self.rounded(self.to_user(high)));
-        format!("{octant}, {from:?} to {to:?}")
+        let [from, to] = [low, high].map(|corner| root.rounded(root.to_user(corner)));
+        write!(f, "{octant}, {from:?} to {to:?}")
     }
 }
 
@@ -172,7 +183,7 @@ mod tests {
     #[test]
     fn an_octant_is_described_by_path_and_user_coordinates() {
         let text = "octant 3.1 (level 2), [2.0, 2.0, 2.0] to [3.0, 3.0, 3.0]";
-        assert_eq!(ROOT.describe(&Octant::ROOT.child(3).child(1)), text);
+        assert_eq!(ROOT.place(Octant::ROOT.child(3).child(1)).to_string(), text);
     }
 
     #[test]

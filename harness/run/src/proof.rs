@@ -43,7 +43,7 @@ pub fn check(
             proof.note = meaning.ok_or(Failure::new(NAME, End::Unusable(silent)))?.to_owned();
         }
         Err(failure) if matches!(failure.end, End::Exited { code: 1, .. }) => {
-            proof.report("the checker of reference/proof rejects the mesh".to_owned());
+            proof.report("the checker of reference/proof rejects the mesh");
         }
         Err(failure) => return Err(failure),
     }

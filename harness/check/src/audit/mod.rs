@@ -28,9 +28,6 @@ use contract::tree::Tree;
 use cpu_time::ProcessTime;
 use serde::Serialize;
 
-/// Name and version of the schema of an audit as JSON.
-const SCHEMA: &str = "octree-audit/1";
-
 /// The result of an audit.
 #[derive(Clone, Debug, Serialize)]
 pub struct AuditReport {
@@ -74,24 +71,14 @@ impl AuditReport {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        #[derive(Serialize)]
-        struct Record<'a> {
-            schema: &'a str,
-            holds: bool,
-            #[serde(flatten)]
-            report: &'a AuditReport,
-            time_cpu_s: f64,
-            /// 0 if the system does not report it.
-            peak_rss_bytes: u64,
-        }
+        let mut record = serde_json::to_value(self)?;
+        record["schema"] = "octree-audit/1".into();
+        record["holds"] = self.holds().into();
+        record["time_cpu_s"] = ProcessTime::now().as_duration().as_secs_f64().into();
+        // 0 if the system does not report it.
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-        let record = Record {
-            schema: SCHEMA,
-            holds: self.holds(),
-            report: self,
-            time_cpu_s: ProcessTime::now().as_duration().as_secs_f64(),
-            peak_rss_bytes: peak_rss_bytes(&status),
-        };
+        record["peak_rss_bytes"] =
+            (1024 * checks::kilobytes(&status, "VmHWM:").unwrap_or(0)).into();
         write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, &record)?))
     }
 
@@ -133,13 +120,6 @@ impl fmt::Display for AuditReport {
              {time_read_s:.2} s: {rate:.1} M leaves/s"
         )
     }
-}
-
-/// The peak resident memory in the text of `/proc/self/status`.
-fn peak_rss_bytes(status: &str) -> u64 {
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
-    kib.unwrap_or(0) * 1024
 }
 
 /// Name of the check that the tree has the leaves of the parts.
@@ -201,8 +181,8 @@ fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
         })
     });
     match read {
-        Err(error) => result.report(error.to_string()),
-        Ok(()) if digest != manifest.digest => result.report(format!(
+        Err(error) => result.report(error),
+        Ok(()) if digest != manifest.digest => result.report(format_args!(
             "the leaves of the tree have the digest {digest}, but those of the manifest {}",
             manifest.digest
         )),

@@ -128,8 +128,8 @@ fn a_promise_of_sides_is_broken_by_a_mesh_without() {
         assert_eq!((check.was_run(), check.holds()), (true, known), "{report}");
         let claims = report.checks.iter().find(|check| check.name == "manifest").unwrap();
         let claims: Vec<&str> = claims.findings.iter().map(|f| f.as_str()).collect();
-        let level = "level_surface: 0 in the manifest, but 2 in fact";
-        assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest, but 4 in fact"]);
+        let level = "level_surface: 0 in the manifest; 2 in fact";
+        assert_eq!(claims, [level, "layer_cells_min: 1 in the manifest; 4 in fact"]);
         // Leaves near the facet are not judged, and are not counted.
         assert!(!known || check.examined > 0 && check.examined < 64, "{report}");
     }
@@ -222,12 +222,6 @@ fn a_tree_beside_parts_must_have_their_leaves() {
 }
 
 #[test]
-fn the_peak_of_memory_is_read_in_kilobytes() {
-    let status = "Name:\tharness\nVmPeak:\t   99 kB\nVmHWM:\t     3 kB\nVmRSS:\t     2 kB\n";
-    assert_eq!([peak_rss_bytes(status), peak_rss_bytes("Name:\tharness\n")], [3072, 0]);
-}
-
-#[test]
 fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
     let place = tempfile::tempdir().unwrap();
     let mut set = leaf_set(vec![correct()]);
@@ -238,10 +232,10 @@ fn a_report_as_json_has_the_verdict_and_a_line_per_check() {
         report.write(&path).unwrap();
         let read: serde_json::Value =
             serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
-        assert_eq!(read["schema"], SCHEMA);
+        assert_eq!(read["schema"], "octree-audit/1");
         assert_eq!(read["holds"], extra_leaves == 0);
         assert_eq!(read["leaves"], report.leaves);
-        assert!(read["time_cpu_s"].is_f64() && read["peak_rss_bytes"].is_u64());
+        assert!(read["time_cpu_s"].is_f64() && read["peak_rss_bytes"].as_u64() > Some(0));
         for (written, check) in read["checks"].as_array().unwrap().iter().zip(&report.checks) {
             let mut expected = serde_json::json!({
                 "name": check.name, "examined": check.examined, "findings": check.findings_total

@@ -28,8 +28,8 @@ pub struct Clearance<'a, R> {
     pub requires: R,
     /// The axes along which the margin extends an octant, for each region that coarse leaves must not meet.
     pub directions: &'a [[i64; 3]],
-    /// A violation as text: of an octant, by the leaves in a part of it, and the coarse leaf.
-    pub text: &'a dyn Fn(&Octant, &Octant, &Octant) -> String,
+    /// Reports a violation: of an octant, by the leaves in a part of it, and the coarse leaf.
+    pub report: &'a dyn Fn([Octant; 3], &mut CheckResult),
 }
 
 /// The margin along all axes at once: a Chebyshev distance.
@@ -87,7 +87,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
             found.is_none() && !is_solid
         });
         if let Some((part, coarse)) = found {
-            result.report_with(|| (self.text)(&octant, &part, &coarse));
+            (self.report)([octant, part, coarse], result);
         }
     }
 }
@@ -108,12 +108,14 @@ pub fn check_gap(
         let below = (finest > level + 1).then(|| finest.saturating_sub(levels));
         Some(Required { margin, own: Some((level + 1).saturating_sub(levels)), below })
     };
-    let text = |split: &Octant, part: &Octant, coarse: &Octant| {
-        let [part, coarse] = [part, coarse].map(|octant| root.describe(octant));
-        let level = split.level;
-        format!("{what}: {part} is refined beyond level {level}, but too near to the leaf {coarse}")
+    let report = |[split, part, coarse]: [Octant; 3], result: &mut CheckResult| {
+        let (level, [part, coarse]) =
+            (split.level, [part, coarse].map(|octant| root.place(octant)));
+        result.report(format_args!(
+            "{what}: {part} is refined beyond level {level}, but too near to the leaf {coarse}"
+        ));
     };
-    Clearance { tree, requires, directions, text: &text }.check(result);
+    Clearance { tree, requires, directions, report: &report }.check(result);
 }
 
 /// The neighbourhoods of all octants from the root to the current octant of a walk.

@@ -14,7 +14,7 @@ use super::region::Survey;
 use super::truth::{Found, Truth};
 use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Handle, Kind, Tree};
 use contract::word::{self, Side};
 
@@ -37,10 +37,11 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             result.examined = subject.examined_with(truth);
             truth.compare(tree, &mut |found| compare(&found, terms, result));
             if let Some(base) = subject.tree_base() {
-                truth.compare(base, &mut |found| {
-                    if found.is_hole() {
+                truth.compare(base, &mut |Found { octant, kinds, .. }| {
+                    if kinds == HOLES {
+                        let place = terms.root.place(octant);
                         let what = "T0 does not tile the root; it has no leaf in";
-                        report(result, what, &found.octant, terms);
+                        result.report(format_args!("{what} {place}"));
                     }
                 });
             }
@@ -61,7 +62,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 fn compare(found: &Found, terms: &Manifest, result: &mut CheckResult) {
     let what = match found.base {
         None => "a leaf is coarser than T0:",
-        Some(kind) => match (Truth::keeps(kind, terms), found.is_hole()) {
+        Some(kind) => match (Truth::keeps(kind, terms), found.kinds == HOLES) {
             (true, true) => "the mesh has a hole:",
             (false, false) if terms.keeps(Truth::side(kind) as Kind) => {
                 "an enclosed T0 leaf still exists, at least in part:"
@@ -70,11 +71,7 @@ fn compare(found: &Found, terms: &Manifest, result: &mut CheckResult) {
             _ => return,
         },
     };
-    report(result, what, &found.octant, terms);
-}
-
-fn report(result: &mut CheckResult, what: &str, octant: &Octant, terms: &Manifest) {
-    result.report_with(|| format!("{what} {}", terms.root.describe(octant)));
+    result.report(format_args!("{what} {}", terms.root.place(found.octant)));
 }
 
 /// Checks the boundaries of holes, from the leaves only.
@@ -82,7 +79,7 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     if tree.root() == Handle::HOLE {
         // A body that fills the root leaves an empty mesh, unless nothing is ever deleted.
         if terms.keep == Keep::All && terms.keep_crossing {
-            result.report("the mesh has no leaves, although nothing is deleted".to_owned());
+            result.report("the mesh has no leaves, although nothing is deleted");
         }
         return;
     }
@@ -94,14 +91,12 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let finest = if terms.keep_crossing { LEVEL_MAX + 1 } else { terms.level_surface };
     contact::visit(tree, of, HOLES, &mut |octant, kind, across| {
         if across & HOLES != 0 && octant.level < finest {
-            result.report_with(|| {
-                let leaf = terms.root.describe(&octant);
-                let side = match terms.sides {
-                    Sides::Known => format!("{} ", contact::name(1 << kind)),
-                    Sides::Unknown => String::new(),
-                };
-                format!("the {side}leaf {leaf} has a hole across a face")
-            });
+            let side = match terms.sides {
+                Sides::Known => format!("{} ", contact::name(1 << kind)),
+                Sides::Unknown => String::new(),
+            };
+            let leaf = terms.root.place(octant);
+            result.report(format_args!("the {side}leaf {leaf} has a hole across a face"));
         }
     });
 }
@@ -110,6 +105,7 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     #[test]

@@ -5,7 +5,6 @@
 //! finer than the surface, lies in a crossed octant of the surface's level. There is no band: one facet in one point decides.
 //! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does, if both are promised).
 
-use super::facets::Facets;
 use super::{Check, CheckResult, Subject, contact};
 use contract::manifest::Sides;
 use contract::octant::Octant;
@@ -27,55 +26,31 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
         return super::unknown_sides(subject, subject.promises.crossing, result);
     }
-    let (Some(facets), Some(truth)) = (subject.facets(), subject.truth()) else {
-        return result.lacks(super::NO_GEOMETRY);
+    let Some(truth) = subject.truth() else { return result.lacks(super::NO_GEOMETRY) };
+    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: Octant| {
+        let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
+        let (given, leaf) = (contact::name(kinds), subject.terms.root.place(octant));
+        result.report(format_args!("{prefix}{what} the {given} leaf {leaf}"));
     };
-    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: &Octant| {
-        result.report_with(|| {
-            let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
-            let (given, leaf) = (contact::name(kinds), subject.terms.root.describe(octant));
-            format!("{prefix}{what} the {given} leaf {leaf}")
-        });
-    };
-    if !subject.promises.definition {
-        return by_itself(subject, facets, &mut report);
+    if subject.promises.definition {
+        // Leaves are crossing iff those of T0 are that contain them.
+        for (prefix, _, pass) in subject.meshes() {
+            truth.mislabelled(pass.tree(), &mut |found, side| {
+                let is_crossed = side == Side::Crossing;
+                if is_crossed || found.kinds == 1 << CROSSING {
+                    report(prefix, is_crossed, found.kinds, found.octant);
+                }
+            });
+        }
+        return;
     }
-    // Leaves are crossing iff those of T0 are that contain them.
-    for (prefix, _, pass) in subject.meshes() {
-        truth.mislabelled(pass.tree(), &mut |found, side| {
-            let is_crossed = side == Side::Crossing;
-            if is_crossed || found.kinds == 1 << CROSSING {
-                report(prefix, is_crossed, found.kinds, &found.octant);
-            }
-        });
-    }
-}
-
-/// Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
-fn by_itself(
-    subject: &Subject,
-    facets: &Facets,
-    report: &mut dyn FnMut(&str, bool, Kinds, &Octant),
-) {
+    // Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
     let surface = subject.terms.level_surface;
-    // The leaves of an octant follow each other.
-    let mut last = None;
-    facets.leaves(subject.tree(), &mut |octant, kind, near| {
-        let mut inherits = || {
-            let above = octant.ancestor(surface.min(octant.level));
-            let known = last.filter(|&(octant, _)| octant == above);
-            let meets = || {
-                let (low, high) = above.bounds();
-                facets.first_meeting(&facets.all(), low, high).is_some()
-            };
-            last.insert(known.unwrap_or_else(|| (above, meets()))).1
-        };
-        let is_right = match near.is_empty() {
-            false => kind == CROSSING,
-            true => kind != CROSSING || octant.level > surface && inherits(),
-        };
-        if !is_right {
-            report("", !near.is_empty(), 1 << kind, &octant);
+    truth.facets.leaves(subject.tree(), &mut |octant, kind, near| {
+        let is_crossed = !near.is_empty();
+        let inherits = || octant.level > surface && truth.is_crossed(&octant.ancestor(surface));
+        if kind == CROSSING && !is_crossed && !inherits() || kind != CROSSING && is_crossed {
+            report("", is_crossed, 1 << kind, octant);
         }
     });
 }

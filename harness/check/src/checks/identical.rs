@@ -7,6 +7,7 @@
 use super::{Check, CheckResult, nothing};
 use contract::lattice::Root;
 use contract::word::{self, Leaf};
+use std::fmt;
 
 /// Name of the check.
 pub const NAME: &str = "identical";
@@ -31,20 +32,25 @@ pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
         return result;
     }
     let first = mesh.iter().zip(reference).take_while(|(a, b)| a == b).count();
-    let text = |words: &[u64]| {
-        words.get(first).map_or("no more leaves".to_owned(), |word| describe(*word, root))
+    let text = |words: &[u64]| match words.get(first) {
+        Some(&word) => Named(word, *root).to_string(),
+        None => "no more leaves".to_owned(),
     };
     let (has, wanted) = (text(mesh), text(reference));
-    result.report(format!("first difference: the mesh has {has}; it should have {wanted}"));
+    result.report(format_args!("first difference: the mesh has {has}; it should have {wanted}"));
     result.findings_total = symmetric_difference(&mesh[first..], &reference[first..]);
     result
 }
 
-/// A word as text, whether or not it is a leaf.
-pub fn describe(word: u64, root: &Root) -> String {
-    match word::decode(word) {
-        Ok(Leaf { octant, side }) => format!("{side} leaf: {}", root.describe(&octant)),
-        Err(why) => format!("the word {word:#018x}: {why}"),
+/// A word of a mesh in a root as text, whether or not it is a leaf.
+pub(crate) struct Named(pub u64, pub Root);
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match word::decode(self.0) {
+            Ok(Leaf { octant, side }) => write!(f, "{side} leaf: {}", self.1.place(octant)),
+            Err(why) => write!(f, "the word {:#018x}: {why}", self.0),
+        }
     }
 }
 

@@ -8,11 +8,10 @@
 mod alone;
 
 use super::components::Component;
-use super::manifest::same_components;
+use super::manifest::{COMPONENTS, components};
 use super::truth::Truth;
 use super::{Check, CheckResult, Subject, for_definition, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
-use contract::octant::Octant;
 use contract::tree::Handle;
 use contract::word::{self, Side};
 
@@ -33,38 +32,28 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 
 fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     result.examined = subject.examined_with(truth);
-    for component in &truth.components {
-        let leaves = component.leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
-        let example = leaves.clone().find(|leaf| subject.tree().at(leaf) != Handle::HOLE);
-        kept_or_deleted(component, example, &subject.terms, result);
-    }
-    let counts = count(&truth.components, &subject.inputs);
-    for (prefix, manifest, _) in subject.meshes() {
-        if let Some(counted) = &manifest.components {
-            same_components(prefix, counted, &counts, &subject.terms, result);
-        }
-    }
-}
-
-/// A component has leaves in the mesh iff it is kept.
-fn kept_or_deleted(
-    component: &Component,
-    example: Option<Octant>,
-    terms: &Manifest,
-    result: &mut CheckResult,
-) {
-    let Component { side, first, leaves, .. } = component;
-    let enclosed = component.enclosed && terms.deletes_enclosed();
-    let (what, octant) = match (terms.keeps(*side as u8) && !enclosed, example) {
-        (false, Some(leaf)) => ("must be deleted, but the mesh has leaves in it, first in", leaf),
-        (true, None) => ("must be kept, but the mesh has no leaf in it:", *first),
-        _ => return,
-    };
-    result.report_with(|| {
+    let terms = &subject.terms;
+    // A component has leaves in the mesh iff it is kept.
+    for &Component { side, first, ref leaves, enclosed, .. } in &truth.components {
+        let mut octants = leaves.iter().map(|&i| word::octant(truth.words[i as usize]));
+        let example = octants.find(|leaf| subject.tree().at(leaf) != Handle::HOLE);
+        let enclosed = enclosed && terms.deletes_enclosed();
+        let (what, octant) = match (terms.keeps(side as u8) && !enclosed, example) {
+            (false, Some(leaf)) => ("deleted, but the mesh has leaves in it, first in", leaf),
+            (true, None) => ("kept, but the mesh has no leaf in it:", first),
+            _ => continue,
+        };
         let why = if enclosed { "enclosed".to_owned() } else { side.to_string() };
-        let (total, octant) = (leaves.len(), terms.root.describe(&octant));
-        format!("a component of {total} leaves of T0 is {why} and {what} {octant}")
-    });
+        let (total, octant) = (leaves.len(), terms.root.place(octant));
+        result.report(format_args!(
+            "a component of {total} leaves of T0 is {why} and must be {what} {octant}"
+        ));
+    }
+    let counts = Some(count(&truth.components, &subject.inputs));
+    let expected = Manifest { components: counts, ..subject.inputs.clone() };
+    for (prefix, manifest, _) in subject.meshes() {
+        components((prefix, manifest), ("T0", &expected), &COMPONENTS, result);
+    }
 }
 
 /// The components by side, as a manifest states them.

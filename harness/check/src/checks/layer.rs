@@ -92,17 +92,16 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
         let margin = surface_margin(terms, kind, of_level);
         (margin > 0).then_some(Required { margin, own, below })
     };
-    let text = |leaf: &Octant, _: &Octant, coarse: &Octant| {
+    let report = |[leaf, _, coarse]: [Octant; 3], result: &mut CheckResult| {
         let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
         let cells = surface_margin(terms, kind, leaf.level) / cell(leaf.level);
-        let (what, place) = (contact::name(1 << kind), |octant| terms.root.describe(octant));
-        format!(
-            "a leaf less than {cells} cells from the {what} leaf {} is coarser than the surface level: {}",
-            place(leaf),
-            place(coarse)
-        )
+        let (what, [leaf, coarse]) =
+            (contact::name(1 << kind), [leaf, coarse].map(|octant| terms.root.place(octant)));
+        result.report(format_args!(
+            "a leaf less than {cells} cells from the {what} leaf {leaf} is coarser than the surface level: {coarse}"
+        ));
     };
-    Clearance { tree, requires, directions: &ALL_AXES, text: &text }.check(result);
+    Clearance { tree, requires, directions: &ALL_AXES, report: &report }.check(result);
 }
 
 #[cfg(test)]

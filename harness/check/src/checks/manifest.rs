@@ -4,95 +4,139 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
 //! leaks and the ambiguous components, and `kept` the numbers of components.
 
-use serde::Serialize;
-
-use super::{Check, CheckResult, Pass, Subject, always, json, nothing};
-use crate::inputs::INPUTS;
+use super::{Check, CheckResult, Subject, always, json, nothing};
 use contract::lattice::Root;
-use contract::manifest::{BySide, Components, Geometry, Leak, Manifest, Sides, Tree};
+use contract::manifest::{
+    BySide, Components, EnclosedComponents, ExtentBox, Leak, Manifest, OCTANTS, Sides, Tree,
+};
+use serde_json::{Value, json};
 
 /// Name of the check.
 pub const NAME: &str = "manifest";
 
 pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothing, run };
 
+/// The inputs, by their keys.
+const INPUTS: [&str; 9] = [
+    "tree",
+    "root",
+    "level_surface",
+    "layer_cells_min",
+    "keep",
+    "keep_crossing",
+    "boxes",
+    "seeds",
+    "enclosed",
+];
+
+/// A manifest with its owner's name.
+type Owned<'a> = (&'a str, &'a Manifest);
+
+/// The differences of these entries, one line each, with names for the owners of both manifests. An entry of a list has the list's key
+/// and its number.
+pub(crate) fn differing(
+    keys: &[impl AsRef<str>],
+    (owner_a, a): Owned,
+    (owner_b, b): Owned,
+) -> Vec<String> {
+    let (a, b) = (stated(a), stated(b));
+    let text = |value: Option<&Value>| match value {
+        None => "not stated".to_owned(),
+        Some(value) => value.to_string(),
+    };
+    let line = |key: &str| {
+        let [x, y] = [&a, &b].map(|entries| entries.pointer(&format!("/{key}")));
+        (x != y).then(|| format!("{key}: {} in {owner_a}; {} in {owner_b}", text(x), text(y)))
+    };
+    keys.iter().filter_map(|key| line(key.as_ref())).collect()
+}
+
+/// The differences of inputs.
+pub(crate) fn differing_inputs(a: Owned, b: Owned) -> Vec<String> {
+    let geometry = a.1.geometry.is_some() && b.1.geometry.is_some();
+    let keys: Vec<_> = INPUTS.into_iter().chain(geometry.then_some("geometry")).collect();
+    differing(&keys, a, b)
+}
+
+/// The manifest as JSON, with boxes and seeds in the user's units.
+fn stated(manifest: &Manifest) -> Value {
+    let root = &manifest.root;
+    let user = |at: [i64; 3]| root.rounded(root.to_user(at));
+    let mut stated = serde_json::to_value(manifest).expect("a manifest is representable in JSON");
+    let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
+    stated["boxes"] = manifest.boxes.iter().map(extent).collect();
+    stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
+    stated
+}
+
 fn run(subject: &Subject, result: &mut CheckResult) {
-    result.examined = 0;
     for (prefix, manifest, pass) in subject.meshes() {
-        of_mesh(prefix, manifest, pass, subject, result);
+        let (claimed, tally) = (("the manifest", manifest), &pass.tally);
+        result.examined += tally.leaves;
+        let mut keys =
+            ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
+        keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
+        keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
+        let mut inputs = Manifest { tree: manifest.tree, ..subject.inputs.clone() };
+        if subject.base.is_some() {
+            // A mesh with an engine's T0 beside it is a final one.
+            inputs.tree = if prefix.is_empty() { Tree::Final } else { Tree::Base };
+        }
+        let of_leaves = differing(&keys, claimed, ("fact", tally));
+        for line in of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs))) {
+            result.report(format_args!("{prefix}{line}"));
+        }
+        let BySide { outside, inside, crossing } = tally.leaves_by_side;
+        if manifest.sides == Sides::Unknown && outside < tally.leaves {
+            result.report(format_args!(
+                "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
+                tally.leaves
+            ));
+        }
     }
-    of_leaks(subject.manifest, result);
-    if let Some((base, _)) = &subject.base {
-        // A mesh with an engine's T0 beside it is a final one.
-        same("", "tree", &subject.manifest.tree, &Tree::Final, result);
-        same("T0: ", "tree", &base.manifest.tree, &Tree::Base, result);
-    }
-    // Of different leaves, `identical` reports the cause.
+    possible_leaks(subject.manifest, result);
+    // Of different leaves, `identical` reports the cause. This is the only check of the counts in a mesh whose T0 is not known, such as one
+    // made on several ranks.
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
         && mesh.words == reference.words
     {
-        of_reference(subject, &reference.manifest, result);
+        let (claimed, expected) = (("", subject.manifest), ("the reference", &reference.manifest));
+        components(claimed, expected, &["components_ambiguous", "leaks"], result);
+        components(claimed, expected, &COMPONENTS, result);
     }
 }
 
-/// The manifest describes the components as that of the equal reference does, if both count them. This is the only check of
-/// the counts in a mesh whose T0 is not known, such as one made on several ranks.
-fn of_reference(subject: &Subject, reference: &Manifest, result: &mut CheckResult) {
-    let mesh = subject.manifest;
-    let (a, b) = (&mesh.components_ambiguous, &reference.components_ambiguous);
-    same("", "components_ambiguous.count", &a.count, &b.count, result);
-    same_place(("", "an ambiguous", "the reference's"), (a.example, b.example), mesh, result);
-    if let (Some(claimed), Some(found)) = (&mesh.components, &reference.components) {
-        same_components("", claimed, found, mesh, result);
-    }
-    if let (Some(claimed), Some(found)) = (&mesh.leaks, &reference.leaks) {
-        same("", "leaks", claimed, found, result);
-    }
-}
+/// The entries about components of T0.
+pub(super) const COMPONENTS: [&str; 3] =
+    ["components/outside", "components/inside", "components/enclosed"];
 
-/// A manifest counts these components, and places an enclosed one where the first is.
-pub(super) fn same_components(
-    prefix: &str,
-    claimed: &Components,
-    found: &Components,
-    inputs: &Manifest,
+/// The manifest has these entries about components as another one, if both have them. Places may be rounded.
+pub(super) fn components(
+    (prefix, manifest): Owned,
+    (owner, other): Owned,
+    keys: &[&str],
     result: &mut CheckResult,
 ) {
-    let (a, b) = (&claimed.enclosed, &found.enclosed);
-    let numbers = [
-        ("outside components", claimed.outside, found.outside),
-        ("inside components", claimed.inside, found.inside),
-        ("enclosed components", a.count, b.count),
-        ("leaves of T0 in enclosed components", a.leaves, b.leaves),
-    ];
-    for (what, claimed, found) in numbers.into_iter().filter(|(_, claimed, found)| claimed != found)
-    {
-        result.report(format!("{prefix}the manifest counts {claimed} {what}, and T0 has {found}"));
-    }
-    same_place((prefix, "an enclosed", "the first"), (a.example, b.example), inputs, result);
-}
-
-/// Whether a manifest places a component where one is.
-fn same_place(
-    (prefix, what, which): (&str, &str, &str),
-    (claimed, found): (Option<[f64; 3]>, Option<[f64; 3]>),
-    inputs: &Manifest,
-    result: &mut CheckResult,
-) {
-    let agree = match (claimed, found) {
-        (Some(a), Some(b)) => inputs.same_place(a, b),
-        (a, b) => a.is_none() && b.is_none(),
+    let aligned = |claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| match (claimed, found) {
+        (Some(a), Some(b)) if other.same_place(a, b) => claimed,
+        _ => found,
     };
-    if !agree {
-        let [claimed, found] = [claimed, found].map(|at| json(&at));
-        result.report(format!(
-            "{prefix}the manifest places {what} component at {claimed}, and {which} one is at {found}"
-        ));
+    let mut expected = other.clone();
+    let ambiguous = &mut expected.components_ambiguous;
+    ambiguous.example = aligned(manifest.components_ambiguous.example, ambiguous.example);
+    expected.leaks = manifest.leaks.clone().map(|leaks| other.leaks.clone().unwrap_or(leaks));
+    expected.components = manifest.components.map(|claimed| {
+        let Some(found) = other.components else { return claimed };
+        let example = aligned(claimed.enclosed.example, found.enclosed.example);
+        Components { enclosed: EnclosedComponents { example, ..found.enclosed }, ..found }
+    });
+    for line in differing(keys, ("the manifest", manifest), (owner, &expected)) {
+        result.report(format_args!("{prefix}{line}"));
     }
 }
 
 /// A leak opens between a coarser spacing and a finer one, and has a volume and a point in the root.
-fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
+fn possible_leaks(manifest: &Manifest, result: &mut CheckResult) {
     let Root { origin, edge } = manifest.root;
     for leak in manifest.leaks.iter().flatten() {
         let Leak { spacing_coarse, spacing_fine, volume, point } = *leak;
@@ -100,66 +144,8 @@ fn of_leaks(manifest: &Manifest, result: &mut CheckResult) {
         let opens = 0.0 < spacing_fine && spacing_fine < spacing_coarse;
         let is_region = 0.0 < volume && volume <= edge.powi(3) && (0..3).all(is_inside);
         if !(opens && is_region) {
-            result.report(format!(
-                "leaks: {} is not possible in the root {}",
-                json(leak),
-                json(&manifest.root)
-            ));
+            let (leak, root) = (json(leak), json(&manifest.root));
+            result.report(format_args!("leaks: {leak} is not possible in the root {root}"));
         }
-    }
-}
-
-/// The manifest has the counts and digests of the leaves, and the inputs and facets of the case.
-fn of_mesh(
-    prefix: &str,
-    manifest: &Manifest,
-    pass: &Pass,
-    subject: &Subject,
-    result: &mut CheckResult,
-) {
-    let Pass { tally, parts, .. } = pass;
-    result.examined += tally.leaves;
-    let entries = |m: &Manifest| serde_json::to_value(m).expect("JSON");
-    let [claimed, of_leaves, inputs] = [manifest, tally, &subject.inputs].map(entries);
-    for key in ["leaves", "leaves_by_level", "leaves_by_side", "digest"] {
-        same(prefix, key, &claimed[key], &of_leaves[key], result);
-    }
-    for key in INPUTS {
-        same(prefix, key, &claimed[key], &inputs[key], result);
-    }
-    let BySide { outside, inside, crossing } = tally.leaves_by_side;
-    if manifest.sides == Sides::Unknown && outside < tally.leaves {
-        result.report(format!(
-            "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
-            tally.leaves
-        ));
-    }
-    for (i, (claimed, found)) in
-        manifest.octant_digests.iter().zip(&tally.octant_digests).enumerate()
-    {
-        same(prefix, &format!("octant_digests[{i}]"), claimed, found, result);
-    }
-    for (claimed, &(leaves, digest)) in manifest.parts.iter().zip(parts) {
-        same(prefix, &format!("leaves of {}", claimed.file), &claimed.leaves, &leaves, result);
-        same(prefix, &format!("digest of {}", claimed.file), &claimed.digest, &digest, result);
-    }
-    // A mesh of another geometry, or one that is older than its geometry.
-    if let (Some(case), Some(claimed)) = (subject.case, manifest.geometry) {
-        same(prefix, "geometry", &claimed, &Geometry::of(&case.facets_lattice), result);
-    }
-}
-
-fn same<T: PartialEq + Serialize>(
-    prefix: &str,
-    field: &str,
-    claimed: &T,
-    found: &T,
-    result: &mut CheckResult,
-) {
-    if claimed != found {
-        result.report_with(|| {
-            let [claimed, found] = [claimed, found].map(json);
-            format!("{prefix}{field}: {claimed} in the manifest, but {found} in fact")
-        });
     }
 }

@@ -31,7 +31,7 @@ pub use subject::{CAPACITY, Subject};
 use serde::Serialize;
 
 pub(crate) use pass::Pass;
-pub(crate) use splits::NAME as SPLITS;
+pub(crate) use splits::{NAME as SPLITS, kilobytes};
 
 /// Why what needs sides is not checked.
 const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
@@ -115,7 +115,7 @@ fn json(value: &impl Serialize) -> String {
 /// Reports sides that are unknown, although they were promised or the case decides them; a mesh by itself may lack them.
 fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     match promised || subject.case.is_some() {
-        true => result.report(format!(
+        true => result.report(format_args!(
             "{UNKNOWN_SIDES} by the manifest; of a mesh in another format, name their array with --sides"
         )),
         false => result.lacks(UNKNOWN_SIDES),

@@ -3,11 +3,13 @@
 //! The check `linear`: every word is a leaf, each part is sorted, and no two leaves overlap. Sections 7 and 8 of
 //! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` and `crossing` do).
 
-use super::{Check, CheckResult, always, identical, nothing};
+use super::identical::Named;
+use super::{Check, CheckResult, always, nothing};
 use contract::digest::Digest;
 use contract::failure::Failure;
+use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::{Manifest, octant_index};
+use contract::manifest::{Manifest, Part, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
 use contract::tree::{Builder, Tree};
 use contract::word;
@@ -17,8 +19,6 @@ use contract::word;
 pub(crate) struct Pass {
     /// The manifest's entries about leaves, as they should be; it has no others.
     pub(crate) tally: Manifest,
-    /// Number of leaves and digest of each part.
-    pub(crate) parts: Vec<(u64, Digest)>,
     pub(crate) linear: CheckResult,
     /// `None` if the tree has more nodes than the limit.
     pub(crate) tree: Option<Tree>,
@@ -53,12 +53,12 @@ impl Pass {
     }
 }
 
-struct State<'a> {
+struct State {
     prefix: &'static str,
-    manifest: &'a Manifest,
+    root: Root,
     nodes_max: usize,
-    /// What was found so far, without counts and tree.
-    pass: Pass,
+    tally: Manifest,
+    linear: CheckResult,
     /// Number of leaves by the low seven bits of their words, which are level and side.
     by_code: [u64; 128],
     /// The last word of each part so far.
@@ -68,60 +68,41 @@ struct State<'a> {
     builder: Builder,
 }
 
-impl<'a> State<'a> {
-    fn new(manifest: &'a Manifest, prefix: &'static str, nodes_max: usize) -> Self {
-        // A part without leaves gives no run.
-        let parts = manifest.parts.len();
-        let mut tally = Manifest::default();
+impl State {
+    fn new(manifest: &Manifest, prefix: &'static str, nodes_max: usize) -> Self {
+        // Of a mesh without parts, the tree is the only one.
+        let files = manifest.parts.iter().map(|part| &part.file).chain(&manifest.hyper_tree_grid);
+        let part =
+            |file: &String| Part { file: file.clone(), leaves: 0, digest: Digest::default() };
+        let parts: Vec<Part> = files.map(part).collect();
+        let last_of_part = vec![None; parts.len()];
+        let mut tally = Manifest { parts, ..Manifest::default() };
         tally.clear_leaves();
-        let pass = Pass {
-            tally,
-            parts: vec![(0, Digest::default()); parts],
-            linear: CheckResult::new(CHECK.name),
-            tree: None,
-        };
-        let (last_of_part, builder) = (vec![None; parts], Builder::default());
-        Self {
-            prefix,
-            manifest,
-            nodes_max,
-            pass,
-            last_of_part,
-            last: 0,
-            builder,
-            by_code: [0; 128],
-        }
+        let (linear, builder) = (CheckResult::new(CHECK.name), Builder::default());
+        let (root, by_code, last) = (manifest.root, [0; 128], 0);
+        Self { prefix, root, nodes_max, tally, linear, by_code, last_of_part, last, builder }
     }
 
     /// Adds to counts and digests, and checks the order. Digests are summed per octant first, because this loop dominates the
     /// time of the pass.
     fn count(&mut self, part: usize, run: &[u64]) {
-        let Pass { tally, parts, linear, .. } = &mut self.pass;
-        if parts.len() <= part {
-            parts.resize(part + 1, (0, Digest::default()));
-            self.last_of_part.resize(part + 1, None);
-        }
-        parts[part].0 += run.len() as u64;
+        let Self { tally: Manifest { parts, octant_digests, .. }, prefix, .. } = self;
+        let (last, Part { file, leaves, digest }) =
+            (&mut self.last_of_part[part], &mut parts[part]);
+        *leaves += run.len() as u64;
         for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
-            let digest = Digest::of(words);
-            parts[part].1.merge(digest);
-            tally.octant_digests[octant_index(words[0])].merge(digest);
+            let of_words = Digest::of(words);
+            digest.merge(of_words);
+            octant_digests[octant_index(words[0])].merge(of_words);
         }
-        let mut last = self.last_of_part[part];
         for &word in run {
             self.by_code[(word & 127) as usize] += 1;
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
-                linear.report_with(|| {
-                    let [before, word] =
-                        [before, word].map(|w| identical::describe(w, &self.manifest.root));
-                    let file = self.manifest.parts.get(part).map(|part| &part.file);
-                    let file = file.or(self.manifest.hyper_tree_grid.as_ref());
-                    let file = file.map_or("a part", String::as_str);
-                    format!("{}{file} is not sorted: {word} follows {before}", self.prefix)
-                });
+                let [before, word] = [before, word].map(|word| Named(word, self.root));
+                let finding = format_args!("{prefix}{file} is not sorted: {word} follows {before}");
+                self.linear.report(finding);
             }
         }
-        self.last_of_part[part] = last;
     }
 
     /// Adds to the tree, unless it exceeds the limit: counts and digests continue without it.
@@ -134,23 +115,24 @@ impl<'a> State<'a> {
                 self.last = word;
                 continue;
             }
-            self.pass.linear.report_with(|| {
-                let [leaf, last] =
-                    [word, self.last].map(|word| identical::describe(word, &self.manifest.root));
-                match word::fault(word) {
-                    Some(_) => format!("{}not a leaf: {leaf}", self.prefix),
-                    None => format!("{}two leaves overlap: {leaf} and {last}", self.prefix),
+            let [leaf, last] = [word, self.last].map(|word| Named(word, self.root));
+            let (prefix, linear) = (self.prefix, &mut self.linear);
+            match word::fault(word) {
+                Some(_) => linear.report(format_args!("{prefix}not a leaf: {leaf}")),
+                None => {
+                    linear.report(format_args!("{prefix}two leaves overlap: {leaf} and {last}"))
                 }
-            });
+            }
         }
     }
 
     fn finish(mut self) -> Pass {
-        (0..).zip(self.by_code).for_each(|(code, leaves)| self.pass.tally.count(code, leaves));
-        self.pass.tally.finish();
-        self.pass.linear.examined = self.pass.tally.leaves;
+        (0..).zip(self.by_code).for_each(|(code, leaves)| self.tally.count(code, leaves));
+        self.tally.finish();
+        self.linear.examined = self.tally.leaves;
         let fits = self.builder.nodes() <= self.nodes_max;
-        Pass { tree: fits.then(|| self.builder.finish()), ..self.pass }
+        let tree = fits.then(|| self.builder.finish());
+        Pass { tally: self.tally, linear: self.linear, tree }
     }
 }
 
@@ -159,12 +141,7 @@ pub(super) const CHECK: Check = Check {
     name: "linear",
     wanted: always,
     needs: nothing,
-    run: |subject, result| {
-        *result = subject.pass.linear.clone();
-        if let Some((_, base)) = &subject.base {
-            result.append(&base.linear);
-        }
-    },
+    run: |subject, result| subject.meshes().for_each(|(.., pass)| result.append(&pass.linear)),
 };
 
 #[cfg(test)]

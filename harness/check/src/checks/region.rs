@@ -12,7 +12,6 @@
 mod tests;
 
 use super::components::Component;
-use super::facets::Facets;
 use super::truth::Truth;
 use super::{CheckResult, NO_GEOMETRY, Subject, contact};
 use contract::lattice::UNITS_PER_EDGE;
@@ -40,7 +39,6 @@ pub struct Survey<'a> {
     terms: &'a Manifest,
     tree: &'a Tree,
     truth: &'a Truth,
-    facets: &'a Facets,
     parity: Parity,
     /// Half the width of the band, in cells of the surface level.
     band_cells: f64,
@@ -56,9 +54,7 @@ type Visit<'v> = &'v mut dyn FnMut(Octant, Option<Kind>, Position);
 impl<'a> Survey<'a> {
     /// Runs a check of a subject, if its geometry is known.
     pub fn of(subject: &'a Subject, result: &mut CheckResult, check: fn(&Self, &mut CheckResult)) {
-        let (Some(case), Some(truth), Some(facets)) =
-            (subject.case, subject.truth(), subject.facets())
-        else {
+        let Some((case, truth)) = subject.case.zip(subject.truth()) else {
             return result.lacks(NO_GEOMETRY);
         };
         let band_cells = subject.promises.sides.map_or(BAND_CELLS, |sides| sides.band_cells);
@@ -66,7 +62,6 @@ impl<'a> Survey<'a> {
             terms: &subject.terms,
             tree: subject.tree(),
             truth,
-            facets,
             parity: Parity::new(&case.facets_lattice),
             band_cells,
             knows_crossing: subject.promises.crossing || band_cells == 0.0,
@@ -74,7 +69,7 @@ impl<'a> Survey<'a> {
         check(&survey, result);
         if result.examined == 0 {
             let band = survey.band_cells;
-            result.lacks(&format!("nothing lies beyond {band} cells from the geometry"));
+            result.lacks(format_args!("nothing lies beyond {band} cells from the geometry"));
         }
     }
 
@@ -94,25 +89,22 @@ impl<'a> Survey<'a> {
 
     /// Checks that every leaf beyond the band has its side.
     pub fn check_sides(&self, result: &mut CheckResult) {
-        let mut undecided = 0u64;
+        let (mut undecided, has_band) = (0u64, self.band_cells > 0.0);
         self.visit(&mut |octant, kind, position| {
             let Some(kind) = kind else { return };
             let why = match position {
+                Position::Near { .. } if has_band => return,
+                Position::Undecided if kind != CROSSING => return undecided += 1,
+                Position::Near { .. } if kind != CROSSING => "is crossed by a facet".to_owned(),
+                Position::Undecided => "is crossed by no facet".to_owned(),
                 Position::On(side, _) if kind != side as Kind => {
                     format!("is in a component that is {side}")
                 }
-                Position::Undecided if kind == CROSSING => "is crossed by no facet".to_owned(),
-                Position::Near { .. } if self.band_cells == 0.0 && kind != CROSSING => {
-                    "is crossed by a facet".to_owned()
-                }
-                Position::Undecided => return undecided += 1,
-                Position::Near { .. } if self.band_cells > 0.0 => return,
                 _ => return result.examined += 1,
             };
             result.examined += 1;
-            result.report_with(|| {
-                format!("the {} leaf {} {why}", contact::name(1 << kind), self.describe(&octant))
-            });
+            let (given, leaf) = (contact::name(1 << kind), self.terms.root.place(octant));
+            result.report(format_args!("the {given} leaf {leaf} {why}"));
         });
         result.note = format!(
             "leaves beyond {} cells from the geometry; {undecided} are not judged, because their rays disagree",
@@ -134,20 +126,16 @@ impl<'a> Survey<'a> {
             result.examined += 1;
             if wanted != kind.is_some() {
                 let what = if wanted { "the mesh has a hole" } else { "a leaf must be deleted" };
-                result.report_with(|| format!("{what}: {}", self.describe(&octant)));
+                result.report(format_args!("{what}: {}", self.terms.root.place(octant)));
             }
         });
-    }
-
-    fn describe(&self, octant: &Octant) -> String {
-        self.terms.root.describe(octant)
     }
 
     /// Visits every leaf, and every hole in the largest octants that have one position. Holes near the geometry are
     /// divided down to the level of the surface.
     fn visit(&self, visit: Visit) {
         let surface = self.terms.level_surface;
-        self.facets.walk(self.band(), &mut |octant, near| {
+        self.truth.facets.walk(self.band(), &mut |octant, near| {
             let handle = self.tree.at(&octant);
             let kind = handle.as_leaf();
             if near.is_empty() {
@@ -163,7 +151,7 @@ impl<'a> Survey<'a> {
             let is_whole = kind.is_some() || handle == Handle::HOLE && octant.level >= surface;
             if is_whole {
                 let (low, high) = octant.bounds();
-                let crossed = self.facets.first_meeting(near, low, high).is_some();
+                let crossed = self.truth.facets.first_meeting(near, low, high).is_some();
                 let may_be_coarse = !crossed && octant.level < surface;
                 let beyond = may_be_coarse.then(|| self.beyond_band(octant, near)).flatten();
                 visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
@@ -180,7 +168,8 @@ impl<'a> Survey<'a> {
     /// The position of a part beyond the band of an octant that no facet crosses. All of it lies on one side.
     fn beyond_band(&self, octant: Octant, candidates: &[u32]) -> Option<Position> {
         let ((low, high), band) = (octant.bounds(), self.band());
-        let near = self.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
+        let near =
+            self.truth.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
         if near.is_empty() {
             return Some(self.position(octant));
         }

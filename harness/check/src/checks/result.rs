@@ -51,13 +51,13 @@ impl CheckResult {
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
     pub fn unreadable(error: &Failure) -> Self {
         let mut result = Self::new(FILES);
-        result.report(error.to_string());
+        result.report(error);
         result
     }
 
     /// States that a premise is missing.
-    pub fn lacks(&mut self, why: &str) {
-        self.nothing_to_check = Some(why.to_owned());
+    pub fn lacks(&mut self, why: impl fmt::Display) {
+        self.nothing_to_check = Some(why.to_string());
     }
 
     /// States that there was nothing to check, if nothing was examined and found.
@@ -126,16 +126,11 @@ impl CheckResult {
         (unlisted > 0).then(|| format!("and {unlisted} more"))
     }
 
-    /// Adds a finding.
-    pub fn report(&mut self, detail: String) {
-        self.report_with(|| detail);
-    }
-
-    /// Adds a finding whose text is computed only if it will be listed.
-    pub fn report_with(&mut self, detail: impl FnOnce() -> String) {
+    /// Adds a finding. Its text is made only if it is listed: a corrupt mesh may have millions.
+    pub fn report(&mut self, finding: impl fmt::Display) {
         self.findings_total += 1;
         if self.findings.len() < FINDINGS_LISTED {
-            self.findings.push(detail());
+            self.findings.push(finding.to_string());
         }
     }
 }
@@ -228,7 +223,13 @@ mod tests {
             listed.starts_with("balance    4 findings, ") && listed.ends_with("\n    finding 3"),
             "{listed}"
         );
-        result.report_with(|| unreachable!("this text is not listed"));
+        struct NeverShown;
+        impl fmt::Display for NeverShown {
+            fn fmt(&self, _: &mut fmt::Formatter<'_>) -> fmt::Result {
+                unreachable!("this text is not listed")
+            }
+        }
+        result.report(NeverShown);
         assert!(!result.holds());
         assert!(result.to_string().ends_with("\n    finding 3\n    and 1 more"));
         let mut nothing = CheckResult::new("sides");

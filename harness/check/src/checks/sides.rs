@@ -10,10 +10,9 @@
 
 use super::components::{self, Component};
 use super::contact;
-use super::facets::Facets;
 use super::region::Survey;
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, json, some_leaves};
+use super::{Check, CheckResult, Subject, some_leaves};
 use crate::oracle::is_watertight;
 use contract::case::Case;
 use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};
@@ -48,38 +47,21 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     of_neighbours(subject.tree(), terms, result);
     let Some(truth) = subject.truth() else { return };
     let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
+    let states_leaks = subject.meshes().any(|(_, manifest, _)| manifest.leaks.is_some());
+    let leaks = states_leaks.then(|| leaks(subject, truth));
     for (prefix, manifest, pass) in subject.meshes() {
         truth.mislabelled(pass.tree(), &mut |found, side| {
-            result.report_with(|| {
-                let (given, leaf) =
-                    (contact::name(found.kinds), terms.root.describe(&found.octant));
-                let why = match side {
-                    Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
-                    _ => format!("{judges} show that its component is {side}"),
-                };
-                format!("{prefix}the leaf is {given}, but {why}: {leaf}")
-            });
+            let (given, leaf) = (contact::name(found.kinds), terms.root.place(found.octant));
+            let why = match side {
+                Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
+                _ => format!("{judges} show that its component is {side}"),
+            };
+            result.report(format_args!("{prefix}the leaf is {given}, but {why}: {leaf}"));
         });
-        ambiguous(prefix, manifest, &truth.components, terms, result);
-    }
-    stated_leaks(subject, truth, result);
-}
-
-/// The manifests state the leaks of T0, if they state any or none.
-fn stated_leaks(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
-    let (Some(case), Some(facets)) = (subject.case, subject.facets()) else { return };
-    let mut known = None;
-    for (prefix, manifest, _) in subject.meshes() {
-        let Some(stated) = &manifest.leaks else { continue };
-        let find = || leaks(case, facets, &subject.inputs, truth);
-        let found = known.get_or_insert_with(find);
-        if stated != found {
-            result.report(format!(
-                "{prefix}the manifest states the leaks {}, but T0 has {}",
-                json(stated),
-                json(found)
-            ));
-        }
+        let components_ambiguous = ambiguous(manifest.components_ambiguous.example, truth, terms);
+        let expected = Manifest { components_ambiguous, leaks: leaks.clone(), ..terms.clone() };
+        let keys = ["components_ambiguous", "leaks"];
+        super::manifest::components((prefix, manifest), ("T0", &expected), &keys, result);
     }
 }
 
@@ -88,10 +70,9 @@ fn of_neighbours(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let [outside, inside] = [Side::Outside, Side::Inside].map(|side| 1 << side as u8);
     contact::visit(tree, outside, inside, &mut |outside, _, across| {
         if across & inside != 0 {
-            let leaf = terms.root.describe(&outside);
-            result.report_with(|| {
-                format!("an inside leaf shares a face with the outside leaf {leaf}")
-            });
+            let leaf = terms.root.place(outside);
+            result
+                .report(format_args!("an inside leaf shares a face with the outside leaf {leaf}"));
         }
     });
 }
@@ -102,59 +83,39 @@ fn not_kept(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     tree.walk(&mut |octant, handle| {
         let deleted = tree.kinds(handle) & !kept;
         if deleted != 0 && !handle.is_node() {
-            result.report_with(|| {
-                let (side, leaf) = (contact::name(deleted), terms.root.describe(&octant));
-                format!("{side} leaves are deleted, but one still exists: {leaf}")
-            });
+            let (side, leaf) = (contact::name(deleted), terms.root.place(octant));
+            result.report(format_args!("{side} leaves are deleted, but one still exists: {leaf}"));
         }
         deleted != 0
     });
 }
 
-/// The manifest states the number of ambiguous components, and its example is in one of them.
-fn ambiguous(
-    prefix: &str,
-    manifest: &Manifest,
-    components: &[Component],
-    terms: &Manifest,
-    result: &mut CheckResult,
-) {
-    let Ambiguous { count, example } = manifest.components_ambiguous;
-    let found: Vec<_> = components.iter().filter(|c| c.is_ambiguous()).collect();
-    if count != found.len() as u64 {
-        let total = found.len();
-        result.report(format!(
-            "{prefix}the manifest counts {count} ambiguous components, but there are {total}"
-        ));
-    }
-    let near = |c: &&Component| {
-        let centre = terms.root.to_user(c.first.centre());
-        example.is_some_and(|e| terms.same_place(e, centre))
-    };
-    let placed = if found.is_empty() { example.is_none() } else { found.iter().any(near) };
-    if !placed {
-        result.report(format!(
-            "{prefix}the example {} of an ambiguous component is in no such component",
-            json(&example)
-        ));
-    }
+/// The ambiguous components of T0, with the example that is claimed if it is one.
+fn ambiguous(claimed: Option<[f64; 3]>, truth: &Truth, terms: &Manifest) -> Ambiguous {
+    let found: Vec<_> = truth.components.iter().filter(|c| c.is_ambiguous()).collect();
+    let places = || found.iter().map(|c| terms.root.to_user(c.first.centre()));
+    let is_claimed = |at: &[f64; 3]| claimed.is_some_and(|claimed| terms.same_place(claimed, *at));
+    let example = places().find(is_claimed).or_else(|| places().next());
+    Ambiguous { count: found.len() as u64, example }
 }
 
 /// The leaks of a case with this T0: regions that are closed at a coarser spacing and open at that of the mesh.
-fn leaks(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth) -> Vec<Leak> {
+fn leaks(subject: &Subject, truth: &Truth) -> Vec<Leak> {
+    let case = subject.case.expect("T0 is that of a case");
+    let terms = &subject.inputs;
     if !terms.seeds.is_empty() && is_watertight(&case.facets_lattice) {
         return Vec::new();
     }
     let levels = (1..=2).filter_map(|k| terms.level_surface.checked_sub(k));
-    levels.flat_map(|level| between(case, facets, terms, truth, level)).collect()
+    levels.flat_map(|level| between(case, terms, truth, level)).collect()
 }
 
 /// The leaks between T0 cut at a level, and T0.
-fn between(case: &Case, facets: &Facets, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
+fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak> {
     let mut cut = Manifest { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
     let make = |terms: &Manifest| {
-        let coarse = Truth::new(facets, &case.facets_lattice, terms);
+        let coarse = Truth::new(truth.facets.clone(), &case.facets_lattice, terms);
         coarse.expect("T0 that is cut has no more leaves than T0")
     };
     let mut coarse = make(&cut);

@@ -50,7 +50,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             Some(_) if found.is_finer => "T0 needlessly splits a leaf; it has",
             Some(_) => return,
         };
-        result.report_with(|| format!("{what} {}", terms.root.describe(&found.octant)));
+        result.report(format_args!("{what} {}", terms.root.place(found.octant)));
     });
 }
 
@@ -61,10 +61,10 @@ fn boxes_met(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
             let is_fine = tree.coarsest_level(handle, octant.level) >= extent.level;
             let may_be_coarse = !is_fine && extent.meets(&octant);
             if may_be_coarse && !handle.is_node() {
-                result.report_with(|| {
-                    let (leaf, level) = (terms.root.describe(&octant), extent.level);
-                    format!("the leaf {leaf} meets a box that requires level {level}")
-                });
+                let (leaf, level) = (terms.root.place(octant), extent.level);
+                result.report(format_args!(
+                    "the leaf {leaf} meets a box that requires level {level}"
+                ));
             }
             may_be_coarse
         });
@@ -77,8 +77,8 @@ fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
         let has_crossing = tree.kinds(handle) & 1 << Side::Crossing as u8 != 0;
         let may_be_coarse = has_crossing && octant.level < terms.level_surface;
         if may_be_coarse && !handle.is_node() {
-            let (leaf, level) = (terms.root.describe(&octant), terms.level_surface);
-            result.report(format!("the crossing leaf {leaf} is coarser than level {level}"));
+            let (leaf, level) = (terms.root.place(octant), terms.level_surface);
+            result.report(format_args!("the crossing leaf {leaf} is coarser than level {level}"));
         }
         may_be_coarse
     });
@@ -107,7 +107,7 @@ impl<'a> Crossed<'a> {
     /// The facets of a subject with the tolerance that it promises, if they are known.
     pub fn of(subject: &'a Subject) -> Option<Self> {
         let cells = subject.promises.surface.map_or(0.0, |surface| surface.tolerance_cells);
-        Some(Self::new(subject.facets()?, &subject.terms, cells))
+        Some(Self::new(&subject.truth()?.facets, &subject.terms, cells))
     }
 
     fn new(facets: &'a Facets, terms: &'a Manifest, tolerance_cells: f64) -> Self {
@@ -132,12 +132,10 @@ impl<'a> Crossed<'a> {
             let Some(facet) = crossing else { return };
             result.examined += 1;
             if is_coarse {
-                result.report_with(|| {
-                    let leaf = self.terms.root.describe(&octant);
-                    format!(
-                        "facet {facet} crosses the leaf {leaf}, which is coarser than level {level}"
-                    )
-                });
+                let leaf = self.terms.root.place(octant);
+                result.report(format_args!(
+                    "facet {facet} crosses the leaf {leaf}, which is coarser than level {level}"
+                ));
             }
         });
         if result.examined == 0 {

@@ -7,7 +7,7 @@
 
 use std::fs;
 
-use super::{Check, CheckResult, FINDINGS_LISTED, NO_GEOMETRY, Subject, nothing};
+use super::{Check, CheckResult, NO_GEOMETRY, Subject, nothing};
 use crate::why::Mesh;
 use contract::manifest::Manifest;
 
@@ -27,48 +27,39 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let Some(body) = subject.facets().zip(subject.truth()) else {
-        return result.lacks(NO_GEOMETRY);
-    };
+    let Some(truth) = subject.truth() else { return result.lacks(NO_GEOMETRY) };
     let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
     if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
-        return result.lacks(&why);
+        return result.lacks(why);
     }
     let inputs = Manifest { tree: subject.manifest.tree, ..subject.inputs.clone() };
-    let mesh = Mesh::new(subject.tree(), inputs, Some(body));
-    let found = match mesh.least(FINDINGS_LISTED) {
-        Ok(found) => found,
-        Err(why) => return result.lacks(&why),
-    };
-    result.examined = found.splits + found.leaves;
-    let faults = [
-        ("a facet, a box, a layer or the balance requires the split of", &found.missing),
-        ("nothing requires the split of", &found.unneeded),
-    ];
-    for (what, octant) in
-        faults.iter().flat_map(|(what, faults)| faults.first.iter().map(move |o| (what, o)))
-    {
-        result.report(format!("{what} {}", subject.terms.root.describe(octant)));
-    }
-    result.findings_total = found.missing.total + found.unneeded.total;
+    Mesh::of(&inputs, subject.tree(), Some(truth)).audit(&mut |octant, fault| {
+        result.examined += 1;
+        if let Some(what) = fault {
+            result.report(format_args!("{what} {}", subject.terms.root.place(octant)));
+        }
+    });
 }
 
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
-    let kilobytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
-    let kilobytes =
-        kilobytes.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
-    let Some(available) = kilobytes.map(|kilobytes| kilobytes * 1024) else { return Ok(()) };
+    let available =
+        kilobytes(meminfo, "MemAvailable:").map_or(u64::MAX, |kilobytes| 1024 * kilobytes);
     let needed = leaves.saturating_mul(BYTES_PER_LEAF);
     if needed <= available {
         return Ok(());
     }
+    let [needed, available] = [needed, available].map(|bytes| bytes as f64 / 1e9);
     Err(format!(
-        "the check of splits needs about {:.1} GB of memory for {leaves} leaves, and {:.1} GB are available: audit a coarser mesh of the same \
-         case, or use a machine with more memory",
-        needed as f64 / 1e9,
-        available as f64 / 1e9
+        "the check of splits needs about {needed:.1} GB of memory for {leaves} leaves, and {available:.1} GB are available: audit a \
+         coarser mesh of the same case, or use a machine with more memory"
     ))
+}
+
+/// A number of kilobytes in a file of `/proc`, by its label.
+pub(crate) fn kilobytes(text: &str, label: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(label))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
@@ -83,5 +74,7 @@ mod tests {
         assert!(why.contains("1.2 GB") && why.contains("1.0 GB are available"), "{why}");
         assert!(refuse_too_large(u64::MAX, meminfo).is_err());
         assert_eq!(refuse_too_large(u64::MAX, ""), Ok(()));
+        let status = "Name:\tharness\nVmPeak:\t   99 kB\nVmHWM:\t     3 kB\nVmRSS:\t     2 kB\n";
+        assert_eq!(["VmHWM:", "VmSwap:"].map(|label| kilobytes(status, label)), [Some(3), None]);
     }
 }

@@ -2,7 +2,6 @@
 
 use std::cell::OnceCell;
 
-use super::facets::Facets;
 use super::truth::Truth;
 use super::{CheckResult, Pass};
 use crate::promises::Promises;
@@ -32,10 +31,9 @@ pub struct Subject<'a> {
     pub mesh: Option<&'a LeafSet>,
     /// The mesh that `mesh` must equal.
     pub reference: Option<&'a LeafSet>,
-    /// The engine's T0, and what a pass over it found.
-    pub(super) base: Option<(&'a LeafSet, Pass)>,
+    /// The manifest of the engine's T0, and what a pass over its leaves found.
+    pub(super) base: Option<(&'a Manifest, Pass)>,
     pub(crate) pass: Pass,
-    facets: OnceCell<Facets>,
     truth: OnceCell<Option<Truth>>,
     with_deleted: OnceCell<Tree>,
 }
@@ -70,7 +68,6 @@ impl<'a> Subject<'a> {
             reference: None,
             base: None,
             pass,
-            facets: OnceCell::new(),
             truth: OnceCell::new(),
             with_deleted: OnceCell::new(),
         }
@@ -78,7 +75,7 @@ impl<'a> Subject<'a> {
 
     /// The subject with the base tree that the engine made.
     pub fn with_base(self, base: &'a LeafSet) -> Self {
-        Self { base: Some((base, Pass::of(base, "T0: "))), ..self }
+        Self { base: Some((&base.manifest, Pass::of(base, "T0: "))), ..self }
     }
 
     /// The subject with the mesh that it must equal.
@@ -98,7 +95,7 @@ impl<'a> Subject<'a> {
 
     /// The mesh, and the engine's T0 with a prefix for findings: manifests, and what a pass found.
     pub(super) fn meshes(&self) -> impl Iterator<Item = (&'static str, &Manifest, &Pass)> {
-        let base = self.base.as_ref().map(|(base, pass)| ("T0: ", &base.manifest, pass));
+        let base = self.base.iter().map(|(manifest, pass)| ("T0: ", *manifest, pass));
         std::iter::once(("", self.manifest, &self.pass)).chain(base)
     }
 
@@ -111,13 +108,12 @@ impl<'a> Subject<'a> {
     pub(super) fn capacity(&self) -> Option<CheckResult> {
         let mut result = CheckResult::new(CAPACITY);
         if self.meshes().any(|(.., pass)| pass.tree.is_none()) {
-            result.report(
-                "a tree has more distinct octants than the limit and was not checked; increase the limit".to_owned(),
-            );
+            let why = "and was not checked; increase the limit";
+            result.report(format_args!("a tree has more distinct octants than the limit {why}"));
         } else if self.case.is_some() && self.truth().is_none() {
-            result.report(format!(
-                "T0 of the case has more than {} leaves, and its mesh was not checked",
-                Truth::LEAVES_MAX
+            let most = Truth::LEAVES_MAX;
+            result.report(format_args!(
+                "T0 of the case has more than {most} leaves, and its mesh was not checked"
             ));
         }
         (!result.holds()).then_some(result)
@@ -152,8 +148,7 @@ impl<'a> Subject<'a> {
     /// T0 of the case with the sides of its leaves; `None` without a case, or if it is too large.
     pub fn truth(&self) -> Option<&Truth> {
         let case = self.case?;
-        let make = || Truth::new(self.facets()?, &case.facets_lattice, &self.inputs);
-        self.truth.get_or_init(make).as_ref()
+        self.truth.get_or_init(|| Truth::of(case, &self.inputs)).as_ref()
     }
 
     /// What a check that compares the mesh with T0 examines: its leaves or, if there are none, those of T0.
@@ -162,11 +157,5 @@ impl<'a> Subject<'a> {
             0 => truth.words.len() as u64,
             leaves => leaves,
         }
-    }
-
-    /// The case's facets, prepared for crossing tests.
-    pub(super) fn facets(&self) -> Option<&Facets> {
-        let case = self.case?;
-        Some(self.facets.get_or_init(|| Facets::new(&case.facets_lattice)))
     }
 }

@@ -6,11 +6,13 @@
 
 use super::components::{self, Component};
 use super::facets::Facets;
+use contract::case::Case;
 use contract::lattice::FacetLattice;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};
 use contract::word::{self, Leaf, Side};
+use std::rc::Rc;
 
 /// The kind, in T0's tree, of an outside leaf that is deleted because its component is enclosed.
 const ENCLOSED: Kind = 3;
@@ -18,6 +20,8 @@ const ENCLOSED: Kind = 3;
 /// T0 of a case.
 #[derive(Debug)]
 pub struct Truth {
+    /// The facets of the case.
+    pub facets: Rc<Facets>,
     /// Its leaf words.
     pub words: Vec<u64>,
     /// The components of the leaves that no facet crosses.
@@ -41,19 +45,17 @@ pub struct Found {
     pub is_finer: bool,
 }
 
-impl Found {
-    /// Whether it has no leaf.
-    pub fn is_hole(&self) -> bool {
-        self.kinds == HOLES
-    }
-}
-
 impl Truth {
     /// Maximum number of leaves. One needs about 40 bytes.
     pub const LEAVES_MAX: usize = 1 << 26;
 
-    /// T0 of the inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
-    pub fn new(facets: &Facets, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
+    /// T0 of a case with these inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
+    pub fn of(case: &Case, terms: &Manifest) -> Option<Self> {
+        Self::new(Rc::new(Facets::new(&case.facets_lattice)), &case.facets_lattice, terms)
+    }
+
+    /// The same, with the facets prepared.
+    pub fn new(facets: Rc<Facets>, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
         let mut words = Vec::new();
         facets.walk(0, &mut |octant, near| {
             let by_surface = !near.is_empty() && octant.level < terms.level_surface;
@@ -82,7 +84,7 @@ impl Truth {
             let pushed = builder.push_leaf(word::key(w), word::level(w), kind);
             pushed.expect("the leaves of T0 are in order and do not overlap");
         }
-        Some(Self { words, components, component_of, tree: builder.finish() })
+        Some(Self { facets, words, components, component_of, tree: builder.finish() })
     }
 
     /// The side of a leaf of T0 of this kind.
@@ -101,6 +103,11 @@ impl Truth {
         self.component_of[leaf].map(|index| &self.components[index as usize])
     }
 
+    /// Whether a facet crosses an octant that is a leaf of T0 or contains some.
+    pub fn is_crossed(&self, octant: &Octant) -> bool {
+        self.tree.kinds(self.tree.at(octant)) & 1 << Side::Crossing as u8 != 0
+    }
+
     /// Visits the parts of a mesh, in Morton order.
     pub fn compare(&self, mesh: &Tree, visit: &mut dyn FnMut(Found)) {
         self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
@@ -109,7 +116,7 @@ impl Truth {
     /// Visits the parts of a mesh whose leaves do not have the side of the leaf of T0 that contains them, with that side.
     pub fn mislabelled(&self, mesh: &Tree, visit: &mut dyn FnMut(&Found, Side)) {
         self.compare(mesh, &mut |found| {
-            let side = found.base.filter(|_| !found.is_hole()).map(Self::side);
+            let side = found.base.filter(|_| found.kinds != HOLES).map(Self::side);
             if let Some(side) = side.filter(|&side| found.kinds != 1 << side as u8) {
                 visit(&found, side);
             }

@@ -14,12 +14,12 @@ mod rule;
 use std::fmt;
 use std::path::Path;
 
-use crate::checks::identical::describe;
-use crate::inputs;
-use crate::why::{self, Body};
+use crate::checks::identical::Named;
+use crate::checks::manifest::{differing, differing_inputs};
+
+use crate::why;
 use contract::case::Case;
 use contract::failure::Failure;
-use contract::lattice::Root;
 use contract::manifest::{Manifest, Sides};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
@@ -90,29 +90,36 @@ impl fmt::Display for DiffReport {
 /// # Errors
 /// If a directory cannot be read.
 pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failure> {
-    let mut meshes = [("A", Mesh::open(a)?), ("B", Mesh::open(b)?)];
-    let unknown = meshes.iter().find(|(_, mesh)| mesh.manifest.sides == Sides::Unknown);
-    let without_sides = unknown.map(|(name, _)| *name);
-    let mut report = DiffReport { without_sides, ..DiffReport::default() };
+    let [mut a, mut b] = [Mesh::open(a)?, Mesh::open(b)?];
+    let unknown = |(_, mesh): &(&str, &Mesh)| mesh.manifest.sides == Sides::Unknown;
+    let without_sides = [("A", &a), ("B", &b)].into_iter().find(unknown).map(|(name, _)| name);
     let mask = if without_sides.is_some() { !word::SIDE_BITS } else { u64::MAX };
-    for (_, mesh) in &mut meshes {
+    for mesh in [&mut a, &mut b] {
         let mut manifest = mesh.manifest.clone();
         manifest.clear_leaves();
         mesh.visit(&mut |words| words.iter().for_each(|&word| manifest.add(word & mask)))?;
         manifest.finish();
         mesh.manifest = manifest;
     }
-    let [(_, a), (_, b)] = meshes;
-    report.leaves = a.manifest.leaves;
-    report.fields = differing(&a.manifest, &b.manifest);
     let digests = a.manifest.octant_digests.iter().zip(&b.manifest.octant_digests);
     let differing = (0..).zip(digests).filter(|(_, (x, y))| x != y);
-    report.octants = differing.map(|(index, _)| level_3(index)).collect();
+    let mut report = DiffReport {
+        without_sides,
+        leaves: a.manifest.leaves,
+        fields: fields(("A", &a.manifest), ("B", &b.manifest)),
+        octants: differing.map(|(index, _)| level_3(index)).collect(),
+        ..DiffReport::default()
+    };
     if let Some(octant) = report.octants.first() {
         let (x, y) = first_difference(&a, &b, octant, mask)?;
-        let sides_known = without_sides.is_none();
-        report.leaf = Some(leaves(x, y, sides_known, &a.manifest.root));
-        report.rule = sides_known.then(|| rule(&a, &b, case, (x, y)));
+        let root = a.manifest.root;
+        let text = |word: Option<u64>| match word {
+            None => "no more leaves".to_owned(),
+            Some(word) if without_sides.is_none() => Named(word, root).to_string(),
+            Some(word) => root.place(word::octant(word)).to_string(),
+        };
+        report.leaf = Some(format!("first difference:\n  A has {}\n  B has {}", text(x), text(y)));
+        report.rule = without_sides.is_none().then(|| rule(&a, &b, case, (x, y)));
     }
     report.check_invariants();
     Ok(report)
@@ -128,30 +135,18 @@ type Differing = (Option<u64>, Option<u64>);
 
 /// The first words that differ in an octant, in the bits of `mask`.
 fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Differing, Failure> {
-    let words = |mesh: &Mesh| -> Result<Vec<u64>, Failure> {
-        Ok(mesh.octant(octant)?.into_iter().map(|word| word & mask).collect())
-    };
-    let (a, b) = (words(a)?, words(b)?);
-    let first = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
-    Ok((a.get(first).copied(), b.get(first).copied()))
-}
-
-/// The leaves of both meshes at the first difference, as text.
-fn leaves(a: Option<u64>, b: Option<u64>, sides_known: bool, root: &Root) -> String {
-    let text = |word: Option<u64>| match word {
-        None => "no more leaves".to_owned(),
-        Some(word) if sides_known => describe(word, root),
-        Some(word) => root.describe(&word::octant(word)),
-    };
-    format!("first difference:\n  A has {}\n  B has {}", text(a), text(b))
+    let (a, b) = (a.octant(octant)?, b.octant(octant)?);
+    let mut masked = (0..).map(|at| [&a, &b].map(|words| words.get(at).map(|word| word & mask)));
+    let [x, y] = masked.find(|[x, y]| x != y).expect("the digests of the octant differ");
+    Ok((x, y))
 }
 
 /// The rule that decides which mesh is right, or why none does.
 fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
-    if !inputs::differing(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
+    if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
-    let (body, caveat) = match case.map(|case| Body::of(case, &a.manifest)).transpose() {
+    let (body, caveat) = match case.map(|case| why::body(case, &a.manifest)).transpose() {
         Ok(body) => (body, String::new()),
         Err(why) => (None, format!("without the case, because {why}: ")),
     };
@@ -164,15 +159,13 @@ fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
     caveat + &rule::at(&a, &b, x, y)
 }
 
-/// Counts that follow from the sides.
-const OF_SIDES: [&str; 3] = ["components", "components_ambiguous", "leaves_by_side"];
-
 /// The differences of inputs and counts, one line each. What follows from the sides is left out if a mesh has none.
-fn differing(a: &Manifest, b: &Manifest) -> Vec<String> {
-    let have_sides = a.sides == Sides::Known && b.sides == Sides::Known;
-    let counts = ["leaves", "leaves_by_level"].into_iter();
-    let counts: Vec<_> = counts.chain(OF_SIDES.into_iter().filter(|_| have_sides)).collect();
-    let mut fields = inputs::differing(("A", a), ("B", b));
-    fields.extend(inputs::compare(&counts, ("A", a), ("B", b)));
+fn fields(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<String> {
+    let mut counts = vec!["leaves", "leaves_by_level"];
+    if [a, b].iter().all(|(_, manifest)| manifest.sides == Sides::Known) {
+        counts.extend(["components", "components_ambiguous", "leaves_by_side"]);
+    }
+    let mut fields = differing_inputs(a, b);
+    fields.extend(differing(&counts, a, b));
     fields
 }

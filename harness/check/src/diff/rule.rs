@@ -81,9 +81,8 @@ fn split(octant: &Octant, (coarse, _): Named, (fine, mesh): Named) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::checks::facets::Facets;
     use crate::checks::truth::Truth;
-    use crate::why::Body;
+    use crate::why;
     use contract::case::Case;
     use contract::manifest;
     use contract::tree::Tree;
@@ -109,7 +108,7 @@ mod tests {
     /// The rule at the first difference of two meshes, whose case is given with `--case` or not.
     fn rule(case: &Case, is_given: bool, a: &[u64], b: &[u64]) -> String {
         let manifest = case.manifest(manifest::Tree::Final, "test".to_owned());
-        let body = is_given.then(|| Body::of(case, &manifest).unwrap());
+        let body = is_given.then(|| why::body(case, &manifest).unwrap());
         let trees = [a, b].map(Tree::of_words);
         let [of_a, of_b] =
             trees.each_ref().map(|tree| Mesh::of(&manifest, tree, body.as_ref()).distrusting());
@@ -119,8 +118,7 @@ mod tests {
 
     /// T0 with these leaves split.
     fn split(case: &Case, paths: &[&[u8]]) -> Vec<u64> {
-        let facets = Facets::new(&case.facets_lattice);
-        let truth = Truth::new(&facets, &case.facets_lattice, &case.inputs()).unwrap();
+        let truth = Truth::of(case, &case.inputs()).unwrap();
         let mut words = truth.words;
         for path in paths {
             let i = words.iter().position(|&w| word::octant(w) == octant(path)).expect("a leaf");

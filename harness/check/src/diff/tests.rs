@@ -59,7 +59,7 @@ fn the_first_difference_is_found_in_any_octant_and_part() {
         let found = diff(a.path(), b.path(), None).unwrap();
         assert_eq!((found.octants, found.leaves), (vec![level_3(index as u64)], 512));
         let octant = word::octant(words[index]);
-        let leaf = leaf_set(vec![]).manifest.root.describe(&octant);
+        let leaf = leaf_set(vec![]).manifest.root.place(octant).to_string();
         let text =
             format!("first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}");
         assert_eq!(found.leaf, Some(text));
@@ -129,7 +129,7 @@ fn a_tree_is_compared_with_parts_like_other_parts() {
         for [a, b] in [[tree.as_path(), changed.path()], [changed.path(), &tree]] {
             let found = compared(a, b);
             assert_eq!(found.octants, [level_3(octant_index(set.words[at]) as u64)], "{found}");
-            let leaf = set.manifest.root.describe(&word::octant(set.words[at]));
+            let leaf = set.manifest.root.place(word::octant(set.words[at])).to_string();
             let text = found.leaf.as_ref().expect("the first difference");
             assert_eq!(text.matches(&leaf).count(), 2, "{text}");
         }

@@ -92,19 +92,20 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
         for (index, quadrant) in quadrants.iter().enumerate() {
             let name = || named(tree, index, quadrant);
             let Some(leaf) = leaf(dimension, length, quadrant) else {
-                valid.report_with(|| {
-                    format!("{} is no octant of a tree whose length is {length}", name())
-                });
+                let name = name();
+                valid
+                    .report(format_args!("{name} is no octant of a tree whose length is {length}"));
                 continue;
             };
             match leaf.key.cmp(&next) {
-                Ordering::Less => linear.report_with(|| {
-                    format!("{} begins before the end of the one before it", name())
-                }),
-                Ordering::Greater => complete.report_with(|| {
+                Ordering::Less => {
+                    let why = "begins before the end of the one before it";
+                    linear.report(format_args!("{} {why}", name()));
+                }
+                Ordering::Greater => {
                     let why = "does not begin where the one before it ends, or the tree begins";
-                    format!("{} {why}", name())
-                }),
+                    complete.report(format_args!("{} {why}", name()));
+                }
                 Ordering::Equal => {}
             }
             next = leaf.end(dimension);
@@ -141,13 +142,10 @@ impl Balance<'_> {
             // Leaves of level 0 and 1 have no neighbour two levels coarser.
             for (index, leaf) in leaves.iter().enumerate().filter(|(_, leaf)| leaf.level > 1) {
                 let Some((other, coarse, axes)) = self.too_coarse(tree, leaf) else { continue };
-                result.report_with(|| {
-                    let name = |tree: usize, index: usize| {
-                        named(tree, index, &self.forest.leaves[tree][index])
-                    };
-                    let what = ["in a face", second, "in a corner"][axes as usize - 1];
-                    format!("{} touches {what} {}", name(tree, index), name(other, coarse))
-                });
+                let [fine, coarse] = [(tree, index), (other, coarse)]
+                    .map(|(tree, index)| named(tree, index, &self.forest.leaves[tree][index]));
+                let what = ["in a face", second, "in a corner"][axes as usize - 1];
+                result.report(format_args!("{fine} touches {what} {coarse}"));
             }
         }
     }
@@ -247,7 +245,7 @@ pub fn diff(a: &Forest, b: &Forest) -> [CheckResult; 2] {
                 Some(leaf) => named(tree, same, leaf),
                 None => format!("no quadrant {same} in tree {tree}"),
             };
-            leaves.report_with(|| format!("A has {}, B has {}", name(of_a), name(of_b)));
+            leaves.report(format_args!("A has {}, B has {}", name(of_a), name(of_b)));
         }
     }
     let mut results = [connectivity, leaves];

@@ -5,12 +5,13 @@
 //! too. Tree edges and tree corners are identified where glued faces map them onto each other, and by the lists of edges and
 //! corners; what is identified is a set, whose members all meet there. So neighbours are found without p4est's tables, also those that no list names.
 
-mod remarks;
-
 use super::isometry::{EDGES, Isometry, LENGTH, corner_at, edge_between, edge_end, point};
 use crate::checks::CheckResult;
 use contract::import::forest::{Connectivity, Lists};
 use contract::sets::Sets;
+
+/// A tree, and the number of an edge or corner of it.
+type Place = (usize, usize);
 
 /// How the trees are glued.
 #[derive(Debug)]
@@ -26,37 +27,36 @@ pub struct Topology {
 }
 
 /// Disjoint sets of the places of all trees.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Identified {
     /// Places of one tree.
     places: usize,
-    sets: Sets,
     /// The representative of every place, and the members of its set.
     roots: Vec<usize>,
-    members: Vec<Vec<usize>>,
+    members: Vec<Vec<Place>>,
 }
 
 impl Identified {
-    fn new(trees: usize, places: usize) -> Self {
-        let sets = Sets::new(trees * places);
-        Self { places, sets, roots: Vec::new(), members: vec![Vec::new(); trees * places] }
+    fn by(trees: usize, places: usize, pairs: &[(Place, Place)]) -> Self {
+        let index = |(tree, place): Place| (tree * places + place) as u32;
+        let mut sets = Sets::new(trees * places);
+        pairs.iter().for_each(|&(first, other)| sets.union(index(first), index(other)));
+        let mut members = vec![Vec::new(); trees * places];
+        let all = all_places(trees, places);
+        let roots: Vec<usize> = all.map(|at| sets.root(index(at)) as usize).collect();
+        all_places(trees, places).zip(&roots).for_each(|(at, &root)| members[root].push(at));
+        Self { places, roots, members }
     }
 
-    fn unite(&mut self, (tree, place): (usize, usize), (other, its): (usize, usize)) {
-        self.sets.union((tree * self.places + place) as u32, (other * self.places + its) as u32);
+    /// Everything that is the same as a place, itself included.
+    fn with(&self, (tree, place): Place) -> impl Iterator<Item = Place> + '_ {
+        self.members[self.roots[tree * self.places + place]].iter().copied()
     }
+}
 
-    fn collect(&mut self) {
-        let count = self.members.len();
-        self.roots = (0..count).map(|place| self.sets.root(place as u32) as usize).collect();
-        (0..count).for_each(|place| self.members[self.roots[place]].push(place));
-    }
-
-    /// Everything that is the same as a place, itself included: trees and their places.
-    fn with(&self, tree: usize, place: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let members = &self.members[self.roots[tree * self.places + place]];
-        members.iter().map(|member| (member / self.places, member % self.places))
-    }
+/// All trees with all of so many places.
+fn all_places(trees: usize, places: usize) -> impl Iterator<Item = Place> {
+    (0..trees).flat_map(move |tree| (0..places).map(move |place| (tree, place)))
 }
 
 impl Topology {
@@ -71,49 +71,106 @@ impl Topology {
         if !result.holds() {
             return None;
         }
-        let edges = if dimension == 3 { 2 * EDGES } else { 0 };
-        let edges = Identified::new(trees, edges);
-        let corners = Identified::new(trees, 1 << dimension);
+        let [edges, corners] = [(); 2].map(|()| Identified::default());
         let mut topology = Self { dimension, faces, edges, corners };
-        topology.identify_across_faces();
-        topology.identify_lists(connectivity);
-        topology.edges.collect();
-        topology.corners.collect();
-        result.note = remarks::of(&topology, connectivity);
+        topology.identify(connectivity);
+        result.note = topology.remarks(connectivity);
         Some(topology)
     }
 
-    fn identify_across_faces(&mut self) {
-        let faces = 2 * self.dimension;
-        for (index, glued) in self.faces.iter().enumerate() {
-            let Some((other, isometry)) = glued else { continue };
-            let (tree, face) = (index / faces, index % faces);
-            let image = |corner| corner_at(isometry.of_cube(point(corner), 0));
-            let own = |corner: &usize| corner >> (face / 2) & 1 == face % 2;
-            for corner in (0..1 << self.dimension).filter(own) {
-                self.corners.unite((tree, corner), (*other, image(corner)));
-            }
-            for edge in 0..self.edges.places {
-                let ends = [edge_end(edge, false), edge_end(edge, true)];
-                if ends.iter().all(own) {
-                    let across = edge_between(image(ends[0]), image(ends[1]));
-                    self.edges.unite((tree, edge), (*other, across));
-                }
-            }
-        }
-    }
-
-    fn identify_lists(&mut self, connectivity: &Connectivity) {
+    fn identify(&mut self, connectivity: &Connectivity) {
+        let trees = connectivity.trees;
+        let (places, corners_each) =
+            (if self.dimension == 3 { 2 * EDGES } else { 0 }, 1 << self.dimension);
+        let mut corners: Vec<(Place, Place)> = pairs(&connectivity.corners).collect();
+        let mut edges = Vec::new();
         for (first, other) in pairs(&connectivity.edges) {
-            let reversed = |(tree, edge): (usize, usize)| (tree, (edge + EDGES) % (2 * EDGES));
-            self.edges.unite(first, other);
-            self.edges.unite(reversed(first), reversed(other));
+            let reversed = |(tree, edge): Place| (tree, (edge + EDGES) % (2 * EDGES));
+            edges.extend([(first, other), (reversed(first), reversed(other))]);
             for end in [false, true] {
                 let corner = |(tree, edge)| (tree, edge_end(edge, end));
-                self.corners.unite(corner(first), corner(other));
+                corners.push((corner(first), corner(other)));
             }
         }
-        pairs(&connectivity.corners).for_each(|(first, other)| self.corners.unite(first, other));
+        for at in all_places(trees, places) {
+            edges.extend(self.edges_across(at).map(|its| (at, its)));
+        }
+        for at in all_places(trees, corners_each) {
+            corners.extend(self.corners_across(at).map(|its| (at, its)));
+        }
+        self.edges = Identified::by(trees, places, &edges);
+        self.corners = Identified::by(trees, corners_each, &corners);
+    }
+
+    /// The trees across the faces of a tree that have these corners, and what the corners are there.
+    fn across<const N: usize>(
+        &self,
+        tree: usize,
+        corners: [usize; N],
+    ) -> impl Iterator<Item = (usize, [usize; N])> + '_ {
+        let faces = 2 * self.dimension;
+        let has = move |face: &usize| corners.iter().all(|c| c >> (face / 2) & 1 == face % 2);
+        let glued = (0..faces).filter(has).filter_map(move |face| self.faces[faces * tree + face]);
+        glued.map(move |(other, map)| (other, corners.map(|c| corner_at(map.of_cube(point(c), 0)))))
+    }
+
+    /// What a directed edge is across faces.
+    fn edges_across(&self, (tree, edge): Place) -> impl Iterator<Item = Place> + '_ {
+        let ends = self.across(tree, [false, true].map(|end| edge_end(edge, end)));
+        ends.map(|(other, [from, to])| (other, edge_between(from, to)))
+    }
+
+    /// What a corner is across faces.
+    fn corners_across(&self, (tree, corner): Place) -> impl Iterator<Item = Place> + '_ {
+        self.across(tree, [corner]).map(|(other, [its])| (other, its))
+    }
+
+    /// What is legal in a connectivity, but p4est balances less than the reader may expect, or differently: the number of places of each
+    /// kind, and the first.
+    ///
+    /// p4est asks for lists of the edges and corners at which trees meet that are no neighbours there across a face, or at a corner across
+    /// a face or an edge. Where one is missing, p4est neither balances over it nor, sometimes, over the faces beside it. An edge that meets itself
+    /// in the opposite direction is a mistake in most connectivities.
+    fn remarks(
+        &self,
+        &Connectivity { trees, ref edges, ref corners, .. }: &Connectivity,
+    ) -> String {
+        let is_in = |lists: &Lists, at: usize| lists.of_tree.get(at).is_some_and(|&list| list >= 0);
+        let is_unlisted_edge = |&(tree, edge): &Place| {
+            let mut near: Vec<Place> = self.edges_across((tree, edge)).collect();
+            near.push((tree, edge));
+            !is_in(edges, EDGES * tree + edge)
+                && !self.edges.with((tree, edge)).all(|at| near.contains(&at))
+        };
+        let is_unlisted_corner = |&(tree, corner): &Place| {
+            let mut near: Vec<Place> = self.corners_across((tree, corner)).collect();
+            near.push((tree, corner));
+            for edge in (0..self.edges.places).filter(|&edge| edge_end(edge, false) == corner) {
+                let meeting = self.edges.with((tree, edge));
+                near.extend(meeting.map(|(other, its)| (other, edge_end(its, false))));
+            }
+            !is_in(corners, (tree << self.dimension) + corner)
+                && !self.corners.with((tree, corner)).all(|at| near.contains(&at))
+        };
+        let meets_itself = |&(tree, edge): &Place| {
+            self.edges.with((tree, edge)).any(|other| other == (tree, edge + EDGES))
+        };
+        let all_edges = || all_places(trees, self.edges.places / 2);
+        let all_corners = all_places(trees, 1 << self.dimension);
+        let unlisted = "whose trees are no neighbours otherwise are in no list";
+        let found: [(String, Vec<Place>); 3] = [
+            (format!("tree edges {unlisted}"), all_edges().filter(is_unlisted_edge).collect()),
+            (format!("tree corners {unlisted}"), all_corners.filter(is_unlisted_corner).collect()),
+            (
+                "tree edges meet themselves in the opposite direction".to_owned(),
+                all_edges().filter(meets_itself).collect(),
+            ),
+        ];
+        let remarks = found.iter().filter_map(|(what, found)| {
+            let (tree, place) = found.first()?;
+            Some(format!("{} {what}, the first {place} of tree {tree}", found.len()))
+        });
+        remarks.collect::<Vec<_>>().join("; ")
     }
 
     /// The cubes of a size that lie where a cube beside or in a tree does, whose minimum corner is given: as many as trees meet there, and
@@ -145,12 +202,14 @@ impl Topology {
             }
             all if all.len() == self.dimension => {
                 let own = number(all);
-                self.corners.with(tree, own).for_each(|(other, its)| visit(other, at_corner(its)));
+                self.corners
+                    .with((tree, own))
+                    .for_each(|(other, its)| visit(other, at_corner(its)));
             }
             two => {
                 let axis = (0..3).find(|&axis| side(axis).is_none()).expect("one of three axes");
                 let own = edge_between(number(two), number(two) + (1 << axis));
-                for (other, edge) in self.edges.with(tree, own) {
+                for (other, edge) in self.edges.with((tree, own)) {
                     let mut at = at_corner(edge_end(edge % EDGES, false));
                     let along = corner[axis];
                     at[edge % EDGES / 4] =
@@ -202,7 +261,7 @@ fn glued_faces(
 }
 
 /// Consecutive members of every list.
-fn pairs(lists: &Lists) -> impl Iterator<Item = ((usize, usize), (usize, usize))> + '_ {
+fn pairs(lists: &Lists) -> impl Iterator<Item = (Place, Place)> + '_ {
     let member = |at: usize| (lists.trees[at] as usize, lists.places[at] as usize);
     let of_list = move |ends: &[i32]| {
         (ends[0] as usize + 1..ends[1] as usize).map(move |at| (member(at - 1), member(at)))

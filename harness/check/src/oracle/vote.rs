@@ -96,22 +96,20 @@ impl Ballot<'_> {
         let sentence = |Answer { name, inside }: &Answer| {
             let differing = self.points(|point| inside[point] != self.mesh[point]);
             let rays = |agree| {
-                differing
-                    .iter()
-                    .filter(|&&point| self.exact[point] == Some(agree == self.mesh[point]))
-                    .count()
+                let votes = differing.iter().map(|&point| (self.exact[point], self.mesh[point]));
+                votes.filter(|&(exact, mesh)| exact == Some(agree == mesh)).count()
             };
             let (points, right, wrong) = (differing.len(), rays(false), rays(true));
+            let undecided = points - right - wrong;
             let judged = match self.seeds {
                 true => format!("exact rays agree with it at {right}"),
                 false => format!(
-                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {}",
-                    points - right - wrong
+                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {undecided}"
                 ),
             };
-            (points > 0).then(|| {
-                format!("{name} differs from the mesh at {points} of {all} points; {judged}")
-            })
+            let note =
+                format!("{name} differs from the mesh at {points} of {all} points; {judged}");
+            (points > 0).then_some(note)
         };
         let mut notes: Vec<String> = self.oracles.iter().filter_map(sentence).collect();
         let (exact, oracles) = (self.exact_against().len(), self.all_against().len());

@@ -5,10 +5,10 @@
 //! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
 //! false alarm and fails the self test, too. The audit of the mesh with its case must report every corruption of the mesh.
 //!
-//! Invariants of a report: every corruption of the catalogue was tried or applies to no mesh, and no other was; the expected
-//! check has a finding iff it reported the corruption.
+//! Invariants of a report: only corruptions of the catalogue were tried, each once on a case; the expected check has a finding iff it
+//! reported the corruption.
 
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 use std::fmt;
 use std::fs;
 use std::path::Path;
@@ -57,16 +57,12 @@ pub struct SelftestCase {
 /// The result of one trial: a corruption of one mesh.
 #[derive(Clone, Debug)]
 pub struct Kill {
-    /// Name of the corruption.
-    pub mutant: &'static str,
+    /// The corruption.
+    pub mutant: Mutant,
     /// Name of the case.
     pub case: String,
-    /// The check that must report it.
-    pub expected: &'static str,
     /// Checks that reported it.
     pub caught_by: Vec<&'static str>,
-    /// Whether the audit must report it, too, because the leaves alone show it.
-    pub audit_expected: bool,
     /// Checks of the audit that reported it.
     pub audit_caught_by: Vec<&'static str>,
     /// Whether the audit with the case misses it, although the mesh on disk is another one.
@@ -79,8 +75,9 @@ impl Kill {
     /// Whether the expected check reported it, in the audit as well if that is expected. An audit with the case must report any
     /// corruption of the mesh.
     pub fn killed(&self) -> bool {
-        let audited = !self.audit_expected || self.audit_caught_by.contains(&self.expected);
-        self.caught_by.contains(&self.expected) && audited && !self.whole_audit_missed
+        let Mutant { expected, audit, .. } = self.mutant;
+        let audited = !audit || self.audit_caught_by.contains(&expected);
+        self.caught_by.contains(&expected) && audited && !self.whole_audit_missed
     }
 }
 
@@ -91,40 +88,32 @@ pub struct SelftestReport {
     pub kills: Vec<Kill>,
     /// Findings on correct meshes, which are false alarms.
     pub alarms: Vec<String>,
-    /// Corruptions that applied to no mesh.
-    pub unused: Vec<&'static str>,
 }
 
 impl SelftestReport {
     /// Whether every corruption applied and was reported, and there were no false alarms.
     pub fn holds(&self) -> bool {
-        let is_idle = self.kills.is_empty() || !self.unused.is_empty();
-        !is_idle && self.alarms.is_empty() && self.kills.iter().all(Kill::killed)
+        self.unused().is_empty() && self.alarms.is_empty() && self.kills.iter().all(Kill::killed)
+    }
+
+    /// Corruptions that applied to no mesh.
+    pub fn unused(&self) -> Vec<&'static str> {
+        let tried: HashSet<&str> = self.kills.iter().map(|kill| kill.mutant.name).collect();
+        let names = catalogue().into_iter().map(|mutant| mutant.name);
+        names.filter(|name| !tried.contains(name)).collect()
     }
 
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
-        for mutant in catalogue() {
-            let mut trials = self.kills.iter().filter(|kill| kill.mutant == mutant.name).peekable();
-            let is_unused = self.unused.contains(&mutant.name);
-            assert!(
-                trials.peek().is_some() != is_unused,
-                "{} was tried, or it applies nowhere",
-                mutant.name
-            );
-            for kill in trials {
-                assert_eq!(kill.expected, mutant.expected, "the check for {}", mutant.name);
-                let by_expected = kill.caught_by.contains(&kill.expected);
-                assert_eq!(kill.finding.is_some(), by_expected, "the finding for {}", mutant.name);
-            }
+        let known = catalogue();
+        let mut trials = HashSet::new();
+        for Kill { mutant, case, caught_by, finding, .. } in &self.kills {
+            let Mutant { name, expected, .. } = *mutant;
+            assert!(known.iter().any(|mutant| mutant.name == name), "{name} is in no catalogue");
+            assert!(trials.insert((name, case)), "{name} was tried twice on {case}");
+            let by_expected = caught_by.contains(&expected);
+            assert_eq!(finding.is_some(), by_expected, "the finding for {name}");
         }
-        let names: Vec<&str> = catalogue().iter().map(|mutant| mutant.name).collect();
-        let known = |name: &&str| names.contains(name);
-        assert!(
-            self.kills.iter().map(|kill| &kill.mutant).all(known),
-            "a corruption of no catalogue"
-        );
-        assert!(self.unused.iter().all(known), "a corruption of no catalogue: {:?}", self.unused);
     }
 }
 
@@ -136,9 +125,10 @@ impl fmt::Display for SelftestReport {
         for alarm in &self.alarms {
             writeln!(f, "FALSE ALARM on a correct mesh: {alarm}")?;
         }
-        self.unused.iter().try_for_each(|name| writeln!(f, "applies to no case: {name}"))?;
-        let names: BTreeSet<_> = self.kills.iter().map(|k| k.mutant).collect();
-        let (corruptions, trials, alarms) = (names.len(), self.kills.len(), self.alarms.len());
+        let unused = self.unused();
+        unused.iter().try_for_each(|name| writeln!(f, "applies to no case: {name}"))?;
+        let corruptions = catalogue().len() - unused.len();
+        let (trials, alarms) = (self.kills.len(), self.alarms.len());
         write!(
             f,
             "{corruptions} corruptions in {trials} trials: {} survived, {alarms} false alarms",
@@ -161,15 +151,11 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
         report.alarms.extend(alarms.map(|r| format!("{}: {r}", correct.case.name)));
     }
     for mutant in catalogue() {
-        let kills = report.kills.len();
         for correct in &cases {
             if let Some(mutation) = mutant.make(correct) {
                 let examined = examine(correct, &mutation, &scratch.join("mutant"))?;
-                report.kills.push(kill(&mutant, correct, &mutation, &examined));
+                report.kills.push(kill(mutant, correct, &mutation, &examined));
             }
-        }
-        if report.kills.len() == kills {
-            report.unused.push(mutant.name);
         }
     }
     report.check_invariants();
@@ -200,7 +186,7 @@ fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::
 }
 
 fn kill(
-    mutant: &Mutant,
+    mutant: Mutant,
     correct: &SelftestCase,
     mutation: &Mutation,
     [checks, audit, whole]: &Examined,
@@ -213,11 +199,9 @@ fn kill(
     let is_of_mesh = mutation.tamper.is_some()
         || (&before.manifest, &before.parts) != (&after.manifest, &after.parts);
     Kill {
-        mutant: mutant.name,
+        mutant,
         case: correct.case.name.clone(),
-        expected: mutant.expected,
         caught_by: failed(checks),
-        audit_expected: mutant.audit,
         audit_caught_by: failed(audit),
         whole_audit_missed: is_of_mesh && failed(whole).is_empty(),
         finding: expected.and_then(|r| r.findings.first()).cloned(),
@@ -231,11 +215,9 @@ mod tests {
     /// A report in which every corruption was tried once and reported.
     fn correct() -> SelftestReport {
         let kill = |mutant: &Mutant| Kill {
-            mutant: mutant.name,
+            mutant: *mutant,
             case: "a case".to_owned(),
-            expected: mutant.expected,
             caught_by: vec![mutant.expected],
-            audit_expected: mutant.audit,
             audit_caught_by: vec![mutant.expected],
             whole_audit_missed: false,
             finding: Some("a finding".to_owned()),
@@ -248,13 +230,12 @@ mod tests {
     fn a_report_that_contradicts_itself_is_a_bug() {
         correct().check_invariants();
         assert!(correct().holds());
-        let faults: [fn(&mut SelftestReport); 6] = [
-            |r| drop(r.kills.pop()),
-            |r| r.unused.push(r.kills[0].mutant),
-            |r| r.kills[0].expected = "files",
+        let faults: [fn(&mut SelftestReport); 5] = [
+            |r| r.kills.push(r.kills[0].clone()),
+            |r| r.kills[0].mutant.name = "another",
+            |r| r.kills[0].mutant.expected = "files",
             |r| r.kills[0].caught_by.clear(),
             |r| r.kills[0].finding = None,
-            |r| r.unused.push("another"),
         ];
         for (i, fault) in faults.iter().enumerate() {
             let mut wrong = correct();
@@ -278,14 +259,24 @@ mod tests {
         report.kills.push(report.kills[0].clone());
         let counts = format!("{corruptions} corruptions in {} trials", corruptions + 1);
         assert_eq!(report.to_string(), format!("{counts}: 0 survived, 0 false alarms"));
+        assert!(report.holds());
+        let unused = report.kills.pop().unwrap().mutant.name;
+        let unused = report.kills.iter().position(|kill| kill.mutant.name == unused).unwrap();
+        let unused = report.kills.remove(unused).mutant.name;
+        assert_eq!(report.unused(), [unused]);
+        assert!(!report.holds(), "a corruption applies to no case");
         report.kills[1].caught_by.clear();
         report.alarms.push("an alarm".to_owned());
-        report.unused.push("unused");
-        let (text, counts) = (report.to_string(), format!("{counts}: 1 survived, 1 false alarms"));
+        let trials = corruptions - 1;
+        let counts = format!("{trials} corruptions in {trials} trials: 1 survived, 1 false alarms");
+        let text = report.to_string();
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("SURVIVED: Kill"), "{text}");
-        let rest =
-            ["FALSE ALARM on a correct mesh: an alarm", "applies to no case: unused", &counts];
+        let rest = [
+            "FALSE ALARM on a correct mesh: an alarm",
+            &format!("applies to no case: {unused}"),
+            &counts,
+        ];
         assert_eq!(lines[1..], rest);
     }
 }

@@ -130,38 +130,26 @@ impl Split {
         let Some(cause) = &self.cause else { return Vec::new() };
         let (mut octant, mut subject, mut clauses) = (self.octant, "", Vec::new());
         for (rule, leaf) in &self.links {
+            let edges = octant.distance(leaf) / i64::from(leaf.edge());
             let near = match rule {
-                Rule::Layer => {
-                    let edges = octant.distance(leaf) / i64::from(leaf.edge());
-                    match edges {
-                        0 => "section 6, step 2 (layer): it touches the leaf".to_owned(),
-                        _ => format!(
-                            "section 6, step 2 (layer): {edges} of its edges away is the leaf"
-                        ),
-                    }
-                }
+                Rule::Layer if edges == 0 => ", step 2 (layer): it touches the leaf".to_owned(),
+                Rule::Layer => format!(", step 2 (layer): {edges} of its edges away is the leaf"),
                 Rule::Balance => {
                     let levels = leaf.level - octant.level;
-                    format!(
-                        "section 6, step 3 (balance): it touches, {levels} levels finer, the leaf"
-                    )
+                    format!(", step 3 (balance): it touches, {levels} levels finer, the leaf")
                 }
                 Rule::ExtraLayer => {
-                    "section 6 (extra layer): it touches the deleted crossing leaf".to_owned()
+                    " (extra layer): it touches the deleted crossing leaf".to_owned()
                 }
             };
-            clauses.push(format!("{subject}by {near} {}", root.describe(leaf)));
+            clauses.push(format!("{subject}by section 6{near} {}", root.place(*leaf)));
             (octant, subject) = (parent(leaf), "its parent is split ");
         }
         let end = match self.links.last() {
             Some((Rule::ExtraLayer, _)) => "it is crossing by section 4".to_owned(),
             _ => format!("{subject}by section 3"),
         };
-        let surface = match cause.facets.is_empty() {
-            true => "the surface crosses it".to_owned(),
-            false => that_cross(&cause.facets),
-        };
-        let surface = cause.is_crossed.then_some(surface).into_iter();
+        let surface = cause.is_crossed.then(|| that_cross(&cause.facets)).into_iter();
         let boxes = cause.boxes.iter().map(|index| format!("box {index} meets it"));
         let causes: Vec<String> = surface.chain(boxes).collect();
         clauses.push(format!("{end}: {}", causes.join("; ")));
@@ -169,8 +157,11 @@ impl Split {
     }
 }
 
-/// Facets that cross an octant, as a clause.
+/// Facets that cross an octant, as a clause; none if they are not known.
 fn that_cross(facets: &[u32]) -> String {
+    if facets.is_empty() {
+        return "the surface crosses it".to_owned();
+    }
     let numbers: Vec<String> = facets.iter().take(FACETS_LISTED).map(u32::to_string).collect();
     let more = facets.len() - numbers.len();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -179,14 +170,13 @@ fn that_cross(facets: &[u32]) -> String {
 
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let place = |octant: &Octant| self.root.describe(octant);
+        let place = |octant: &Octant| self.root.place(*octant);
         let Self { point, leaf, base_leaf, side_decided_by, deleted_by, split, .. } = self;
-        match leaf {
-            Some(leaf) => {
-                writeln!(f, "{point:?} lies in the {} leaf {}", leaf.side, place(&leaf.octant))?
-            }
-            None => writeln!(f, "{point:?} lies in a part of the root that was deleted")?,
-        }
+        let lies_in = match leaf {
+            Some(leaf) => format!("the {} leaf {}", leaf.side, place(&leaf.octant)),
+            None => "a part of the root that was deleted".to_owned(),
+        };
+        writeln!(f, "{point:?} lies in {lies_in}")?;
         if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|leaf| leaf.octant != *base)) {
             writeln!(f, "  leaf of T0: {}", place(&base))?;
         }
@@ -195,27 +185,21 @@ impl fmt::Display for Answer {
         }
         if let Some(split) = split {
             writeln!(f, "size\n  its parent, {}, is split", place(&split.octant))?;
-            match &split.cause {
-                None => writeln!(
-                    f,
-                    "    by no rule that is known (harness audit --case finds all such splits)"
-                )?,
-                Some(_) => split
-                    .clauses(&self.root)
-                    .iter()
-                    .try_for_each(|clause| writeln!(f, "    {clause}"))?,
+            let clauses = split.clauses(&self.root);
+            clauses.iter().try_for_each(|clause| writeln!(f, "    {clause}"))?;
+            if clauses.is_empty() {
+                let why = "harness audit --case finds all such splits";
+                writeln!(f, "    by no rule that is known ({why})")?;
             }
         }
         if let Some(SideReason { side, decision }) = side_decided_by {
             writeln!(f, "side\n  {side} by section 4: {decision}")?;
         }
-        match self.knows_facets {
-            true => Ok(()),
-            false => writeln!(
-                f,
-                "left out: what depends on facets, which the mesh does not contain: give the case with --case"
-            ),
+        if !self.knows_facets {
+            let why = "which the mesh does not contain: give the case with --case";
+            writeln!(f, "left out: what depends on facets, {why}")?;
         }
+        Ok(())
     }
 }
 
@@ -300,18 +284,14 @@ impl Mesh<'_> {
 
     /// What decides the side of a leaf of T0, and the rule that deletes it if it was deleted.
     fn side_of(&self, base: &Octant) -> Option<(SideReason, String)> {
-        let (_, truth) = self.body?;
-        let (side, decision, rule) = match truth.component_at(base) {
+        let (side, decision, rule) = match self.body?.component_at(base) {
             Some(component) => (component.side, self.decision(component), self.deletion(component)),
             None => {
-                let rule = match self.inputs.keep_crossing {
-                    false => {
-                        "keep_crossing is false, so crossing leaves are deleted after gradation"
-                    }
-                    true => LOST,
-                };
-                let rule = format!("section 7: {rule}");
-                (Side::Crossing, that_cross(&self.facets_of(base)), rule)
+                let deletes =
+                    "keep_crossing is false, so crossing leaves are deleted after gradation";
+                let rule = if self.inputs.keep_crossing { LOST } else { deletes };
+                let facets = that_cross(&self.facets_of(base));
+                (Side::Crossing, facets, format!("section 7: {rule}"))
             }
         };
         Some((SideReason { side, decision }, rule))
@@ -325,7 +305,7 @@ impl Mesh<'_> {
             Decision::NoSeed => "no seed lies in its component".to_owned(),
             Decision::Rays(candidate) => {
                 let parity = if component.side == Side::Inside { "an odd" } else { "an even" };
-                let candidate = self.inputs.root.describe(&candidate);
+                let candidate = self.inputs.root.place(candidate);
                 format!(
                     "each of the six rays of the candidate {candidate} intersects {parity} number of facets"
                 )

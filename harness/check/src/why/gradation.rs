@@ -21,6 +21,7 @@
 //! requires the split of its ancestors. So the leaf of T0 at a point is the first octant on the way down that no rule splits.
 
 use super::Mesh;
+use crate::checks::truth::Truth;
 use contract::neighbourhood::OFFSETS;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::Handle;
@@ -217,14 +218,14 @@ impl Mesh<'_> {
     /// Whether the surface crosses an octant that is a leaf of T0 or contains some. Without facets the answer holds for octants coarser
     /// than D only: such an octant contains a crossing leaf iff a facet crosses it.
     pub(super) fn is_crossed(&self, octant: &Octant) -> bool {
-        let tree = self.body.map_or(self.tree, |(_, truth)| &truth.tree);
+        let tree = self.body.map_or(self.tree, |truth| &truth.tree);
         tree.kinds(tree.at(octant)) & 1 << Side::Crossing as u8 != 0
     }
 
     /// Whether T0 splits an octant.
     pub(super) fn base_splits(&self, octant: &Octant) -> bool {
         match self.body {
-            Some((_, truth)) => truth.tree.at(octant).is_node(),
+            Some(truth) => truth.tree.at(octant).is_node(),
             None => {
                 octant.level < LEVEL_MAX
                     && (self.inputs.box_that_splits(octant).is_some()
@@ -236,7 +237,8 @@ impl Mesh<'_> {
     /// The facets that cross an octant, ascending; empty if facets are not known.
     pub(super) fn facets_of(&self, octant: &Octant) -> Vec<u32> {
         let (low, high) = octant.bounds();
-        self.body.map_or(Vec::new(), |(facets, _)| facets.meeting(&facets.all(), low, high))
+        let meeting = |Truth { facets, .. }: &Truth| facets.meeting(&facets.all(), low, high);
+        self.body.map_or(Vec::new(), meeting)
     }
 
     /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.

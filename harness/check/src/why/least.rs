@@ -11,60 +11,38 @@ use crate::checks::clearance::Trail;
 use contract::octant::Octant;
 use contract::tree::HOLES;
 
-/// The result of the audit.
-#[derive(Clone, Debug, Default)]
-pub struct Least {
-    /// Number of split octants that were examined.
-    pub splits: u64,
-    /// Number of leaves that were examined.
-    pub leaves: u64,
-    /// Octants that are split without a cause.
-    pub unneeded: Faults,
-    /// Leaves that have to be split.
-    pub missing: Faults,
-}
+/// A split that no rule requires.
+pub const NEEDLESS: &str = "nothing requires the split of";
+/// A leaf that a rule requires to be split.
+pub const MISSING: &str = "a facet, a box, a layer or the balance requires the split of";
 
-/// Octants with the same fault.
-#[derive(Clone, Debug, Default)]
-pub struct Faults {
-    /// Number of them.
-    pub total: u64,
-    /// The first of them, in Morton order.
-    pub first: Vec<Octant>,
-}
+/// Is called with every octant that is examined and its fault, in Morton order.
+type Visit<'v> = &'v mut dyn FnMut(Octant, Option<&'static str>);
 
 impl Mesh<'_> {
-    /// Audits a whole mesh and lists at most `first` octants of each fault. What is found out about split octants is kept in memory.
-    ///
-    /// # Errors
-    /// One sentence, if the surface is not known.
-    pub fn least(self, first: usize) -> Result<Least, String> {
-        if !self.knows_surface() {
-            return Err("the mesh has no crossing leaves, so the surface is not known; give its case with --case"
-                .to_owned());
-        }
-        let (mut found, mesh) = (Least::default(), self.distrusting());
-        mesh.audit(&mut Trail::new(mesh.tree), first, &mut found);
-        Ok(found)
+    /// Visits all octants of the mesh with their faults. What is found out about split octants is kept in memory. Panics if the surface is
+    /// not known.
+    pub fn audit(self, visit: Visit) {
+        assert!(self.knows_surface(), "splits are audited where the surface is known");
+        let mesh = self.distrusting();
+        mesh.audit_below(&mut Trail::new(mesh.tree), visit);
     }
 
-    fn audit(&self, trail: &mut Trail, first: usize, found: &mut Least) {
+    fn audit_below(&self, trail: &mut Trail, visit: Visit) {
         let (handle, octant) = (trail.current().centre(), trail.current().octant);
         if handle.is_node() {
-            found.splits += 1;
-            found.unneeded.add(!self.is_justified(&octant), octant, first);
+            visit(octant, (!self.is_justified(&octant)).then_some(NEEDLESS));
             for digit in 0..8 {
                 trail.descend(self.tree, digit);
-                self.audit(trail, first, found);
+                self.audit_below(trail, visit);
                 trail.ascend();
             }
         } else if handle.as_leaf().is_some() {
-            found.leaves += 1;
             let is_missing = match self.has_nothing_finer(trail) {
                 true => self.base_splits(&octant),
                 false => self.requires_split(&octant),
             };
-            found.missing.add(is_missing, octant, first);
+            visit(octant, is_missing.then_some(MISSING));
         }
     }
 
@@ -78,14 +56,5 @@ impl Mesh<'_> {
         };
         level >= self.level_deepest
             || trail.all_nearby(self.layer_reach(level + 1).max(1), is_coarse)
-    }
-}
-
-impl Faults {
-    fn add(&mut self, is_fault: bool, octant: Octant, first: usize) {
-        self.total += u64::from(is_fault);
-        if is_fault && self.first.len() < first {
-            self.first.push(octant);
-        }
     }
 }

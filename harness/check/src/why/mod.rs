@@ -14,45 +14,33 @@ use contract::manifest::{self, Geometry, Manifest};
 use contract::tree::Tree;
 use rustc_hash::FxHashMap;
 
-use crate::checks::facets::Facets;
+use crate::checks::manifest::differing_inputs;
 use crate::checks::truth::Truth;
-use crate::inputs;
 
 pub mod answer;
 mod gradation;
 pub mod least;
 
-/// The body of a case: its facets, and T0 with the sides of its leaves.
-#[derive(Debug)]
-pub struct Body {
-    facets: Facets,
-    truth: Truth,
-}
-
-impl Body {
-    /// The body of the case from which a mesh was made.
-    ///
-    /// # Errors
-    /// One sentence, if the case is not that of the mesh, or if its T0 is too large.
-    pub fn of(case: &Case, of_mesh: &Manifest) -> Result<Self, String> {
-        let geometry = Some(Geometry::of(&case.facets_lattice));
-        let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
-        let mut differing = inputs::differing(("the mesh", of_mesh), ("the case", &inputs));
-        if of_mesh.sides == manifest::Sides::Unknown {
-            differing.push("the sides of the mesh are unknown".to_owned());
-        }
-        if !differing.is_empty() {
-            return Err(format!(
-                "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
-                differing.join("; ")
-            ));
-        }
-        let facets = Facets::new(&case.facets_lattice);
-        let truth = Truth::new(&facets, &case.facets_lattice, &inputs).ok_or_else(|| {
-            format!("T0 of the case has more than {} leaves: omit --case", Truth::LEAVES_MAX)
-        })?;
-        Ok(Self { facets, truth })
+/// The body of the case from which a mesh was made: its facets, and T0 with the sides of its leaves.
+///
+/// # Errors
+/// One sentence, if the case is not that of the mesh, or if its T0 is too large.
+pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth, String> {
+    let geometry = Some(Geometry::of(&case.facets_lattice));
+    let inputs = Manifest { geometry, ..case.manifest(of_mesh.tree, String::new()) };
+    let mut differing = differing_inputs(("the mesh", of_mesh), ("the case", &inputs));
+    if of_mesh.sides == manifest::Sides::Unknown {
+        differing.push("the sides of the mesh are unknown".to_owned());
     }
+    if !differing.is_empty() {
+        return Err(format!(
+            "the mesh was made from other inputs than the case ({}); give the case file from which it was made",
+            differing.join("; ")
+        ));
+    }
+    let most = Truth::LEAVES_MAX;
+    let too_large = || format!("T0 of the case has more than {most} leaves: omit --case");
+    Truth::of(case, &inputs).ok_or_else(too_large)
 }
 
 /// A mesh with the inputs that explain it.
@@ -61,7 +49,7 @@ pub struct Mesh<'a> {
     tree: &'a Tree,
     pub(crate) inputs: Manifest,
     /// The facets and T0, if the case is known.
-    body: Option<(&'a Facets, &'a Truth)>,
+    body: Option<&'a Truth>,
     /// Whether the leaves are those of T0, which precedes gradation.
     is_base: bool,
     /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
@@ -74,16 +62,8 @@ pub struct Mesh<'a> {
 
 impl<'a> Mesh<'a> {
     /// A mesh of this body. Without it, facets are not known.
-    pub fn of(manifest: &Manifest, tree: &'a Tree, body: Option<&'a Body>) -> Self {
-        Self::new(tree, manifest.clone(), body.map(|Body { facets, truth }| (facets, truth)))
-    }
-
-    /// A mesh of these inputs.
-    pub(crate) fn new(
-        tree: &'a Tree,
-        mut inputs: Manifest,
-        body: Option<(&'a Facets, &'a Truth)>,
-    ) -> Self {
+    pub fn of(manifest: &Manifest, tree: &'a Tree, body: Option<&'a Truth>) -> Self {
+        let mut inputs = manifest.clone();
         let is_base = inputs.tree == manifest::Tree::Base;
         if is_base {
             (inputs.keep, inputs.keep_crossing) = (manifest::Keep::All, true);

@@ -1,9 +1,33 @@
 //! A correct mesh has no needless and no missing split, and every planted one is found.
 
 use super::*;
-use contract::octant::LEVEL_MAX;
+use check::why::least::NEEDLESS;
+use contract::octant::{LEVEL_MAX, Octant};
 use contract::testing::octants_of;
 use contract::word::{self, Leaf};
+
+/// The octants with each fault, and how many were examined.
+#[derive(Debug, Default)]
+struct Found {
+    splits_and_leaves: usize,
+    needless: Vec<Octant>,
+    missing: Vec<Octant>,
+}
+
+fn audited(set: &LeafSet, case: Option<&Case>) -> Found {
+    let mut found = Found::default();
+    with_mesh(set, case, |mesh| {
+        mesh.audit(&mut |octant, fault| {
+            found.splits_and_leaves += 1;
+            match fault {
+                Some(NEEDLESS) => found.needless.push(octant),
+                Some(_) => found.missing.push(octant),
+                None => {}
+            }
+        });
+    });
+    found
+}
 
 /// The words with the leaf at an index split.
 fn split(words: &mut Vec<u64>, at: usize) {
@@ -36,12 +60,11 @@ proptest! {
         let case = correct.case.keep_crossing.then_some(None).into_iter();
         for case in case.chain([Some(&correct.case)]) {
             let mutated = correct.mesh.with_parts(vec![words.clone()]);
-            let found = with_mesh(&mutated, case, |mesh| mesh.least(100).unwrap());
-            prop_assert_eq!(found.unneeded.total, planted as u64, "{}{:?}", text, found);
+            let found = audited(&mutated, case);
+            prop_assert_eq!(found.needless.len(), planted, "{}{:?}", text, found);
             let splits = octants_of(&words).len() - words.len();
-            prop_assert_eq!((found.splits, found.leaves), (splits as u64, words.len() as u64));
-            prop_assert_eq!(found.missing.total, 0, "{}{:?}", text, found);
-            prop_assert_eq!(found.unneeded.total, found.unneeded.first.len() as u64);
+            prop_assert_eq!(found.splits_and_leaves, splits + words.len());
+            prop_assert_eq!(found.missing.len(), 0, "{}{:?}", text, found);
         }
     }
 }
@@ -74,8 +97,8 @@ proptest! {
             let side = word::decode(words[at]).unwrap().side;
             words.splice(at..at + 8, [word::encode(&Leaf { octant, side })]);
             let mutated = correct.mesh.with_parts(vec![words]);
-            let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(100).unwrap());
-            prop_assert!(found.missing.first.contains(&octant), "{}{} {:?}", text, octant, found);
+            let found = audited(&mutated, Some(&correct.case));
+            prop_assert!(found.missing.contains(&octant), "{}{} {:?}", text, octant, found);
         }
     }
 }
@@ -92,18 +115,18 @@ fn a_needless_split_is_found_wherever_it_is() {
     for (name, text) in cases {
         let correct = support::selftest_case(name, text);
         let (case, words) = (Some(&correct.case), &correct.mesh.words);
-        let count = |set: &LeafSet| with_mesh(set, case, |mesh| mesh.least(1).unwrap());
+        let count = |set: &LeafSet| audited(set, case);
         for set in [&correct.mesh, &correct.base] {
             let found = count(set);
-            assert_eq!((found.unneeded.total, found.missing.total), (0, 0), "{name}");
+            assert_eq!((found.needless.len(), found.missing.len()), (0, 0), "{name}");
         }
         for at in (0..words.len()).step_by(words.len() / 12) {
             let mut mutated = words.clone();
             split(&mut mutated, at);
             let found = count(&correct.mesh.with_parts(vec![mutated]));
-            assert_eq!(found.unneeded.total, 1, "{name}: {found:?}");
+            assert_eq!(found.needless.len(), 1, "{name}: {found:?}");
             let planted = word::octant(words[at]);
-            assert_eq!(found.unneeded.first[0], planted, "{name}: {found:?}");
+            assert_eq!(found.needless[0], planted, "{name}: {found:?}");
         }
         // No layer and no balance requires a split of the base tree.
         let words = &correct.base.words;
@@ -111,7 +134,7 @@ fn a_needless_split_is_found_wherever_it_is() {
             let mut mutated = words.clone();
             split(&mut mutated, at);
             let found = count(&correct.base.with_parts(vec![mutated]));
-            assert_eq!(found.unneeded.total, 1, "{name}: {found:?}");
+            assert_eq!(found.needless.len(), 1, "{name}: {found:?}");
         }
     }
 }
@@ -134,7 +157,7 @@ fn deleted_crossing_leaves_require_the_layers_around_them_and_other_deleted_leav
             let words = &correct.mesh.words;
             let count = |words: Vec<u64>| {
                 let set = correct.mesh.with_parts(vec![words]);
-                with_mesh(&set, Some(&correct.case), |mesh| mesh.least(1).unwrap().unneeded.total)
+                audited(&set, Some(&correct.case)).needless.len()
             };
             assert_eq!(count(words.clone()), 0, "{n} cells, {keep}");
             let coarsest = words.iter().map(|&w| word::level(w)).min().unwrap();
@@ -162,12 +185,8 @@ fn needless_splits_of_all_leaves_are_counted_and_no_other() {
         let mut words = correct.mesh.words.clone();
         (0..words.len()).rev().for_each(|i| split(&mut words, i));
         let mutated = correct.mesh.with_parts(vec![words]);
-        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(1).unwrap());
-        assert_eq!(
-            found.unneeded.total,
-            correct.mesh.words.len() as u64,
-            "{keep}, {crossing}: {found:?}"
-        );
+        let found = audited(&mutated, Some(&correct.case));
+        assert_eq!(found.needless.len(), correct.mesh.words.len(), "{keep}, {crossing}: {found:?}");
     }
 }
 
@@ -199,32 +218,12 @@ fn a_layer_thicker_than_the_root_refines_all_of_it_and_a_single_leaf_has_no_spli
         let correct = support::selftest_case("thick", &text);
         assert_eq!(correct.mesh.words.len(), leaves);
         for case in [None, Some(&correct.case)] {
-            let found = with_mesh(&correct.mesh, case, |mesh| mesh.least(1).unwrap());
-            assert_eq!((found.unneeded.total, found.splits), (0, splits), "{found:?}");
+            let found = audited(&correct.mesh, case);
+            assert_eq!(
+                (found.needless.len(), found.splits_and_leaves),
+                (0, splits + leaves),
+                "{found:?}"
+            );
         }
     }
-}
-
-#[test]
-fn as_many_octants_are_listed_as_wanted() {
-    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
-    let correct = support::selftest_case(name, text);
-    let mut words = correct.mesh.words.clone();
-    split(&mut words, 0);
-    split(&mut words, 0);
-    let last = words.len() - 1;
-    split(&mut words, last);
-    let mutated = correct.mesh.with_parts(vec![words]);
-    for wanted in [2, 1] {
-        let found = with_mesh(&mutated, Some(&correct.case), |mesh| mesh.least(wanted).unwrap());
-        assert_eq!((found.unneeded.total, found.unneeded.first.len()), (3, wanted));
-    }
-}
-
-#[test]
-fn without_crossing_leaves_the_case_is_required() {
-    let text = include_str!("../../../selftest-cases/inside.toml");
-    let correct = support::selftest_case("inside", text);
-    let why = with_mesh(&correct.mesh, None, |mesh| mesh.least(1).unwrap_err());
-    assert!(why.contains("--case"), "{why}");
 }

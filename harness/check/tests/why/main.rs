@@ -10,7 +10,7 @@ mod sides;
 
 use check::selftest::CASES;
 use check::selftest::SelftestCase;
-use check::why::{Body, Mesh};
+use check::why::{self, Mesh};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::testing::assert_text;
@@ -21,7 +21,7 @@ use proptest::prelude::*;
 
 fn with_mesh<T>(set: &LeafSet, case: Option<&Case>, examine: impl FnOnce(Mesh) -> T) -> T {
     let tree = Tree::of_words(&set.words);
-    let body = case.map(|case| Body::of(case, &set.manifest).unwrap());
+    let body = case.map(|case| why::body(case, &set.manifest).unwrap());
     examine(Mesh::of(&set.manifest, &tree, body.as_ref()))
 }
 

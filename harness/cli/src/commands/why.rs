@@ -2,7 +2,7 @@
 
 use super::meshed::MeshArguments;
 use crate::options::point;
-use check::why::{Body, Mesh};
+use check::why::{self, Mesh};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh;
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    let body = case.as_ref().map(|case| Body::of(case, &disk.manifest)).transpose();
+    let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
     print!("{}", mesh.at(arguments.point)?);

@@ -23,47 +23,45 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
         possible(tree, counted, manifest.tree, terms, result);
     }
     let Some(octants) = uniform_octants(tree) else {
-        result.note =
-            format!("components are not known: over {OCTANTS_MAX} octants have leaves of one side");
+        let why = format!("over {OCTANTS_MAX} octants have leaves of one side");
+        result.note = format!("components are not known: {why}");
         return;
     };
     let found = components::stated(&octants, terms);
-    let place = |component: &Component| terms.root.describe(&component.first);
+    let place = |component: &Component| terms.root.place(component.first);
     let enclosed = || found.iter().filter(|component| component.enclosed);
     if manifest.tree == Kind::Final {
-        for component in enclosed() {
-            result.report_with(|| {
-                format!(
-                    "an outside component has no face on the root's boundary, although another has, so it is enclosed \
-                     and must be deleted; in it lies {}",
-                    place(component)
-                )
-            });
+        for place in enclosed().map(place) {
+            result.report(format_args!(
+                "an outside component has no face on the root's boundary, although another has, so it is enclosed \
+                 and must be deleted; in it lies {place}"
+            ));
         }
     }
     if !terms.seeds.is_empty() {
         let seeded = components::seeded_leaves(&octants, terms);
-        let is_flow = |component: &&Component| component.side == terms.side_of_flow();
-        for component in found.iter().filter(is_flow) {
-            if components::seed_in(&component.leaves, &seeded).is_none() {
-                let place = place(component);
-                result.report(format!("no seed lies in a component of flow, that of {place}"));
-            }
+        let lacks_seed = |component: &&Component| {
+            component.side == terms.side_of_flow()
+                && components::seed_in(&component.leaves, &seeded).is_none()
+        };
+        for place in found.iter().filter(lacks_seed).map(place) {
+            result.report(format_args!("no seed lies in a component of flow, that of {place}"));
         }
     }
     let Some(counted) = &manifest.components else { return };
     for (side, expected) in counts_of_tree(counted, terms, manifest.tree) {
         let found = found.iter().filter(|component| component.side == side).count() as u64;
         if found != expected {
-            result.report(format!(
+            result.report(format_args!(
                 "the manifest leaves {expected} {side} components, and there are {found}"
             ));
         }
     }
     let (found, count) = (enclosed().count() as u64, counted.enclosed.count);
     if manifest.tree == Kind::Base && found != count {
-        result
-            .report(format!("the manifest counts {count} enclosed components, and T0 has {found}"));
+        result.report(format_args!(
+            "the manifest counts {count} enclosed components, and T0 has {found}"
+        ));
     }
 }
 
@@ -85,41 +83,30 @@ fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
 
 /// The sides of a tree's leaves, with the numbers of components that a manifest leaves of them.
 fn counts_of_tree(counted: &Components, terms: &Manifest, kind: Kind) -> Vec<(Side, u64)> {
-    let sides = [(Side::Outside, counted.outside), (Side::Inside, counted.inside)];
-    let left = |(side, count): (Side, u64)| match (side, kind) {
-        (_, Kind::Base) => Some((side, count)),
-        _ if !terms.keeps(side as u8) => None,
-        (Side::Outside, _) => Some((side, count.saturating_sub(counted.enclosed.count))),
-        _ => Some((side, count)),
-    };
-    sides.into_iter().filter_map(left).collect()
+    let (outside, deleted) = (counted.outside, counted.enclosed.count);
+    let left = if kind == Kind::Base { outside } else { outside.saturating_sub(deleted) };
+    let counts = [(Side::Outside, left), (Side::Inside, counted.inside)];
+    let is_of_tree = |(side, _): &(Side, u64)| kind == Kind::Base || terms.keeps(*side as u8);
+    counts.into_iter().filter(is_of_tree).collect()
 }
 
 /// Every seed lies in a leaf of flow.
 fn seeds_in_flow(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let flow = terms.side_of_flow();
     for (i, &seed) in terms.seeds.iter().enumerate() {
-        if !components::in_root(seed) {
-            result.report(format!("seed {i} at {seed:?} on the lattice lies outside the root"));
-            continue;
-        }
-        let found = tree.locate(seed.map(|q| (q / UNITS_PER_CELL) as u32));
-        if found.is_none_or(|(_, kind)| kind != flow as u8) {
-            let at = terms.root.to_user(seed);
-            let found = match found {
-                Some((leaf, kind)) => {
-                    format!(
-                        "in the {} leaf {}",
-                        contact::name(1 << kind),
-                        terms.root.describe(&leaf)
-                    )
-                }
-                None => "in no leaf".to_owned(),
-            };
-            result.report(format!(
-                "seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"
-            ));
-        }
+        let cell = components::in_root(seed).then(|| seed.map(|q| (q / UNITS_PER_CELL) as u32));
+        let found = match cell.map(|cell| tree.locate(cell)) {
+            Some(Some((_, kind))) if kind == flow as u8 => continue,
+            Some(Some((leaf, kind))) => {
+                format!("in the {} leaf {}", contact::name(1 << kind), terms.root.place(leaf))
+            }
+            Some(None) => "in no leaf".to_owned(),
+            None => "outside the root".to_owned(),
+        };
+        let at = terms.root.to_user(seed);
+        result.report(format_args!(
+            "seed {i} at {at:?} lies {found}, and not in a leaf that is {flow}"
+        ));
     }
 }
 
@@ -140,17 +127,16 @@ fn possible(
         && count <= leaves
         && example.is_some_and(|at| deleted_at(tree, at, kind, terms));
     if !none && !some {
-        result.report(format!(
-            "{count} of {} outside components cannot be enclosed with {leaves} leaves of T0 and one at {}",
-            counted.outside,
-            json(&example)
+        let (outside, at) = (counted.outside, json(&example));
+        result.report(format_args!(
+            "{count} of {outside} outside components cannot be enclosed with {leaves} leaves of T0 and one at {at}"
         ));
     }
     let kinds = tree.kinds(tree.root());
     for (side, expected) in counts_of_tree(counted, terms, kind) {
         if (expected > 0) != (kinds & 1 << side as u8 != 0) {
             let leaves = if expected > 0 { "no leaf is" } else { "leaves are" };
-            result.report(format!(
+            result.report(format_args!(
                 "the manifest leaves {expected} {side} components, but {leaves} {side}"
             ));
         }

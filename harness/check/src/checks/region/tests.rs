@@ -5,22 +5,21 @@ use contract::word;
 /// What the surveys of a case share.
 struct Geometry {
     terms: Manifest,
-    facets: Facets,
     truth: Truth,
     lattice: Vec<contract::lattice::FacetLattice>,
 }
 
 impl Geometry {
     fn of(case: &Case) -> Self {
-        let (terms, facets) = (case.inputs(), Facets::new(&case.facets_lattice));
-        let truth = Truth::new(&facets, &case.facets_lattice, &terms).unwrap();
-        Self { terms, facets, truth, lattice: case.facets_lattice.clone() }
+        let terms = case.inputs();
+        let truth = Truth::of(case, &terms).unwrap();
+        Self { terms, truth, lattice: case.facets_lattice.clone() }
     }
 
     fn survey<'a>(&'a self, tree: &'a Tree, band_cells: f64) -> Survey<'a> {
-        let Self { terms, facets, truth, lattice } = self;
+        let Self { terms, truth, lattice } = self;
         let (parity, knows_crossing) = (Parity::new(lattice), band_cells == 0.0);
-        Survey { terms, tree, truth, facets, parity, band_cells, knows_crossing }
+        Survey { terms, tree, truth, parity, band_cells, knows_crossing }
     }
 
     fn sides(&self, tree: &Tree, band_cells: f64) -> CheckResult {
@@ -84,7 +83,7 @@ fn a_band_wider_than_the_root_leaves_nothing_to_check() {
 fn places_within_the_band_are_not_judged() {
     let case = tetrahedron(4, "[]");
     let geometry = Geometry::of(&case);
-    let Geometry { terms, facets, .. } = &geometry;
+    let (terms, facets) = (&geometry.terms, &geometry.truth.facets);
     let words = contract::testing::words_of(|o| o.level < 3);
     let tree = Tree::of_words(&words);
     for band_cells in [0.0, 0.5, 1.0, 1.5] {
@@ -104,7 +103,7 @@ fn places_within_the_band_are_not_judged() {
         let findings = result.findings;
         assert!(!findings.is_empty(), "{band_cells}");
         for detail in &findings {
-            let names = |&w: &u64| detail.ends_with(&terms.root.describe(&word::octant(w)));
+            let names = |&w: &u64| detail.ends_with(&terms.root.place(word::octant(w)).to_string());
             assert!(words.iter().any(names), "{detail}");
         }
     }
@@ -115,7 +114,7 @@ fn a_leaf_coarser_than_the_surface_level_is_judged_by_its_parts_beyond_the_band(
     let mut case = tetrahedron(4, "[]");
     case.rules.level_surface = 5;
     let (geometry, none) = (Geometry::of(&case), Tree::default());
-    let Geometry { facets, .. } = &geometry;
+    let facets = &geometry.truth.facets;
     let survey = geometry.survey(&none, 1.0);
     let meets = |octant: &Octant, by: i64| {
         let (low, high) = octant.bounds();
@@ -158,7 +157,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
             let around = (0..=3).map(|level| word::octant(*w).ancestor(level));
             let is_free = |octant: &Octant| {
                 let (low, high) = octant.bounds();
-                let facets = &geometry.facets;
+                let facets = &geometry.truth.facets;
                 facets.meeting(&facets.all(), low, high).is_empty()
             };
             around.into_iter().find(is_free).map_or(CROSSED, |o| space.position(o))
@@ -176,7 +175,7 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         assert_eq!((result.findings_total, result.examined, &result.note), (0, judged, &note));
         let far = words.iter().position(|w| matches!(position(w), Position::On(..))).unwrap();
         words[far] ^= 1;
-        let (result, leaf) = (check(&words), case.root.describe(&word::octant(words[far])));
+        let (result, leaf) = (check(&words), case.root.place(word::octant(words[far])).to_string());
         let expected = format!("the inside leaf {leaf} is in a component that is outside");
         assert_eq!((result.findings_total, &result.findings[0]), (1, &expected));
         // A label of its own: a crossing leaf where no facet is, even if the rays disagree, and a crossed leaf without it.
@@ -220,7 +219,7 @@ fn crossed_leaves_are_kept_or_deleted_as_the_case_says_unless_the_band_hides_the
                 words.sort_unstable();
             }
             let what = if keep_crossing { "the mesh has a hole" } else { "a leaf must be deleted" };
-            let octant = case.root.describe(&word::octant(wrong[0]));
+            let octant = case.root.place(word::octant(wrong[0])).to_string();
             for band_cells in [0.0, 1.0] {
                 let result = check(&words, band_cells, true);
                 assert_eq!(result.findings_total, wrong.len() as u64, "{result}");
