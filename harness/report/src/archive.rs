@@ -45,18 +45,12 @@ fn today() -> String {
     now_utc().chars().take("2026-01-31".len()).collect()
 }
 
-impl About {
-    fn licence_address(&self) -> String {
-        match self.licence.contains("://") {
-            true => self.licence.clone(),
-            false => format!("https://spdx.org/licenses/{}", self.licence),
-        }
-    }
-}
-
 /// The metadata: files with their sizes, sessions with command, machine and time, programs with their digests.
 pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
-    let (licence, id) = (about.licence_address(), |id: &str| json!({ "@id": id }));
+    let is_address = about.licence.contains("://");
+    let place = if is_address { "" } else { "https://spdx.org/licenses/" };
+    let licence = format!("{place}{}", about.licence);
+    let id = |id: &str| json!({ "@id": id });
     let file = |(path, bytes): &Member| json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string()});
     let files: Vec<Value> = members.iter().map(file).collect();
     let programs = distinct(lines.iter().filter_map(|line| match &line.entry {

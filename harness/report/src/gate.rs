@@ -12,7 +12,12 @@ use std::time::Duration;
 
 /// The report as text: a section per layer; unchanged values are only counted.
 pub fn text(report: &GateReport) -> String {
-    let mut text = format!("{}\n", heading(report));
+    let baseline = report.baseline.iter().map(|measured| format!(" against baseline {measured}"));
+    let mut text = format!("candidate {}{}\n", report.candidate, baseline.collect::<String>());
+    // Unchanged times are shown, too: their notes state how certain they are.
+    let is_shown = |layer: &Layer, finding: &GateFinding| {
+        finding.verdict != Verdict::Unchanged || layer.name == LayerName::Time
+    };
     for layer in &report.layers {
         // Writing into a string cannot fail.
         let _ = writeln!(text, "{:<13} {}", layer.name, summary(layer));
@@ -56,13 +61,6 @@ pub fn junit(report: &GateReport) -> String {
     to_text(&xml)
 }
 
-fn heading(report: &GateReport) -> String {
-    match &report.baseline {
-        Some(baseline) => format!("candidate {} against baseline {baseline}", report.candidate),
-        None => format!("candidate {}", report.candidate),
-    }
-}
-
 /// The verdict on the candidate, with the time of the gate.
 fn verdict(report: &GateReport) -> String {
     let end = match report.end() {
@@ -87,14 +85,8 @@ fn summary(layer: &Layer) -> String {
     }
     let mut counts: BTreeMap<Verdict, usize> = BTreeMap::new();
     layer.findings.iter().for_each(|finding| *counts.entry(finding.verdict).or_default() += 1);
-    let present = counts.iter().rev().map(|(verdict, n)| format!("{n} {verdict}"));
-    let present: Vec<String> = present.collect();
+    let present: Vec<String> = counts.iter().rev().map(|(of, n)| format!("{n} {of}")).collect();
     format!("{} ({:.1} s)", present.join(", "), layer.time_s)
-}
-
-/// Unchanged times are shown, too: their notes state how certain they are.
-fn is_shown(layer: &Layer, finding: &GateFinding) -> bool {
-    finding.verdict != Verdict::Unchanged || layer.name == LayerName::Time
 }
 
 fn line(finding: &GateFinding) -> String {

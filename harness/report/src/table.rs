@@ -8,7 +8,7 @@ use maud::{Markup, html};
 pub struct Table {
     /// Its title, which its Markdown does not show.
     pub title: String,
-    /// Headings of the columns.
+    /// Headings of the columns, which text shows in as many lines as they have.
     pub columns: Vec<&'static str>,
     /// The rows.
     pub rows: Vec<Vec<String>>,
@@ -28,19 +28,11 @@ impl Table {
         Self { title, columns, rows, notes: Vec::new() }
     }
 
-    /// The table as text: columns as wide as their widest field. The words of a heading are below each other, but for units.
+    /// The table as text: columns as wide as their widest field. Headings end in one line.
     pub fn text(&self) -> String {
-        const GLUED: &str = "\u{a0}/\u{a0}";
-        let titles: Vec<String> = self.columns.iter().map(|t| t.replace(" / ", GLUED)).collect();
-        let height = titles.iter().map(|title| title.split(' ').count()).max().unwrap_or(0);
-        // The words of a title, the last one in the last line.
-        let line = |up: usize| {
-            let word = |title: &String| {
-                let word = title.rsplit(' ').nth(up).unwrap_or_default();
-                word.replace(GLUED, " / ")
-            };
-            titles.iter().map(word).collect::<Vec<String>>()
-        };
+        let height = self.columns.iter().map(|title| title.lines().count()).max().unwrap_or(0);
+        let line_of = |title: &str, up| title.rsplit('\n').nth(up).unwrap_or_default().to_owned();
+        let line = |up| self.columns.iter().map(|title| line_of(title, up)).collect();
         let head: Vec<Vec<String>> = (0..height).rev().map(line).collect();
         let all = || head.iter().chain(&self.rows);
         let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
@@ -71,7 +63,8 @@ impl Table {
     pub fn markdown(&self) -> String {
         let line = |fields: Vec<String>| format!("| {} |\n", fields.join(" | "));
         let rule = |i: usize| if self.is_number(i) { "---:" } else { "---" }.to_owned();
-        let mut text = line(self.columns.iter().map(|title| escaped(title)).collect());
+        let mut text =
+            line(self.columns.iter().map(|title| escaped(&title.replace('\n', " "))).collect());
         text += &line((0..self.columns.len()).map(rule).collect());
         let rows =
             self.rows.iter().map(|row| line(row.iter().map(|field| escaped(field)).collect()));
@@ -111,7 +104,7 @@ mod tests {
     fn sample() -> Table {
         let rows =
             [["a", "<x>", "7"], ["long", "_y_", "-12"]].map(|row| row.map(str::to_owned).to_vec());
-        let columns = vec!["a|b", "two words", "n / s"];
+        let columns = vec!["a|b", "two\nwords", "n / s"];
         Table { title: "t".into(), columns, rows: rows.to_vec(), notes: vec!["n".into()] }
     }
 

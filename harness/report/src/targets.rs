@@ -1,14 +1,13 @@
 //! The table of targets as text and as Markdown.
 
 use crate::table::{Table, escaped};
-use bench::study::judge::{Judged, Verdict};
+use bench::study::judge::Judged;
+use bench::study::judge::Verdict::{self, Failed, ForComparison, LeftOut, Met, Missed};
 
-fn table(rows: &[Judged]) -> Table {
-    Table {
-        columns: vec!["row", "target", "measured", "how", "verdict"],
-        rows: rows.iter().map(|row| row.fields().to_vec()).collect(),
-        ..Table::default()
-    }
+fn table(judged: &[Judged]) -> Table {
+    let columns = vec!["row", "target", "measured", "how", "verdict"];
+    let rows = judged.iter().map(|row| row.fields().to_vec()).collect();
+    Table { columns, rows, ..Table::default() }
 }
 
 /// The table as text, followed by the counts of the verdicts.
@@ -23,14 +22,11 @@ pub fn markdown(rows: &[Judged], machine: &str) -> String {
 }
 
 fn count(rows: &[Judged]) -> String {
-    let number = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let number = |verdict: Verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let [met, missed, failed, left_out, others] =
+        [Met, Missed, Failed, LeftOut, ForComparison].map(number);
     format!(
-        "{} met, {} missed, {} failed, {} left out, {} for comparison",
-        number(Verdict::Met),
-        number(Verdict::Missed),
-        number(Verdict::Failed),
-        number(Verdict::LeftOut),
-        number(Verdict::ForComparison)
+        "{met} met, {missed} missed, {failed} failed, {left_out} left out, {others} for comparison"
     )
 }
 

@@ -18,28 +18,22 @@ pub const COMMIT: &str = "{commit}";
 
 /// The page. Metrics with changes come first. `link` is the address of a commit, with [`COMMIT`] for its hash.
 pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
-    let (changed, constant): (Vec<&Series>, Vec<&Series>) =
-        all.iter().partition(|series| !series.changes.is_empty());
-    let sections = [("Metrics with changes", changed), ("Metrics without changes", constant)];
+    let mut sorted: Vec<&Series> = all.iter().collect();
+    sorted.sort_by_key(|series| series.changes.is_empty());
+    let ends = [("from", records.first()), ("to", records.last())];
     let dated = |record: &Record| {
         let date = record.time.get(..10).unwrap_or("no date");
         html! { (linked(&record.commit, link)) " (" (date) ")" }
     };
     let content = html! {
         p {
-            @match records {
-                [] => "No records.",
-                [one] => { "One commit, " (dated(one)) "." }
-                [first, .., last] => { (records.len()) " commits, " (dated(first)) " to " (dated(last)) "." }
-            }
+            "Commits: " (records.len())
+            @for (word, end) in ends { @if let Some(record) = end { " " (word) " " (dated(record)) } }
         }
         (changes(records, all, link))
-        @for (title, series) in sections.iter().filter(|(_, series)| !series.is_empty()) {
-            h2 { (title) }
-            @for one in series {
-                @let f = of_metric(records, one);
-                (figure(&f.id, &f.title, &svg(&f), &html! {}))
-            }
+        h2 { "Metrics, those with changes first" }
+        @for f in sorted.into_iter().map(|series| of_metric(records, series)) {
+            (figure(&f.id, &f.title, &svg(&f), &html! {}))
         }
     };
     whole_page("Trend", &content)
@@ -132,9 +126,6 @@ pub fn junit(all: &[Series], recent: usize) -> String {
     to_text(&xml)
 }
 
-/// Height of the figure of a metric.
-const HEIGHT: u32 = 560;
-
 /// The figure of one metric, with its steps as vertical lines. Outliers do not widen the
 /// axis: they are drawn at its ends.
 fn of_metric(records: &[Record], series: &Series) -> Figure {
@@ -170,16 +161,14 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
         lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
     }
     lines.extend(series.changes.iter().map(mark));
-    let y = Axis { range: Some((low, high)), ..Axis::linear(series.unit) };
     Figure {
-        height: HEIGHT,
-        ..Figure::new(
-            file_name(&format!("metric-{}", series.name)),
-            series.name.clone(),
-            String::new(),
-            [commits(records.len()), y],
-            lines,
-        )
+        id: file_name(&format!("metric-{}", series.name)),
+        title: series.name.clone(),
+        x: commits(records.len()),
+        y: Axis { range: Some((low, high)), ..Axis::linear(series.unit) },
+        series: lines,
+        is_flat: true,
+        ..Figure::default()
     }
 }
 
@@ -216,7 +205,7 @@ fn commits(count: usize) -> Axis {
     let ticks = (0..=last).step_by(last.div_ceil(8)).map(|t| t as f64).collect();
     let margin = last as f64 * 0.03;
     let range = Some((-margin, last as f64 + margin));
-    Axis { range, ..Axis::linear("commit (index in the history)").with_ticks(ticks) }
+    Axis { range, ticks, ..Axis::linear("commit (index in the history)") }
 }
 
 #[cfg(test)]
@@ -248,9 +237,9 @@ mod tests {
 
     #[test]
     fn histories_of_zero_and_one_commits_have_a_page() {
-        assert!(page(&[], &[], None).contains("No records"));
+        assert!(page(&[], &[], None).contains("Commits: 0<"));
         let one = &sample()[..1];
-        assert!(page(one, &analyse(one, &Rules::default()), None).contains("One commit"));
+        assert!(page(one, &analyse(one, &Rules::default()), None).contains("Commits: 1 from"));
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub fn markdown(report: &Report) -> String {
 }
 
 fn table_of(report: &Report) -> Table {
-    let columns = "case,facets,base,cells,ranks,hold,fail,left out,time s,M cells/s,B/cell";
+    let columns = "case,facets,base,cells,ranks,hold,fail,left\nout,time\ns,M\ncells/s,B/cell";
     let columns = columns.split(',').collect();
     let rows: Vec<Vec<String>> = report.cases.iter().flat_map(rows_of).collect();
     check_rows(&rows, report);
@@ -37,24 +37,27 @@ fn table_of(report: &Report) -> Table {
 
 /// The rows of one case, each with one field per column.
 fn rows_of(case: &CaseReport) -> Vec<Vec<String>> {
-    let serial = case.runs.iter().find(|run| run.program == "mesher" && run.layout.is_none());
-    let counts = rank_counts(case);
-    let of_case = |check: &&Check| check.ranks.is_none_or(|ranks| !counts.contains(&ranks));
-    let [facets, base, cells] =
-        [case.facets, case.leaves_base, case.cells].map(|size| size.to_string());
-    let head = [case.name.clone(), facets, base, cells, "serial".to_owned()];
-    let mut rows = vec![row(head, Tally::of(case.checks.iter().filter(of_case)), serial)];
-    rows.extend(counts.iter().map(|&ranks| {
-        let with_ranks =
-            |run: &&Run| run.layout.as_ref().is_some_and(|layout| layout.ranks.count() == ranks);
-        let runs = case.runs.iter().filter(with_ranks);
+    // The rank counts on which anything was run.
+    let run = case.checks.iter().filter(|c| !matches!(c.outcome, Outcome::LeftOut { .. }));
+    let counts: BTreeSet<usize> = run.filter_map(|check| check.ranks).collect();
+    let sizes = [case.facets, case.leaves_base, case.cells].map(|size| size.to_string());
+    let (of_case, blank) =
+        ([vec![case.name.clone()], sizes.to_vec()].concat(), vec![String::new(); 4]);
+    let row_of = |ranks: Option<usize>| {
+        let is_of = |run: &&Run| {
+            let layout = run.layout.as_ref();
+            run.program == "mesher" && layout.map(|layout| layout.ranks.count()) == ranks
+        };
         // All layouts give the same mesh; the table has the time of the fastest.
+        let runs = case.runs.iter().filter(is_of);
         let fastest = runs.min_by(|a, b| a.time_wall_s.total_cmp(&b.time_wall_s));
-        let checks = Tally::of(case.checks.iter().filter(|check| check.ranks == Some(ranks)));
-        let head = std::array::from_fn(|i| if i == 4 { ranks.to_string() } else { String::new() });
-        row(head, checks, fastest)
-    }));
-    rows
+        let is_in = |check: &&Check| check.ranks.filter(|n| counts.contains(n)) == ranks;
+        let checks = Tally::of(case.checks.iter().filter(is_in));
+        let label = ranks.map_or("serial".to_owned(), |ranks| ranks.to_string());
+        let head = ranks.map_or(&of_case, |_| &blank).iter().cloned();
+        head.chain([label]).chain(numbers(checks, fastest)).collect()
+    };
+    [None].into_iter().chain(counts.iter().copied().map(Some)).map(row_of).collect()
 }
 
 /// Each check is in one row.
@@ -65,21 +68,15 @@ fn check_rows(rows: &[Vec<String>], report: &Report) {
     assert_eq!(shown, report.tally(), "checks in the rows of the table, and in the report");
 }
 
-/// The rank counts on which anything was run.
-fn rank_counts(case: &CaseReport) -> BTreeSet<usize> {
-    let run = case.checks.iter().filter(|c| !matches!(c.outcome, Outcome::LeftOut { .. }));
-    run.filter_map(|check| check.ranks).collect()
-}
-
-fn row(head: [String; 5], Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<String> {
+/// The counts of a row's checks, and time, rate and memory of its run.
+fn numbers(Tally { pass, fail, left_out }: Tally, run: Option<&Run>) -> Vec<String> {
     let measured = run.map(|run| {
         let time_s = run.is_time_reported.then(|| format!("{:.3}", run.time_wall_s));
         let rate = format!("{:.3}", run.cells_per_s() / 1e6);
         [time_s.unwrap_or("-".to_owned()), rate, format!("{:.1}", run.bytes_per_cell())]
     });
-    let measured = measured.unwrap_or(["-"; 3].map(str::to_owned));
     let counts = [pass, fail, left_out].map(|n| n.to_string());
-    head.into_iter().chain(counts).chain(measured).collect()
+    [counts, measured.unwrap_or(["-"; 3].map(str::to_owned))].concat()
 }
 
 /// Missing programs, then failures, omissions and notes of each case, one line each.
@@ -151,16 +148,13 @@ fn check_json(text: &str, report: &Report) {
 pub fn junit(report: &Report) -> String {
     let mut xml = quick_junit::Report::new("harness verify");
     xml.set_time(Duration::from_secs_f64(report.time_s));
-    xml.add_test_suites(
-        report.cases.iter().map(|case| suite(&case.name, case.time_s, tests(case))),
-    );
+    let of_case = |case: &CaseReport| suite(&case.name, case.time_s, tests(case));
+    xml.add_test_suites(report.cases.iter().map(of_case));
     // A missing program that `--require` names fails the build, so it is an error here too.
     let required = report.missing.iter().filter(|missing| missing.required);
-    let required: Vec<TestCase> =
-        required.map(|one| test(&one.what, unsuccessful(Error, &one.why), "")).collect();
-    if !required.is_empty() {
-        xml.add_test_suite(suite("required", 0.0, required));
-    }
+    let required = required.map(|one| test(&one.what, unsuccessful(Error, &one.why), ""));
+    let required = Some(suite("required", 0.0, required)).filter(|suite| suite.tests > 0);
+    xml.add_test_suites(required);
     check_junit(&xml, report);
     to_text(&xml)
 }

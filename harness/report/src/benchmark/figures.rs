@@ -1,6 +1,6 @@
 //! Figures over cells: run time (counterparts of the paper's Figures 17 and 18), rate and memory. All numbers of the paper are those of `reports/paper.md`.
 
-use super::groups::{Subject, cited, is_counterpart, point, provenance, repetitions};
+use super::groups::{OWN, Subject, cited, is_counterpart, point, provenance, repetitions};
 use super::scaling;
 use crate::figure::{Axis, Figure, Provenance, Series};
 use bench::experiments::entry::Comm;
@@ -14,7 +14,8 @@ use std::collections::BTreeSet;
 pub fn figures(groups: &Groups) -> Vec<Figure> {
     let by_case = |is_of: &dyn Fn(&Group) -> bool| {
         let of = groups.all.iter().filter(|group| is_of(group));
-        by_key(of, |group| Subject::of_all(&group.setup))
+        // These figures show all programs.
+        by_key(of, |group| Subject { engine: OWN, ..Subject::of(&group.setup) })
     };
     let of = |experiment: &'static str| by_case(&move |g| g.setup.experiment == experiment);
     let mut all: Vec<Figure> = of("spacing").iter().map(|(of, all)| by_spacing(of, all)).collect();
@@ -66,93 +67,83 @@ fn with_paper(figure: Figure, subject: &Subject, sentence: &str, value: Option<V
 /// A value of cells, ranks and time in seconds.
 type Value = fn(f64, f64, f64) -> f64;
 
-/// A value of all groups over their cells. The names are those of its file, of its title and of the vertical axis.
+/// A value of all groups over their cells. The names are those of its file, of its title and of the vertical axis; the caption states what
+/// is shown, and of which meshes.
 fn over_cells(
     subject: &Subject,
     all: &[&Group],
     [id, title, y]: [&str; 3],
-    caption: String,
+    [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (id, title) = (format!("{id}-{}", subject.file()), format!("{title}: {}", subject.mesh()));
-    Figure::new(id, title, caption, [Axis::log("cells"), Axis::log(y)], series(all, value))
+    let (mesh, repetitions) = (subject.mesh(), repetitions(all));
+    let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
+    let id = format!("{id}-{}", subject.file());
+    let title = format!("{title}: {mesh}");
+    let caption =
+        format!("{what} of {engines} over the number of cells of {mesh}{which}. {repetitions}");
+    let x = Axis::log("cells");
+    let y = Axis::log(y);
+    let series = series(all, value);
+    Figure { id, title, caption, x, y, series, ..Figure::default() }
 }
 
 /// A value of every group over its cells: a series per program, number and kind of ranks. Programs stay in the order of the record.
 fn series(all: &[&Group], value: impl Fn(&Group) -> Median) -> Vec<Series> {
+    let programs = by_key(all.iter().copied(), |g| &g.setup.engine);
     let mut lines = Vec::new();
-    let mut by_program =
-        by_key(all.iter().copied(), |g| (&g.setup.engine, g.setup.ranks, g.setup.comm));
-    let programs = distinct(all.iter().map(|g| &g.setup.engine));
-    by_program.sort_by_key(|((engine, ranks, _), _)| {
-        (programs.iter().position(|program| program == engine), *ranks)
-    });
-    for ((engine, ranks, _), mut groups) in by_program {
-        groups.sort_by_key(|g| g.cells());
-        let how = provenance(groups[0]);
-        let s = if ranks == 1 { "" } else { "s" };
-        let name = format!("{engine}, {ranks} rank{s}, {}", how.word());
-        let points = groups.iter().map(|g| point(g.cells() as f64, value(g))).collect();
-        lines.push(Series::new(&name, how, lines.len(), points));
+    for (engine, mut groups) in programs {
+        groups.sort_by_key(|g| (g.setup.ranks, g.cells()));
+        for ((ranks, _), groups) in by_key(groups, |g| (g.setup.ranks, g.setup.comm)) {
+            let how = provenance(groups[0]);
+            let s = if ranks == 1 { "" } else { "s" };
+            let name = format!("{engine}, {ranks} rank{s}, {}", how.word());
+            let points = groups.iter().map(|g| point(g.cells() as f64, value(g))).collect();
+            lines.push(Series::new(&name, how, lines.len(), points));
+        }
     }
     lines
 }
 
-fn engines(groups: &[&Group]) -> String {
-    distinct(groups.iter().map(|group| group.setup.engine.as_str())).join(", ")
-}
-
 /// The counterpart of the paper's Figure 17.
 fn by_spacing(subject: &Subject, all: &[&Group]) -> Figure {
-    let caption = format!(
-        "Run time of {} over the number of cells of {} at n = {}. The spacing is halved from point to point; lines join meshes of one \
-         family of spacings. {}",
-        engines(all),
-        subject.mesh(),
-        all[0].setup.layer_cells_min,
-        repetitions(all)
+    let which = format!(
+        " at n = {}. The spacing is halved from point to point; lines join meshes of one family of spacings",
+        all[0].setup.layer_cells_min
     );
     let names = ["time-over-cells", "Run time over cells, by spacing", "run time / s"];
-    let figure = over_cells(subject, all, names, caption, |group| group.time_s);
+    let figure = over_cells(subject, all, names, ["Run time", &which], |group| group.time_s);
     let sentence = " The paper's Figure 17, which is linear, is the counterpart.";
     with_paper(figure, subject, sentence, Some(|_, _, time_s| time_s))
 }
 
 /// Rate and memory of meshes of several sizes or programs.
 fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
-    let (case, engines, repetitions) = (subject.mesh(), engines(all), repetitions(all));
-    let of = format!("of {engines} over the number of cells of {case}. {repetitions}");
     let rate: Value = |cells, ranks, time_s| cells / time_s / ranks / 1e6;
     let rates = |g: &Group| {
         let (cells, ranks) = (g.cells() as f64, g.setup.ranks as f64);
         g.time_s.falling(|time_s| rate(cells, ranks, time_s))
     };
-    let of_rates = format!("Cells per second and core {of} Rates are cells over median times.");
-    let of_memory = format!("Peak resident memory of all ranks, program and facets included, {of}");
     let names = ["rate", "Cells per second and core", "million cells / (s core)"];
+    let of_rates = ["Cells per second and core", ". Rates are cells over median times"];
     let figure = over_cells(subject, all, names, of_rates, rates);
     let names = ["memory", "Peak memory per cell", "bytes per cell"];
-    [
-        with_paper(figure, subject, "", Some(rate)),
-        over_cells(subject, all, names, of_memory, Group::bytes_per_cell),
-    ]
+    let of_memory = ["Peak resident memory of all ranks, program and facets included,", ""];
+    let memory = over_cells(subject, all, names, of_memory, Group::bytes_per_cell);
+    [with_paper(figure, subject, "", Some(rate)), memory]
 }
 
 /// The counterpart of the paper's Figure 18. The paper's largest mesh is not drawn: it has no number of ranks.
 fn by_layers(subject: &Subject, all: &[&Group]) -> Figure {
     let layers: BTreeSet<u32> = all.iter().map(|g| g.setup.layer_cells_min).collect();
     let layers: Vec<String> = layers.iter().map(u32::to_string).collect();
-    let caption = format!(
-        "Run time of {} over the number of cells of {} at a fixed spacing of {:.3e}, with layers of n = {} cells from left to right; \
-         lines join consecutive values of n. {}",
-        engines(all),
-        subject.mesh(),
+    let which = format!(
+        " at a fixed spacing of {:.3e}, with layers of n = {} cells from left to right; lines join consecutive values of n",
         all[0].setup.spacing_min,
-        layers.join(", "),
-        repetitions(all)
+        layers.join(", ")
     );
     let names = ["time-over-layers", "Run time over cells, by layer thickness", "run time / s"];
-    let figure = over_cells(subject, all, names, caption, |group| group.time_s);
+    let figure = over_cells(subject, all, names, ["Run time", &which], |group| group.time_s);
     let sentence = " The paper's Figure 18, which \"does not scale linearly\", is the counterpart.";
     with_paper(figure, subject, sentence, None)
 }

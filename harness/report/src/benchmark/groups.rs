@@ -9,7 +9,7 @@ use statistics::Median;
 use std::fmt;
 
 /// The engine whose name is not in names of files.
-const OWN: &str = "mesher";
+pub const OWN: &str = "mesher";
 
 /// How the times of a group were obtained.
 pub fn provenance(group: &Group) -> Provenance {
@@ -52,19 +52,22 @@ pub fn rank_times(groups: &[&Group]) -> String {
 
 /// The number of repetitions, or the range of numbers.
 fn counts(groups: &[&Group]) -> String {
-    let counts = || groups.iter().map(|g| g.time_s.count);
-    range([counts().min(), counts().max()], |n| n.to_string())
+    range(groups, |g| g.time_s.count as u64)
 }
 
-/// Least and greatest as text, or one of them if both look alike.
-pub fn range<T>(ends: [Option<T>; 2], text: impl Fn(T) -> String) -> String {
-    distinct(ends.into_iter().flatten().map(text)).join(" to ")
+/// The least and the greatest value, or the only one.
+pub fn range(groups: &[&Group], value: impl Fn(&Group) -> u64) -> String {
+    let values = || groups.iter().map(|group| value(group));
+    let ends = [values().min(), values().max()];
+    distinct(ends.into_iter().flatten().map(grouped)).join(" to ")
 }
 
-/// The groups of an experiment by engine and case, in the order of the record.
+/// The groups of an experiment by engine and case, in the order of the record; those of each by ranks.
 pub fn by_subject<'a>(groups: &'a Groups, experiment: &str) -> Vec<(Subject<'a>, Vec<&'a Group>)> {
     let of = groups.all.iter().filter(|g| g.setup.experiment == experiment);
-    by_key(of, |group| Subject::of(&group.setup))
+    let mut found = by_key(of, |group| Subject::of(&group.setup));
+    found.iter_mut().for_each(|(_, of)| of.sort_by_key(|g| g.setup.ranks));
+    found
 }
 
 /// The program and the case of a figure that shows only one of each.
@@ -82,11 +85,6 @@ impl<'a> Subject<'a> {
     /// The program and the case of a run.
     pub fn of(setup: &'a Setup) -> Self {
         Self { engine: &setup.engine, case: &setup.case, cells: setup.series_cells }
-    }
-
-    /// The same for figures that show all programs.
-    pub fn of_all(setup: &'a Setup) -> Self {
-        Self { engine: OWN, ..Self::of(setup) }
     }
 
     /// A name for files: the case, and before it the program unless that is the mesher of this repository.

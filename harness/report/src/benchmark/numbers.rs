@@ -58,12 +58,10 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
         let Median { value, low, high, count, .. } = median.filter(|m| m.value.is_finite())?;
-        let name_of = || format!("{setup}/{name}");
-        assert!(low <= value && value <= high, "{}: {value} is not in its interval", name_of());
-        let several = count > 1;
-        let interval =
-            if several { format!("{}--{}", digits(low), digits(high)) } else { String::new() };
-        Some(Number { key: name_of(), value: digits(value), interval, unit })
+        let key = format!("{setup}/{name}");
+        assert!(low <= value && value <= high, "{key}: {value} is not in its interval");
+        let ends = Some([low, high].map(digits).join("--")).filter(|_| count > 1);
+        Some(Number { key, value: digits(value), interval: ends.unwrap_or_default(), unit })
     };
     let cells = Number {
         key: format!("{setup}/cells"),

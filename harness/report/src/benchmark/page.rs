@@ -19,11 +19,9 @@ pub fn page(
     lines: &[Line],
 ) -> String {
     let runs: usize = groups.all.iter().map(|g| g.runs.len()).sum();
-    let failed = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
-    let summarised = || groups.all.iter().filter(|g| is_summarised(g));
     let content = html! {
         p {
-            (runs) " runs of " (groups.all.len()) " configurations, " (failed) " more failed. For simulated ranks, time is the critical path: \
+            (runs) " runs of " (groups.all.len()) " configurations, " (failures(lines)) " more failed. For simulated ranks, time is the critical path: \
              the sum over phases of the CPU time of the slowest rank, plus " (Groups::networks(&groups.all)) "."
         }
         nav {
@@ -32,7 +30,7 @@ pub fn page(
         }
         h2 { "Causes of lost efficiency" }
         ul {
-            @for group in summarised() {
+            @for group in groups.all.iter().filter(|group| is_summarised(group)) {
                 li {
                     b { (Subject::of(&group.setup)) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
                     (with_code(&groups.cause(group)))
@@ -80,43 +78,45 @@ pub type Broken = (usize, String);
 
 /// The rules that a record breaks, in the order of the rules.
 pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {
-    let mut broken = Vec::new();
-    let failures = lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count();
-    if failures > 0 {
-        broken.push((2, format!("{failures} runs failed and are missing in the figures")));
-    }
+    let failures = failures(lines);
+    let why = || format!("{failures} runs failed and are missing in the figures");
+    let failed = (failures > 0).then(|| (2, why()));
     // Efficiencies are of medians per rank, and counts repeat exactly.
     let has_interval = |experiment: &str| ["strong", "spacing", "layers"].contains(&experiment);
     let shown = groups.all.iter().filter(|g| has_interval(&g.setup.experiment));
     let poor: Vec<usize> =
         shown.filter(|g| g.time_s.coverage < 0.95).map(|g| g.runs.len()).collect();
-    if let Some(least) = poor.iter().min() {
-        let count = poor.len();
-        broken.push((5, format!(
-            "{count} configurations have fewer than the six runs that an interval with 95 % coverage needs (minimum: {least})"
-        )));
-    }
+    let count = poor.len();
+    let vague = poor.iter().min().map(|least| (5, format!(
+        "{count} configurations have fewer than the six runs that an interval with 95 % coverage needs (minimum: {least})"
+    )));
     let sessions = || lines.iter().filter_map(Line::session);
-    let mut require = |holds: bool, why: &str| {
-        if !holds {
-            broken.push((9, why.to_owned()));
-        }
-    };
     let is_documented = sessions().all(|session| {
         let m = &session.machine;
         let known = [&m.cpu, &m.kernel, &m.compiler, &m.commit].iter().all(|v| !v.is_empty());
         known && m.memory_bytes > 0
     });
-    let why = "machine, compiler or commit are missing in the record";
-    require(sessions().next().is_some() && is_documented, why);
-    let is_clean = sessions().all(|session| !session.machine.commit.ends_with("-dirty"));
-    require(is_clean, "a session ran with files that differ from its commit");
+    let of_rule_9 = |is_broken: bool, why: &str| is_broken.then(|| (9, why.to_owned()));
+    let is_unknown = sessions().next().is_none() || !is_documented;
+    let unknown = of_rule_9(is_unknown, "machine, compiler or commit are missing in the record");
+    let is_unclean = sessions().any(|session| session.machine.commit.ends_with("-dirty"));
+    let unclean = of_rule_9(is_unclean, "a session ran with files that differ from its commit");
     let disturbed = sessions().find(|s| s.load_average > 0.5 * s.machine.cores as f64);
-    let why = |load| {
-        format!("other processes may have disturbed a session, whose load average was {load:.1}")
-    };
-    require(disturbed.is_none(), &disturbed.map_or(String::new(), |s| why(s.load_average)));
-    broken
+    let disturbed = disturbed.map(|s| {
+        (
+            9,
+            format!(
+                "other processes may have disturbed a session, whose load average was {:.1}",
+                s.load_average
+            ),
+        )
+    });
+    [failed, vague, unknown, unclean, disturbed].into_iter().flatten().collect()
+}
+
+/// Number of runs that failed.
+fn failures(lines: &[Line]) -> usize {
+    lines.iter().filter(|l| matches!(l.entry, Entry::Failure(_))).count()
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use super::groups::{
     repetitions,
 };
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
-use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, Factor, above_one, heaviest_base_leaf, phase_s};
@@ -30,20 +29,18 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
             if all.iter().any(|group| group.setup.ranks > 1) {
                 out.push(speedup(groups, subject, &all, &file));
             }
-            out.extend(efficiency(groups, subject, &all, &file));
-            out.extend(phases(subject, &with(&all, "projected"), &file));
+            out.extend(projected(groups, subject, &all, &file));
         }
         for ranks in SHOWN {
-            let sims = all.iter().filter(|g| g.setup.ranks == ranks && g.setup.comm == Comm::Sim);
+            let sims = with(&all, "projected").into_iter().filter(|g| g.setup.ranks == ranks);
             // Of several meshes, the one whose size is nearest to the paper's.
-            let distance = |g: &&&Group| (g.cells() as f64 / number("second_cells")).ln().abs();
+            let distance = |g: &&Group| (g.cells() as f64 / number("second_cells")).ln().abs();
             let nearest = sims.min_by(|a, b| distance(a).total_cmp(&distance(b)));
             out.extend(nearest.and_then(|g| load(subject, g)));
         }
     }
     for (subject, all) in by_subject(groups, "weak") {
-        out.extend(efficiency(groups, subject, &all, &subject.file()));
-        out.extend(phases(subject, &with(&all, "projected"), &subject.file()));
+        out.extend(projected(groups, subject, &all, &subject.file()));
     }
     for (subject, all) in by_subject(groups, "weights") {
         for (_, of) in by_key(all, |g| (g.cells(), g.setup.ranks)) {
@@ -53,11 +50,17 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     out
 }
 
-/// The groups whose times were obtained in one way, by ranks.
+/// The groups whose times were obtained in one way.
 fn with<'a>(all: &[&'a Group], how: &str) -> Vec<&'a Group> {
-    let mut found: Vec<&Group> = all.iter().copied().filter(|g| g.how() == how).collect();
-    found.sort_by_key(|g| g.setup.ranks);
-    found
+    all.iter().copied().filter(|g| g.how() == how).collect()
+}
+
+/// The figures of a mesh, or of those of weak scaling, on simulated ranks.
+fn projected(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Vec<Figure> {
+    let simulated = with(all, "projected");
+    let figures =
+        [efficiency(groups, subject, &simulated, file), phases(subject, &simulated, file)];
+    figures.into_iter().flatten().collect()
 }
 
 /// The base cases of efficiencies with their run times, without repetitions.
@@ -106,14 +109,20 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
             number("parallel_ranks"),
         );
     }
+    let id = format!("speedup-{file}");
     let title = format!("Speedup: {subject}, {cells} cells");
-    let axes = [ranks_axis(all), Axis::log("speedup")];
-    Figure::new(format!("speedup-{file}"), title, caption, axes, series)
+    let x = ranks_axis(all);
+    let y = Axis::log("speedup");
+    Figure { id, title, caption, x, y, series, ..Figure::default() }
 }
 
 /// Global efficiency and its factors on simulated ranks.
-fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Option<Figure> {
-    let simulated = with(all, "projected");
+fn efficiency(
+    groups: &Groups,
+    subject: Subject,
+    simulated: &[&Group],
+    file: &str,
+) -> Option<Figure> {
     let last = simulated.last().filter(|_| simulated.len() > 1)?;
     let factors: [(&str, Factor); 5] = [
         ("global", Efficiency::global),
@@ -123,7 +132,7 @@ fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> 
         ("computation scaling", |e| e.computation_scaling),
     ];
     let efficiencies: Vec<_> = simulated.iter().map(|group| groups.efficiency(group)).collect();
-    let mut series = vec![ideal(&simulated, |_| 1.0)];
+    let mut series = vec![ideal(simulated, |_| 1.0)];
     for (style, (name, value)) in factors.into_iter().enumerate() {
         let factor = |(g, e): (&&Group, &Efficiency)| Point::exact(g.setup.ranks as f64, value(e));
         let points = simulated.iter().zip(&efficiencies).map(factor).collect();
@@ -133,14 +142,9 @@ fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> 
     let experiment = &last.setup.experiment;
     let size = match experiment.as_str() {
         "weak" => {
-            let cells = || simulated.iter().map(|g| g.cells() / g.setup.ranks as u64);
+            let cells = range(simulated, |g| g.cells() / g.setup.ranks as u64);
             // Fixed facets cost less and less per cell.
-            let facets = || simulated.iter().map(|g| g.typical.facets);
-            let [cells, facets] = [
-                range([cells().min(), cells().max()], grouped),
-                range([facets().min(), facets().max()], grouped),
-            ];
-            format!("{cells} cells per rank, {facets} facets")
+            format!("{cells} cells per rank, {} facets", range(simulated, |g| g.typical.facets))
         }
         _ => format!("{} cells", grouped(last.cells())),
     };
@@ -149,14 +153,16 @@ fn efficiency(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> 
          ranks. {} Lines join powers of two. {}",
         last.setup.layer_cells_min,
         base_cases(groups, &[last]),
-        rank_times(&simulated),
+        rank_times(simulated),
         above_one(&efficiencies).unwrap_or_default()
     );
     let highest = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
-    let y = Axis { range: Some((0.0, highest * 1.1)), ..Axis::linear("efficiency") };
-    let title = format!("Efficiency in {experiment} scaling: {subject}, {size}");
     let id = format!("efficiency-{experiment}-{file}");
-    Some(Figure::new(id, title, caption.trim_end().to_owned(), [ranks_axis(&simulated), y], series))
+    let title = format!("Efficiency in {experiment} scaling: {subject}, {size}");
+    let caption = caption.trim_end().to_owned();
+    let x = ranks_axis(simulated);
+    let y = Axis { range: Some((0.0, highest * 1.1)), ..Axis::linear("efficiency") };
+    Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }
 
 /// Useful time per rank: the counterpart of the paper's Figures 21 to 23.
@@ -183,21 +189,19 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
         Series::new(&format!("mean; λ = {lambda:.2}"), Provenance::Bound, 0, mean),
     ];
     let margin = 0.02 * last;
-    let x = Axis { range: Some((-margin, last + margin)), ..Axis::linear("rank") };
     let id = format!("per-rank-{}-{ranks}", subject.file());
     let title = format!("Useful time per rank: {subject}, {ranks} ranks");
-    Some(Figure::new(id, title, caption, [x, Axis::linear("useful time / s")], series))
+    let x = Axis { range: Some((-margin, last + margin)), ..Axis::linear("rank") };
+    let y = Axis::linear("useful time / s");
+    Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }
 
 fn ranks_axis(all: &[&Group]) -> Axis {
-    let mut ranks: Vec<f64> = all.iter().map(|g| g.setup.ranks as f64).collect();
-    ranks.sort_by(f64::total_cmp);
-    ranks.dedup();
-    Axis::log("ranks").with_ticks(ranks)
+    Axis { ticks: distinct(all.iter().map(|g| g.setup.ranks as f64)), ..Axis::log("ranks") }
 }
 
 fn ideal(all: &[&Group], value: impl Fn(f64) -> f64) -> Series {
-    let ranks_max = all.iter().map(|g| g.setup.ranks).max().unwrap_or(1) as f64;
+    let ranks_max = all.last().map_or(1.0, |g| g.setup.ranks as f64);
     let points = [1.0, ranks_max].map(|r| Point::exact(r, value(r)));
     Series::new("ideal", Provenance::Bound, 0, points.to_vec())
 }
@@ -234,11 +238,13 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
         last.setup.ranks,
         rank_times(simulated)
     );
-    let title = format!("Time by phase in {experiment} scaling: {subject}");
     let names = simulated.iter().map(|g| g.setup.ranks.to_string()).collect();
-    let axes = [Axis::linear(unit), Axis { names, ..Axis::linear("ranks") }];
+    let id = format!("phases-{experiment}-{file}");
+    let title = format!("Time by phase in {experiment} scaling: {subject}");
+    let x = Axis::linear(unit);
+    let y = Axis { names, ..Axis::linear("ranks") };
     let series = labelled.enumerate().map(segment).collect();
-    Some(Figure::new(format!("phases-{experiment}-{file}"), title, caption, axes, series))
+    Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }
 
 /// Segments of bars with these lengths, from top to bottom.
@@ -273,12 +279,12 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
          tree and the weights of its leaves. {baseline} The counts repeat exactly."
     );
+    let names = of.iter().map(|g| g.setup.division()).collect();
     let id = format!("balance-{}-{millions:.0}M-{ranks}", subject.file());
     let title = format!(
         "Load imbalance of cells by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
     );
-    let names = of.iter().map(|g| g.setup.division()).collect();
+    let x = Axis::linear("λ = max/mean over ranks");
     let y = Axis { names, ..Axis::linear("partitioner and weights") };
-    let axes = [Axis::linear("λ = max/mean over ranks"), y];
-    Some(Figure::new(id, title, caption, axes, series))
+    Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }

@@ -55,18 +55,18 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("partition", &|(g, _)| g.setup.division()),
             ("ranks", &|(g, _)| g.setup.ranks.to_string()),
             ("how", &|(g, _)| g.how().to_owned()),
-            ("median time / s", &|(g, _)| format!("{:.3}", g.time_s.value)),
+            ("median\ntime / s", &|(g, _)| format!("{:.3}", g.time_s.value)),
             ("interval", &|(g, _)| format!("{:.3} – {:.3}", g.time_s.low, g.time_s.high)),
             ("coverage", &|(g, _)| format!("{:.0} %", g.time_s.coverage * 100.0)),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
-            ("λ (time)", &|(_, e)| format!("{:.3}", 1.0 / e.load_balance)),
-            ("λ (cells)", &|(g, _)| lambda(g)),
+            ("λ\n(time)", &|(_, e)| format!("{:.3}", 1.0 / e.load_balance)),
+            ("λ\n(cells)", &|(g, _)| lambda(g)),
             ("serialisation", &|(_, e)| format!("{:.3}", e.serialisation)),
             ("transfer", &|(_, e)| format!("{:.3}", e.transfer)),
-            ("parallel efficiency", &|(_, e)| format!("{:.3}", e.parallel())),
-            ("computation scaling", &|(g, e)| of_base(g, e.computation_scaling)),
-            ("global efficiency", &|(g, e)| of_base(g, e.global())),
-            ("10⁶ cells / s / rank", &|(g, _)| format!("{:.2}", g.rate() / 1e6)),
+            ("parallel\nefficiency", &|(_, e)| format!("{:.3}", e.parallel())),
+            ("computation\nscaling", &|(g, e)| of_base(g, e.computation_scaling)),
+            ("global\nefficiency", &|(g, e)| of_base(g, e.global())),
+            ("10⁶\ncells / s / rank", &|(g, _)| format!("{:.2}", g.rate() / 1e6)),
             ("bytes / cell", &|(g, _)| format!("{:.2}", g.bytes_per_cell().value)),
         ],
     );
@@ -118,12 +118,12 @@ fn phases(group: &Group) -> Table {
         &run.phases,
         &[
             ("phase", &|p| p.name.clone()),
-            ("mean useful time / s", &|p| format!("{:.4}", p.useful_s.sum / ranks as f64)),
-            ("max useful time / s", &|p| format!("{:.4}", p.useful_s.max)),
+            ("mean\nuseful\ntime / s", &|p| format!("{:.4}", p.useful_s.sum / ranks as f64)),
+            ("max\nuseful\ntime / s", &|p| format!("{:.4}", p.useful_s.max)),
             ("λ", &|p| format!("{:.2}", p.useful_s.lambda(ranks))),
-            ("of run time", &|p| format!("{:.1} %", 100.0 * phase_s(run, p, network) / total)),
-            ("max messages / rank", &|p| format!("{:.0}", p.messages.max)),
-            ("max MB / rank", &|p| format!("{:.3}", p.message_bytes.max / 1e6)),
+            ("of\nrun\ntime", &|p| format!("{:.1} %", 100.0 * phase_s(run, p, network) / total)),
+            ("max\nmessages / rank", &|p| format!("{:.0}", p.messages.max)),
+            ("max\nMB / rank", &|p| format!("{:.3}", p.message_bytes.max / 1e6)),
         ],
     )
 }
@@ -141,11 +141,11 @@ fn programs(comparison: &Comparison) -> Table {
                 _ => g.setup.engine.clone(),
             }),
             ("cells", &|g| grouped(g.cells())),
-            ("CPU time / s", &|g| format!("{:.2}", cpu_s(g))),
-            ("of it search / s", &|g| {
+            ("CPU\ntime / s", &|g| format!("{:.2}", cpu_s(g))),
+            ("of\nit\nsearch / s", &|g| {
                 g.search_s().map_or("not separate".to_owned(), |time| format!("{:.2}", time.value))
             }),
-            ("10⁶ cells / s / core", &|g| format!("{:.3}", g.cells() as f64 / cpu_s(g) / 1e6)),
+            ("10⁶\ncells / s / core", &|g| format!("{:.3}", g.cells() as f64 / cpu_s(g) / 1e6)),
             ("bytes / cell", &|g| format!("{:.1}", g.bytes_per_cell().value)),
         ],
     );

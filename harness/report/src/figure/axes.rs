@@ -21,8 +21,7 @@ pub const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '�
 pub struct Scale {
     pub log: bool,
     pub ends: Range<f64>,
-    pub ticks: Vec<f64>,
-    pub labels: Vec<String>,
+    pub ticks: Vec<(f64, String)>,
 }
 
 impl Scale {
@@ -31,12 +30,11 @@ impl Scale {
         if !axis.names.is_empty() {
             let every = axis.names.len().div_ceil(NAMES_SHOWN);
             let named = (0..).zip(&axis.names).step_by(every);
-            let (ticks, labels) = named.map(|(i, name)| (f64::from(i), name.clone())).unzip();
-            return Self { log: false, ends: axis.names.len() as f64 - 0.5..-0.5, ticks, labels };
+            let ticks = named.map(|(i, name)| (f64::from(i), name.clone())).collect();
+            return Self { log: false, ends: axis.names.len() as f64 - 0.5..-0.5, ticks };
         }
         let ends = range(axis, values);
-        let ticks = ticks(axis, &ends);
-        Self { log: axis.log, labels: tick_labels(&ticks), ends, ticks }
+        Self { log: axis.log, ticks: labelled(ticks(axis, &ends)), ends }
     }
 
     /// The place of a value, which is linear on the page.
@@ -51,21 +49,21 @@ impl Scale {
 
     /// The label of the tick at a place.
     pub fn label(&self, place: f64) -> String {
-        let index = self.ticks.iter().position(|tick| self.place(*tick) == place);
-        index.map_or_else(String::new, |index| self.labels[index].clone())
+        let tick = self.ticks.iter().find(|(tick, _)| self.place(*tick) == place);
+        tick.map_or_else(String::new, |(_, label)| label.clone())
     }
 
     /// Space at the left of data, if this is the vertical axis.
     pub fn left(&self) -> f64 {
-        self.labels.iter().map(|label| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
+        self.ticks.iter().map(|(_, label)| BESIDE_TICKS + width(label)).fold(LEFT, f64::max)
     }
 
     /// Clears the labels that have no room beside others, if this is the horizontal axis, whose places are these on the page.
     pub fn clear_labels(&mut self, on_page: impl Fn(f64) -> f64) {
         let mut taken = 0.0;
-        for i in 0..self.ticks.len() {
-            let (middle, label) = (on_page(self.place(self.ticks[i])), &mut self.labels[i]);
-            let half = width(label) / 2.0;
+        let places: Vec<f64> = self.ticks.iter().map(|(tick, _)| self.place(*tick)).collect();
+        for ((_, label), place) in self.ticks.iter_mut().zip(places) {
+            let (middle, half) = (on_page(place), width(label) / 2.0);
             if middle - half < taken || middle + half > WIDTH {
                 label.clear();
             } else {
@@ -125,15 +123,13 @@ fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
     all.into_iter().step_by(every).collect()
 }
 
-/// The labels of ticks, with as many digits as distinguish them.
-fn tick_labels(ticks: &[f64]) -> Vec<String> {
-    let short: Vec<String> = ticks.iter().map(|tick| tick_label(*tick)).collect();
-    if distinct(&short).len() == ticks.len() {
-        return short;
-    }
+/// Ticks with their labels, which have as many digits as distinguish them.
+fn labelled(ticks: Vec<f64>) -> Vec<(f64, String)> {
+    let is_short = distinct(ticks.iter().map(|tick| tick_label(*tick))).len() == ticks.len();
     let step = ticks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
     let decimals = (-step.log10().floor()).max(0.0) as usize;
-    ticks.iter().map(|tick| format!("{tick:.decimals$}")).collect()
+    let label = |tick| if is_short { tick_label(tick) } else { format!("{tick:.decimals$}") };
+    ticks.into_iter().map(|tick| (tick, label(tick))).collect()
 }
 
 /// A number for a tick: a decimal where that is short, else with a power of ten.
@@ -202,7 +198,7 @@ mod tests {
 
     #[test]
     fn given_ticks_outside_the_range_are_dropped() {
-        let axis = Axis::log("").with_ticks(vec![1.0, 2.0, 4.0, 512.0]);
+        let axis = Axis { ticks: vec![1.0, 2.0, 4.0, 512.0], ..Axis::log("") };
         assert_eq!(of(&axis, &[1.0, 4.0]), [1.0, 2.0, 4.0]);
     }
 

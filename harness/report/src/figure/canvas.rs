@@ -1,6 +1,4 @@
-//! The page of a drawing: its document as SVG, typeface, colours, and the places of a legend.
-
-use maud::{PreEscaped, html};
+//! The page of a drawing: its typeface, colours, and the places of a legend.
 
 /// Width of every figure in the units of its coordinates.
 pub const WIDTH: f64 = 1600.0;
@@ -52,15 +50,4 @@ pub fn legend(left: f64, names: &[&str]) -> (Vec<(i32, i32)>, f64) {
         x += entry + 40.0;
     }
     (places, y + 40.0)
-}
-
-/// The document of elements, each on a line; `title` describes it to those who do not see it.
-pub fn document(title: &str, height: u32, elements: &str) -> String {
-    let document = html! {
-        svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label=(title) width=(WIDTH) height=(height)
-            viewBox=(format!("0 0 {WIDTH} {height}")) font-family=(FONT) font-size=(SIZE) fill=(INK) stroke-linejoin="round" {
-            "\n" (PreEscaped(elements)) "\n"
-        }
-    };
-    document.into_string() + "\n"
 }

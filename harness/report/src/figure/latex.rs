@@ -31,14 +31,11 @@ pub fn csv(figure: &Figure) -> String {
         false => "plot,x,y,bar,part,how",
     };
     let row = |plot: usize, s: &Series, p: &Point| {
-        let between = match y.names.is_empty() {
-            true => format!("{},{}", p.low, p.high),
+        let between = match (y.names.is_empty(), s.kind) {
+            (true, _) => format!("{},{}", p.low, p.high),
+            (_, Kind::Bars) => plain(&y.names[p.y as usize]),
             // A line begins and ends beside the bars.
-            false => y
-                .names
-                .get(p.y as usize)
-                .filter(|_| s.kind == Kind::Bars)
-                .map_or("".into(), |n| plain(n)),
+            _ => String::new(),
         };
         let (name, how) = (plain(&s.name), s.provenance.word());
         format!("{plot},{},{},{between},{name},{how}\n", p.x, p.y)
@@ -120,8 +117,8 @@ fn plot_options(s: &Series) -> String {
 
 /// Label, kind, ends and ticks of an axis. Names of bars are from top to bottom.
 fn axis_options(name: &str, axis: &Axis, scale: &Scale) -> String {
-    let at: Vec<String> = scale.ticks.iter().map(f64::to_string).collect();
-    let labels: Vec<String> = scale.labels.iter().map(|label| escape(label)).collect();
+    let ticks = scale.ticks.iter().map(|(tick, label)| (tick.to_string(), escape(label)));
+    let (at, labels): (Vec<String>, Vec<String>) = ticks.unzip();
     let (start, end) = (scale.ends.start, scale.ends.end);
     format!(
         "{name}label={{{}}}, {name}mode={}, {name}min={}, {name}max={}, {}{name}tick={{{}}}, {name}ticklabels={{{}}}",

@@ -5,7 +5,6 @@
 
 use super::axes::{BELOW, Scale};
 use super::canvas::{BESIDE, INK, WIDTH, hex};
-use maud::html;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -67,15 +66,12 @@ pub fn paint(
     let mut painted = Vec::new();
     for Fill { colour, is_outlined, cells } in &map.fills {
         let d: String = cells.iter().map(rectangle).collect();
-        let (line, edges) = match is_outlined {
-            true => (Some(hex(outline(*colour))), None),
+        let edges = match is_outlined {
+            true => format!(r#"stroke="{}" stroke-width="0.7""#, hex(outline(*colour))),
             // Without seams between neighbours.
-            false => (None, Some("crispEdges")),
+            false => r#"shape-rendering="crispEdges""#.to_owned(),
         };
-        let cells = html! {
-            path d=(d) fill=(hex(*colour)) stroke=[line] stroke-width="0.7" shape-rendering=[edges] {}
-        };
-        painted.push(cells.into_string());
+        painted.push(format!(r#"<path d="{d}" fill="{}" {edges}/>"#, hex(*colour)));
     }
     let segment = |ends: &[[f64; 2]; 2]| {
         let [[x, y], [to_x, to_y]] = ends.map(at);
@@ -86,15 +82,11 @@ pub fn paint(
     let d: String = segments.into_iter().collect();
     let lines = [("#FFFFFF", 5.0), ("#000000", 2.5)].into_iter().filter(|_| !d.is_empty());
     for (colour, width) in lines {
-        let line = html! {
-            path d=(d) fill="none" stroke=(colour) stroke-width=(width) stroke-linecap="round" {}
-        };
-        painted.push(line.into_string());
+        let line = format!(r#"stroke="{colour}" stroke-width="{width}" stroke-linecap="round""#);
+        painted.push(format!(r#"<path d="{d}" fill="none" {line}/>"#));
     }
-    let frame = html! {
-        rect x=(left) y=(top) width=(right - left) height=(bottom - top) fill="none" stroke=(INK) stroke-width="2" {}
-    };
-    painted.push(frame.into_string());
+    let frame = rectangle(&[[x.start, y.start], [x.end, y.end]]);
+    painted.push(format!(r#"<path d="{frame}" fill="none" stroke="{INK}" stroke-width="2"/>"#));
     painted
 }
 

@@ -25,7 +25,7 @@ use map::Map;
 use std::collections::BTreeSet;
 
 /// An axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
     /// Quantity and unit.
     pub label: String,
@@ -45,17 +45,7 @@ impl Axis {
 
     /// A linear axis that starts at zero.
     pub fn linear(label: &str) -> Self {
-        Self {
-            label: label.to_owned(),
-            log: false,
-            ticks: Vec::new(),
-            range: None,
-            names: Vec::new(),
-        }
-    }
-
-    pub fn with_ticks(self, ticks: Vec<f64>) -> Self {
-        Self { ticks, ..self }
+        Self { label: label.to_owned(), ..Self::default() }
     }
 
     fn shows(&self, value: f64) -> bool {
@@ -81,13 +71,7 @@ pub enum Provenance {
 impl Provenance {
     /// The word for legends and tables.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Oversubscribed => "oversubscribed",
-            Self::Projected => "projected",
-            Self::Cited => "cited",
-            Self::Bound => "bound",
-        }
+        ["measured", "oversubscribed", "projected", "cited", "bound"][self as usize]
     }
 }
 
@@ -156,7 +140,7 @@ impl Series {
 }
 
 /// A figure.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figure {
     /// Name of its files, without the extension.
     pub id: String,
@@ -169,22 +153,11 @@ pub struct Figure {
     /// Those of one name have one entry in the legend.
     pub series: Vec<Series>,
     pub map: Option<Map>,
-    /// Height in units of which the width has [`canvas::WIDTH`]; without effect on a map.
-    pub height: u32,
+    /// Whether it is about half as high as usual.
+    pub is_flat: bool,
 }
 
 impl Figure {
-    /// A figure of the usual height.
-    pub fn new(
-        id: String,
-        title: String,
-        caption: String,
-        [x, y]: [Axis; 2],
-        series: Vec<Series>,
-    ) -> Self {
-        Self { id, title, caption, x, y, series, map: None, height: 1040 }
-    }
-
     /// The axes with their ends and ticks.
     fn scales(&self) -> [Scale; 2] {
         let all = || self.series.iter().flat_map(|s| s.points.iter().map(move |p| (s.kind, p)));
@@ -282,13 +255,15 @@ pub mod samples {
     use super::*;
 
     pub(crate) fn figure(series: Vec<Series>) -> Figure {
-        Figure::new(
-            "speedup".into(),
-            "Speedup".into(),
-            "Speedup & <more>, n = 6.".into(),
-            [Axis::log("ranks").with_ticks(vec![1.0, 2.0, 4.0]), Axis::log("speedup")],
+        Figure {
+            id: "speedup".into(),
+            title: "Speedup".into(),
+            caption: "Speedup & <more>, n = 6.".into(),
+            x: Axis { ticks: vec![1.0, 2.0, 4.0], ..Axis::log("ranks") },
+            y: Axis::log("speedup"),
             series,
-        )
+            ..Figure::default()
+        }
     }
 
     pub(crate) fn bars() -> Figure {

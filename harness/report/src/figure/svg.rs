@@ -4,12 +4,12 @@
 //! Logarithmic axes are linear in the logarithm and are given their key points, because those of `plotters` drop the lowest tick.
 
 use super::axes::{BELOW, Scale};
-use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, document, legend};
+use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, legend};
 use super::map::{CAPTION, outline, paint, size};
 use super::{Figure, Kind, Provenance, Series};
 use maud::html;
 use plotters::coord::Shift;
-use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
+use plotters::element::{DashedPathElement, DynElement, IntoDynElement};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -54,7 +54,7 @@ pub fn svg(figure: &Figure) -> String {
     let (places, top) = legend(y.left(), &names);
     let (height, right) = match figure.map {
         Some(_) => size(&x, &y, top),
-        None => (figure.height, BESIDE[0]),
+        None => (if figure.is_flat { 560 } else { 1040 }, BESIDE[0]),
     };
     let mut drawn = String::new();
     let backend = SVGBackend::with_string(&mut drawn, (WIDTH as u32, height));
@@ -62,22 +62,23 @@ pub fn svg(figure: &Figure) -> String {
     for ((name, of), at) in legend_entries.iter().zip(places) {
         symbol(&page, at, of);
         let beside = if matches!(of, Symbol::Nothing) { 0 } else { SYMBOL as i32 };
-        put(&page, &text(name, (at.0 + beside, at.1)));
+        page.draw(&text(name, (at.0 + beside, at.1))).expect(DRAWN);
     }
     if let Some(map) = &figure.map {
-        put(&page, &text(&map.caption, (y.left() as i32, height as i32 - CAPTION as i32 / 2)));
+        page.draw(&text(&map.caption, (y.left() as i32, height as i32 - CAPTION as i32 / 2)))
+            .expect(DRAWN);
     }
     let above = chart(figure, (&page, top, right), [x, y]);
     drop(page);
-    let (_, elements) = drawn.split_once('\n').expect("an element begins the document");
-    let elements = elements.trim_end().strip_suffix("</svg>").expect("it ends the document");
-    let elements = elements.replace("\"#000000\"", &format!("\"{INK}\""));
+    // The title describes the drawing to those who do not see it.
+    let title = html! { (figure.title) }.into_string();
+    let described = format!("<svg role=\"img\" aria-label=\"{title}\" stroke-linejoin=\"round\"");
+    let drawn = drawn.replacen("<svg", &described, 1).replace(" opacity=\"1\"", "");
     // A text is on the line of its element.
-    let elements = elements.replace(" opacity=\"1\"", "").replace("\n</text>", "</text>");
-    let end = |line: &str| if line.starts_with("<text") { "" } else { "\n" };
-    let mut lines: String = elements.lines().flat_map(|line| [line, end(line)]).collect();
-    lines += &above.join("\n");
-    document(&figure.title, height, lines.trim_end())
+    let drawn = drawn.replace("\">\n", "\">").replace("\n</text>", "</text>");
+    let drawn = drawn.replace("\"#000000\"", &format!("\"{INK}\""));
+    let elements = drawn.trim_end().strip_suffix("</svg>").expect("it ends the document");
+    format!("{elements}{}\n</svg>\n", above.join("\n"))
 }
 
 /// Names and symbols of the legend. Series of one name have one entry.
@@ -101,21 +102,23 @@ fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
     let corners = [(x, y - 16), (right, y + 16)];
     match symbol {
         Symbol::Series(s) if s.kind == Kind::Bars => {
-            bar(corners, s.style).iter().for_each(|part| put(page, part));
+            bar(corners, s.style).iter().for_each(|part| page.draw(part).expect(DRAWN));
         }
         Symbol::Series(s) if s.kind == Kind::Line => {
-            put(page, &PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(s.style)));
+            page.draw(&PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(s.style)))
+                .expect(DRAWN);
         }
         Symbol::Series(s) => {
-            put(page, &path(vec![(x, y), (right, y)], s));
+            page.draw(&path(vec![(x, y), (right, y)], s)).expect(DRAWN);
             marker(page, (middle, y), s);
         }
         Symbol::Cell(fill) => {
-            put(page, &Rectangle::new(corners, rgb(*fill).filled()));
-            put(page, &Rectangle::new(corners, rgb(outline(*fill))));
+            page.draw(&Rectangle::new(corners, rgb(*fill).filled())).expect(DRAWN);
+            page.draw(&Rectangle::new(corners, rgb(outline(*fill)))).expect(DRAWN);
         }
         Symbol::Section => {
-            put(page, &PathElement::new(vec![(x, y), (right, y)], BLACK.stroke_width(3)));
+            page.draw(&PathElement::new(vec![(x, y), (right, y)], BLACK.stroke_width(3)))
+                .expect(DRAWN);
         }
         Symbol::Nothing => {}
     }
@@ -130,7 +133,7 @@ fn chart(
 ) -> Vec<String> {
     // The axis is not partial, but what plotters makes of one with key points has no labels.
     let axis = |scale: &Scale| {
-        let ticks = scale.ticks.iter().map(|tick| scale.place(*tick));
+        let ticks = scale.ticks.iter().map(|(tick, _)| scale.place(*tick));
         scale.places().with_key_points(ticks.collect()).partial_axis(scale.places())
     };
     let edge = BESIDE[1];
@@ -187,14 +190,6 @@ fn chart(
     above
 }
 
-fn put<'a, E>(page: &Page<'a>, element: &E)
-where
-    E: Drawable<SVGBackend<'a>>,
-    for<'b> &'b E: PointCollection<'b, (i32, i32)>,
-{
-    page.draw(element).expect(DRAWN);
-}
-
 fn rgb([r, g, b]: [u8; 3]) -> RGBColor {
     RGBColor(r, g, b)
 }
@@ -245,14 +240,14 @@ fn marker(page: &Page, at: (i32, i32), s: &Series) {
     }
     if corners.is_empty() {
         let shape = if is_filled { ink.filled() } else { line(s.style) };
-        return put(page, &Circle::new(at, if is_filled { 14 } else { 12 }, shape));
+        return page.draw(&Circle::new(at, if is_filled { 14 } else { 12 }, shape)).expect(DRAWN);
     }
     if is_filled {
-        put(page, &Polygon::new(corners.clone(), ink.filled()));
+        page.draw(&Polygon::new(corners.clone(), ink.filled())).expect(DRAWN);
     }
     // Twice the first edge, so that the corner where the line ends is like the others.
     corners.extend_from_within(..2);
-    put(page, &PathElement::new(corners, line(s.style)));
+    page.draw(&PathElement::new(corners, line(s.style))).expect(DRAWN);
 }
 
 /// A bar, filled with its colour or with a tint of it: bars with odd styles are lighter, so that neighbours differ in grey too.

@@ -39,16 +39,9 @@ pub struct Entry {
 
 /// Ranks that the legend names one by one.
 const RANKS_NAMED: usize = 16;
-/// Cividis from its light end on: it looks alike with and without deficiencies of colour vision, and larger values are darker in grey
-/// too. Its dark end, on which lines are not visible, is not used.
-const CIVIDIS: [[u8; 3]; 6] = [
-    [255, 234, 70],
-    [211, 193, 100],
-    [166, 157, 117],
-    [124, 123, 120],
-    [87, 92, 109],
-    [45, 68, 108],
-];
+/// Part of cividis, from its light end on, that levels have: on its dark end, lines are not visible. It looks alike with and without
+/// deficiencies of colour vision, and larger values are darker in grey too.
+const CIVIDIS: f64 = 0.8;
 /// Part of white in the lightest shade, which covers most of a picture.
 const LIGHTEST: f64 = 0.5;
 /// Tints of a colour, as [`tint`] takes them; ranks have as many colours as there are tints of all colours. The second is dark:
@@ -93,13 +86,8 @@ impl Colour {
 
 /// The colour of a level, 0 for the coarsest and 1 for the finest.
 fn of_level(position: f64) -> [u8; 3] {
-    let place = position * (CIVIDIS.len() - 1) as f64;
-    let lower = (place as usize).min(CIVIDIS.len() - 2);
-    let mixed = std::array::from_fn(|i| {
-        let (a, b) = (f64::from(CIVIDIS[lower][i]), f64::from(CIVIDIS[lower + 1][i]));
-        (a + (b - a) * (place - lower as f64)).round() as u8
-    });
-    tint(mixed, LIGHTEST * (1.0 - position))
+    let shade = colorous::CIVIDIS.eval_continuous(1.0 - CIVIDIS * position);
+    tint([shade.r, shade.g, shade.b], LIGHTEST * (1.0 - position))
 }
 
 /// The colour of a rank. Consecutive ranks, which are often neighbours, differ in hue.

@@ -43,19 +43,6 @@ pub struct Request<'a> {
     pub zoom: f64,
 }
 
-impl Request<'_> {
-    /// Returns an error if the mesh does not have what colours show.
-    fn check(&self, mesh: &Mesh) -> Result<(), Failure> {
-        match self.colour {
-            Colour::Side if mesh.manifest.sides == Sides::Unknown => {
-                Err(Failure::input("the sides of this mesh are unknown: choose another colour"))
-            }
-            Colour::Rank => mesh.require_ranks(),
-            _ => Ok(()),
-        }
-    }
-}
-
 /// The data of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -136,12 +123,14 @@ impl Picture {
     /// # Errors
     /// If the mesh cannot be read, or the picture would be empty.
     pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, Failure> {
-        Self::with_squares(mesh, request, SQUARES_MAX)
-    }
-
-    fn with_squares(mesh: &Mesh, request: &Request, squares_max: usize) -> Result<Self, Failure> {
-        let root = mesh.manifest.root;
-        request.check(mesh)?;
+        let (root, colour) = (mesh.manifest.root, request.colour);
+        if colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
+            let why = "the sides of this mesh are unknown: choose another colour";
+            return Err(Failure::input(why));
+        }
+        if colour == Colour::Rank {
+            mesh.require_ranks()?;
+        }
         let slice = request.selection.slice.unwrap_or_else(|| middle(&root, request.body));
         let axes = plane_axes(slice.axis);
         let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
@@ -151,14 +140,13 @@ impl Picture {
             return Err(Failure::input(why));
         }
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
-        let colour = request.colour;
         // The window may end within the root, but the plane need not be in the box.
         (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
         let selection =
             Selection { slice: Some(slice), clip: Some(clip), ..request.selection.clone() };
         let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));
         let levels = squares::deepest(root.edge * scales[0].min(scales[1]));
-        let squares = Squares::collect(mesh, &selection, colour, levels, squares_max)?;
+        let squares = Squares::collect(mesh, &selection, colour, levels, SQUARES_MAX)?;
         if squares.squares.is_empty() {
             let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
             return Err(Failure::input(why));
@@ -212,11 +200,8 @@ impl Picture {
         let caption = format!("{plane}; cells in the plane: {leaves}{merged}");
         let section = self.section.clone();
         let map = Some(Map { title, key, fills, section, caption });
-        let axes = [axis(0), axis(1)];
-        svg::svg(&Figure {
-            map,
-            ..Figure::new(String::new(), self.title(), String::new(), axes, Vec::new())
-        })
+        let [x, y] = [axis(0), axis(1)];
+        svg::svg(&Figure { title: self.title(), x, y, map, ..Figure::default() })
     }
 
     /// The visible parts of the squares of one value, with or without outlines.

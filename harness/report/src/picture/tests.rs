@@ -116,7 +116,7 @@ proptest! {
         prop_assert_eq!(squares.iter().map(|s| area(s.edge())).sum::<f64>(), expected);
         prop_assert_eq!(picture.squares.leaves, cut.len() as u64);
         // As many as a small page holds; each leaf is in one of them.
-        let merged = Picture::with_squares(&mesh, &shown, 20).unwrap().squares;
+        let merged = Squares::collect(&mesh, &shown.selection, Colour::Level, [10, 8], 20).unwrap();
         prop_assert!(merged.squares.len() <= 20);
         prop_assert_eq!(merged.squares.iter().map(|s| s.leaves).sum::<u64>(), cut.len() as u64);
         prop_assert_eq!(merged.leaves, cut.len() as u64);
