@@ -23,7 +23,7 @@ pub fn markdown(rows: &[Judged], machine: &str) -> String {
 }
 
 fn count(rows: &[Judged]) -> String {
-    let number = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let number = |verdict| rows.iter().filter(|r| r.verdict() == verdict).count();
     format!(
         "{} met, {} missed, {} failed, {} left out, {} for comparison",
         number(Verdict::Met),
@@ -48,11 +48,9 @@ mod tests {
         )
         .unwrap();
         let row = &targets.row[0];
-        let missed = Judged {
-            measured: Some((99.5e6, "measured")),
-            ..unjudged(row, Verdict::Missed, String::new())
-        };
-        let failed = unjudged(row, Verdict::Failed, "run a failed: <no memory>".into());
+        let missed =
+            Judged { measured: Some((99.5e6, "measured")), ..unjudged(row, false, String::new()) };
+        let failed = unjudged(row, true, "run a failed: <no memory>".into());
         let rows = [missed, failed];
         let text = text(&rows);
         for part in [

@@ -71,7 +71,7 @@ impl Efficiency {
 }
 
 /// Efficiencies up to this are 1.
-const ABOVE_ONE: f64 = 1.005;
+pub(crate) const ABOVE_ONE: f64 = 1.005;
 /// Factors up to this are shown as 1.
 const SHOWN_AS_ONE: f64 = 1.0005;
 /// Error of a time that is stored to the microsecond.

@@ -62,12 +62,13 @@ impl Subject {
         baseline: Option<&Self>,
     ) -> Result<Self, Failure> {
         let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
-        if let Some(named) = options.candidate.as_deref().or(is_built.then_some(WORKING_TREE)) {
-            return Self::find(named, options, engine);
+        let own = engine.program().to_string_lossy();
+        let default = if is_built { WORKING_TREE } else { &own };
+        let named = options.candidate.as_deref().unwrap_or(default);
+        if named == own {
+            engine.require()?;
         }
-        let named = engine.program().display().to_string();
-        engine.require()?;
-        Ok(Self::new(engine.clone(), named, None))
+        Self::find(named, options, engine)
     }
 
     /// The program of this name: a file, or else a revision.
