@@ -55,15 +55,16 @@ impl Runner<'_> {
             sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
-        let completed = engine.run(case, &layout(setup), &options);
-        let kept = match checked && completed.is_ok() {
-            true => keeps_promises(&engine, case, &mesh),
-            false => Ok(()),
-        };
+        let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);
+        let completed = completed.and_then(|completed| {
+            if checked {
+                keeps_promises(&engine, case, &mesh)?;
+            }
+            Ok(completed)
+        });
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
-        kept?;
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
             (

@@ -64,7 +64,13 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     let judged = measured(study, row, lines).unwrap_or_else(|why| {
-        let failed = row.runs().find_map(|name| failure(study, name, lines));
+        let failure = |name: &String, line: &Line| match &line.entry {
+            Entry::Failure(f) if study.is_run(name, &f.setup) => {
+                Some(format!("run {name} failed: {}", f.why))
+            }
+            _ => None,
+        };
+        let failed = row.runs().find_map(|name| lines.iter().find_map(|line| failure(name, line)));
         unjudged(row, failed.is_some(), failed.unwrap_or(why))
     });
     check_invariants(&judged);
@@ -105,16 +111,6 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
-}
-
-/// Returns the reason for which a run failed, if it did.
-fn failure(study: &Study, name: &str, lines: &[Line]) -> Option<String> {
-    lines.iter().find_map(|line| match &line.entry {
-        Entry::Failure(f) if study.is_run(name, &f.setup) => {
-            Some(format!("run {name} failed: {}", f.why))
-        }
-        _ => None,
-    })
 }
 
 impl Judged {
