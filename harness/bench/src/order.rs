@@ -41,10 +41,10 @@ impl Origins {
     pub fn suffix(&mut self, name: &str, origin: &str) -> String {
         let seen = self.0.entry(name.to_owned()).or_default();
         let known = seen.iter().position(|other| other == origin);
-        let at = known.unwrap_or(seen.len());
-        if known.is_none() {
+        let at = known.unwrap_or_else(|| {
             seen.push(origin.to_owned());
-        }
+            seen.len() - 1
+        });
         if at == 0 { String::new() } else { format!(" [{}]", at + 1) }
     }
 

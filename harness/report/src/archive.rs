@@ -1,8 +1,7 @@
 //! The metadata of an archive that can be replayed: an RO-Crate 1.1 (Research Object Crate).
 
 use crate::benchmark::machines;
-use bench::experiments::entry::{Entry, Line};
-use bench::experiments::record::now_utc;
+use bench::experiments::entry::{Entry, Line, now_utc};
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;

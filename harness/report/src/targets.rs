@@ -22,7 +22,7 @@ pub fn markdown(rows: &[Judged], machine: &str) -> String {
 }
 
 fn count(rows: &[Judged]) -> String {
-    let number = |verdict: Verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let number = |verdict: Verdict| rows.iter().filter(|r| r.verdict() == verdict).count();
     let [met, missed, failed, left_out, others] =
         [Met, Missed, Failed, LeftOut, ForComparison].map(number);
     format!(
@@ -44,11 +44,9 @@ mod tests {
         )
         .unwrap();
         let row = &targets.row[0];
-        let missed = Judged {
-            measured: Some((99.5e6, "measured")),
-            ..unjudged(row, Verdict::Missed, String::new())
-        };
-        let failed = unjudged(row, Verdict::Failed, "run a failed: <no memory>".into());
+        let missed =
+            Judged { measured: Some((99.5e6, "measured")), ..unjudged(row, false, String::new()) };
+        let failed = unjudged(row, true, "run a failed: <no memory>".into());
         let rows = [missed, failed];
         let text = text(&rows);
         for part in [

@@ -213,12 +213,11 @@ mod tests {
     use super::*;
     use bench::testing::history as sample;
     use bench::track::analyse;
-    use statistics::change_points::Rules;
 
     #[test]
     fn the_page_is_self_contained_and_has_every_change_point() {
         let records = sample();
-        let page = page(&records, &analyse(&records, &Rules::default()), None);
+        let page = page(&records, &analyse(&records, 0.01), None);
         assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"));
         assert!(!page.contains("<script"));
         assert_eq!(page.matches("<figure").count(), 2);
@@ -229,7 +228,7 @@ mod tests {
     #[test]
     fn commits_are_linked_if_there_is_an_address() {
         let records = sample();
-        let all = analyse(&records, &Rules::default());
+        let all = analyse(&records, 0.01);
         let page = page(&records, &all, Some("https://host.org/a/b/commit/{commit}"));
         let address = format!("href=\"https://host.org/a/b/commit/{:040x}\"", 20);
         assert_eq!(page.matches(&address).count(), 1, "{page}");
@@ -239,12 +238,12 @@ mod tests {
     fn histories_of_zero_and_one_commits_have_a_page() {
         assert!(page(&[], &[], None).contains("Commits: 0<"));
         let one = &sample()[..1];
-        assert!(page(one, &analyse(one, &Rules::default()), None).contains("Commits: 1 from"));
+        assert!(page(one, &analyse(one, 0.01), None).contains("Commits: 1 from"));
     }
 
     #[test]
     fn a_recent_increase_of_a_cost_is_a_failed_test() {
-        let all = analyse(&sample(), &Rules::default());
+        let all = analyse(&sample(), 0.01);
         let failures = |recent| {
             quick_junit::Report::deserialize_from_str(&junit(&all, recent)).unwrap().failures
         };
@@ -255,7 +254,7 @@ mod tests {
     fn an_outlier_does_not_squash_the_plot() {
         let mut records = bench::testing::history();
         records[5].metrics.insert("uav/words".into(), 1e9);
-        let all = analyse(&records, &Rules::default());
+        let all = analyse(&records, 0.01);
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
         let figure = of_metric(&records, words);
         let (low, high) = figure.y.range.unwrap();
@@ -269,7 +268,7 @@ mod tests {
     #[test]
     fn a_change_point_lies_between_its_commits() {
         let records = bench::testing::history();
-        let all = analyse(&records, &Rules::default());
+        let all = analyse(&records, 0.01);
         let words = all.iter().find(|s| s.name == "uav/words").unwrap();
         let Figure { series, y, .. } = of_metric(&records, words);
         assert_eq!(series[1..], [Plotted::vertical("worse", 1, 19.5, y.range.unwrap())]);

@@ -15,21 +15,6 @@
 use super::median::median_of;
 use super::segments::{Fit, Mean, Series};
 
-/// Criteria for a change.
-#[derive(Clone, Copy, Debug)]
-pub struct Rules {
-    /// Significance level: the greatest probability of a step in a series without one.
-    pub alpha: f64,
-    /// Smaller changes are ignored; a fraction of the value.
-    pub effect_min: f64,
-}
-
-impl Default for Rules {
-    fn default() -> Self {
-        Self { alpha: 0.01, effect_min: 0.001 }
-    }
-}
-
 /// A step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
@@ -42,6 +27,9 @@ pub struct Change {
     /// The p-value.
     pub p: f64,
 }
+
+/// Smaller steps are ignored; a fraction of the value.
+const EFFECT_MIN: f64 = 0.001;
 
 /// Minimum number of values: two on either side of a step.
 const VALUES_MIN: usize = 4;
@@ -73,8 +61,8 @@ const STEP_MIN: f64 = 1.5;
 /// No p-value is smaller: noise is normal only near its middle.
 const P_MIN: f64 = 1e-9;
 
-/// Returns the steps of a series in ascending order.
-pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
+/// Returns the steps of a series in ascending order. `alpha` is the greatest probability of a step in a series without one.
+pub fn change_points(values: &[f64], alpha: f64) -> Vec<Change> {
     let size = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
     if values.len() < VALUES_MIN || size == 0.0 || !size.is_finite() {
         return Vec::new();
@@ -82,11 +70,11 @@ pub fn change_points(values: &[f64], rules: &Rules) -> Vec<Change> {
     let middle = median_of(values);
     let scaled: Vec<f64> = values.iter().map(|value| (value - middle) / size).collect();
     let clean = without_outliers(&scaled);
-    let least = rules.effect_min * middle.abs() / size;
+    let least = EFFECT_MIN * middle.abs() / size;
     // The variance below which noise is not distinguished from none.
     let floor = (least / 4.0).max(1e-9).powi(2);
     let mut model = Model::select(&clean, floor);
-    let p_values = model.steps(least, rules.alpha);
+    let p_values = model.steps(least, alpha);
     let edges = model.edges();
     let step = |(w, p): (&[usize], f64)| {
         let at = w[1];

@@ -6,6 +6,7 @@
 //! from random permutations. The noise floor is the largest effect that noise alone produces at that level, estimated by
 //! random sign changes of the differences between the two baseline runs.
 
+use super::median::sorted;
 use super::random::Random;
 
 /// Minimum number of rounds for significance level `alpha`. With n rounds, a quarter of which the trimmed mean ignores at
@@ -90,12 +91,6 @@ pub fn compare(rounds: &[Round], alpha: f64, seed: u64) -> Comparison {
         low: relative(quantile(&bootstrap_effects, 0.005)),
         high: relative(quantile(&bootstrap_effects, 0.995)),
     }
-}
-
-fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut sorted: Vec<f64> = values.into_iter().collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted
 }
 
 /// Returns a quantile of values in ascending order.

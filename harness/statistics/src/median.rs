@@ -32,8 +32,7 @@ impl Median {
 
 /// Returns the median with its interval, or `None` for no values.
 pub fn median(values: &[f64]) -> Option<Median> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    let sorted = sorted(values.iter().copied());
     let n = sorted.len();
     if n == 0 {
         return None;
@@ -47,9 +46,14 @@ pub fn median(values: &[f64]) -> Option<Median> {
 
 /// Returns the median of a non-empty slice.
 pub fn median_of(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
+    middle(&sorted(values.iter().copied()))
+}
+
+/// Returns values in ascending order.
+pub(super) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_unstable_by(f64::total_cmp);
-    middle(&sorted)
+    sorted
 }
 
 /// Returns the median of values in ascending order.

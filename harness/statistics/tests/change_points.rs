@@ -1,6 +1,6 @@
 //! False alarms and power of the change point detector on simulated series. All seeds are fixed.
 
-use statistics::change_points::{Change, Rules, change_points};
+use statistics::change_points::{Change, change_points};
 use statistics::random::Random;
 
 /// Series per kind of noise.
@@ -44,7 +44,7 @@ fn autoregressive(count: usize, seed: u64, phi: f64) -> Vec<f64> {
 }
 
 fn found(values: &[f64]) -> Vec<Change> {
-    change_points(values, &Rules::default())
+    change_points(values, 0.01)
 }
 
 fn places(values: &[f64]) -> Vec<usize> {

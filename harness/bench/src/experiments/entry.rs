@@ -1,13 +1,18 @@
-//! A line of a benchmark record: schema `octree-bench/1`, described in reports/README.md.
+//! The record: a file of [JSON lines](crate::jsonl) to which every result is appended immediately. reports/README.md describes
+//! its schema, `octree-bench/1`.
 //!
 //! Invariants: a line depends on no other line but the first of its session, which describes the machine; seconds, bytes
 //! and counts are plain numbers in the units of their names; values over the ranks are stored as sum and maximum, and
 //! rank by rank only for useful times on up to [`BY_RANK_MAX`] ranks, so that a record stays small.
 
+use crate::jsonl;
+use jiff::Timestamp;
 use run::engine::report::SECONDS_MAX;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io;
+use std::path::Path;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "octree-bench/1";
@@ -29,6 +34,12 @@ pub struct Line {
 }
 
 impl Line {
+    /// A line of a session, as of now.
+    pub fn new(session: &str, entry: Entry) -> Self {
+        let (schema, session) = (SCHEMA.to_owned(), session.to_owned());
+        Self { schema, session, time_utc: now_utc(), entry }
+    }
+
     /// What cannot be true of any run, in one sentence.
     pub fn fault(&self) -> Option<String> {
         let times: Vec<f64> = match &self.entry {
@@ -329,6 +340,33 @@ pub struct NoResult {
     pub why: String,
 }
 
+/// The lines of a record in chronological order, and the numbers (from 1) of invalid ones, with the reason.
+pub type Content = (Vec<Line>, Vec<(usize, String)>);
+
+/// Reads a record.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn read(path: &Path) -> io::Result<Content> {
+    let (mut lines, mut broken) = Content::default();
+    for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
+        match line {
+            Ok(Line { entry: Entry::Former, .. }) => {}
+            Ok(line) => match line.fault() {
+                None => lines.push(line),
+                Some(why) => broken.push((number, why)),
+            },
+            Err(why) => broken.push((number, why)),
+        }
+    }
+    Ok((lines, broken))
+}
+
+/// Returns the current time, as `2026-01-31T12:00:00Z`.
+pub fn now_utc() -> String {
+    Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -355,5 +393,46 @@ mod tests {
         let text = serde_json::to_string(&line).unwrap();
         assert!(text.contains(r#""kind":"network""#), "{text}");
         assert_eq!(serde_json::from_str::<Line>(&text).unwrap(), line);
+    }
+
+    fn network(latency_s: f64) -> Entry {
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e9, measured: false })
+    }
+
+    fn append(path: &Path, latency_s: f64) {
+        jsonl::append(path, &Line::new("s", network(latency_s))).unwrap();
+    }
+
+    #[test]
+    fn an_interrupted_line_does_not_damage_others() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("record.jsonl");
+        append(&path, 1.0);
+        let mut text = std::fs::read_to_string(&path).unwrap();
+        text.push_str(&text.clone()[..20]);
+        std::fs::write(&path, &text).unwrap();
+        let (lines, broken) = read(&path).unwrap();
+        assert_eq!((lines.len(), broken.len(), broken[0].0), (1, 1, 2));
+        append(&path, 2.0);
+        let (lines, broken) = read(&path).unwrap();
+        assert_eq!((lines.len(), broken.len()), (2, 0));
+    }
+
+    #[test]
+    fn a_line_of_another_schema_is_reported() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("record.jsonl");
+        append(&path, 1.0);
+        let text = std::fs::read_to_string(&path).unwrap().replace("bench/1", "bench/9");
+        std::fs::write(&path, text).unwrap();
+        assert!(read(&path).unwrap().1[0].1.contains("octree-bench/9"));
+    }
+
+    #[test]
+    fn times_are_utc_without_fractions_of_a_second() {
+        let now = now_utc();
+        let read: Timestamp = now.parse().unwrap();
+        assert_eq!((read.to_string(), read.subsec_nanosecond()), (now, 0));
+        assert!(read.duration_until(Timestamp::now()).as_secs() < 60);
     }
 }

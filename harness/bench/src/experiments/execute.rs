@@ -1,6 +1,7 @@
-//! Measured runs: one run of a setup, as a line of the record.
+//! Measured runs: one run of a setup, as a line of the record, and whether it is worth starting: a slow program is not started on a mesh that
+//! it would not finish.
 
-use super::entry::{Comm, Phase, Run, Setup, Spread};
+use super::entry::{Comm, Line, Phase, Run, Setup, Spread};
 use super::machine;
 use crate::refuse;
 use check::audit::audit_against;
@@ -10,7 +11,7 @@ use run::engine::description::is_own;
 use run::engine::launcher::Launcher;
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::programs::Programs;
-use run::engine::report::{PhaseReport, RunReport};
+use run::engine::report::PhaseReport;
 use run::engine::runner::{Completed, Engine};
 use std::ffi::OsStr;
 use std::fs;
@@ -54,15 +55,16 @@ impl Runner<'_> {
             sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
-        let completed = engine.run(case, &layout(setup), &options);
-        let kept = match checked && completed.is_ok() {
-            true => keeps_promises(&engine, case, &mesh),
-            false => Ok(()),
-        };
+        let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);
+        let completed = completed.and_then(|completed| {
+            if checked {
+                keeps_promises(&engine, case, &mesh)?;
+            }
+            Ok(completed)
+        });
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
-        kept?;
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
             (
@@ -75,17 +77,57 @@ impl Runner<'_> {
                  ranks or more cells",
             ),
         ])?;
+        let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
+        let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         Ok(Run {
             program: machine::digest_of_file(engine.program()),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
             command: shown(&command),
+            facets: report.facets,
+            geometry: report.geometry.map(|geometry| geometry.digest),
+            cells: report.cells,
+            time_wall_s,
             time_launch_s: time_process_s,
             time_cpu_s: time_process_cpu_s,
-            ..measurements(setup.clone(), report, time_process_s)
+            peak_rss_bytes: spread(&report.peak_rss_bytes),
+            useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
+            phases: report.phases.iter().map(phase).collect(),
+            counters: counters.collect(),
+            digest: report.digest.unwrap_or_default(),
+            setup: setup.clone(),
         })
     }
+}
+
+/// Returns the reason for which a run would exceed `limit` or the memory of the machine, extrapolated from the finest coarser
+/// mesh of the same program; `None` if it would not, or if the lines have no such mesh.
+pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<String> {
+    let is_coarser = |run: &&Run| {
+        let [wanted, found] =
+            [setup, &run.setup].map(|s| (&s.engine, &s.case, s.layer_cells_min, s.ranks, s.comm));
+        wanted == found && run.setup.spacing_min > setup.spacing_min
+    };
+    let coarser = lines.iter().filter_map(Line::run).filter(is_coarser);
+    let spacing = |run: &&Run| run.setup.spacing_min;
+    let finest = coarser.min_by(|a, b| spacing(a).total_cmp(&spacing(b)))?;
+    // Cells, and with them time and memory, grow with the inverse square of the spacing.
+    let growth = (finest.setup.spacing_min / setup.spacing_min).powi(2);
+    let (time_s, bytes) = (finest.time_launch_s * growth, finest.peak_rss_bytes.sum * growth);
+    let memory = lines.iter().find_map(Line::session)?.machine.memory_bytes as f64;
+    let [needed, available] = [bytes, memory].map(|b| b / 1e9);
+    let would = match () {
+        () if time_s > limit.as_secs_f64() => {
+            format!("take {time_s:.0} s, more than --timeout {}", limit.as_secs())
+        }
+        () if bytes > memory => {
+            format!("need {needed:.0} GB of memory, and the machine has {available:.0} GB")
+        }
+        () => return None,
+    };
+    let (program, cells) = (&setup.engine, finest.cells as f64);
+    Some(format!("{program} would {would}, extrapolated from {cells:.1e} cells"))
 }
 
 /// Audits a mesh against the promises of the engine that made it.
@@ -110,24 +152,6 @@ fn layout(setup: &Setup) -> Layout {
     let (partitioner, weights) = (choice(&setup.partitioner), choice(&setup.weights));
     let level_base = setup.level_base.map(|level| level.to_string());
     Layout { partitioner, weights, level_base, ..Layout::on(ranks) }
-}
-
-/// The measurements in a run report.
-fn measurements(setup: Setup, report: RunReport, time_process_s: f64) -> Run {
-    let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
-    Run {
-        facets: report.facets,
-        geometry: report.geometry.as_ref().map(|geometry| geometry.digest.clone()),
-        cells: report.cells,
-        time_wall_s,
-        peak_rss_bytes: spread(&report.peak_rss_bytes),
-        useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
-        phases: report.phases.iter().map(phase).collect(),
-        counters: report.counters.iter().map(|(name, of)| (name.clone(), spread(of))).collect(),
-        digest: report.digest.unwrap_or_default(),
-        setup,
-        ..Run::default()
-    }
 }
 
 /// CPU time outside calls to other ranks, per rank; the wall time if there are no phases, or those of rank 0 alone.
@@ -170,38 +194,11 @@ fn shown(command: &Command) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiments::entry::{Entry, Machine, Session};
+    use crate::testing::{line, run};
     use contract::octant::Octant;
     use contract::word::{self, Leaf, Side};
     use run::engine::programs::Given;
-
-    const REPORT: &str = r#"{"schema": "octree-mesher-run/1", "facets": 12, "cells": 80, "digest": "00", "ranks": 2,
-        "time_wall_s": 9.0, "peak_rss_bytes": [70, 70], "counters": {"leaves": [30, 50]},
-        "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0], "time_comm_wall_s": [1.0, 1.0],
-          "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
-
-    fn setup(comm: Comm, ranks: usize) -> Setup {
-        Setup { ranks, comm, ..crate::testing::run(comm, 1, &[("a", &[0.0])]).setup }
-    }
-
-    #[test]
-    fn useful_time_is_cpu_time_outside_calls() {
-        let report: RunReport = serde_json::from_str(REPORT).unwrap();
-        let run = measurements(setup(Comm::Mpi, 2), report.clone(), 1.0);
-        assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
-        assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
-        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
-        assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
-        assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
-        // A simulated rank reports its part of the one process.
-        assert_eq!(measurements(setup(Comm::Sim, 2), report, 1.0).peak_rss_bytes.sum, 140.0);
-    }
-
-    #[test]
-    fn the_useful_time_of_a_program_without_phases_is_its_wall_time() {
-        let text = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
-        let run = measurements(setup(Comm::Solo, 1), serde_json::from_str(text).unwrap(), 1.0);
-        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
-    }
 
     #[test]
     fn a_shown_command_contains_no_directory_of_the_machine() {
@@ -269,6 +266,29 @@ mod tests {
     const REPORTS: &str = "json = ['{json}']\n";
 
     #[test]
+    fn useful_time_is_cpu_time_outside_calls() {
+        let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 9.0, "peak_rss_bytes": [70, 70],
+            "counters": {"leaves": [30, 50]}, "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0],
+            "time_comm_wall_s": [1.0, 1.0], "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
+        let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
+        let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
+        assert_eq!((run.phases[0].useful_s.max, run.phases[0].useful_s.at), (1.5, 0));
+        assert_eq!(run.useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!(run.phases[0].useful_s.by_rank, [1.5, 0.0]);
+        assert_eq!((run.useful_s.sum, run.useful_s.max), (1.5, 1.5));
+        assert_eq!((run.phases[0].wall_s.max, run.phases[0].message_bytes.sum), (4.5, 24.0));
+        // A simulated rank reports its part of the one process.
+        assert_eq!((run.peak_rss_bytes.sum, run.counters["leaves"].max), (140.0, 50.0));
+    }
+
+    #[test]
+    fn the_useful_time_of_a_program_without_phases_is_its_wall_time() {
+        let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
+        let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
+        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
+    }
+
+    #[test]
     fn time_and_memory_are_measured_from_outside_if_they_are_not_reported() {
         let script = "sleep 0.05; echo '{\"cells\": 8, \"digest\": \"ab\"}' > $2";
         let run = scripted(script, REPORTS, Comm::Solo).unwrap();
@@ -308,5 +328,26 @@ mod tests {
                 .unwrap_err()
                 .contains("code 3: no")
         );
+    }
+
+    #[test]
+    fn a_run_is_left_out_if_a_coarser_one_was_too_long_or_too_large() {
+        let of = |bytes: f64| {
+            let mut coarse = run(Comm::Solo, 1000, &[("a", &[2.0])]);
+            (coarse.time_launch_s, coarse.peak_rss_bytes.sum) = (2.0, bytes);
+            let machine = Machine { memory_bytes: 8 << 30, ..Machine::default() };
+            let session = Session { machine, ..Session::default() };
+            [line(Entry::Session(Box::new(session))), line(Entry::Run(Box::new(coarse)))]
+        };
+        let finer = |lines: &[Line], spacing_min: f64, limit: u64| {
+            let setup = run(Comm::Solo, 1, &[("a", &[0.0])]).setup;
+            excess(lines, &Setup { spacing_min, ..setup }, Duration::from_secs(limit))
+        };
+        let (small, large) = (of(1e6), of(1e13));
+        assert_eq!(finer(&small, 0.01, 300), None);
+        assert!(finer(&small, 0.01, 100).unwrap().contains("take 200 s, more than --timeout 100"));
+        assert!(finer(&large, 0.05, 300).unwrap().contains("need 40000 GB of memory"));
+        // The same spacing is no coarser mesh.
+        assert_eq!(finer(&large, 0.1, 1), None);
     }
 }

@@ -45,10 +45,7 @@ impl Group {
         let mut time_s = median(&times)?;
         let off = |run: &&Run| (pop::time_s(run, &network) - time_s.value).abs();
         let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
-        let by_rank = reports_ranks(&runs);
-        if by_rank {
-            quieten(&mut typical, &runs);
-        }
+        let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
             typical.time_wall_s = time_s.value;
         } else if by_rank {
@@ -114,20 +111,17 @@ impl Group {
     }
 }
 
-/// Whether there are several runs, and each has the same phases with the times of all ranks.
-fn reports_ranks(runs: &[Run]) -> bool {
-    let phases = |r: &Run| {
-        let phase = |p: &super::entry::Phase| (p.name.clone(), p.useful_s.by_rank.len());
-        r.phases.iter().map(phase).collect::<Vec<_>>()
+/// Replaces the useful time of every rank in every phase by its median over the runs, if there are several and each has the same phases
+/// with the times of all ranks; returns whether they have.
+fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
+    let phases = |run: &Run| -> Vec<(String, usize)> {
+        run.phases.iter().map(|p| (p.name.clone(), p.useful_s.by_rank.len())).collect()
     };
-    let first = phases(&runs[0]);
-    let is_complete = !first.is_empty() && first.iter().all(|p| p.1 == runs[0].setup.ranks);
-    runs.len() > 1 && is_complete && runs.iter().all(|run| phases(run) == first)
-}
-
-/// Replaces the useful time of every rank in every phase by its median over the runs.
-fn quieten(typical: &mut Run, runs: &[Run]) {
-    let mut total = vec![0.0; typical.setup.ranks];
+    let (first, mut total) = (phases(typical), vec![0.0; typical.setup.ranks]);
+    let is_complete = !first.is_empty() && first.iter().all(|phase| phase.1 == total.len());
+    if runs.len() < 2 || !is_complete || runs.iter().any(|run| phases(run) != first) {
+        return false;
+    }
     for (p, phase) in typical.phases.iter_mut().enumerate() {
         let of_rank = |rank: usize| {
             let of_run = |run: &Run| run.phases[p].useful_s.by_rank[rank];
@@ -138,6 +132,7 @@ fn quieten(typical: &mut Run, runs: &[Run]) {
         total.iter_mut().zip(times).for_each(|(total, time)| *total += time);
     }
     typical.useful_s = Spread::of(&total);
+    true
 }
 
 /// The runs of a record, grouped.

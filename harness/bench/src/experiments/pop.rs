@@ -71,7 +71,7 @@ impl Efficiency {
 }
 
 /// Efficiencies up to this are 1.
-const ABOVE_ONE: f64 = 1.005;
+pub(crate) const ABOVE_ONE: f64 = 1.005;
 /// Factors up to this are shown as 1.
 const SHOWN_AS_ONE: f64 = 1.0005;
 /// Error of a time that is stored to the microsecond.
@@ -92,10 +92,7 @@ pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
 
 /// Returns the critical path on an ideal network, in seconds. A program that reports no phases has a single one.
 fn path_s(run: &Run) -> f64 {
-    if run.phases.is_empty() {
-        return run.useful_s.max;
-    }
-    run.phases.iter().map(|p| p.useful_s.max).sum()
+    run.phases.iter().map(|p| p.useful_s.max).reduce(|a, b| a + b).unwrap_or(run.useful_s.max)
 }
 
 /// Returns the time of a run in seconds: measured, or projected for simulated ranks.

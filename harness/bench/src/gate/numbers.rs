@@ -47,8 +47,6 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
         if let Ok(new) = &new {
             measures.case(&case.name).add(new.clone());
         }
-        let has_numbers = |of: &CaseMeasures| !of.of_layer(name).is_empty();
-        let had = old.as_ref().is_none_or(|old| old.as_ref().is_ok_and(has_numbers));
         let (verdict, why) = match (old, new) {
             (Some(Ok(old)), Ok(new)) => {
                 let tolerance = &bench.rules.tolerance;
@@ -66,10 +64,10 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             (Some(Err(why)), Ok(_)) => {
                 (Verdict::Missing, format!("the baseline has no result: {why}"))
             }
-            (_, Err(why)) if had => {
-                (Verdict::Regression, format!("the candidate has no result: {why}"))
+            (Some(Err(_)), Err(why)) => {
+                (Verdict::Missing, format!("neither program has a result: {why}"))
             }
-            (_, Err(why)) => (Verdict::Missing, format!("neither program has a result: {why}")),
+            (_, Err(why)) => (Verdict::Regression, format!("the candidate has no result: {why}")),
         };
         layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, why));
     }

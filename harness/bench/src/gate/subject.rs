@@ -62,12 +62,13 @@ impl Subject {
         baseline: Option<&Self>,
     ) -> Result<Self, Failure> {
         let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
-        if let Some(named) = options.candidate.as_deref().or(is_built.then_some(WORKING_TREE)) {
-            return Self::find(named, options, engine);
+        let own = engine.program().to_string_lossy();
+        let default = if is_built { WORKING_TREE } else { &own };
+        let named = options.candidate.as_deref().unwrap_or(default);
+        if named == own {
+            engine.require()?;
         }
-        let named = engine.program().display().to_string();
-        engine.require()?;
-        Ok(Self::new(engine.clone(), named, None))
+        Self::find(named, options, engine)
     }
 
     /// The program of this name: a file, or else a revision.
@@ -86,7 +87,8 @@ impl Subject {
                 let why = "is neither a program that can be executed nor a revision";
                 return Err(Failure::input(format!("{named} {why}")));
             }
-            let program = fs::canonicalize(named)?;
+            // A link may lead to a program that behaves by its own name, as those of a virtual environment do.
+            let program = std::path::absolute(named)?;
             return Ok(Self::new(engine.with_program(program), named.to_owned(), None));
         }
         let build = description.build.as_ref().ok_or_else(|| {
@@ -132,7 +134,10 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         if is_built && program.is_file() {
             return Ok(program);
         }
-        unpack(revision, repository, tree, &place)?;
+        let mut archive = Command::new("sh");
+        archive.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
+        archive.arg(repository).arg(revision).arg(tree);
+        process::run(&mut archive, &Watch::new("git archive", LIMIT, &place))?;
         label = &revision[..12.min(revision.len())];
     }
     crate::announce(&format!("harness gate: building {label}"));
@@ -152,15 +157,6 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     }
     fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
-}
-
-/// Puts a revision's files into a directory.
-fn unpack(revision: &str, repository: &Path, tree: &Path, place: &Path) -> Result<(), Failure> {
-    let mut command = Command::new("sh");
-    command.args(["-c", "git -C \"$0\" archive --format=tar \"$1\" | tar -xf - -C \"$2\""]);
-    command.arg(repository).arg(revision).arg(tree);
-    process::run(&mut command, &Watch::new("git archive", LIMIT, place))?;
-    Ok(())
 }
 
 /// Returns the root directory of the repository that contains a directory; the directory itself without a repository.

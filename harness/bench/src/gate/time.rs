@@ -29,7 +29,6 @@ const CANDIDATE: usize = 2;
 /// A time that the gate compares, over all rounds of a case on some ranks.
 #[derive(Debug)]
 struct Quantity {
-    case: String,
     /// Its name in the report.
     metric: String,
     /// Logarithms of its times.
@@ -47,51 +46,41 @@ pub(super) fn layer(bench: &Bench, layer: &mut Layer) {
         return;
     }
     let rules = &bench.rules.time;
-    let mut measured: Vec<(&GateCase, Ranks, [Quantity; 2])> = Vec::new();
+    let mut measured: Vec<(&GateCase, Ranks, Times)> = Vec::new();
     for case in bench.cases_of(LayerName::Time) {
-        for ranks in case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. })) {
-            match rounds(bench, case, ranks, false) {
-                Ok(times) => measured.push((case, ranks, times)),
-                Err(why) => layer.findings.extend(failed(case, ranks, &why)),
-            }
-        }
+        let real = case.layouts().filter(|ranks| !matches!(ranks, Ranks::Simulated { .. }));
+        measured.extend(real.map(|ranks| (case, ranks, rounds(bench, case, ranks, false))));
     }
     // All quantities of all cases are tested together.
-    let all = || measured.iter().flat_map(|(.., times)| times);
-    let p_values = adjusted(&all().map(|quantity| quantity.found.p).collect::<Vec<f64>>());
-    let all = measured.iter_mut().flat_map(|(.., times)| times);
-    all.zip(p_values).for_each(|(quantity, p)| quantity.found.p = p);
+    let mut all: Vec<&mut Quantity> =
+        measured.iter_mut().flat_map(|of| &mut of.2).flatten().collect();
+    let p_values = adjusted(&all.iter().map(|quantity| quantity.found.p).collect::<Vec<f64>>());
+    all.iter_mut().zip(p_values).for_each(|(quantity, p)| quantity.found.p = p);
     for (case, ranks, times) in measured {
-        let is_change = |quantity: &Quantity| quantity.is_change(rules);
-        if !times.iter().any(is_change) {
-            layer.findings.extend(times.iter().map(|quantity| quantity.finding(rules)));
-            continue;
-        }
-        match rounds(bench, case, ranks, true) {
-            Ok(again) => {
-                layer.findings.extend(times.into_iter().zip(again).map(|(first, again)| {
-                    let last = if is_change(&first) { again.confirming(&first) } else { first };
-                    last.finding(rules)
-                }))
+        let confirmed = times.and_then(|times| {
+            if !times.iter().any(|quantity| quantity.is_change(rules)) {
+                return Ok(times);
             }
-            Err(why) => layer.findings.extend(failed(case, ranks, &why)),
+            let both = times.into_iter().zip(rounds(bench, case, ranks, true)?);
+            Ok(both.map(|(first, again)| first.confirmed_by(again, rules)).collect())
+        });
+        match confirmed {
+            Ok(times) => {
+                layer.findings.extend(times.iter().map(|of| of.finding(&case.name, rules)))
+            }
+            Err((_, why)) if why.is_interrupt() => {}
+            Err((verdict, why)) => {
+                let who = if verdict == Verdict::Missing { "baseline" } else { "candidate" };
+                let note = format!("the {who} has no result: {why}");
+                let metric = format!("{}time", prefix(ranks));
+                layer.findings.push(GateFinding::noted(&case.name, &metric, verdict, note));
+            }
         }
     }
 }
 
-/// Why a case has no times, and the verdict on that: the baseline fails, or the candidate alone.
-type NoTimes = (Verdict, Failure);
-
-/// The CPU times and the wall times of a case.
-type Times = Result<[Quantity; 2], NoTimes>;
-
-/// The finding about runs that failed; none if the user interrupted them.
-fn failed(case: &GateCase, ranks: Ranks, (verdict, why): &NoTimes) -> Option<GateFinding> {
-    let (name, metric) = (&case.name, format!("{}time", prefix(ranks)));
-    let who = if *verdict == Verdict::Missing { "baseline" } else { "candidate" };
-    let note = || format!("the {who} has no result: {why}");
-    (!why.is_interrupt()).then(|| GateFinding::noted(name, &metric, *verdict, note()))
-}
+/// The CPU times and the wall times of a case, or why it has none, with the verdict on that: the baseline fails, or the candidate alone.
+type Times = Result<Vec<Quantity>, (Verdict, Failure)>;
 
 /// Runs all rounds of a case: of the first measurement, or of the second.
 fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
@@ -127,11 +116,11 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
         cpu.push(times.map(|(cpu_s, _)| f64::max(cpu_s, 1e-6).ln()));
         wall.push(times.map(|(_, wall_s)| f64::max(wall_s, 1e-6).ln()));
     }
-    Ok([(CPU, cpu), (WALL, wall)].map(|(name, rounds): (&str, Vec<Round>)| {
-        let (case, metric) = (case.name.clone(), format!("{}{name}", prefix(ranks)));
+    let quantity = |(name, rounds): (&str, Vec<Round>)| {
         let found = compare(&rounds, rules.alpha.sqrt(), seed);
-        Quantity { case, metric, rounds, found, first: None }
-    }))
+        Quantity { metric: format!("{}{name}", prefix(ranks)), rounds, found, first: None }
+    };
+    Ok([(CPU, cpu), (WALL, wall)].map(quantity).into())
 }
 
 /// The size of an effect: as a ratio, 1/3 less time equals 1/2 more time.
@@ -147,17 +136,21 @@ impl Quantity {
         [baseline, baseline * (1.0 + self.found.effect)]
     }
 
-    /// Returns this measurement as the second one. Its p-value becomes that of both: two are at most x with probability x squared.
-    fn confirming(mut self, first: &Self) -> Self {
-        self.found.p = self.found.p.max(first.found.p).powi(2);
-        Self { first: Some(first.found.effect), ..self }
+    /// Returns the second measurement of a change, and else the first. Its p-value becomes that of both: two are at most x with
+    /// probability x squared.
+    fn confirmed_by(self, mut again: Self, rules: &TimeRules) -> Self {
+        if !self.is_change(rules) {
+            return self;
+        }
+        again.found.p = again.found.p.max(self.found.p).powi(2);
+        Self { first: Some(self.found.effect), ..again }
     }
 
     fn is_change(&self, rules: &TimeRules) -> bool {
         matches!(self.verdict(rules), Verdict::Regression | Verdict::Improvement)
     }
 
-    fn finding(&self, rules: &TimeRules) -> GateFinding {
+    fn finding(&self, case: &str, rules: &TimeRules) -> GateFinding {
         let Comparison { low, high, p, floor, visible, .. } = self.found;
         let visible = visible.max(rules.effect_min / 100.0);
         let [low, high, floor, visible] = [low, high, floor, visible].map(|ratio| ratio * 100.0);
@@ -174,7 +167,7 @@ impl Quantity {
                 "; a second measurement, which {answer} {first:+.1} % in the first"
             ));
         }
-        GateFinding::noted(&self.case, &self.metric, verdict, note).of_values(self.times())
+        GateFinding::noted(case, &self.metric, verdict, note).of_values(self.times())
     }
 
     /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), and of the same
@@ -213,9 +206,11 @@ mod tests {
             low: 0.06,
             high: 0.1,
         };
-        let quantity = |found: Comparison| {
-            let (case, metric) = ("c".to_owned(), CPU.to_owned());
-            Quantity { case, metric, rounds: Vec::new(), found, first: None }
+        let quantity = |found: Comparison| Quantity {
+            metric: CPU.to_owned(),
+            rounds: Vec::new(),
+            found,
+            first: None,
         };
         let of = |found: Comparison| quantity(found).verdict(&rules);
         assert_eq!(of(found), Verdict::Regression);
@@ -225,7 +220,7 @@ mod tests {
         assert_eq!(of(Comparison { p: 0.3, high: 0.11, ..found }), Verdict::Inconclusive);
         assert_eq!(of(Comparison { effect: 0.009, ..found }), Verdict::Unchanged);
         assert_eq!(of(Comparison { floor: 0.09, visible: 0.12, ..found }), Verdict::Inconclusive);
-        let twice = |again| quantity(again).confirming(&quantity(found)).verdict(&rules);
+        let twice = |again| quantity(found).confirmed_by(quantity(again), &rules).verdict(&rules);
         assert_eq!(twice(found), Verdict::Regression);
         assert_eq!(twice(Comparison { p: 0.04, ..found }), Verdict::Unchanged);
         assert_eq!(twice(Comparison { effect: 0.0, p: 1.0, ..found }), Verdict::Unchanged);
@@ -239,8 +234,8 @@ mod tests {
         #[test]
         fn the_times_have_the_ratio_of_the_effect(rounds in prop::collection::vec(prop::array::uniform3(0.0..2.0f64), 8..20)) {
             let found = compare(&rounds, 0.01, 1);
-            let (case, metric, effect) = ("c".to_owned(), CPU.to_owned(), found.effect);
-            let times = Quantity { case, metric, rounds, found, first: None }.times();
+            let (metric, effect) = (CPU.to_owned(), found.effect);
+            let times = Quantity { metric, rounds, found, first: None }.times();
             prop_assert!((times[1] / times[0] - 1.0 - effect).abs() < 1e-9);
         }
     }

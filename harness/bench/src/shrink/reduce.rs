@@ -6,6 +6,7 @@
 use super::probe::Trial;
 use crate::announce;
 use contract::case::Facet;
+use contract::octant::LEVEL_MAX;
 use run::engine::layout::Ranks;
 use toml::Value;
 
@@ -17,7 +18,8 @@ pub fn reduce(trial: Trial, fails: Fails) -> Trial {
     let mut smallest = trial;
     loop {
         let before = smallest.clone();
-        smallest = facets(depth(smallest, fails), fails);
+        let coarser = coarser(&smallest);
+        smallest = facets(first(smallest, fails, coarser), fails);
         // With all leaves kept, crossing and enclosed ones too, deletion is ruled out as a cause.
         let all = Some(Value::String("all".into()));
         for (key, value) in [("keep", all), ("keep_crossing", None), ("enclosed", None)] {
@@ -66,24 +68,18 @@ fn with(trial: &Trial, key: &str, value: Option<Value>) -> Trial {
     changed
 }
 
-/// Coarsens surface and boxes by as many levels as possible, in large steps first.
-fn depth(trial: Trial, fails: Fails) -> Trial {
-    let mut smallest = trial;
-    for levels in [4, 2, 1] {
-        let factor = f64::from(1 << levels);
-        while let Some(coarser) = coarsened(&smallest, factor).filter(|coarser| fails(coarser)) {
-            smallest = coarser;
-        }
-    }
-    smallest
+/// Coarsens surface and boxes, by as many levels as possible first.
+fn coarser(trial: &Trial) -> Vec<Trial> {
+    let factors = (1..=LEVEL_MAX).rev().map(|levels| 2f64.powi(i32::from(levels)));
+    factors.filter_map(|factor| coarsened(trial, factor)).collect()
 }
 
-/// Returns the trial with surface and boxes coarsened by a factor; `None` if the surface is as coarse as the root.
+/// Returns the trial with surface and boxes coarsened by a factor; `None` if the surface would be coarser than twice the root.
 fn coarsened(trial: &Trial, factor: f64) -> Option<Trial> {
     let mut coarser = trial.clone();
     let edge = number(trial.case.table.get("root")?.get("edge")?)?;
     let spacing = number(trial.case.table.get("spacing_min")?)?;
-    if spacing > edge {
+    if spacing * factor > 2.0 * edge {
         return None;
     }
     coarser.case.table.insert("spacing_min".into(), Value::Float(spacing * factor));

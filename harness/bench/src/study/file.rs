@@ -8,7 +8,8 @@ use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
 use crate::refuse;
 use run::engine::description::{Description, is_own};
-use serde::{Deserialize, Deserializer, Serialize};
+use run::engine::report::one_or_many;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -133,6 +134,13 @@ pub struct Row {
     pub at_most: Option<f64>,
 }
 
+impl Row {
+    /// Returns the runs that it needs: its own and the one with which it is compared.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &String> {
+        self.run.iter().chain(&self.against)
+    }
+}
+
 /// A kind of experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -184,20 +192,6 @@ pub struct Series {
     pub repeats: usize,
 }
 
-/// Reads a name or a list of names.
-fn one_or_many<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<String>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged, expecting = "a name or a list of names was expected")]
-    enum OneOrMany {
-        One(String),
-        Many(Vec<String>),
-    }
-    Ok(match OneOrMany::deserialize(from)? {
-        OneOrMany::One(name) => vec![name],
-        OneOrMany::Many(names) => names,
-    })
-}
-
 impl Study {
     /// Reads a file.
     ///
@@ -219,20 +213,18 @@ impl Study {
     /// If no row and no experiment has one of the names.
     pub fn only(&mut self, names: &[String]) -> Result<(), String> {
         // A row of several runs has the name of the run at its end.
-        let is_row = |row: &Row, name: &String| {
-            row.name == *name || row.name == format!("{name}: {}", row.run[0])
+        let of_row = |Row { name, run, .. }: &Row| {
+            [name, name.strip_suffix(&format!(": {}", run[0])).unwrap_or(name)].map(str::to_owned)
         };
-        let is_series = |series: &Series, name: &String| series.experiment.to_string() == *name;
-        let is_known = |name: &&String| {
-            self.row.iter().any(|row| is_row(row, name))
-                || self.series.iter().any(|series| is_series(series, name))
-        };
-        if let Some(name) = names.iter().find(|name| !is_known(name)) {
+        let of_series = |series: &Series| series.experiment.to_string();
+        let rows = self.row.iter().flat_map(of_row);
+        let known: Vec<String> = rows.chain(self.series.iter().map(of_series)).collect();
+        if let Some(name) = names.iter().find(|name| !known.contains(name)) {
             return Err(format!("no row and no experiment is called {name:?}"));
         }
         if !names.is_empty() {
-            self.row.retain(|row| names.iter().any(|name| is_row(row, name)));
-            self.series.retain(|series| names.iter().any(|name| is_series(series, name)));
+            self.row.retain(|row| of_row(row).iter().any(|name| names.contains(name)));
+            self.series.retain(|series| names.contains(&of_series(series)));
         }
         Ok(())
     }
@@ -241,11 +233,6 @@ impl Study {
     pub fn engines(&self) -> Vec<String> {
         let of_rows = (!self.row.is_empty()).then(mesher).unwrap_or_default();
         distinct(self.series.iter().flat_map(|series| series.engines.clone()).chain(of_rows))
-    }
-
-    /// Returns the runs that a row needs: its own and the one with which it is compared.
-    pub fn runs_of<'a>(&self, row: &'a Row) -> impl Iterator<Item = &'a String> + use<'a> {
-        row.run.iter().chain(&row.against)
     }
 
     /// Whether a setup of a record is the run of this name.
@@ -307,7 +294,7 @@ impl Study {
     }
 
     fn check_row(&self, row: &Row) -> Result<(), String> {
-        if let Some(name) = self.runs_of(row).find(|n| !self.run.contains_key(*n)) {
+        if let Some(name) = row.runs().find(|n| !self.run.contains_key(*n)) {
             return Err(format!("no run is called {name:?}"));
         }
         let (name, input) = (row.measure.name, row.measure.input);

@@ -1,14 +1,13 @@
 //! Judges rows from the declaration and the lines of a record alone.
 //!
-//! Invariants of a judged row, executed by `check_invariants` before it is printed: it has a value if and only if it is met, missed or for
-//! comparison; met is within the bounds, missed is not, and for comparison has none; a row without a value, and an efficiency above 1,
-//! states the reason.
+//! The verdict on a row is not stored: it follows from the value and the bounds. Invariant of a judged row, executed by `check_invariants`
+//! before it is printed: a row without a value, and an efficiency above 1, states the reason.
 
 use super::file::{Row, Study};
 use super::measure::Sample;
 use crate::experiments::entry::{Entry, Line};
 use crate::experiments::group::{Group, Groups};
-use crate::experiments::pop::{Efficiency, above_one};
+use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
 use std::collections::HashMap;
 
 /// A row of a table of targets.
@@ -18,8 +17,8 @@ pub struct Judged {
     pub row: Row,
     /// The measured value, and how it was measured: `serial`, `measured`, `oversubscribed` or `projected`.
     pub measured: Option<(f64, &'static str)>,
-    /// The verdict.
-    pub verdict: Verdict,
+    /// Whether a run of a row without a value failed.
+    pub failed: bool,
     /// Why it was left out or failed, or why an efficiency is above 1.
     pub why: String,
 }
@@ -65,9 +64,14 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     let judged = measured(study, row, lines).unwrap_or_else(|why| {
-        let failed = study.runs_of(row).find_map(|name| failure(study, name, lines));
-        let verdict = if failed.is_some() { Verdict::Failed } else { Verdict::LeftOut };
-        unjudged(row, verdict, failed.unwrap_or(why))
+        let failure = |name: &String, line: &Line| match &line.entry {
+            Entry::Failure(f) if study.is_run(name, &f.setup) => {
+                Some(format!("run {name} failed: {}", f.why))
+            }
+            _ => None,
+        };
+        let failed = row.runs().find_map(|name| lines.iter().find_map(|line| failure(name, line)));
+        unjudged(row, failed.is_some(), failed.unwrap_or(why))
     });
     check_invariants(&judged);
     judged
@@ -75,36 +79,16 @@ pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
 
 /// Executes the invariants at the head of this file.
 fn check_invariants(judged: &Judged) {
-    use Verdict::{Failed, LeftOut};
-    let Judged { row, measured, verdict: found, why } = judged;
-    let name = &row.name;
-    let Some((value, _)) = *measured else {
-        assert!(matches!(found, Failed | LeftOut), "{name}: a value is measured: {judged:?}");
-        return assert!(!why.is_empty(), "{name}: a row without a value has a reason: {judged:?}");
+    let needs_reason = match judged.measured {
+        None => true,
+        Some((value, _)) => judged.row.measure.is_efficiency() && value > ABOVE_ONE,
     };
-    let expected = verdict(row, value);
-    assert_eq!(*found, expected, "{name}: the verdict is that of value and bounds: {judged:?}");
-    let explained = !row.measure.is_efficiency() || value <= EXPLAINED || !why.is_empty();
-    assert!(explained, "{name}: an efficiency above 1 has a reason: {judged:?}");
+    assert!(!needs_reason || !judged.why.is_empty(), "the row has a reason: {judged:?}");
 }
-
-/// Efficiencies up to this need no explanation.
-const EXPLAINED: f64 = 1.01;
 
 /// Returns a row without a measured value.
-pub fn unjudged(row: &Row, verdict: Verdict, why: String) -> Judged {
-    Judged { row: row.clone(), measured: None, verdict, why }
-}
-
-fn verdict(row: &Row, value: f64) -> Verdict {
-    // NaN is within no bounds.
-    let is_within = row.at_least.is_none_or(|least| value >= least)
-        && row.at_most.is_none_or(|most| value <= most);
-    match () {
-        () if row.at_least.or(row.at_most).is_none() => Verdict::ForComparison,
-        () if is_within => Verdict::Met,
-        () => Verdict::Missed,
-    }
+pub fn unjudged(row: &Row, failed: bool, why: String) -> Judged {
+    Judged { row: row.clone(), measured: None, failed, why }
 }
 
 /// Returns the row with its value, how it was measured, and the reason for an efficiency above 1.
@@ -126,28 +110,35 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     };
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
-    let measured = Some((value, how));
-    Ok(Judged { measured, ..unjudged(row, verdict(row, value), why) })
-}
-
-/// Returns the reason for which a run failed, if it did.
-fn failure(study: &Study, name: &str, lines: &[Line]) -> Option<String> {
-    lines.iter().find_map(|line| match &line.entry {
-        Entry::Failure(f) if study.is_run(name, &f.setup) => {
-            Some(format!("run {name} failed: {}", f.why))
-        }
-        _ => None,
-    })
+    Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
 }
 
 impl Judged {
+    /// Returns the verdict.
+    pub fn verdict(&self) -> Verdict {
+        let Row { at_least, at_most, .. } = self.row;
+        match self.measured {
+            None if self.failed => Verdict::Failed,
+            None => Verdict::LeftOut,
+            Some(_) if at_least.or(at_most).is_none() => Verdict::ForComparison,
+            // NaN is within no bounds.
+            Some((value, _))
+                if at_least.is_none_or(|least| value >= least)
+                    && at_most.is_none_or(|most| value <= most) =>
+            {
+                Verdict::Met
+            }
+            Some(_) => Verdict::Missed,
+        }
+    }
+
     /// Returns name, target, measured value, how it was measured, and verdict.
     pub fn fields(&self) -> [String; 5] {
         let Row { name, measure, at_least, at_most, .. } = &self.row;
         let bounds = [("at least ", at_least), ("at most ", at_most)];
         let shown = |(word, b): (&str, &Option<f64>)| Some(word.to_owned() + &measure.show((*b)?));
         let target = bounds.into_iter().filter_map(shown).collect::<Vec<_>>().join(", ");
-        let word = match self.verdict {
+        let word = match self.verdict() {
             Verdict::Met => "met",
             Verdict::Missed => "MISSED",
             Verdict::ForComparison => "for comparison",
@@ -218,7 +209,7 @@ mod tests {
     fn bounds_are_met_and_missed() {
         let targets = read(FILE).unwrap();
         let verdicts = |lines: &[Line]| -> Vec<Verdict> {
-            judged(&targets, lines).iter().map(|j| j.verdict).collect()
+            judged(&targets, lines).iter().map(Judged::verdict).collect()
         };
         use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
         assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 5.0)]), [Met, Met, ForComparison]);
@@ -277,19 +268,13 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "the verdict is that of value and bounds")]
-    fn a_row_that_is_met_outside_its_bounds_is_noticed() {
-        planted(|row| row.row.at_most = Some(1.0));
-    }
-
-    #[test]
-    #[should_panic(expected = "a row without a value has a reason")]
+    #[should_panic(expected = "the row has a reason")]
     fn a_row_that_is_left_out_without_a_reason_is_noticed() {
-        planted(|row| (row.measured, row.verdict) = (None, Verdict::LeftOut));
+        planted(|row| row.measured = None);
     }
 
     #[test]
-    #[should_panic(expected = "an efficiency above 1 has a reason")]
+    #[should_panic(expected = "the row has a reason")]
     fn an_efficiency_above_1_without_a_reason_is_noticed() {
         planted(|row| row.row.measure = Measure::named("efficiency").unwrap());
     }
@@ -299,7 +284,7 @@ mod tests {
         let targets = read(FILE).unwrap();
         let lines = [ran(1, 90.0), ran(1, 8.0), ran(1, 9.0)];
         let rate = judge(&targets, &targets.row[0], &lines);
-        assert_eq!((rate.measured, rate.verdict), (Some((100.0, "measured")), Verdict::Met));
+        assert_eq!((rate.measured, rate.verdict()), (Some((100.0, "measured")), Verdict::Met));
     }
 
     #[test]

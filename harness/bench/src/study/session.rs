@@ -4,15 +4,14 @@
 //! a wrong mesh is not a result.
 
 use super::file::{Experiment, Row, Series, Study};
-use super::judge::{Judged, Verdict, judge, unjudged};
+use super::judge::{Judged, judge, unjudged};
 use crate::experiments::cases::{Base, Sizes};
 use crate::experiments::entry::{
-    Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup,
+    Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, now_utc,
 };
-use crate::experiments::execute::Runner;
+use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Digests, another_mesh};
-use crate::experiments::record::now_utc;
-use crate::experiments::{feasible, machine, network};
+use crate::experiments::{machine, network};
 use crate::jsonl;
 use clap::Args;
 use contract::case::Case;
@@ -121,7 +120,7 @@ pub fn measure(
     }
     // A row that was not measured before the interruption is not a result.
     let rest = study.row[rows.len()..].iter();
-    rows.extend(rest.map(|row| unjudged(row, Verdict::LeftOut, "interrupted".to_owned())));
+    rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
     let program = launcher.program();
     let missing = (rows.iter().any(|row| row.why == NO_LAUNCHER))
         .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
@@ -303,10 +302,10 @@ impl Session<'_> {
     fn row(&mut self, row: &Row) -> Result<Judged, Failure> {
         let study = self.study;
         let mut points = Vec::new();
-        for name in study.runs_of(row) {
+        for name in row.runs() {
             let is_mpi = study.run[name].comm == Comm::Mpi;
             if let Some(why) = self.mpi_left_out().filter(|_| is_mpi) {
-                return Ok(unjudged(row, Verdict::LeftOut, why.to_owned()));
+                return Ok(unjudged(row, false, why.to_owned()));
             }
             if self.made.contains(name) {
                 continue;
@@ -316,12 +315,12 @@ impl Session<'_> {
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(Failure { why, .. }) => {
                     let why = format!("mesh {}: {why}", study.run[name].mesh);
-                    return Ok(unjudged(row, Verdict::Failed, why));
+                    return Ok(unjudged(row, true, why));
                 }
             }
         }
         self.make(&mut points)?;
-        self.made.extend(study.runs_of(row).cloned());
+        self.made.extend(row.runs().cloned());
         Ok(judge(study, row, &self.lines))
     }
 
@@ -339,8 +338,8 @@ impl Session<'_> {
             }
             let engine = self.runner.programs.labelled(&setup.engine).description();
             let declined = engine.declines(&Case::read(&mesh.1)?);
-            let excess = || feasible::excess(&self.lines, &setup, self.runner.limit);
-            match declined.or_else(excess) {
+            let too_much = || excess(&self.lines, &setup, self.runner.limit);
+            match declined.or_else(too_much) {
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
                     self.leave_out(setup, why)?;

@@ -14,7 +14,7 @@ pub mod history;
 use crate::gate::report::change_percent;
 use history::Record;
 use serde::Serialize;
-use statistics::change_points::{Change as Found, Rules, change_points};
+use statistics::change_points::{Change as Found, change_points};
 use statistics::comparison::adjusted;
 use std::collections::BTreeSet;
 
@@ -124,50 +124,42 @@ pub fn unit(name: &str) -> &'static str {
     }
 }
 
-/// Returns every metric of the history with its changes. Of all metrics with a change, at most the fraction `rules.alpha`
+/// Returns every metric of the history with its changes. Of all metrics with a change, at most the fraction `alpha`
 /// is expected to have none in truth.
-pub fn analyse(records: &[Record], rules: &Rules) -> Vec<Series> {
+pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
     let names: BTreeSet<&String> =
         records.iter().flat_map(|record| record.metrics.keys()).collect();
     let of_metric = |name: &String| {
         let value = |(i, record): (usize, &Record)| Some((i, *record.metrics.get(name)?));
         let points: Vec<(usize, f64)> = records.iter().enumerate().filter_map(value).collect();
         let values: Vec<f64> = points.iter().map(|point| point.1).collect();
-        (name.clone(), points, change_points(&values, rules))
+        (name.clone(), points, change_points(&values, alpha))
     };
     let all: Vec<_> = names.into_iter().map(of_metric).collect();
     // A metric is one test: its smallest p-value counts, and 1 if nothing was found.
     let least = |found: &[Found]| found.iter().map(|change| change.p).fold(1.0, f64::min);
     let p_values: Vec<f64> = all.iter().map(|(.., found)| least(found)).collect();
-    let both = all.into_iter().zip(adjusted(&p_values));
-    let of_discovery = |((name, points, found), p): ((String, _, Vec<Found>), f64)| {
-        let found = if p > rules.alpha { Vec::new() } else { found };
-        let series = series(name, points, found, records);
+    let mut p_values = adjusted(&p_values).into_iter();
+    let of_discovery = |(name, points, found): (String, Vec<(usize, f64)>, Vec<Found>)| {
+        let is_discovery = p_values.next() <= Some(alpha);
+        let commit = |at: usize| records[points[at].0].commit.clone();
+        let change = |Found { at, before, after, p }| Change {
+            at,
+            last_old: commit(at - 1),
+            first_new: commit(at),
+            before,
+            after,
+            percent: change_percent(before, after),
+            p,
+            accepted: is_accepted(at, &points, records),
+        };
+        let found = found.into_iter().filter(|_| is_discovery);
+        let changes = found.map(change).collect();
+        let series = Series { unit: unit(&name), name, changes, points };
         series.check_invariants(records);
         series
     };
-    both.map(of_discovery).collect()
-}
-
-fn series(
-    name: String,
-    points: Vec<(usize, f64)>,
-    found: Vec<Found>,
-    records: &[Record],
-) -> Series {
-    let commit = |at: usize| records[points[at].0].commit.clone();
-    let change = |Found { at, before, after, p }| Change {
-        at,
-        last_old: commit(at - 1),
-        first_new: commit(at),
-        before,
-        after,
-        percent: change_percent(before, after),
-        p,
-        accepted: is_accepted(at, &points, records),
-    };
-    let changes = found.into_iter().map(change).collect();
-    Series { unit: unit(&name), name, changes, points }
+    all.into_iter().map(of_discovery).collect()
 }
 
 /// Whether a commit near a step was accepted.
@@ -185,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_change_point_has_its_commits_and_size() {
-        let all = analyse(&sample(), &Rules::default());
+        let all = analyse(&sample(), 0.01);
         assert!(all[0].changes.is_empty());
         let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
         assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
@@ -194,7 +186,7 @@ mod tests {
 
     #[test]
     fn only_recent_changes_for_the_worse_are_returned() {
-        let all = analyse(&sample(), &Rules::default());
+        let all = analyse(&sample(), 0.01);
         assert!(all[1].worse_recently(10).is_some() && all[1].worse_recently(9).is_none());
         let mut better = all[1].clone();
         better.changes[0].after = 1.0;
@@ -218,7 +210,7 @@ mod tests {
         for (accepted, holds) in [(17, false), (18, true), (20, true), (22, true), (23, false)] {
             let mut records = sample();
             records[accepted].accepted = true;
-            let all = analyse(&records, &Rules::default());
+            let all = analyse(&records, 0.01);
             assert_eq!(all[1].changes.len(), 1);
             assert_eq!(all[1].worse_recently(10).is_none(), holds, "{accepted}");
         }
@@ -238,13 +230,13 @@ mod tests {
                 Record { metrics: metrics.into_iter().collect(), ..Record::new(format!("{i:040x}")) }
             };
             let records: Vec<Record> = drawn.iter().enumerate().map(record).collect();
-            analyse(&records, &Rules::default());
+            analyse(&records, 0.01);
         }
     }
 
     fn planted(fault: impl Fn(&mut Change)) {
         let records = sample();
-        let mut wrong = analyse(&records, &Rules::default()).remove(1);
+        let mut wrong = analyse(&records, 0.01).remove(1);
         fault(&mut wrong.changes[0]);
         wrong.check_invariants(&records);
     }

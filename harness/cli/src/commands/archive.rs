@@ -209,7 +209,7 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     };
     let row = |row: &Row| {
         let Value { run, quantity, found } = &row.expected;
-        let verdict = match (row.verdict, &row.measured) {
+        let verdict = match (row.verdict(), &row.measured) {
             (Verdict::NotCompared, Some(Found::Ratio { how, .. })) => how.clone(),
             (Verdict::NotCompared, _) => String::new(),
             (bad @ (Verdict::Differs | Verdict::Outside), _) => format!("{bad:?}").to_uppercase(),
@@ -221,11 +221,11 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
     };
     let mut rows = Vec::new();
     for of_run in replayed.0.chunk_by(|a, b| a.expected.run == b.expected.run) {
-        let equal = of_run.iter().filter(|row| row.verdict == Verdict::Equal).count();
+        let equal = of_run.iter().filter(|row| row.verdict() == Verdict::Equal).count();
         let count = equal.to_string();
         let all = [&of_run[0].expected.run, "digests and counts", &count, "exact", &count, "equal"];
         rows.extend((equal > 0).then(|| all.map(str::to_owned).to_vec()));
-        rows.extend(of_run.iter().filter(|r| r.verdict != Verdict::Equal).map(row));
+        rows.extend(of_run.iter().filter(|r| r.verdict() != Verdict::Equal).map(row));
     }
     let count = |verdict| replayed.count(verdict);
     let mut notes = vec![format!(

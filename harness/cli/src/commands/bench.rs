@@ -174,7 +174,7 @@ fn publish(
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
-    let bad = |row: &Judged| matches!(row.verdict, Verdict::Missed | Verdict::Failed);
+    let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
     let measured = |line: &Line| matches!(&line.entry, Entry::Run(run) if !run.warm_up);
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {

@@ -1,8 +1,8 @@
 //! `harness report`: draws figures and a page from records.
 
 use crate::options::Input;
+use bench::experiments::entry;
 use bench::experiments::entry::{Entry, Line};
-use bench::experiments::record;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::benchmark::numbers::{Checked, Number, check};
@@ -82,7 +82,7 @@ pub(super) fn read(records: &[PathBuf]) -> Result<Vec<Line>, String> {
     let (mut lines, mut known) = (Vec::new(), HashSet::new());
     for path in records {
         let shown = path.display();
-        let (mut read, broken) = record::read(path).map_err(|error| format!("{shown}: {error}"))?;
+        let (mut read, broken) = entry::read(path).map_err(|error| format!("{shown}: {error}"))?;
         for (line, why) in broken {
             eprintln!("harness: {shown}, line {line} is skipped: {why}");
         }

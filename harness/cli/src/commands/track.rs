@@ -9,7 +9,6 @@ use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::json::pretty;
 use report::track::{junit, page, summary};
-use statistics::change_points::Rules;
 use std::path::{Path, PathBuf};
 
 /// `harness track`.
@@ -81,8 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     for warning in &warnings {
         eprintln!("harness: {}: {warning}", arguments.history.display());
     }
-    let rules = Rules { alpha: arguments.alpha, ..Rules::default() };
-    let all = analyse(&records, &rules);
+    let all = analyse(&records, arguments.alpha);
     println!("{} commits, {} metrics", records.len(), all.len());
     if all.is_empty() {
         return Err(Failure::missing(format!(

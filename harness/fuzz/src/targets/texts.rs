@@ -1,7 +1,7 @@
 //! Files of the harness in TOML and JSON.
 
 use crate::Scratch;
-use bench::experiments::record;
+use bench::experiments::entry;
 use bench::gate::Rules;
 use bench::gate::measures::Measures;
 use bench::track::history::{self, Record};
@@ -41,7 +41,7 @@ pub(super) fn catalogue(scratch: &mut Scratch, bytes: &[u8]) -> bool {
 
 /// A record of `harness bench`.
 pub(super) fn record(scratch: &mut Scratch, bytes: &[u8]) -> bool {
-    let content = record::read(scratch.file("record.jsonl", bytes));
+    let content = entry::read(scratch.file("record.jsonl", bytes));
     content.is_ok_and(|(lines, _)| !lines.is_empty())
 }
 

@@ -71,12 +71,18 @@ pub struct PhaseReport {
     pub message_bytes: Vec<u64>,
 }
 
-fn one_or_many<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<u64>, D::Error> {
+/// Reads a value or a list of values.
+///
+/// # Errors
+/// If it is neither.
+pub fn one_or_many<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    input: D,
+) -> Result<Vec<T>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged, expecting = "peak_rss_bytes must be a whole number or a list of them")]
-    enum OneOrMany {
-        One(u64),
-        Many(Vec<u64>),
+    #[serde(untagged, expecting = "a value of the right type or a list of them was expected")]
+    enum OneOrMany<T> {
+        One(T),
+        Many(Vec<T>),
     }
     Ok(match OneOrMany::deserialize(input)? {
         OneOrMany::One(value) => vec![value],
@@ -185,7 +191,7 @@ mod tests {
         }
         let wrong = r#"{"cells": 8, "peak_rss_bytes": [-3]}"#;
         let error = serde_json::from_str::<RunReport>(wrong).unwrap_err().to_string();
-        assert!(error.contains("must be a whole number or a list of them"), "{error}");
+        assert!(error.contains("a value of the right type or a list of them"), "{error}");
     }
 
     #[test]

@@ -47,8 +47,7 @@ fn the_targets_of_this_repository_are_consistent() {
     for name in ["targets.toml", "paper-partition.toml"] {
         let study = of_repository(name);
         // A run that no row needs is a mistake.
-        let used =
-            |name: &&String| study.row.iter().any(|r| study.runs_of(r).any(|run| run == *name));
+        let used = |name: &&String| study.row.iter().any(|r| r.runs().any(|run| run == *name));
         let unused: Vec<&String> = study.run.keys().filter(|name| !used(name)).collect();
         assert!(unused.is_empty(), "{unused:?}");
     }
