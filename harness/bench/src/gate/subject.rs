@@ -46,7 +46,7 @@ pub struct Subject {
 
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
-        let program = digest_of_file(engine.program());
+        let program = digest_of_file(&engine.program);
         let measured = Measured { named, revision, program };
         Self { engine, measured, counted: RefCell::default() }
     }
@@ -65,7 +65,7 @@ impl Subject {
         if let Some(named) = options.candidate.as_deref().or(is_built.then_some(WORKING_TREE)) {
             return Self::find(named, options, engine);
         }
-        let named = engine.program().display().to_string();
+        let named = engine.program.display().to_string();
         engine.require()?;
         Ok(Self::new(engine.clone(), named, None))
     }
@@ -75,7 +75,7 @@ impl Subject {
     /// # Errors
     /// If it is neither, or does not build.
     pub fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
-        let description = engine.description();
+        let description = &engine.description;
         if Path::new(named).is_file() {
             let is_data =
                 Path::new(named).extension().is_some_and(|of| of == "json" || of == "toml");

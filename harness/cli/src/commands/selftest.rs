@@ -7,7 +7,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::leafset;
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
-use run::engine::programs::{Given, Programs};
+use run::engine::runner::{Given, Programs};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;

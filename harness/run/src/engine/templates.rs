@@ -1,8 +1,7 @@
 //! The table `[run]` of an engine file: command templates, and the command lines made of them.
 
 use super::failure::End;
-use super::launcher::Launcher;
-use super::layout::{Layout, Ranks, RunOptions};
+use super::layout::{Launcher, Layout, Ranks, RunOptions};
 use check::promises::{Independence, Promises};
 use contract::import::{Format, Position};
 use serde::Deserialize;

@@ -8,6 +8,7 @@ use crate::engine::description::Description;
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
+use crate::engine::runner::Engine;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
@@ -84,7 +85,7 @@ impl<'a> CaseRun<'a> {
 
     /// The description of the engine under test.
     pub fn engine(&self) -> &'a Description {
-        self.all.programs.engine.description()
+        &self.all.programs.engine.description
     }
 
     /// What the engine under test promises.
@@ -147,30 +148,27 @@ impl<'a> CaseRun<'a> {
     /// A shell command that repeats the run with this layout, or the serial one.
     fn command_for(&self, layout: Option<&Layout>) -> String {
         let (options, programs) = (self.all.options, self.all.programs);
-        let text = |path: &Path| path.to_string_lossy().into_owned();
-        let full = |path: &Path| text(&absolute(path).unwrap_or_else(|_| path.to_owned()));
-        let mut words: Vec<String> =
-            vec![text(&programs.paths.harness), "verify".into(), self.selected.argument.clone()];
-        let mut add = |option: &str, value: String| words.extend([option.to_owned(), value]);
-        match programs.engine.name() {
-            "mesher" => {}
-            file if file.ends_with(".toml") => add("--engine", full(Path::new(file))),
-            name => add("--engine", name.to_owned()),
-        }
-        for (option, engine) in
-            [("--mesher", &programs.engine), ("--reference", &programs.reference)]
-        {
-            engine.program_given().into_iter().for_each(|program| add(option, full(program)));
-        }
-        let timeout = options.timeout.as_secs().to_string();
-        if timeout != TIMEOUT_S {
-            add("--timeout", timeout);
-        }
-        if let Some(layout) = layout {
-            add("--ranks", layout.ranks.count().to_string());
-            layout.partitioner.iter().for_each(|of| add("--partitioners", of.clone()));
-            layout.level_base.iter().for_each(|of| add("--level-bases", of.clone()));
-        }
+        let full = |path: &Path| {
+            absolute(path).unwrap_or_else(|_| path.to_owned()).to_string_lossy().into_owned()
+        };
+        let engine = match programs.engine.name() {
+            file if file.ends_with(".toml") => full(Path::new(file)),
+            name => name.to_owned(),
+        };
+        let program = |of: &Engine| of.is_given.then(|| full(&of.program));
+        let given = [
+            ("--engine", Some(engine).filter(|engine| engine != "mesher")),
+            ("--mesher", program(&programs.engine)),
+            ("--reference", program(&programs.reference)),
+            ("--timeout", Some(options.timeout.as_secs().to_string()).filter(|s| s != TIMEOUT_S)),
+            ("--ranks", layout.map(|layout| layout.ranks.count().to_string())),
+            ("--partitioners", layout.and_then(|layout| layout.partitioner.clone())),
+            ("--level-bases", layout.and_then(|layout| layout.level_base.clone())),
+        ];
+        let given = given.into_iter().filter_map(|(option, value)| Some([option.into(), value?]));
+        let harness = programs.paths.harness.to_string_lossy().into_owned();
+        let mut words = vec![harness, "verify".into(), self.selected.argument.clone()];
+        words.extend(given.flatten());
         let left_out: &[&str] = match layout {
             Some(_) => &["--no-oracles", "--no-p4est", "--no-proof", "--keep"],
             None => &["--no-mpi", "--keep"],
