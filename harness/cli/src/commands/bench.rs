@@ -125,19 +125,16 @@ fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
     for name in foreign {
         programs.others.push(Engine::find(name, None, &programs.paths)?);
     }
-    if names.iter().any(|name| name != "reference") {
-        // Our mesher chooses the spacings, also for other engines.
-        programs.mesher.require()?;
+    let mut known = HashSet::new();
+    let mut labels = names.iter().map(|name| programs.named(name).label());
+    if let Some(label) = labels.find(|label| !known.insert(label.clone())) {
+        let why = format!("two programs of one name, {label}: rename a file");
+        return Err(Failure::input(why));
     }
-    let mut labels = HashSet::new();
-    for name in &names {
-        let (engine, label) = (programs.named(name), programs.named(name).label());
-        engine.require()?;
-        if !labels.insert(label.clone()) {
-            let why = format!("two programs of one name, {label}: rename a file");
-            return Err(Failure::input(why));
-        }
-    }
+    // Our mesher chooses the spacings, also for other engines.
+    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
+    let mut required = also.into_iter().chain(names.iter().map(|name| programs.named(name)));
+    required.try_for_each(Engine::require)?;
     for name in study.series.iter_mut().flat_map(|series| &mut series.engines) {
         *name = programs.named(name).label();
     }

@@ -79,7 +79,7 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let progress = Progress::new();
+    let progress = Progress::default();
     let options = Options {
         jobs: jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN),
         watch: &progress,

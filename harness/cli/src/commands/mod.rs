@@ -154,7 +154,7 @@ mod tests {
             );
             count += 1;
         }
-        assert_eq!(count, 11);
+        assert_eq!(count, 10);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `harness report`: draws figures and a page from records.
 
 use crate::options::Input;
-use bench::experiments::entry::{Entry, Line};
+use bench::experiments::entry::Line;
 use bench::experiments::record;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
@@ -61,10 +61,7 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
         ));
     }
     let written = report(directory, &lines).map_err(|error| error.to_string())?;
-    let shows_nothing = |line: &Line| {
-        matches!(line.entry, Entry::Session(_) | Entry::Failure(_) | Entry::LeftOut(_))
-    };
-    if lines.iter().all(shows_nothing) {
+    if lines.iter().all(|line| line.run().is_none()) {
         return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
     for (rule, why) in &written.broken {

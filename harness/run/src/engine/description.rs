@@ -176,7 +176,13 @@ impl Description {
             templates.check_placeholders()?;
             templates.check_promises(&description.promises)?;
             if description.program.is_empty() {
-                templates.name_program(&first);
+                // So that another program can be run.
+                let Templates { serial, parallel, simulated, .. } = templates;
+                for word in [serial, parallel, simulated].into_iter().flatten() {
+                    if *word == first {
+                        *word = "{program}".to_owned();
+                    }
+                }
                 description.program = first;
             }
         }

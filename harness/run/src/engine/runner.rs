@@ -230,7 +230,10 @@ impl Engine {
     ) -> Result<RunReport, String> {
         let is_written = options.report && !self.description.run.json.is_empty();
         let mut report = match written {
-            Some(mesh) if !is_written => RunReport::of_mesh(&mesh.manifest),
+            // The digest is that of the mesh.
+            Some(mesh) if !is_written => {
+                RunReport { cells: mesh.manifest.leaves, ..RunReport::default() }
+            }
             _ => RunReport::read(&options.report_path())
                 .map_err(|why| format!("ended, but {why}"))?,
         };

@@ -73,14 +73,6 @@ impl Templates {
         ]
     }
 
-    /// Replaces the program in all commands by its placeholder, so that another one can be run.
-    pub(super) fn name_program(&mut self, program: &str) {
-        let commands = [&mut self.serial, &mut self.parallel, &mut self.simulated];
-        for word in commands.into_iter().flatten().filter(|word| *word == program) {
-            *word = "{program}".to_owned();
-        }
-    }
-
     /// Whether every run writes a mesh, because the engine cannot describe it in another way.
     pub fn always_writes_mesh(&self) -> bool {
         self.json.is_empty() || self.out.is_empty()

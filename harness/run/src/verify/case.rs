@@ -30,25 +30,9 @@ pub(super) struct CaseRun<'a> {
 }
 
 impl<'a> CaseRun<'a> {
-    /// A case before its first step.
-    pub fn new(
-        all: &'a Verification,
-        selected: &'a Selected,
-        file: PathBuf,
-        place: &'a Path,
-    ) -> Self {
-        let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
-        Self { all, selected, file, place, report }
-    }
-
     /// Performs all steps: serial meshes and their checks, ranks, other programs. Without serial meshes the later steps are left out.
     /// An engine that promises less than the definition is not compared with T0, the proof, oracles and p4est.
     pub fn verify(&mut self) {
-        self.verify_steps();
-        self.leave_out_rest();
-    }
-
-    fn verify_steps(&mut self) {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
         if let Some(why) = self.engine().declines(&case) {

@@ -48,7 +48,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
         programs,
         workplace: Workplace::new(options)?,
         needs: Needs::probe(options, programs),
-        progress: Progress::new(),
+        progress: Progress::default(),
     };
     let mut cases = Vec::new();
     for case in selected.iter().take_while(|_| !interrupt::requested()) {
@@ -94,18 +94,17 @@ struct Verification<'a> {
 impl Verification<'_> {
     fn case(&self, selected: &Selected) -> Result<CaseReport, Failure> {
         let start = Instant::now();
-        if let Some(why) = &selected.absent {
-            let mut run = CaseRun::new(self, selected, PathBuf::new(), Path::new(""));
-            run.leave_out(("case", options::GEOMETRY), why);
-            run.leave_out_rest();
-            return Ok(run.report);
-        }
         let place = self.workplace.enter(&selected.name)?;
         // A case that the harness cannot read is passed on unchanged, because refusing it is part of the verification.
         let prepared = self.programs.engine.prepare(&selected.path, &place.join("plain"));
         let file = prepared.unwrap_or_else(|_| selected.path.clone());
-        let mut run = CaseRun::new(self, selected, file, &place);
-        run.verify();
+        let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
+        let mut run = CaseRun { all: self, selected, file, place: &place, report };
+        match &selected.absent {
+            Some(why) => run.leave_out(("case", options::GEOMETRY), why),
+            None => run.verify(),
+        }
+        run.leave_out_rest();
         let mut report = run.report;
         report.time_s = start.elapsed().as_secs_f64();
         let keep = self.options.keep || (report.failed() && !interrupt::requested());

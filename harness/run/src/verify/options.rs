@@ -150,7 +150,7 @@ pub(super) struct Needs {
     /// Why something is not used.
     absent: BTreeMap<Need, String>,
     /// Oracles that gave no answer.
-    silent: RefCell<Vec<Failure>>,
+    pub silent: RefCell<Vec<Failure>>,
 }
 
 impl Needs {
@@ -187,11 +187,6 @@ impl Needs {
     /// Why something is not used, if it is not.
     pub fn lacks(&self, need: Need) -> Option<&str> {
         self.absent.get(&need).map(String::as_str)
-    }
-
-    /// Notes that an oracle gave no answer.
-    pub fn note_silent(&self, failure: &Failure) {
-        self.silent.borrow_mut().push(failure.clone());
     }
 
     /// Why an oracle cannot be asked: it is missing, or has hung, which costs the whole time limit.

@@ -106,7 +106,7 @@ impl CaseRun<'_> {
                 Ok(answer) => answers.push(answer),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(failure) => {
-                    needs.note_silent(&failure);
+                    needs.silent.borrow_mut().push(failure.clone());
                     failures.push(failure);
                 }
             }
