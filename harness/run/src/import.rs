@@ -74,7 +74,6 @@ pub fn import(
     request: &Request,
     case: Option<&Case>,
     program: String,
-    paths: &Paths,
     limit: Duration,
 ) -> Result<Imported, Failure> {
     let input = |error: Failure| error.of_file(path);
@@ -90,7 +89,7 @@ pub fn import(
     }
     let is_root_of_case = request.root.is_none();
     let request = Request { root, is_root_of_case, ..request.clone() };
-    let cells = read(path, format, &request, paths, limit);
+    let cells = read(path, format, &request, &Paths::find(), limit);
     let cells = cells.map_err(|failure| failure.of_file(path))?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
@@ -263,7 +262,7 @@ fn imported(
 ) -> Result<Imported, End> {
     let (sides, position) = (engine.run.sides.clone(), engine.run.position);
     let request = Request { sides, position, root: Some(case.root), ..Request::default() };
-    let read = import(written, Some(format), &request, Some(case), label, &Paths::find(), limit);
+    let read = import(written, Some(format), &request, Some(case), label, limit);
     read.map_err(|failure| {
         let why = format!("wrote a mesh that cannot be imported: {failure}");
         match failure.code {

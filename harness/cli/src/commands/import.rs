@@ -8,7 +8,6 @@ use contract::import::forest::{self, Forest};
 use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
 use contract::manifest::{self, Manifest};
-use run::engine::paths::Paths;
 use run::import::{Imported, import};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -99,8 +98,7 @@ impl Source {
             ..Request::default()
         };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let mut imported =
-            import(mesh, *format, &request, case, program, &Paths::find(), *timeout)?;
+        let mut imported = import(mesh, *format, &request, case, program, *timeout)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(

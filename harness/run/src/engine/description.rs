@@ -156,11 +156,9 @@ impl Description {
                 wrong(format!("{error}: give a name in {engines}, or a path that ends in .toml"))
             })?,
         };
-        let mut description = Self::parse(&text).map_err(wrong)?;
-        description.name = name.to_owned();
         let here = path.parent().unwrap_or(Path::new(""));
-        description.here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
-        Ok(description)
+        let here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
+        Ok(Self { name: name.to_owned(), here, ..Self::parse(&text).map_err(wrong)? })
     }
 
     /// Parses an engine file.

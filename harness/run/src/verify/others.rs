@@ -67,22 +67,17 @@ impl CaseRun<'_> {
     }
 
     /// Has the proven checker judge the mesh, given its base tree.
-    fn prove(
-        &self,
-        (subject, name): Step,
-        serial: &Meshed,
-        base: &Meshed,
-    ) -> Result<Check, Failure> {
+    fn prove(&self, step: Step, serial: &Meshed, base: &Meshed) -> Result<Check, Failure> {
         let options = self.all.options;
         let checker = &self.all.programs.paths.proven_checker;
         let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
         match proof::check(checker, places, leaves, options.timeout) {
-            Ok(proof) => Ok(Check::of_result(subject, CheckResult { name, ..proof })),
+            Ok(proof) => Ok(Check::of_result(step.0, CheckResult { name: step.1, ..proof })),
             // The files of another program may lack what the proof needs.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
                 if !options.require.contains(&Need::Proof) =>
             {
-                Ok(Check::new(subject, name, Outcome::left_out(error)))
+                Ok(Check::new(step.0, step.1, Outcome::left_out(error)))
             }
             Err(failure) => Err(failure),
         }
