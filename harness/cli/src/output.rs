@@ -1,7 +1,6 @@
 //! Outputs: files, and printing that never panics, and shows control characters of other programs as signs. The macros here replace those of the standard library in the whole program: a closed pipe, as in
 //! `harness ... | head`, ends the printing and not the command, and a full disk becomes an exit code.
 
-use crate::options::Output;
 use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT, Failure, exit_first};
 use contract::files::write_atomically;
 use files::{message, plain};
@@ -84,8 +83,8 @@ pub fn unwritten(code: u8) -> impl Fn(Failure) -> Failure {
     }
 }
 
-/// A file for a form of a report, if it was asked for, and the form.
-pub type Form<'a> = (&'a Option<Output>, &'a dyn Fn() -> String);
+/// A file for a form of a report, if one was asked for, and the form.
+pub type Form<'a> = (Option<&'a Path>, &'a dyn Fn() -> String);
 
 /// Writes the forms that were asked for, and appends Markdown to the summary page of a GitHub action; returns the exit code of the
 /// report.
@@ -95,7 +94,7 @@ pub type Form<'a> = (&'a Option<Output>, &'a dyn Fn() -> String);
 pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8, Failure> {
     let write = || -> Result<(), Failure> {
         for (file, form) in forms {
-            file.as_ref().map_or(Ok(()), |file| put(file, &form()))?;
+            file.map_or(Ok(()), |file| put(file, &form()))?;
         }
         let page = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty());
         if let (Some(page), Some(text)) = (page, summary) {

@@ -239,7 +239,7 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
     assert_eq!((code, error.as_str()), (0, ""));
     assert_eq!(
         output,
-        "front.stl: 24 faces, 2484 bytes (103.5 per face)\n  a surface of area 24.0, closed\n"
+        "front.stl: 24 faces, 2484 bytes (103.50 per face)\n  a surface of area 24.0, closed\n"
     );
     assert_eq!(export(&place, "front.vtp", &["--case", "case.toml"]).0, 0);
     let (code, output, _) = export(&place, "part.vtp", &["--clip", "0,0,0,8,8,4"]);

@@ -38,11 +38,12 @@ impl PlainCase {
         Ok(Self { table, facets: case.facets })
     }
 
-    /// Writes `case.toml` and `body.stl` into an existing directory, and returns the path of the case file.
+    /// Writes `case.toml` and `body.stl` into a directory, which is made, and returns the path of the case file.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, directory: &Path, form: StlForm) -> io::Result<PathBuf> {
+        fs::create_dir_all(directory)?;
         let mut table = Table::new();
         table.insert("geometry".into(), Value::String("body.stl".into()));
         table.extend(self.table.clone());

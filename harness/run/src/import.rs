@@ -1,23 +1,29 @@
 //! Meshes in the formats of other programs. Those that the crate `contract` does not read are read in Python;
-//! `harness/oracles/imports.py` describes how.
+//! `harness/oracles/imports.py` describes how. What an engine wrote becomes a leaf-set directory: leaf words without a manifest get one,
+//! and any other format is imported.
 
+use crate::engine::description::{self, Description};
 use crate::engine::failure::{CODE_INPUT, End};
+use crate::engine::layout::RunOptions;
 use crate::engine::paths::Paths;
 use crate::python;
 use contract::case::Case;
 use contract::digest::Digest;
-use contract::failure::Failure;
+use contract::failure::{EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
 use contract::import::{self, Format, Request};
 use contract::lattice::Root;
-use contract::leafset::LeafSet;
-use contract::manifest::Manifest;
+use contract::leafset::{self, LeafSet};
+use contract::manifest::{self, Manifest, Tree};
+use contract::mesh::Mesh;
 use serde::Deserialize;
 use serde_json::json;
+use std::fmt::Display;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 
 /// A mesh that was read.
@@ -68,7 +74,6 @@ pub fn import(
     request: &Request,
     case: Option<&Case>,
     program: String,
-    paths: &Paths,
     limit: Duration,
 ) -> Result<Imported, Failure> {
     let input = |error: Failure| error.of_file(path);
@@ -84,7 +89,7 @@ pub fn import(
     }
     let is_root_of_case = request.root.is_none();
     let request = Request { root, is_root_of_case, ..request.clone() };
-    let cells = read(path, format, &request, paths, limit);
+    let cells = read(path, format, &request, &Paths::find(), limit);
     let cells = cells.map_err(|failure| failure.of_file(path))?;
     let set = Box::new(import::leaf_set(&cells, root, case, program).map_err(input)?);
     Ok(Imported::Words { set, is_root_derived: root.is_none() && cells.root.is_none() })
@@ -171,10 +176,107 @@ fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Failure> {
     Ok(cells)
 }
 
+/// What ends a path within a command of a shell.
+const ENDS: [char; 6] = [' ', '\'', '"', ';', '&', '|'];
+
+/// The beginning of the paths that a run writes in a format that is imported: the value of `{out}`.
+pub(crate) fn foreign(place: &Path) -> PathBuf {
+    place.join("written/mesh")
+}
+
+/// Makes the place of these paths, empty: what an earlier run wrote must not be mistaken for this run's.
+pub(crate) fn clear(place: &Path, mesh: &Path) -> std::io::Result<()> {
+    let written = place.join("written");
+    let _ = (fs::remove_dir_all(&written), fs::remove_dir_all(mesh));
+    fs::create_dir_all(written)
+}
+
+/// The path that a command writes: `{out}` and what follows it there, such as an extension.
+fn path_in(command: &Command, out: &Path) -> PathBuf {
+    let out = out.to_string_lossy();
+    let words = command.get_args().map(|word| word.to_string_lossy().into_owned());
+    let rest = words.filter_map(|word| Some(word.split_once(&*out)?.1.to_owned())).next();
+    let rest = rest.unwrap_or_default();
+    PathBuf::from(format!("{out}{}", rest.split(ENDS).next().unwrap_or_default()))
+}
+
+/// Makes the mesh of a run that ended well a leaf-set directory, unless it is one, and opens it. Its manifest has the inputs of the
+/// case, and names `label` as the program.
+pub(crate) fn complete(
+    engine: &Description,
+    label: String,
+    command: &Command,
+    case: &Path,
+    mesh: &Path,
+    options: &RunOptions,
+) -> Result<Mesh, End> {
+    let unusable = |why: String| Err(End::Unusable(why));
+    let unreadable =
+        |why: &dyn Display| End::Unusable(format!("wrote a mesh that cannot be read: {why}"));
+    let read_case = || Case::read(case).map_err(|error| End::Unusable(error.to_string()));
+    let tree = if options.ungraded { Tree::Base } else { Tree::Final };
+    let is_complete = mesh.join(manifest::FILE).exists();
+    if let Some(format) = engine.run.format {
+        let written = path_in(command, &foreign(options.place));
+        if !written.exists() {
+            return unusable(format!(
+                "wrote no {}, which {{out}} stands for in [run] of {}",
+                written.display(),
+                engine.name
+            ));
+        }
+        let (case, limit) = (read_case()?, options.limit);
+        let mut imported = imported(engine, format, &written, &case, label, limit)?;
+        imported.manifest().tree = tree;
+        imported.create(mesh, true).map_err(|error| unreadable(&error))?;
+    } else if !is_complete && description::is_own(&engine.name) {
+        // Our programs write it last: without it their mesh is incomplete.
+        return unusable(format!("wrote no {}", manifest::FILE));
+    } else if !mesh.exists() {
+        return unusable(format!(
+            "wrote no directory of leaf words {}: if it writes another format to a path that begins so, [run] of {} must state it, as in \
+             format = \"vtk\"",
+            mesh.display(),
+            engine.name
+        ));
+    } else if !is_complete {
+        let parts = leafset::read_parts(mesh).map_err(|error| unreadable(&error))?;
+        let (names, words): (Vec<String>, Vec<Vec<u64>>) = parts.into_iter().unzip();
+        let empty = read_case()?.manifest(tree, label);
+        let mut set = LeafSet::new(empty, Vec::new()).with_parts(words);
+        set.manifest.parts.iter_mut().zip(names).for_each(|(part, name)| part.file = name);
+        let written = set.manifest.write(mesh);
+        written.map_err(|error| unreadable(&format!("{}: {error}", mesh.display())))?;
+    }
+    Mesh::open(mesh).map_err(|error| unreadable(&error))
+}
+
+/// The mesh that a run has written in a format of another program.
+fn imported(
+    engine: &Description,
+    format: Format,
+    written: &Path,
+    case: &Case,
+    label: String,
+    limit: Duration,
+) -> Result<Imported, End> {
+    let (sides, position) = (engine.run.sides.clone(), engine.run.position);
+    let request = Request { sides, position, root: Some(case.root), ..Request::default() };
+    let read = import(written, Some(format), &request, Some(case), label, limit);
+    read.map_err(|failure| {
+        let why = format!("wrote a mesh that cannot be imported: {failure}");
+        match failure.code {
+            EXIT_INTERRUPTED => End::Interrupted,
+            EXIT_MISSING => End::Missing(why),
+            _ => End::Unusable(why),
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::failure::{EXIT_INPUT, EXIT_MISSING};
+    use contract::failure::EXIT_INPUT;
     use std::os::unix::fs::PermissionsExt;
 
     /// Reads a file with a shell script instead of Python, which gets the table's path as $4 and the request as $5.
@@ -232,5 +334,18 @@ mod tests {
         assert!(sentence(&writing("")).contains("no root"));
         let missing = read_with("echo no module >&2; exit 3", None).unwrap_err();
         assert!(missing.code == EXIT_MISSING && missing.why.contains("no module"), "{missing}");
+    }
+
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Whatever surrounds `{out}` in a word, the path begins with it and ends where a shell would end it.
+        #[test]
+        fn a_path_begins_with_out(before in "[a-z=-]{0,8}", rest in "[a-z./_0-9]{0,12}", after in "([ ;'\"&|][ -~]{0,8})?") {
+            let out = Path::new("/a place/written/mesh");
+            let mut command = Command::new("sh");
+            command.arg("-c").arg(format!("{before}{}{rest}{after}", out.display()));
+            prop_assert_eq!(path_in(&command, out), PathBuf::from(format!("{}{rest}", out.display())));
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! Runs engines and oracles as processes, and verifies the meshes that engines make.
 //!
-//! - [`base_tree`]: base trees of a case at any level;
 //! - [`engine`]: finds, starts, watches and judges programs, and reads their run reports;
 //! - [`import`]: reads meshes in the formats of other programs, most of them in Python;
 //! - [`progress`]: a line of progress;
@@ -8,7 +7,6 @@
 //! - [`python`]: the scripts in Python, among them the oracles trimesh, open3d and pyvista;
 //! - [`verify`](mod@verify): runs engines on cases and checks the meshes.
 
-pub mod base_tree;
 pub mod engine;
 pub mod import;
 pub mod progress;

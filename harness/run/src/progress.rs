@@ -5,22 +5,15 @@ use contract::watch::Watch;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The line.
-#[derive(Debug)]
+/// The line, which is empty at first.
+#[derive(Debug, Default)]
 pub struct Progress {
-    is_shown: bool,
     percent: AtomicU64,
 }
 
 impl Progress {
-    /// An empty line.
-    #[expect(clippy::new_without_default, reason = "it depends on the terminal")]
-    pub fn new() -> Self {
-        Self { is_shown: stderr().is_terminal(), percent: AtomicU64::new(0) }
-    }
-
     fn show(&self, text: &str) {
-        if self.is_shown {
+        if stderr().is_terminal() {
             let _ = write!(stderr().lock(), "\r\x1b[K{text}");
         }
     }

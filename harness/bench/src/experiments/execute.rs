@@ -8,11 +8,9 @@ use check::audit::audit_against;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::description::is_own;
-use run::engine::launcher::Launcher;
-use run::engine::layout::{Layout, Ranks, RunOptions};
-use run::engine::programs::Programs;
+use run::engine::layout::{Launcher, Layout, Ranks, RunOptions};
 use run::engine::report::PhaseReport;
-use run::engine::runner::{Completed, Engine};
+use run::engine::runner::{Completed, Engine, Programs};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
@@ -45,9 +43,9 @@ impl Runner<'_> {
     /// # Errors
     /// If the run gives no result, or the mesh breaks a promise.
     pub fn run(&self, setup: &Setup, case: &Path, repeat: Option<usize>) -> Result<Run, Failure> {
-        let engine = self.programs.labelled(&setup.engine).with_launcher(self.launcher.clone());
+        let engine = self.programs.named(&setup.engine).with_launcher(self.launcher.clone());
         let written = repeat.is_none() && !is_own(engine.name());
-        let checked = written && !engine.description().promises.definition;
+        let checked = written && !engine.description.promises.definition;
         let mesh = self.place.join("mesh");
         let options = RunOptions {
             // Its digest need not be in the run report.
@@ -64,7 +62,7 @@ impl Runner<'_> {
         });
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
-        let Completed { report, time_process_s, time_process_cpu_s, command, .. } = completed?;
+        let Completed { report, time_process_s, time_process_cpu_s, command } = completed?;
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
             (
@@ -80,7 +78,7 @@ impl Runner<'_> {
         let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         Ok(Run {
-            program: machine::digest_of_file(engine.program()),
+            program: machine::digest_of_file(&engine.program),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
@@ -133,7 +131,7 @@ pub(crate) fn excess(lines: &[Line], setup: &Setup, limit: Duration) -> Option<S
 /// Audits a mesh against the promises of the engine that made it.
 fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), String> {
     let case = Case::read(case).map_err(|error| error.to_string())?;
-    let promises = &engine.description().promises;
+    let promises = &engine.description.promises;
     let report = audit_against(mesh, Some(&case), promises);
     match report.checks.iter().find(|check| !check.holds()) {
         Some(check) => Err(format!("the mesh breaks the promise {check}")),
@@ -198,7 +196,7 @@ mod tests {
     use crate::testing::{line, run};
     use contract::octant::Octant;
     use contract::word::{self, Leaf, Side};
-    use run::engine::programs::Given;
+    use run::engine::runner::Given;
 
     #[test]
     fn a_shown_command_contains_no_directory_of_the_machine() {

@@ -35,7 +35,7 @@ impl fmt::Display for Network {
 /// # Errors
 /// One sentence, if the ping-pong is missing or fails.
 pub fn measured(runner: &Runner) -> Result<Network, String> {
-    let program = runner.programs.mesher.program().with_file_name("pingpong");
+    let program = runner.programs.mesher.program.with_file_name("pingpong");
     if !program.is_file() {
         let program = program.display();
         return Err(format!("{program} is missing: build the mesher with --features mpi"));

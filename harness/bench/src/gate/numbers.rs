@@ -158,7 +158,7 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
         let options =
             RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.timeout) };
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
-        let independent = engine.description().promises.is_independent_of(Independence::Ranks);
+        let independent = engine.description.promises.is_independent_of(Independence::Ranks);
         // Of a report without a digest, the layer of correctness compares the mesh.
         if let Some(digest) = &report.digest
             && measures.digest.get_or_insert(digest.clone()) != digest

@@ -5,7 +5,7 @@ use crate::refuse;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::layout::Ranks;
-use run::engine::programs::Programs;
+use run::engine::runner::Programs;
 use serde::Deserialize;
 use statistics::comparison::rounds_min;
 use std::collections::BTreeMap;
@@ -118,7 +118,7 @@ impl GateCase {
             (self.file, self.absent) = (found.path.clone(), found.absent.clone());
         }
         self.file = std::path::absolute(&self.file)?;
-        let engine = programs.engine.description();
+        let engine = &programs.engine.description;
         // Only a geometry that has to be fetched may be missing.
         if self.absent.is_none() {
             self.absent = engine.declines(&Case::read(&self.file)?);

@@ -46,7 +46,7 @@ pub struct Subject {
 
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
-        let program = digest_of_file(engine.program());
+        let program = digest_of_file(&engine.program);
         let measured = Measured { named, revision, program };
         Self { engine, measured, counted: RefCell::default() }
     }
@@ -62,7 +62,7 @@ impl Subject {
         baseline: Option<&Self>,
     ) -> Result<Self, Failure> {
         let is_built = baseline.is_some_and(|subject| subject.measured.revision.is_some());
-        let own = engine.program().to_string_lossy();
+        let own = engine.program.to_string_lossy();
         let default = if is_built { WORKING_TREE } else { &own };
         let named = options.candidate.as_deref().unwrap_or(default);
         if named == own {
@@ -76,7 +76,7 @@ impl Subject {
     /// # Errors
     /// If it is neither, or does not build.
     pub fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
-        let description = engine.description();
+        let description = &engine.description;
         if Path::new(named).is_file() {
             let is_data =
                 Path::new(named).extension().is_some_and(|of| of == "json" || of == "toml");

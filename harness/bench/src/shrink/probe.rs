@@ -94,10 +94,10 @@ impl Probe {
     /// If the engine declines the case or cannot be run, if no mesh exists to compare with, or if nothing was checked.
     pub fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, Failure> {
         let left_out = |why: &str| Failure::missing(format!("left out: {why}"));
-        let Description { takes, promises, .. } = self.engine.description();
+        let Description { takes, promises, .. } = &self.engine.description;
         let path = trial.case.write(self.place.path(), takes.stl)?;
         let case = Case::read(&path)?;
-        if let Some(why) = self.engine.description().declines(&case) {
+        if let Some(why) = self.engine.description.declines(&case) {
             return Err(left_out(&why));
         }
         let of_definition = promises.definition.then_some((&self.reference, "the reference"));
@@ -150,7 +150,7 @@ impl Probe {
         ranks: Ranks,
         subject: Subject,
     ) -> Result<Vec<CheckResult>, Failure> {
-        let promises = &self.engine.description().promises;
+        let promises = &self.engine.description.promises;
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
         if promises.deterministic && ranks == Ranks::Serial {
@@ -175,8 +175,8 @@ impl Probe {
         let mesh = place.join("mesh");
         let options =
             RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
-        let completed = engine.run(case, &Layout::on(ranks), &options)?;
-        engine.read_mesh(completed.mesh.as_deref())
+        engine.run(case, &Layout::on(ranks), &options)?;
+        engine.read_mesh(&mesh)
     }
 }
 

@@ -17,8 +17,8 @@ use clap::Args;
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::interrupt;
-use run::engine::launcher::Launcher;
-use run::engine::programs::Programs;
+use run::engine::layout::Launcher;
+use run::engine::runner::Programs;
 use run::verify::options::whole_seconds;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -178,7 +178,7 @@ impl Session<'_> {
         let programs = self.runner.programs;
         let catalogue = programs.paths.catalogue.path();
         let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
-        let lacks = |name: String| (name.clone(), programs.labelled(&name).description().lacks());
+        let lacks = |name: String| (name.clone(), programs.named(&name).description.lacks());
         let opening = Opening {
             command: std::env::args().collect(),
             machine: machine::describe(&self.runner.launcher.program(), repository),
@@ -219,7 +219,7 @@ impl Session<'_> {
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
         for engine in &series.engines {
-            let description = self.runner.programs.labelled(engine).description();
+            let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
             if layouts.is_empty() {
                 (self.progress)(&format!("{engine} cannot run the series {experiment}"));
@@ -336,7 +336,7 @@ impl Session<'_> {
             if !points[index].warm_up || points[index].failed {
                 continue;
             }
-            let engine = self.runner.programs.labelled(&setup.engine).description();
+            let engine = &self.runner.programs.named(&setup.engine).description;
             let declined = engine.declines(&Case::read(&mesh.1)?);
             let too_much = || excess(&self.lines, &setup, self.runner.limit);
             match declined.or_else(too_much) {
@@ -387,8 +387,8 @@ impl Session<'_> {
     /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result. The mesh of an
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
     fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), Failure> {
-        let engine = self.runner.programs.labelled(&point.setup.engine);
-        let (promises, s) = (&engine.description().promises, &run.setup);
+        let engine = self.runner.programs.named(&point.setup.engine);
+        let (promises, s) = (&engine.description.promises, &run.setup);
         if run.warm_up && engine.name() != "mesher" && promises.definition {
             let setup = Setup::serial(&s.case, s.spacing_min, s.layer_cells_min);
             // Whether the mesher can be run is not a property of this engine.
@@ -409,7 +409,7 @@ impl Session<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use run::engine::programs::Given;
+    use run::engine::runner::Given;
 
     /// A mesh of the first series is known in the second, and is declined again.
     #[test]

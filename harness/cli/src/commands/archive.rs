@@ -1,13 +1,13 @@
 //! `harness archive`: a report that others can replay; `harness replay`: repeats its runs.
 
-use super::bench::programs;
+use super::bench::execute;
 use super::report::{read, records_in};
 use crate::options::Input;
 use crate::output::put;
-use bench::experiments::entry::{Entry, Line, Session};
+use bench::experiments::entry::{Line, Session};
 use bench::replay::{Expected, Found, Replayed, Row, Value, Verdict};
 use bench::study::package::{self, copy, package};
-use bench::study::{self, SessionOptions, Study};
+use bench::study::{SessionOptions, Study};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure};
 use contract::files::{Staging, nearest_directory};
@@ -16,11 +16,9 @@ use report::json::pretty;
 use report::table::Table;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
-use run::engine::programs::Given;
-use run::engine::runner::Engine;
+use run::engine::runner::{Engine, Given};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// `harness archive`.
 #[derive(Args, Debug)]
@@ -54,11 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
     let of_study = Study::read(study)?;
-    let other = lines.iter().find_map(|line| match &line.entry {
-        Entry::Run(run) => Some(&run.setup.case).filter(|case| !of_study.has_case(case)),
-        _ => None,
-    });
-    if let Some(case) = other {
+    let mut cases = lines.iter().filter_map(Line::run).map(|run| &run.setup.case);
+    if let Some(case) = cases.find(|case| !of_study.has_case(case)) {
         let why = format!(
             "the record has runs on {case}, and the study has no such case: give the study that made it"
         );
@@ -152,18 +147,12 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
     let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };
     leave_out_missing(&mut study)?;
-    let programs = programs(&arguments.programs, &mut study)?;
     let place = tempfile::tempdir()?;
     let temporary = place.path().join("replay.jsonl");
     let record = record.as_deref().unwrap_or(&temporary);
-    let start = Instant::now();
-    let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&session, record, &study, &programs, &progress)?;
+    let outcome = execute(&session, record, &mut study, &arguments.programs)?;
     if outcome.interrupted {
         return Ok(EXIT_INTERRUPTED);
-    }
-    if let Some(missing) = &outcome.missing {
-        eprintln!("harness: {missing}");
     }
     let replayed = expected.compare(&outcome.lines);
     let session = outcome.lines.iter().find_map(Line::session);
@@ -182,12 +171,10 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
 fn leave_out_missing(study: &mut Study) -> Result<(), Failure> {
     let paths = Paths::find();
     for name in study.engines().iter().filter(|name| !is_own(name)) {
-        let found = Engine::find(name, None, &paths);
-        if found.as_ref().is_ok_and(|engine| engine.program().is_file()) {
-            continue;
+        if !Engine::find(name, None, &paths).is_ok_and(|engine| engine.program.is_file()) {
+            eprintln!("harness: {name} is not installed here: its runs are left out");
+            study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
         }
-        eprintln!("harness: {name} is not installed here: its runs are left out");
-        study.series.iter_mut().for_each(|series| series.engines.retain(|other| other != name));
     }
     study.series.retain(|series| !series.engines.is_empty());
     match study.series.is_empty() && study.row.is_empty() {
@@ -227,24 +214,21 @@ fn table(replayed: &Replayed, session: Option<&Session>) -> Table {
         rows.extend((equal > 0).then(|| all.map(str::to_owned).to_vec()));
         rows.extend(of_run.iter().filter(|r| r.verdict() != Verdict::Equal).map(row));
     }
-    let count = |verdict| replayed.count(verdict);
+    use Verdict::{Differs, Equal, Inside, Missing, NotCompared, Outside};
+    let [equal, differ, inside, outside, missing, left_out] =
+        [Equal, Differs, Inside, Outside, Missing, NotCompared].map(|v| replayed.count(v));
     let mut notes = vec![format!(
-        "exact: {} equal, {} differ; ratios: {} inside of their bands, {} outside; {} missing; {} not compared",
-        count(Verdict::Equal),
-        count(Verdict::Differs),
-        count(Verdict::Inside),
-        count(Verdict::Outside),
-        count(Verdict::Missing),
-        count(Verdict::NotCompared)
+        "exact: {equal} equal, {differ} differ; ratios: {inside} inside of their bands, {outside} outside; {missing} missing; \
+         {left_out} not compared"
     )];
-    let busy = session.filter(|s| s.load_average > 0.5 * s.machine.cores as f64);
-    notes.extend(busy.map(|s| {
-        let Session { load_average, machine, .. } = s;
-        format!(
-            "the load was {load_average} on {} cores when it began: ratios need an idle machine",
-            machine.cores
-        )
-    }));
+    if let Some(Session { load_average: load, machine, .. }) = session
+        && *load > 0.5 * machine.cores as f64
+    {
+        let cores = machine.cores;
+        notes.push(format!(
+            "the load was {load} on {cores} cores when it began: ratios need an idle machine"
+        ));
+    }
     let columns = vec!["run", "quantity", "expected", "band", "measured", "verdict"];
     Table { columns, rows, notes, ..Table::default() }
 }

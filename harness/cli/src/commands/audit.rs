@@ -1,12 +1,12 @@
 //! `harness audit`: checks a mesh by itself, or against its case, or against promises on a case.
 
 use super::import::Source;
-use crate::options::{Input, Output};
+use crate::options::{Input, Output, examples};
 use check::audit::{AuditReport, audit_against};
 use check::forest;
 use check::promises::{Promises, Touching};
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, exit_first};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
 use run::proof;
@@ -17,17 +17,7 @@ const LIMIT: Duration = Duration::from_secs(86_400);
 
 /// `harness audit`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Examples:
-  harness audit mesh                                   what the leaves alone show
-  harness audit mesh --case body.toml                  everything: geometry, T0, crossing leaves, sides, layers, every split
-  harness audit mesh.vtu --case body.toml --sides side a mesh of another program, against the definition
-  harness audit mesh --case all.toml --promises p4est  a mesh that need not keep the whole definition (p4est deletes nothing)
-  harness audit forest.p8est --balance corners         every tree, and the balance across their faces, edges and corners
-  harness audit mesh.vtu --promises 'complete = true'  nothing but these promises
-
-Exit codes: 0 all checks hold; 1 a check has findings; 2 invalid input; 3 nothing was checked, memory does not suffice, or \
-Python, VTK or the proven checker is missing.")]
+#[command(after_help = examples(include_str!("../../../doc/audit.md")))]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
     mesh: Input,
@@ -100,11 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             Err(failure) => unproven = Some(Failure::from(failure)),
         }
     }
-    let code = publish(&report, arguments)?;
-    match unproven {
-        Some(failure) if report.holds() => return Err(failure),
-        Some(failure) => println!("left out: proof: {}", failure.why),
-        None => {}
+    let mut code = publish(&report, arguments)?;
+    if let Some(Failure { code: of_proof, why }) = unproven {
+        println!("left out: proof: {why}");
+        code = exit_first(code, of_proof);
     }
     let has_holes = report.checks.iter().any(|check| check.name == "complete" && !check.holds());
     if opened.made.is_some() && case.is_none() && has_holes {

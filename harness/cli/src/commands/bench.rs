@@ -4,7 +4,7 @@ use crate::output::{put, unwritten};
 use bench::experiments::entry::{Entry, Line};
 use bench::experiments::group::Groups;
 use bench::study::judge::{Judged, Verdict};
-use bench::study::{self, SessionOptions, Study};
+use bench::study::{self, Outcome, SessionOptions, Study};
 use clap::Args;
 use contract::failure::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, exit_first,
@@ -13,8 +13,8 @@ use report::benchmark::tables;
 use report::targets as page;
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
-use run::engine::programs::{Given, Programs};
-use run::engine::runner::Engine;
+use run::engine::runner::{Engine, Given, Programs};
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -88,27 +88,34 @@ fn measure(arguments: &Arguments, mut study: Study, record: &Path) -> Result<u8,
         fs::create_dir_all(directory).map_err(|error| Failure::at(directory, error))?;
         files::check_writable(&directory.join(PAGE))?;
     }
-    let programs = programs(&arguments.programs, &mut study)?;
-    let start = Instant::now();
-    let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
-    let outcome = study::measure(&arguments.session, record, &study, &programs, &progress)?;
+    let outcome = execute(&arguments.session, record, &mut study, &arguments.programs)?;
     let code = publish(&study, &outcome.rows, &outcome.lines, arguments.report.as_deref());
     println!("record: {}", record.display());
     if outcome.interrupted {
         eprintln!("harness: interrupted: the record contains all results so far");
         return Ok(EXIT_INTERRUPTED);
     }
-    match outcome.missing {
-        Some(missing) => {
-            eprintln!("harness: {missing}");
-            Ok(exit_first(code?, EXIT_MISSING))
-        }
-        None => code,
-    }
+    let is_complete = outcome.missing.is_none();
+    Ok(exit_first(code?, if is_complete { EXIT_HOLDS } else { EXIT_MISSING }))
+}
+
+/// Executes a study, and prints its progress and what is missing.
+pub(super) fn execute(
+    options: &SessionOptions,
+    record: &Path,
+    study: &mut Study,
+    given: &Given,
+) -> Result<Outcome, Failure> {
+    let programs = programs(given, study)?;
+    let start = Instant::now();
+    let progress = |what: &str| eprintln!("[{:>5} s] {what}", start.elapsed().as_secs());
+    let outcome = study::measure(options, record, study, &programs, &progress)?;
+    outcome.missing.iter().for_each(|missing| eprintln!("harness: {missing}"));
+    Ok(outcome)
 }
 
 /// Finds the programs, and replaces the names in the series by those of the results.
-pub(super) fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
+fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
     let names = study.engines();
     if names.len() > 1 && given.mesher.is_some() {
         return Err(Failure::input("--mesher replaces the program of one engine: name one"));
@@ -118,24 +125,18 @@ pub(super) fn programs(given: &Given, study: &mut Study) -> Result<Programs, Fai
     for name in foreign {
         programs.others.push(Engine::find(name, None, &programs.paths)?);
     }
-    let Programs { engine, others, mesher, reference, .. } = &programs;
-    let found = |name: &String| {
-        let mut all = [mesher, reference, engine].into_iter().chain(others);
-        all.find(|engine| engine.name() == name).expect("every engine was found")
-    };
-    let engines: Vec<&Engine> = names.iter().map(found).collect();
-    for (index, label) in engines.iter().map(|engine| engine.label()).enumerate() {
-        if engines[..index].iter().any(|other| other.label() == label) {
-            let why = format!("two programs of one name, {label}: rename a file");
-            return Err(Failure::input(why));
-        }
+    let mut known = HashSet::new();
+    let mut labels = names.iter().map(|name| programs.named(name).label());
+    if let Some(label) = labels.find(|label| !known.insert(label.clone())) {
+        let why = format!("two programs of one name, {label}: rename a file");
+        return Err(Failure::input(why));
     }
     // Our mesher chooses the spacings, also for other engines.
-    let also = names.iter().any(|name| name != "reference").then_some(mesher);
-    let mut required = also.into_iter().chain(engines);
+    let also = names.iter().any(|name| name != "reference").then_some(&programs.mesher);
+    let mut required = also.into_iter().chain(names.iter().map(|name| programs.named(name)));
     required.try_for_each(Engine::require)?;
     for name in study.series.iter_mut().flat_map(|series| &mut series.engines) {
-        *name = found(name).label();
+        *name = programs.named(name).label();
     }
     Ok(programs)
 }
@@ -176,7 +177,7 @@ fn publish(
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
-    let measured = |line: &Line| matches!(&line.entry, Entry::Run(run) if !run.warm_up);
+    let measured = |line: &Line| line.run().is_some_and(|run| !run.warm_up);
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }

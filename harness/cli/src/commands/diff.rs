@@ -1,7 +1,7 @@
 //! `harness diff`: prints the first difference between two meshes.
 
 use super::import::Source;
-use crate::options::Input;
+use crate::options::{Input, examples};
 use check::checks::CheckResult;
 use check::{diff, forest};
 use clap::Args;
@@ -9,12 +9,7 @@ use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 
 /// `harness diff`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Prints the inputs and counts that differ, the first leaf that differs, and the rule of reference/DEFINITION.md that decides \
-which mesh is right. Forests of p4est with many trees, or of quadrants, are compared tree by tree.
-
-Options for reading apply to each mesh that is not a leaf-set directory. Exit codes: 0 the meshes are the same; 1 their leaves \
-or their roots differ; 2 invalid input; 3 Python or VTK is missing.")]
+#[command(after_help = examples(include_str!("../../../doc/diff.md")))]
 pub struct Arguments {
     /// A leaf-set directory, or a mesh in any format of harness import
     a: Input,

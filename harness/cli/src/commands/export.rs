@@ -1,6 +1,6 @@
 //! `harness export`: writes a mesh, or part of it, in the format of other programs.
 
-use crate::options::{Input, SelectionArguments, read_case};
+use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
@@ -44,19 +44,8 @@ pub struct Arguments {
 
 fn after_help() -> String {
     let formats = FORMATS.iter().map(|f| format!("  {:<12}{}\n", f.ending, f.purpose));
-    format!(
-        "Formats:\n{}\n\
-         Examples:\n  \
-         harness export mesh mesh.vtu                           the whole mesh\n  \
-         harness export mesh slice.vtu --slice z=0              the cells at a plane, read without the others\n  \
-         harness export mesh nose.vtu --clip -1,-1,-1,0,1,1     the cells in a box\n  \
-         harness export mesh far.vtu --level-max 7              coarse cells only\n  \
-         harness export mesh case/constant/polyMesh             an OpenFOAM mesh\n  \
-         harness export mesh front.vtp --case body.toml         the surface towards the body, with the gap of every face\n\n\
-         Exit codes: 0 success; 2 invalid input, an unknown format, or a selection without cells; 130 interrupted, after \
-         which no file remains.",
-        formats.collect::<String>()
-    )
+    let examples = examples(include_str!("../../../doc/export.md"));
+    format!("Formats:\n{}\n{examples}", formats.collect::<String>())
 }
 
 /// Writes; returns the exit code.
@@ -68,17 +57,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Summary { leaves, files, bytes, notes } = write(format, arguments)?;
     let file = arguments.file.display();
     let what = if format.is_surface() { "face" } else { "cell" };
-    let per_cell = brief(bytes as f64 / leaves as f64);
+    let per_cell = bytes as f64 / leaves as f64;
     let files = if files == 1 { String::new() } else { format!(" in {files} files") };
-    println!("{file}: {leaves} {what}s, {bytes} bytes{files} ({per_cell} per {what})");
+    println!("{file}: {leaves} {what}s, {bytes} bytes{files} ({per_cell:.2} per {what})");
     notes.iter().for_each(|note| println!("  {note}"));
     Ok(EXIT_HOLDS)
-}
-
-/// A number with one decimal, or with two significant digits if it is less than 1.
-fn brief(number: f64) -> String {
-    let decimals = (1.0 - number.log10().floor()).clamp(1.0, 9.0) as usize;
-    format!("{number:.decimals$}")
 }
 
 fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
@@ -96,7 +79,7 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let progress = Progress::new();
+    let progress = Progress::default();
     let options = Options {
         jobs: jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN),
         watch: &progress,
@@ -117,15 +100,4 @@ fn script(format: &str, source: &Path, file: &Path) -> Result<(), Failure> {
     let (name, script) = (format.to_uppercase(), format!("export_{format}.py"));
     python::run(&name, &script, [source, file], &Paths::find(), SCRIPT_LIMIT, place)?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_below_one_have_two_significant_digits() {
-        let expected = [(16.94, "16.9"), (1.0, "1.0"), (0.26, "0.26"), (0.0415, "0.042")];
-        assert!(expected.iter().all(|&(number, text)| brief(number) == text));
-    }
 }

@@ -1,6 +1,6 @@
 //! `harness gate`: compares a candidate with a baseline and reports.
 
-use crate::options::{EngineArguments, Output};
+use crate::options::{EngineArguments, Output, examples};
 use crate::output::put_forms;
 use bench::gate::report::End;
 use bench::gate::{GateOptions, gate};
@@ -11,6 +11,7 @@ use report::json::pretty;
 
 /// `harness gate`.
 #[derive(Args, Debug)]
+#[command(after_help = examples(include_str!("../../../doc/gate.md")))]
 pub struct Arguments {
     #[command(flatten)]
     options: GateOptions,
@@ -47,10 +48,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     put_forms(
         code,
         &[
-            (&arguments.record, &|| pretty(&report.candidate_measures)),
-            (&arguments.junit, &|| junit(&report)),
-            (&arguments.json, &|| pretty(&report)),
-            (&arguments.markdown, &|| summary.clone()),
+            (arguments.record.as_deref(), &|| pretty(&report.candidate_measures)),
+            (arguments.junit.as_deref(), &|| junit(&report)),
+            (arguments.json.as_deref(), &|| pretty(&report)),
+            (arguments.markdown.as_deref(), &|| summary.clone()),
         ],
         Some(&summary),
     )

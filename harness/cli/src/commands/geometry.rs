@@ -1,6 +1,6 @@
 //! `harness geometry`: prints the defects of an STL file or a case, and their effect on the mesh.
 
-use crate::options::{self, Output, root};
+use crate::options::{self, Output, examples, root};
 use crate::output::put;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
@@ -12,10 +12,7 @@ use std::num::NonZero;
 
 /// `harness geometry`.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Exit codes: 0 no finding changes the mesh's region; 1 a finding can change it; 2 the geometry \
-                        cannot be meshed."
-)]
+#[command(after_help = examples(include_str!("../../../doc/geometry.md")))]
 pub struct Arguments {
     /// An STL file, or a case file (.toml), which provides root and spacing
     file: options::Input,

@@ -1,7 +1,6 @@
 //! `harness import`: makes a leaf-set directory from a mesh in another program's format.
 
-use super::meshed::Meshed;
-use crate::options::{Input, read_case, root, whole_seconds};
+use crate::options::{Input, Meshed, examples, read_case, root, whole_seconds};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_HOLDS, Failure};
@@ -9,23 +8,13 @@ use contract::import::forest::{self, Forest};
 use contract::import::{Format, Position, Request, guess};
 use contract::lattice::Root;
 use contract::manifest::{self, Manifest};
-use run::engine::paths::Paths;
 use run::import::{Imported, import};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// `harness import`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Examples:
-  harness import forest.p8est --root -4,-4,-4,8 --out mesh     the unit cube of the forest becomes this root
-  harness import cells.csv --case body.toml --out mesh         columns x, y, z, level; the root of the case
-  harness import mesh.vtu --sides side --out mesh              sides from a cell array: 0 outside, 1 inside, 2 crossing
-  harness import foam/constant/polyMesh --out mesh             the root is derived from the cells
-
-Every cell must be a cube of the oct-tree, within 0.01 of its edge, and no two may overlap. Exit codes: 0 success; 2 the
-file is not such a mesh, which is explained in one sentence, or cannot be written; 3 Python, or VTK for VTK's formats, is missing (leaf \
-words, p4est and the mesher's trees need neither).")]
+#[command(after_help = examples(include_str!("../../../doc/import.md")))]
 pub struct Arguments {
     /// The mesh: a file, or an OpenFOAM case or polyMesh
     mesh: Input,
@@ -109,8 +98,7 @@ impl Source {
             ..Request::default()
         };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let mut imported =
-            import(mesh, *format, &request, case, program, &Paths::find(), *timeout)?;
+        let mut imported = import(mesh, *format, &request, case, program, *timeout)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(

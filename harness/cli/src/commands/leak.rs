@@ -1,44 +1,31 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
-use crate::options::{Output, point, whole_seconds, with_extension};
+use crate::options::{Output, examples, point, whole_seconds};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::files::{Content, write_together};
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
+use contract::plain::{PlainCase, StlForm};
 use contract::watch::Watch;
 use export::polydata;
 use geometry::leak::Leaks;
 use geometry::leak::ends::Target;
 use geometry::leak::report::{Answers, Passage};
 use report::json::pretty;
-use run::base_tree::BaseTrees;
 use run::engine::interrupt;
-use run::engine::programs::{Given, Programs};
+use run::engine::layout::SERIAL;
+use run::engine::runner::{Given, Programs};
 use run::progress::Progress;
+use std::cell::Cell;
+use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
 /// `harness leak`.
 #[derive(Args, Debug)]
-#[command(after_help = "\
-Two places are joined if a path of leaves of the base tree that no facet touches leads from one to the other, through \
-shared parts of faces. The widest path is the one whose narrowest place is widest. The width of a place is the diameter \
-of the largest ball centred there that no facet enters; the narrowest place is reported with bounds on the width of the \
-largest ball that passes it, at most 5 % apart.
-
-Without --from, every region is examined that is inside at a coarser spacing and outside at the case's, as the mesher \
-reports it. With --to alone, the path starts at the first seed of the case that reaches the end.
-
-Examples:
-  harness leak car.toml                                  where does the body leak?
-  harness leak car.toml --from 0,0,1                     does the cabin leak?
-  harness leak duct.toml --from 0,0,0 --to 9,0,0         are two rooms joined?
-  harness leak car.toml --from 0,0,1 --vtk leak.vtp      its path for ParaView
-
-Exit codes: 0 no path at the case's spacing, whatever a finer one would do; 1 a path was found; 2 invalid input, or nothing to \
-examine; 3 the mesher is missing; 130 interrupted.")]
+#[command(after_help = examples(include_str!("../../../doc/leak.md")))]
 pub struct Arguments {
     /// Name in geometries/catalogue.toml or path of a case file
     case: String,
@@ -52,7 +39,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<Output>,
     /// Write the paths as VTK polylines with the free width at each point
-    #[arg(long, value_name = "FILE.vtp", value_parser = with_extension("vtp"))]
+    #[arg(long, value_name = "FILE.vtp")]
     vtk: Option<Output>,
     /// Time limit of every single run of the mesher
     #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = whole_seconds)]
@@ -67,23 +54,35 @@ pub struct Arguments {
 /// # Errors
 /// If the case cannot be read or meshed, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let is_vtp = |file: &Output| file.extension().is_some_and(|extension| extension == "vtp");
+    if !arguments.vtk.as_ref().is_none_or(is_vtp) {
+        return Err(Failure::input("the file name of --vtk must end in .vtp"));
+    }
     let programs = Programs::find("mesher", &arguments.programs)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;
-    let mut trees = BaseTrees::new(&programs.mesher, &path, &case, arguments.timeout)?;
-    let progress = Progress::new();
-    let (mut first, leaked) = match (arguments.from, arguments.to) {
-        (None, None) => {
-            progress.step("meshing the base tree of the case");
-            let tree = trees.at(case.level_surface, true)?;
-            let leaked = leaked(&case, &tree)?;
-            (Some(tree.words), leaked)
+    let place = tempfile::tempdir()?;
+    let plain = PlainCase::read(&path)?;
+    let tree = |level: u8| -> Result<LeafSet, Failure> {
+        let mut plain = plain.clone();
+        if level != case.level_surface {
+            // The base tree does not depend on seeds, but one in a crossing leaf of a coarser tree would be refused.
+            plain.table.remove("seeds");
         }
-        _ => (None, Vec::new()),
+        let spacing = case.root.edge / f64::from(1u32 << level);
+        plain.table.insert("spacing_min".into(), spacing.into());
+        let file = plain.write(place.path(), StlForm::Binary)?;
+        let limits = (place.path(), arguments.timeout);
+        let mesh = programs.mesher.mesh(&file, &SERIAL, true, limits)?;
+        let tree = programs.mesher.read_mesh(&mesh)?;
+        fs::remove_dir_all(mesh)?;
+        Ok(tree)
     };
-    let make = |level| match first.take_if(|_| level == case.level_surface) {
-        Some(words) => Ok(words),
-        None => Ok(trees.at(level, false)?.words),
+    let progress = Progress::default();
+    let of_case = Cell::new(None);
+    let make = |level| match of_case.take() {
+        Some(words) if level == case.level_surface => Ok(words),
+        _ => Ok(tree(level)?.words),
     };
     let mut leaks = Leaks::new(&case, make, &progress)?;
     let ends = match (arguments.from, arguments.to) {
@@ -93,6 +92,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             vec![(seed, to)]
         }
         (None, None) => {
+            progress.step("meshing the base tree of the case");
+            let tree = tree(case.level_surface)?;
+            let leaked = leaked(&case, &tree)?;
+            of_case.set(Some(tree.words));
             let regions = leaks.regions(&leaked)?.into_iter();
             // Seeds lie in the flow, into which the region leaked.
             let seed = |from| Ok((from, leaks.seed(Target::Point(from))?));

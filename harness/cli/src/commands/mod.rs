@@ -1,4 +1,4 @@
-//! The command line: the commands, one file each with its arguments. `meshed` is shared.
+//! The command line: the commands, one file each with its arguments.
 
 mod archive;
 mod audit;
@@ -9,9 +9,7 @@ mod gate;
 mod geometry;
 mod import;
 mod leak;
-mod meshed;
 mod picture;
-mod planted;
 mod report;
 mod selftest;
 mod shrink;
@@ -22,6 +20,8 @@ mod why;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use contract::failure::{EXIT_HOLDS, Failure};
+use std::hint::black_box;
+use std::thread;
 
 /// Verifies and benchmarks oct-tree meshers.
 ///
@@ -80,7 +80,11 @@ pub enum Command {
     },
     /// End with a fault, for the tests of the exit codes
     #[command(hide = true)]
-    Planted(planted::Arguments),
+    Planted {
+        /// A `panic` on the main thread, a panic on another `thread` for which it waits, or a request for too much `memory`
+        #[arg(long)]
+        fault: String,
+    },
 }
 
 impl Command {
@@ -113,9 +117,20 @@ impl Command {
                 print!("{}", String::from_utf8_lossy(&script));
                 Ok(EXIT_HOLDS)
             }
-            Self::Planted(arguments) => Ok(planted::run(&arguments)),
+            Self::Planted { fault } => plant(&fault),
         }
     }
+}
+
+fn plant(fault: &str) -> ! {
+    let _place = tempfile::tempdir();
+    let panic = || panic!("a fault that was asked for");
+    match fault {
+        "memory" => _ = black_box(vec![0_u8; 1 << 62]),
+        "thread" => thread::scope(|scope| _ = scope.spawn(panic)),
+        _ => panic(),
+    }
+    unreachable!("{fault} has ended the harness")
 }
 
 #[cfg(test)]
@@ -126,6 +141,20 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn help_ends_with_the_examples_of_the_page() {
+        let mut count = 0;
+        for command in Arguments::command().get_subcommands() {
+            let Some(help) = command.get_after_help().map(ToString::to_string) else { continue };
+            assert!(
+                help.contains(&format!("Examples:\n  harness {} ", command.get_name())),
+                "{help}"
+            );
+            count += 1;
+        }
+        assert_eq!(count, 10);
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! `harness picture`: draws a slice of a mesh.
 
-use super::meshed::MeshArguments;
-use crate::options::{Output, SelectionArguments, number_in};
+use crate::options::{MeshArguments, Output, SelectionArguments, examples, number_in};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
@@ -11,21 +10,9 @@ use run::engine::layout::{Layout, Ranks, SERIAL};
 use std::io;
 use std::path::Path;
 
-const EXAMPLES: &str = "\
-A slice is drawn at page width with the section of the geometry, axes and a legend; cells too small to be seen \
-are merged, and their greatest value counts. An existing file is replaced.
-
-Examples:
-  harness picture uav-small --out uav.svg                             mesh a case and draw its middle
-  harness picture body.toml --out nose.png --slice y=0 --zoom 8       closer, in another plane
-  harness picture mesh --case body.toml --out mesh.pdf --colour side  a mesh on disk; without --case, no geometry is drawn
-  harness picture uav-small --out ranks.svg --ranks 16 --colour rank  the partition
-
-Exit codes: 0 success; 2 invalid input or an unknown format; 3 the mesher is missing; 130 interrupted.";
-
 /// `harness picture`.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = examples(include_str!("../../../doc/picture.md")))]
 pub struct Arguments {
     /// The mesh.
     #[command(flatten)]

@@ -4,10 +4,9 @@ use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
-use contract::leafset;
 use run::engine::failure::End;
 use run::engine::layout::SERIAL;
-use run::engine::programs::{Given, Programs};
+use run::engine::runner::{Given, Programs};
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -48,15 +47,15 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 /// Meshes a case with the reference in `directory`: the mesh, and the base tree T0.
 fn mesh_case(programs: &Programs, path: &Path, directory: &Path) -> Result<SelftestCase, Failure> {
     let case = Case::read(path)?;
-    let failed = |why| Failure { code: EXIT_FAILED, why };
+    let reference = &programs.reference;
     let made = |name, ungraded| {
         let place = (&*directory.join(name), LIMIT);
-        let meshed = programs.reference.mesh(path, &SERIAL, ungraded, place);
-        let out = meshed.map_err(|failure| match &failure.end {
+        let meshed = reference.mesh(path, &SERIAL, ungraded, place);
+        let read = meshed.and_then(|mesh| reference.read_mesh(&mesh));
+        read.map_err(|failure| match &failure.end {
             End::Missing(_) | End::Interrupted => Failure::from(failure),
-            _ => failed(format!("{failure}, on {}", path.display())),
-        })?;
-        leafset::read(&out).map_err(|error| failed(error.to_string()))
+            _ => Failure { code: EXIT_FAILED, why: format!("{failure}, on {}", path.display()) },
+        })
     };
     Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
 }

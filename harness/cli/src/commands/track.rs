@@ -103,9 +103,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     put_forms(
         if worse.is_empty() { EXIT_HOLDS } else { EXIT_FAILED },
         &[
-            (&arguments.page, &|| page(&records, &all, link)),
-            (&arguments.junit, &|| junit(&all, recent)),
-            (&arguments.json, &|| pretty(&all)),
+            (arguments.page.as_deref(), &|| page(&records, &all, link)),
+            (arguments.junit.as_deref(), &|| junit(&all, recent)),
+            (arguments.json.as_deref(), &|| pretty(&all)),
         ],
         None,
     )

@@ -1,7 +1,7 @@
 //! `harness verify`: verifies the selected cases and reports.
 
-use crate::options::{EngineArguments, Output};
-use crate::output::{put, put_forms};
+use crate::options::{EngineArguments, Output, examples};
+use crate::output::put_forms;
 use clap::Args;
 use contract::failure::Failure;
 use report::verification::{json, junit, markdown, table};
@@ -10,6 +10,7 @@ use run::verify::verify;
 
 /// `harness verify`.
 #[derive(Args, Debug)]
+#[command(after_help = examples(include_str!("../../../doc/verify.md")))]
 pub struct Arguments {
     #[command(flatten)]
     pub options: Options,
@@ -27,26 +28,21 @@ pub struct Arguments {
 ///
 /// # Errors
 /// If the verification cannot begin, or a report cannot be written.
-pub fn run(
-    Arguments { options, junit: junit_file, json: json_file, engine }: &Arguments,
-) -> Result<u8, Failure> {
-    let report = verify(options, &engine.find()?)?;
-    print!("{}", table(&report));
-    let text = markdown(&report);
-    // All forms go into the directory of `--out`.
-    if let Some(out) = &options.out {
-        for (name, text) in [
-            ("table.txt", &table(&report)),
-            ("report.md", &text),
-            ("junit.xml", &junit(&report)),
-            ("report.json", &json(&report)),
-        ] {
-            put(&out.join(name), text)?;
-        }
-    }
+pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let report = verify(&arguments.options, &arguments.engine.find()?)?;
+    let (shown, page) = (table(&report), markdown(&report));
+    print!("{shown}");
+    let out = |name| arguments.options.out.as_ref().map(|out| out.join(name));
     put_forms(
         report.exit_code(),
-        &[(junit_file, &|| junit(&report)), (json_file, &|| json(&report))],
-        Some(&text),
+        &[
+            (out("table.txt").as_deref(), &|| shown.clone()),
+            (out("report.md").as_deref(), &|| page.clone()),
+            (out("junit.xml").as_deref(), &|| junit(&report)),
+            (out("report.json").as_deref(), &|| json(&report)),
+            (arguments.junit.as_deref(), &|| junit(&report)),
+            (arguments.json.as_deref(), &|| json(&report)),
+        ],
+        Some(&page),
     )
 }

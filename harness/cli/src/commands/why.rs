@@ -1,25 +1,15 @@
 //! `harness why`: explains the leaf at a point.
 
-use super::meshed::MeshArguments;
-use crate::options::point;
+use crate::options::{MeshArguments, examples, point};
 use check::why::{self, Mesh};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh;
 use run::engine::layout::SERIAL;
 
-const EXAMPLES: &str = "Examples:
-  harness why uav-small 0.1,0,0.2                mesh a case of the catalogue and explain the leaf at a point
-  harness why body.toml -1.5,2,0                 mesh a case file
-  harness why mesh 0.1,0,0.2 --case body.toml    a mesh on disk; without --case, facets are not known
-
-Sections are those of reference/DEFINITION.md. Facets, boxes and seeds are counted from 0.
-
-Exit codes: 0 answered; 2 invalid input; 3 the mesher is missing.";
-
 /// `harness why`.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = examples(include_str!("../../../doc/why.md")))]
 pub struct Arguments {
     /// The mesh.
     #[command(flatten)]

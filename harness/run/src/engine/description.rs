@@ -12,10 +12,9 @@ use contract::manifest::{Enclosed, Keep};
 use contract::octant::LEVEL_MAX;
 use contract::plain::StlForm;
 use serde::Deserialize;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Our own engine files, for a harness that runs outside the repository.
+/// Our own engine files, which belong to the version of the harness.
 const OWN: [(&str, &str); 2] = [
     ("mesher", include_str!("../../../engines/mesher.toml")),
     ("reference", include_str!("../../../engines/reference.toml")),
@@ -130,19 +129,13 @@ impl Default for Takes {
 }
 
 /// Limits: the engine is not run on a case beyond them.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Limits {
     /// Deepest level.
-    pub level_max: u8,
+    pub level_max: Option<u8>,
     /// Greatest number of facets.
-    pub facets_max: u64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { level_max: LEVEL_MAX, facets_max: u64::MAX }
-    }
+    pub facets_max: Option<u64>,
 }
 
 impl Description {
@@ -156,23 +149,16 @@ impl Description {
             false => paths.engines.join(format!("{name}.toml")),
         };
         let wrong = |why: String| format!("{}: {why}", path.display());
-        let own = OWN.iter().find(|(own, _)| *own == name);
-        let text = match (contract::files::read_text(&path), own) {
-            (Err(error), Some((_, text))) if error.kind() == ErrorKind::NotFound => {
-                (*text).to_owned()
-            }
-            (text, _) => text.map_err(|error| {
-                wrong(format!(
-                    "{error}: give a name in {}, or a path that ends in .toml",
-                    paths.engines.display()
-                ))
+        let text = match OWN.iter().find(|(own, _)| *own == name) {
+            Some((_, text)) => (*text).to_owned(),
+            None => contract::files::read_text(&path).map_err(|error| {
+                let engines = paths.engines.display();
+                wrong(format!("{error}: give a name in {engines}, or a path that ends in .toml"))
             })?,
         };
-        let mut description = Self::parse(&text).map_err(wrong)?;
-        description.name = name.to_owned();
         let here = path.parent().unwrap_or(Path::new(""));
-        description.here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
-        Ok(description)
+        let here = std::fs::canonicalize(here.join(".")).unwrap_or(here.to_owned());
+        Ok(Self { name: name.to_owned(), here, ..Self::parse(&text).map_err(wrong)? })
     }
 
     /// Parses an engine file.
@@ -188,7 +174,13 @@ impl Description {
             templates.check_placeholders()?;
             templates.check_promises(&description.promises)?;
             if description.program.is_empty() {
-                templates.name_program(&first);
+                // So that another program can be run.
+                let Templates { serial, parallel, simulated, .. } = templates;
+                for word in [serial, parallel, simulated].into_iter().flatten() {
+                    if *word == first {
+                        *word = "{program}".to_owned();
+                    }
+                }
                 description.program = first;
             }
         }
@@ -215,8 +207,14 @@ impl Description {
         let keep = format!("{:?}", case.keep).to_lowercase();
         let is_enclosed_kept = case.enclosed == Enclosed::Keep;
         let beyond = [
-            (level > limits.level_max, format!("level {level} (level_max in [limits])")),
-            (facets > limits.facets_max, format!("{facets} facets (facets_max in [limits])")),
+            (
+                limits.level_max.is_some_and(|max| level > max),
+                format!("level {level} (level_max in [limits])"),
+            ),
+            (
+                limits.facets_max.is_some_and(|max| facets > max),
+                format!("{facets} facets (facets_max in [limits])"),
+            ),
             (!case.boxes.is_empty() && !takes.boxes, "extent boxes (boxes in [takes])".to_owned()),
             (
                 !case.keep_crossing && !takes.drop_crossing,
@@ -255,8 +253,8 @@ impl Description {
             (!parallel || of_ranks, EQUAL_RANKS),
         ];
         let missing = features.into_iter().filter(|(has, _)| !has).map(|(_, name)| name.to_owned());
-        let level = self.limits.level_max;
-        missing.chain((level < LEVEL_MAX).then(|| format!("levels beyond {level}"))).collect()
+        let deepest = self.limits.level_max.filter(|level| *level < LEVEL_MAX);
+        missing.chain(deepest.map(|level| format!("levels beyond {level}"))).collect()
     }
 }
 
@@ -295,7 +293,7 @@ mod tests {
         assert!(
             least.run.parallel.is_empty() && least.run.json.is_empty() && !least.takes.generator
         );
-        assert_eq!((least.limits.level_max, least.run.always_writes_mesh()), (19, true));
+        assert_eq!((least.limits.level_max, least.run.always_writes_mesh()), (None, true));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Why a program gave no result, and the one sentence for it.
 
+use std::io;
 use std::time::Duration;
 use thiserror::Error;
 
@@ -58,6 +59,13 @@ impl Failure {
     /// Whether the user interrupted the harness; the failure is then not the program's.
     pub fn is_interrupt(&self) -> bool {
         self.end == End::Interrupted
+    }
+}
+
+/// A directory or a file of a run could not be made or read, which is no program's fault.
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::new("the harness", End::Unusable(format!("cannot use its files: {error}")))
     }
 }
 

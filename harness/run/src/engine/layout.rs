@@ -1,10 +1,18 @@
-//! How a run is distributed over ranks, on which its mesh does not depend, and the files and limits of the run.
+//! How a run is distributed over ranks, on which its mesh does not depend, how ranks on MPI are started, and the files and limits of a run.
+//!
+//! Invariant: the shared memory of a run on one machine lies in a directory of its own, so that cleaning up after a
+//! killed run cannot affect another run.
 
+use super::paths::on_path;
 use super::service::Services;
+use contract::files::publications;
 use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// The number of ranks and their kind.
 ///
@@ -105,7 +113,7 @@ impl fmt::Display for Layout {
 /// Files, choices and limits of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions<'a> {
-    /// Existing directory for the run report, the status and the logs; no other run may use it at the same time.
+    /// Directory for the run report, the status and the logs, which is made; no other run may use it at the same time.
     pub place: &'a Path,
     /// Time after which the run is killed.
     pub limit: Duration,
@@ -148,6 +156,96 @@ impl<'a> RunOptions<'a> {
     }
 }
 
+/// The placeholder for the number of ranks.
+const RANKS: &str = "{ranks}";
+
+/// A launcher's command template, such as `srun -n {ranks} --cpu-bind=cores`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Launcher {
+    words: Vec<String>,
+}
+
+impl Launcher {
+    /// Parses a template: words separated by blanks, with `{ranks}` at least once.
+    ///
+    /// # Errors
+    /// One sentence, if `{ranks}` is missing.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+        match words.iter().any(|word| word.contains(RANKS)) {
+            true => Ok(Self { words }),
+            false => Err(format!(
+                "the launcher `{text}` has no place for the number of ranks: write {RANKS} there"
+            )),
+        }
+    }
+
+    /// `mpirun -n {ranks}`, with the program at this path.
+    pub fn mpirun(program: &Path) -> Self {
+        Self { words: vec![program.to_string_lossy().into_owned(), "-n".into(), RANKS.into()] }
+    }
+
+    /// The launcher's own program.
+    pub fn program(&self) -> PathBuf {
+        PathBuf::from(&self.words[0])
+    }
+
+    /// Whether that program exists, at its path or on the `PATH`.
+    pub fn is_found(&self) -> bool {
+        self.program().is_file() || on_path(&self.words[0]).is_some()
+    }
+
+    /// The words that start a program on `ranks` ranks.
+    pub fn words(&self, ranks: usize) -> impl Iterator<Item = String> {
+        self.words.iter().map(move |word| word.replace(RANKS, &ranks.to_string()))
+    }
+
+    /// The command that runs `program` on `ranks` ranks; the caller adds the arguments.
+    pub fn command(&self, ranks: usize, program: impl AsRef<OsStr>) -> Command {
+        let mut words = self.words(ranks);
+        let mut command = Command::new(words.next().expect("a template has a word with {ranks}"));
+        command.args(words).arg(program);
+        set_environment(&mut command);
+        command
+    }
+
+    /// Prepares the environment of a run, and makes a directory for its shared memory. `None` if the launcher may start ranks on other
+    /// machines, where the directory would not exist, or if this machine has no `/dev/shm`; OpenMPI then uses its own default.
+    pub fn prepare(&self, command: &mut Command) -> Option<TempDir> {
+        set_environment(command);
+        let is_mpirun = self.program().file_name() == Some(OsStr::new("mpirun"));
+        // In a job of Slurm, mpirun starts ranks on all of its nodes.
+        let nodes = std::env::var("SLURM_JOB_NUM_NODES").unwrap_or_else(|_| "1".to_owned());
+        if !is_mpirun || self.words[1..] != ["-n", RANKS] || nodes != "1" {
+            return None;
+        }
+        own_directory(command)
+    }
+}
+
+/// Makes a directory for the files of OpenMPI, which leaves them if its ranks or daemon are killed. `None` if this machine has no
+/// `/dev/shm`.
+pub fn own_directory(command: &mut Command) -> Option<TempDir> {
+    let made = tempfile::Builder::new().prefix("harness-").tempdir_in("/dev/shm").ok()?;
+    publications().push(made.path().to_owned());
+    command.env("OMPI_MCA_btl_vader_backing_directory", made.path());
+    command.env("OMPI_MCA_orte_tmpdir_base", made.path());
+    Some(made)
+}
+
+/// Sets the environment that OpenMPI needs to run as root and with more ranks than cores, also for a program that
+/// initialises MPI without `mpirun`.
+pub fn set_environment(command: &mut Command) {
+    command
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        // In a job of Slurm, several jobs of ranks share the allocation; without this, each would wait for the one before it.
+        .env("SLURM_OVERLAP", "1")
+        // On a shared machine, other work may occupy the cores that ranks would be bound to.
+        .env("OMPI_MCA_hwloc_base_binding_policy", "none");
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,5 +261,24 @@ mod tests {
         let json = serde_json::to_string(&layout).unwrap();
         assert_eq!(json, r#"{"ranks":3,"partitioner":"metis","level_base":"auto"}"#);
         assert_eq!(serde_json::from_str::<Layout>(&json).unwrap(), layout);
+    }
+
+    #[test]
+    fn a_template_is_filled_in() {
+        let launcher = Launcher::parse("srun -n {ranks} --tasks={ranks}").unwrap();
+        let command = launcher.command(16, "mesher");
+        let words: Vec<_> = command.get_args().map(|w| w.to_string_lossy().into_owned()).collect();
+        assert_eq!(words, ["-n", "16", "--tasks=16", "mesher"]);
+        assert_eq!(command.get_program(), "srun");
+        assert!(Launcher::parse("mpirun -n 4").unwrap_err().contains("{ranks}"));
+    }
+
+    #[test]
+    fn only_a_run_on_this_machine_has_its_own_shared_memory() {
+        let cluster = Launcher::parse("mpirun --hostfile hosts -n {ranks}").unwrap();
+        let mut command = Command::new("true");
+        assert!(cluster.prepare(&mut command).is_none());
+        let local = Launcher::mpirun(Path::new("/usr/bin/mpirun"));
+        assert_eq!(local.prepare(&mut command).is_some(), Path::new("/dev/shm").is_dir());
     }
 }

@@ -4,14 +4,11 @@
 pub mod description;
 pub mod failure;
 pub mod interrupt;
-pub mod launcher;
 pub mod layout;
 pub mod paths;
 pub mod process;
-pub mod programs;
 pub mod report;
 pub mod runner;
 pub mod service;
 mod session;
 pub mod templates;
-mod written;

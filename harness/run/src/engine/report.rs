@@ -8,7 +8,6 @@
 //!
 //! An engine without a run report is described by the manifest of its mesh, which has cells and digest only.
 
-use contract::manifest::Manifest;
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -129,12 +128,6 @@ impl RunReport {
         let sum = |of: &[u64]| of.iter().try_fold(0u64, |sum, n| sum.checked_add(*n));
         let (name, _) = numbers.into_iter().find(|(_, of)| sum(of).is_none())?;
         Some(format!("the sum of {name} over all ranks exceeds 64 bits"))
-    }
-
-    /// The report of a run that wrote a mesh and no run report.
-    pub fn of_mesh(manifest: &Manifest) -> Self {
-        let digest = Some(manifest.digest.to_string());
-        Self { cells: manifest.leaves, digest, ..Self::default() }
     }
 
     /// Peak memory of all ranks together.

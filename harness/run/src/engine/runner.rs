@@ -1,15 +1,16 @@
-//! An engine: any program that meshes a case, ours included, run as its engine file describes.
+//! An engine: any program that meshes a case, ours included, run as its engine file describes; and the engines of a session.
 
 use super::description::{self, Description};
 use super::failure::{End, Failure};
-use super::launcher::Launcher;
-use super::layout::{Layout, Ranks, RunOptions};
-use super::paths::{Paths, on_path};
+use super::layout::{Launcher, Layout, Ranks, RunOptions};
+use super::paths::{Input, Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use super::service::{self, Services};
 use super::templates::{LAUNCHER, Values, fill};
-use super::written;
+use crate::import;
+use clap::Args;
+use contract::failure::named;
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
 use contract::plain::{PlainCase, StlForm};
@@ -21,10 +22,12 @@ use std::time::Duration;
 /// An engine, ready to run.
 #[derive(Clone, Debug)]
 pub struct Engine {
-    description: Description,
-    program: PathBuf,
+    /// The engine file.
+    pub description: Description,
+    /// The program.
+    pub program: PathBuf,
     /// Whether the program is not the one that the engine file names.
-    is_given: bool,
+    pub is_given: bool,
     places: Values<'static>,
     launcher: Launcher,
 }
@@ -40,8 +43,6 @@ pub struct Completed {
     pub time_process_cpu_s: f64,
     /// The command that was run.
     pub command: Command,
-    /// The mesh's directory, if it was written.
-    pub mesh: Option<PathBuf>,
 }
 
 impl Engine {
@@ -81,24 +82,9 @@ impl Engine {
         Self { launcher, ..self.clone() }
     }
 
-    /// The engine file.
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
-
     /// The name or path by which the engine was found.
     pub fn name(&self) -> &str {
         &self.description.name
-    }
-
-    /// The program.
-    pub fn program(&self) -> &Path {
-        &self.program
-    }
-
-    /// The program, if it is not the one that the engine file names.
-    pub fn program_given(&self) -> Option<&Path> {
-        self.is_given.then_some(&self.program)
     }
 
     /// Refuses to go on if the program is missing.
@@ -154,7 +140,6 @@ impl Engine {
         if takes.generator && takes.stl == StlForm::Any {
             return Ok(case.to_owned());
         }
-        fs::create_dir_all(directory).map_err(|error| error.to_string())?;
         PlainCase::read(case)?.write(directory, takes.stl).map_err(|error| error.to_string())
     }
 
@@ -173,7 +158,7 @@ impl Engine {
         values.extend([("program", text(&self.program)), ("case", text(case))]);
         let templates = &self.description.run;
         let out = self.mesh_path(options).map(|mesh| match templates.format {
-            Some(_) => text(&written::foreign(options.place)),
+            Some(_) => text(&import::foreign(options.place)),
             None => text(&mesh),
         });
         let words = templates.words(&self.launcher, layout, options, out, values);
@@ -193,29 +178,29 @@ impl Engine {
         layout: &Layout,
         options: &RunOptions,
     ) -> Result<Completed, Failure> {
+        fs::create_dir_all(options.place).map_err(|error| named(options.place, &error))?;
         let mut command = self.command(case, layout, options)?;
         let mesh = self.mesh_path(options);
         // An earlier run's files must not be mistaken for this run's.
         let _ = fs::remove_file(options.report_path());
         if let (Some(mesh), Some(_)) = (&mesh, self.description.run.format) {
-            let cleared = written::clear(options.place, mesh);
-            cleared.map_err(|error| self.unusable(format!("has no place to write to: {error}")))?;
+            import::clear(options.place, mesh)?;
         }
         let finished = self.execute(&mut command, layout.ranks, options)?;
         let written = mesh.as_deref().map(|mesh| {
-            written::complete(&self.description, self.label(), &command, case, mesh, options)
+            import::complete(&self.description, self.label(), &command, case, mesh, options)
         });
         let written = written.transpose().map_err(|end| self.failure(end))?;
         let report = self.report(written.as_ref(), options, layout.ranks.count(), &finished);
         let report = report.map_err(|why| self.unusable(why))?;
         let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
-        Ok(Completed { report, time_process_s, time_process_cpu_s, command, mesh })
+        Ok(Completed { report, time_process_s, time_process_cpu_s, command })
     }
 
-    /// Meshes a case in a directory, which is made, without a run report; returns the leaf-set directory.
+    /// Meshes a case in a directory without a run report; returns the leaf-set directory.
     ///
     /// # Errors
-    /// As [`Self::run`], or if the directory cannot be made.
+    /// As [`Self::run`].
     pub fn mesh(
         &self,
         case: &Path,
@@ -223,9 +208,6 @@ impl Engine {
         ungraded: bool,
         (place, limit): (&Path, Duration),
     ) -> Result<PathBuf, Failure> {
-        let why = |error| format!("has no directory {}: {error}", place.display());
-        let failed = |error| self.failure(End::Missing(why(error)));
-        fs::create_dir_all(place).map_err(failed)?;
         let mesh = place.join("mesh");
         let options = RunOptions {
             mesh: Some(&mesh),
@@ -248,7 +230,10 @@ impl Engine {
     ) -> Result<RunReport, String> {
         let is_written = options.report && !self.description.run.json.is_empty();
         let mut report = match written {
-            Some(mesh) if !is_written => RunReport::of_mesh(&mesh.manifest),
+            // The digest is that of the mesh.
+            Some(mesh) if !is_written => {
+                RunReport { cells: mesh.manifest.leaves, ..RunReport::default() }
+            }
             _ => RunReport::read(&options.report_path())
                 .map_err(|why| format!("ended, but {why}"))?,
         };
@@ -285,9 +270,8 @@ impl Engine {
     /// Reads the mesh of a run that was to write one.
     ///
     /// # Errors
-    /// If there is none, or it cannot be read.
-    pub fn read_mesh(&self, mesh: Option<&Path>) -> Result<LeafSet, Failure> {
-        let mesh = mesh.ok_or_else(|| self.unusable("wrote no mesh".into()))?;
+    /// If it cannot be read.
+    pub fn read_mesh(&self, mesh: &Path) -> Result<LeafSet, Failure> {
         let unreadable = |error| format!("wrote a mesh that cannot be read: {error}");
         leafset::read(mesh).map_err(|error| self.unusable(unreadable(error)))
     }
@@ -300,8 +284,7 @@ impl Engine {
     ) -> Result<Finished, Failure> {
         let status = options.status_path();
         if options.status {
-            fs::create_dir_all(&status)
-                .map_err(|error| self.unusable(format!("has no {}: {error}", status.display())))?;
+            fs::create_dir_all(&status)?;
         }
         let label = self.label();
         let watch = Watch {
@@ -365,11 +348,60 @@ impl Engine {
     }
 }
 
+/// Programs that the command line names.
+#[derive(Args, Clone, Debug, Default)]
+pub struct Given {
+    /// The mesher [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    pub mesher: Option<Input>,
+    /// The reference [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    pub reference: Option<Input>,
+}
+
+/// The programs of a session.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// Paths of everything else.
+    pub paths: Paths,
+    /// The engine under test.
+    pub engine: Engine,
+    /// Further engines under test, in a comparison.
+    pub others: Vec<Engine>,
+    /// The mesher of this repository. It is the engine under test unless another one was named.
+    pub mesher: Engine,
+    /// The reference of this repository.
+    pub reference: Engine,
+}
+
+impl Programs {
+    /// Finds the programs, with the engine of this name or path under test.
+    ///
+    /// # Errors
+    /// One sentence, if an engine file is missing or wrong.
+    pub fn find(name: &str, given: &Given) -> Result<Self, String> {
+        let paths = Paths::find();
+        let engine = Engine::find(name, given.mesher.as_deref(), &paths)?;
+        let mesher = match name {
+            "mesher" => engine.clone(),
+            _ => Engine::find("mesher", None, &paths)?,
+        };
+        let reference = Engine::find("reference", given.reference.as_deref(), &paths)?;
+        Ok(Self { paths, engine, others: Vec::new(), mesher, reference })
+    }
+
+    /// The engine of this name, or that is called so in results: the mesher, the reference or an engine under test.
+    pub fn named(&self, name: &str) -> &Engine {
+        let own = [&self.mesher, &self.reference];
+        let mut all = own.into_iter().chain(&self.others);
+        all.find(|engine| engine.name() == name || engine.label() == name).unwrap_or(&self.engine)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::engine::layout::SERIAL;
-    use crate::engine::programs::Programs;
 
     fn words(engine: &Engine, layout: &Layout, options: &RunOptions) -> String {
         let command = engine.command(Path::new("a.toml"), layout, options).unwrap();

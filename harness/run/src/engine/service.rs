@@ -85,7 +85,12 @@ impl Services {
     ) -> Result<(), Failure> {
         self.start(name, start)?;
         let mut services = self.0.borrow_mut();
-        services.get_mut(name).expect("it has been started").send(words);
+        let service = services.get_mut(name).expect("it has been started");
+        let _ = service.errors.set_len(0);
+        service.sent = Instant::now();
+        let line = serde_json::to_string(words).expect("words are text");
+        // That the program has ended is found when it is waited for.
+        let _ = service.requests.as_mut().map(|requests| writeln!(requests, "{line}"));
         Ok(())
     }
 
@@ -129,14 +134,6 @@ impl Service {
         let answers = lines_of(child.stdout.take().expect("it is a pipe"))?;
         let (requests, sent) = (child.stdin.take(), Instant::now());
         Ok(Self { session, requests, answers, errors, sent, _shared: shared })
-    }
-
-    fn send(&mut self, words: &[String]) {
-        let _ = self.errors.set_len(0);
-        self.sent = Instant::now();
-        let line = serde_json::to_string(words).expect("words are text");
-        // That the program has ended is found when it is waited for.
-        let _ = self.requests.as_mut().map(|requests| writeln!(requests, "{line}"));
     }
 
     /// The wall time from request to answer, in seconds.

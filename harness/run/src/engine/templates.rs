@@ -1,8 +1,7 @@
 //! The table `[run]` of an engine file: command templates, and the command lines made of them.
 
 use super::failure::End;
-use super::launcher::Launcher;
-use super::layout::{Layout, Ranks, RunOptions};
+use super::layout::{Launcher, Layout, Ranks, RunOptions};
 use check::promises::{Independence, Promises};
 use contract::import::{Format, Position};
 use serde::Deserialize;
@@ -72,14 +71,6 @@ impl Templates {
             ("level_base", &self.level_base),
             ("weights", &self.weights),
         ]
-    }
-
-    /// Replaces the program in all commands by its placeholder, so that another one can be run.
-    pub(super) fn name_program(&mut self, program: &str) {
-        let commands = [&mut self.serial, &mut self.parallel, &mut self.simulated];
-        for word in commands.into_iter().flatten().filter(|word| *word == program) {
-            *word = "{program}".to_owned();
-        }
     }
 
     /// Whether every run writes a mesh, because the engine cannot describe it in another way.

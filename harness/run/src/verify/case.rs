@@ -8,6 +8,7 @@ use crate::engine::description::Description;
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
+use crate::engine::runner::Engine;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
@@ -29,25 +30,9 @@ pub(super) struct CaseRun<'a> {
 }
 
 impl<'a> CaseRun<'a> {
-    /// A case before its first step.
-    pub fn new(
-        all: &'a Verification,
-        selected: &'a Selected,
-        file: PathBuf,
-        place: &'a Path,
-    ) -> Self {
-        let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
-        Self { all, selected, file, place, report }
-    }
-
     /// Performs all steps: serial meshes and their checks, ranks, other programs. Without serial meshes the later steps are left out.
     /// An engine that promises less than the definition is not compared with T0, the proof, oracles and p4est.
     pub fn verify(&mut self) {
-        self.verify_steps();
-        self.leave_out_rest();
-    }
-
-    fn verify_steps(&mut self) {
         let Some(case) = self.read() else { return };
         self.report.facets = case.facets.len() as u64;
         if let Some(why) = self.engine().declines(&case) {
@@ -84,7 +69,7 @@ impl<'a> CaseRun<'a> {
 
     /// The description of the engine under test.
     pub fn engine(&self) -> &'a Description {
-        self.all.programs.engine.description()
+        &self.all.programs.engine.description
     }
 
     /// What the engine under test promises.
@@ -147,30 +132,27 @@ impl<'a> CaseRun<'a> {
     /// A shell command that repeats the run with this layout, or the serial one.
     fn command_for(&self, layout: Option<&Layout>) -> String {
         let (options, programs) = (self.all.options, self.all.programs);
-        let text = |path: &Path| path.to_string_lossy().into_owned();
-        let full = |path: &Path| text(&absolute(path).unwrap_or_else(|_| path.to_owned()));
-        let mut words: Vec<String> =
-            vec![text(&programs.paths.harness), "verify".into(), self.selected.argument.clone()];
-        let mut add = |option: &str, value: String| words.extend([option.to_owned(), value]);
-        match programs.engine.name() {
-            "mesher" => {}
-            file if file.ends_with(".toml") => add("--engine", full(Path::new(file))),
-            name => add("--engine", name.to_owned()),
-        }
-        for (option, engine) in
-            [("--mesher", &programs.engine), ("--reference", &programs.reference)]
-        {
-            engine.program_given().into_iter().for_each(|program| add(option, full(program)));
-        }
-        let timeout = options.timeout.as_secs().to_string();
-        if timeout != TIMEOUT_S {
-            add("--timeout", timeout);
-        }
-        if let Some(layout) = layout {
-            add("--ranks", layout.ranks.count().to_string());
-            layout.partitioner.iter().for_each(|of| add("--partitioners", of.clone()));
-            layout.level_base.iter().for_each(|of| add("--level-bases", of.clone()));
-        }
+        let full = |path: &Path| {
+            absolute(path).unwrap_or_else(|_| path.to_owned()).to_string_lossy().into_owned()
+        };
+        let engine = match programs.engine.name() {
+            file if file.ends_with(".toml") => full(Path::new(file)),
+            name => name.to_owned(),
+        };
+        let program = |of: &Engine| of.is_given.then(|| full(&of.program));
+        let given = [
+            ("--engine", Some(engine).filter(|engine| engine != "mesher")),
+            ("--mesher", program(&programs.engine)),
+            ("--reference", program(&programs.reference)),
+            ("--timeout", Some(options.timeout.as_secs().to_string()).filter(|s| s != TIMEOUT_S)),
+            ("--ranks", layout.map(|layout| layout.ranks.count().to_string())),
+            ("--partitioners", layout.and_then(|layout| layout.partitioner.clone())),
+            ("--level-bases", layout.and_then(|layout| layout.level_base.clone())),
+        ];
+        let given = given.into_iter().filter_map(|(option, value)| Some([option.into(), value?]));
+        let harness = programs.paths.harness.to_string_lossy().into_owned();
+        let mut words = vec![harness, "verify".into(), self.selected.argument.clone()];
+        words.extend(given.flatten());
         let left_out: &[&str] = match layout {
             Some(_) => &["--no-oracles", "--no-p4est", "--no-proof", "--keep"],
             None => &["--no-mpi", "--keep"],

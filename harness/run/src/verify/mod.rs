@@ -2,27 +2,30 @@
 //!
 //! [`options`] are the user's choices and what is missing on this machine, [`case`] verifies one case
 //! with a module per family of checks, and [`report`] is the result.
+//!
+//! Invariants of the directories of results: only directories that a verification made are removed, which a marker file proves;
+//! without `--out` and `--keep`, only the directories of failed cases are kept; that of a case under way does not outlive an interrupt.
 
 pub mod case;
 mod meshes;
 pub mod options;
 mod others;
-mod ranks;
 pub mod report;
-mod workplace;
 
 use crate::engine::interrupt;
-use crate::engine::programs::Programs;
+use crate::engine::runner::Programs;
 use crate::progress::Progress;
 use case::CaseRun;
 use contract::catalogue::Selected;
 use contract::failure::Failure;
+use contract::files::publications;
 use options::{Needs, Options};
 use report::{Asked, CaseReport, Report};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Instant;
-use workplace::Workplace;
+use tempfile::TempDir;
 
 /// Verifies the cases that the options select.
 ///
@@ -31,7 +34,7 @@ use workplace::Workplace;
 pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure> {
     let start = Instant::now();
     programs.engine.require()?;
-    if programs.engine.description().promises.definition {
+    if programs.engine.description.promises.definition {
         // Only the definition is compared with it.
         programs.reference.require()?;
     }
@@ -45,7 +48,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
         programs,
         workplace: Workplace::new(options)?,
         needs: Needs::probe(options, programs),
-        progress: Progress::new(),
+        progress: Progress::default(),
     };
     let mut cases = Vec::new();
     for case in selected.iter().take_while(|_| !interrupt::requested()) {
@@ -55,7 +58,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
     progress.finish();
     let interrupted = interrupt::requested();
     workplace.close(cases.iter().any(|case| case.kept.is_some()) && (options.keep || !interrupted));
-    let engine = programs.engine.description();
+    let engine = &programs.engine.description;
     let report = Report {
         schema: report::SCHEMA.to_owned(),
         program: format!("harness {}", env!("CARGO_PKG_VERSION")),
@@ -91,22 +94,130 @@ struct Verification<'a> {
 impl Verification<'_> {
     fn case(&self, selected: &Selected) -> Result<CaseReport, Failure> {
         let start = Instant::now();
-        if let Some(why) = &selected.absent {
-            let mut run = CaseRun::new(self, selected, PathBuf::new(), Path::new(""));
-            run.leave_out(("case", options::GEOMETRY), why);
-            run.leave_out_rest();
-            return Ok(run.report);
-        }
         let place = self.workplace.enter(&selected.name)?;
         // A case that the harness cannot read is passed on unchanged, because refusing it is part of the verification.
         let prepared = self.programs.engine.prepare(&selected.path, &place.join("plain"));
         let file = prepared.unwrap_or_else(|_| selected.path.clone());
-        let mut run = CaseRun::new(self, selected, file, &place);
-        run.verify();
+        let report = CaseReport { name: selected.name.clone(), ..CaseReport::default() };
+        let mut run = CaseRun { all: self, selected, file, place: &place, report };
+        match &selected.absent {
+            Some(why) => run.leave_out(("case", options::GEOMETRY), why),
+            None => run.verify(),
+        }
+        run.leave_out_rest();
         let mut report = run.report;
         report.time_s = start.elapsed().as_secs_f64();
         let keep = self.options.keep || (report.failed() && !interrupt::requested());
         report.kept = self.workplace.leave(&place, keep).map(|kept| kept.display().to_string());
         Ok(report)
+    }
+}
+
+/// The file that marks the directory of a case.
+const MARKER: &str = "made-by-harness-verify";
+
+/// The directory of all cases.
+#[derive(Debug)]
+struct Workplace {
+    root: PathBuf,
+    temporary: Option<TempDir>,
+}
+
+impl Workplace {
+    /// The directory given by the options, or a temporary one.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    fn new(options: &Options) -> Result<Self, Failure> {
+        if let Some(out) = &options.out {
+            let root = fs::create_dir_all(out).and_then(|()| fs::canonicalize(out));
+            let root = root.map_err(|error| Failure::at(out, error))?;
+            return Ok(Self { root, temporary: None });
+        }
+        let temporary = tempfile::Builder::new().prefix("harness-verify-").tempdir()?;
+        Ok(Self { root: temporary.path().to_owned(), temporary: Some(temporary) })
+    }
+
+    /// Makes the directory of a case, and replaces one that an earlier verification left.
+    ///
+    /// # Errors
+    /// If something else has that name, or the directory cannot be made.
+    fn enter(&self, case: &str) -> Result<PathBuf, Failure> {
+        let place = self.root.join(case);
+        let shown = place.display();
+        if place.join(MARKER).is_file() {
+            // What cannot be removed is in the way of the new directory.
+            let _ = fs::remove_dir_all(&place);
+        }
+        let mark = |()| {
+            publications().push(place.clone());
+            fs::write(place.join(MARKER), "")
+        };
+        let made = fs::create_dir(&place).and_then(mark);
+        made.map_err(|error| Failure::input(format!("{shown} cannot be made: {error}")))?;
+        Ok(place)
+    }
+
+    /// Removes the directory of a case, or keeps and returns it.
+    fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
+        if keep {
+            publications().retain(|other| other != place);
+            return Some(place.to_owned());
+        }
+        // Failing to remove a directory is no reason to lose the report.
+        let _ = fs::remove_dir_all(place);
+        None
+    }
+
+    /// Closes it. A temporary directory is kept only for the cases that were kept in it.
+    fn close(self, keep: bool) {
+        self.temporary.filter(|_| keep).map(TempDir::keep);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::options;
+
+    #[test]
+    fn a_temporary_directory_is_kept_only_if_a_case_is_kept() {
+        for keep in [false, true] {
+            let workplace = Workplace::new(&options()).unwrap();
+            let root = workplace.root.clone();
+            let place = workplace.enter("cube").unwrap();
+            assert_eq!(workplace.leave(&place, keep).is_some(), keep);
+            workplace.close(keep);
+            assert_eq!((root.exists(), place.exists()), (keep, keep));
+            let _ = fs::remove_dir_all(root);
+        }
+    }
+
+    #[test]
+    fn an_interrupt_removes_the_results_of_the_case_under_way_but_not_those_that_are_kept() {
+        let out = tempfile::tempdir().unwrap();
+        let options = Options { out: Some(out.path().to_owned()), ..options() };
+        let workplace = Workplace::new(&options).unwrap();
+        let [failed, under_way] = ["failed", "under-way"].map(|case| {
+            let place = workplace.enter(case).unwrap();
+            assert!(publications().contains(&place));
+            place
+        });
+        workplace.leave(&failed, true);
+        assert!(!publications().contains(&failed) && publications().contains(&under_way));
+    }
+
+    #[test]
+    fn only_an_earlier_result_is_replaced() {
+        let out = tempfile::tempdir().unwrap();
+        let options = Options { out: Some(out.path().to_owned()), ..options() };
+        let workplace = Workplace::new(&options).unwrap();
+        let place = workplace.enter("cube").unwrap();
+        fs::write(place.join("mesh"), "").unwrap();
+        assert_eq!(workplace.enter("cube").unwrap(), place);
+        assert!(!place.join("mesh").exists());
+        fs::create_dir(out.path().join("precious")).unwrap();
+        let refused = workplace.enter("precious").unwrap_err();
+        assert!(refused.why.contains("precious cannot be made"), "{refused}");
     }
 }

@@ -4,12 +4,13 @@ use super::report::{CaseReport, Missing};
 use crate::engine::description::Description;
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
-use crate::engine::programs::Programs;
+use crate::engine::runner::Programs;
 use crate::engine::service::Services;
 use crate::proof;
 use crate::python::{ORACLES, start};
 use check::promises::Independence;
-use clap::{Args, Parser};
+use clap::Parser;
+use clap::builder::RangedU64ValueParser;
 use contract::catalogue::Size;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,7 +42,7 @@ impl fmt::Display for Need {
 }
 
 /// The options, as on the command line.
-#[derive(Args, Clone, Debug)]
+#[derive(Parser, Clone, Debug)]
 pub struct Options {
     /// Names in geometries/catalogue.toml or paths of case files [default: all of --size]
     pub cases: Vec<String>,
@@ -49,7 +50,7 @@ pub struct Options {
     #[arg(long, value_delimiter = ',', default_value = "small")]
     pub size: Vec<Size>,
     /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
-    #[arg(long, value_delimiter = ',', value_parser = rank_count)]
+    #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub ranks: Option<Vec<usize>>,
     /// Partitioners, each at every rank count
     #[arg(long, value_delimiter = ',', default_value = "metis,morton")]
@@ -88,14 +89,6 @@ pub(super) const TIMEOUT_S: &str = "600";
 /// Rank counts without `--ranks`.
 const RANKS: [usize; 9] = [1, 2, 3, 4, 7, 8, 16, 32, 64];
 
-fn rank_count(text: &str) -> Result<usize, String> {
-    match text.trim().parse() {
-        Ok(0) => Err("a run has at least one rank".to_owned()),
-        Ok(ranks) => Ok(ranks),
-        Err(error) => Err(error.to_string()),
-    }
-}
-
 /// Parses a whole number of seconds: at least 1, and at most a week.
 pub fn whole_seconds(text: &str) -> Result<Duration, String> {
     const WEEK: u64 = 7 * 86_400;
@@ -107,14 +100,8 @@ pub fn whole_seconds(text: &str) -> Result<Duration, String> {
 impl Options {
     /// A verification by reference and checks only, without MPI, oracles, p4est and proof.
     pub fn of_leaves_alone(cases: Vec<String>) -> Self {
-        #[derive(Parser)]
-        struct Defaults {
-            #[command(flatten)]
-            options: Options,
-        }
-        let left_out = ["--no-mpi", "--no-oracles", "--no-p4est", "--no-proof"];
-        let words = ["verify"].into_iter().chain(left_out);
-        Self { cases, ..Defaults::parse_from(words).options }
+        let words = ["verify", "--no-mpi", "--no-oracles", "--no-p4est", "--no-proof"];
+        Self { cases, ..Self::parse_from(words) }
     }
 
     /// Rank counts of the runs on MPI, each once: a run has one directory. They are those that were asked for, or all of which the
@@ -163,13 +150,13 @@ pub(super) struct Needs {
     /// Why something is not used.
     absent: BTreeMap<Need, String>,
     /// Oracles that gave no answer.
-    silent: RefCell<Vec<Failure>>,
+    pub silent: RefCell<Vec<Failure>>,
 }
 
 impl Needs {
     /// Tries the prerequisites of these options, and starts what stays while the first case is meshed serially.
     pub fn probe(options: &Options, programs: &Programs) -> Self {
-        let (engine, paths) = (programs.engine.description(), &programs.paths);
+        let (engine, paths) = (&programs.engine.description, &programs.paths);
         let unused = (!engine.promises.definition)
             .then(|| format!("{} does not promise the definition", engine.name));
         let p4est = (!paths.p4est.is_file())
@@ -200,11 +187,6 @@ impl Needs {
     /// Why something is not used, if it is not.
     pub fn lacks(&self, need: Need) -> Option<&str> {
         self.absent.get(&need).map(String::as_str)
-    }
-
-    /// Notes that an oracle gave no answer.
-    pub fn note_silent(&self, failure: &Failure) {
-        self.silent.borrow_mut().push(failure.clone());
     }
 
     /// Why an oracle cannot be asked: it is missing, or has hung, which costs the whole time limit.

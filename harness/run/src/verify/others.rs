@@ -6,7 +6,7 @@ use super::meshes::{MESHER, Meshed};
 use super::options::Need;
 use super::report::{Check, Outcome};
 use crate::engine::failure::{CODE_INPUT, End, Failure};
-use crate::engine::launcher;
+use crate::engine::layout;
 use crate::engine::layout::SERIAL;
 use crate::engine::process::{self, Watch};
 use crate::proof;
@@ -22,7 +22,6 @@ use contract::npy::PartFile;
 use contract::parity::Parity;
 use contract::plain::{PlainCase, StlForm};
 use contract::word::{self, Side};
-use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -68,22 +67,17 @@ impl CaseRun<'_> {
     }
 
     /// Has the proven checker judge the mesh, given its base tree.
-    fn prove(
-        &self,
-        (subject, name): Step,
-        serial: &Meshed,
-        base: &Meshed,
-    ) -> Result<Check, Failure> {
+    fn prove(&self, step: Step, serial: &Meshed, base: &Meshed) -> Result<Check, Failure> {
         let options = self.all.options;
         let checker = &self.all.programs.paths.proven_checker;
         let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
         match proof::check(checker, places, leaves, options.timeout) {
-            Ok(proof) => Ok(Check::of_result(subject, CheckResult { name, ..proof })),
+            Ok(proof) => Ok(Check::of_result(step.0, CheckResult { name: step.1, ..proof })),
             // The files of another program may lack what the proof needs.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
                 if !options.require.contains(&Need::Proof) =>
             {
-                Ok(Check::new(subject, name, Outcome::left_out(error)))
+                Ok(Check::new(step.0, step.1, Outcome::left_out(error)))
             }
             Err(failure) => Err(failure),
         }
@@ -102,15 +96,12 @@ impl CaseRun<'_> {
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
         let (paths, limit) = (&self.all.programs.paths, self.all.options.timeout);
         let (question, place) = ((&*sample.points, &*case.facets), self.place.join("oracles"));
-        let answered = ask(&asked, question, &place, &needs.services, paths, limit);
-        let unusable = |error| End::Unusable(format!("have no input files: {error}"));
-        let answered = answered.map_err(|error| Failure::new("the oracles", unusable(error)));
-        for answer in answered.unwrap_or_else(|failure| vec![Err(failure)]) {
+        for answer in ask(&asked, question, &place, &needs.services, paths, limit)? {
             match answer {
                 Ok(answer) => answers.push(answer),
                 Err(failure) if failure.is_interrupt() => return Err(failure),
                 Err(failure) => {
-                    needs.note_silent(&failure);
+                    needs.silent.borrow_mut().push(failure.clone());
                     failures.push(failure);
                 }
             }
@@ -150,25 +141,22 @@ impl CaseRun<'_> {
         let place = self.place.join("plain-case");
         let unusable = |why: String| Failure::new("the harness", End::Unusable(why));
         let case = PlainCase::read(&self.file).map_err(unusable)?;
-        let written = fs::create_dir_all(&place)
-            .and_then(|()| plain(case).write(&place, StlForm::Any))
-            .map_err(|error| unusable(format!("cannot write a case with n = 1: {error}")))?;
+        let written = plain(case).write(&place, StlForm::Any)?;
         Ok(self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh.words)
     }
 
     fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
-        let unusable = |error: &dyn Display| {
-            Failure::new("p4est", End::Unusable(format!("wrote no leaves: {error}")))
-        };
         let out = self.place.join("p4est");
-        fs::create_dir_all(&out).map_err(|error| unusable(&error))?;
+        fs::create_dir_all(&out)?;
         let mut command = Command::new(&self.all.programs.paths.p4est);
         command.arg(base).arg(&out);
-        launcher::set_environment(&mut command);
-        let _files = launcher::own_directory(&mut command);
+        layout::set_environment(&mut command);
+        let _files = layout::own_directory(&mut command);
         process::run(&mut command, &Watch::new("p4est", self.all.options.timeout, &out))?;
         let part = PartFile::open(&out.join("leaves-00000.npy"));
-        part.map_err(|error| unusable(&error))?.read_all().map_err(|error| unusable(&error))
+        part.and_then(|part| part.read_all()).map_err(|error| {
+            Failure::new("p4est", End::Unusable(format!("wrote no leaves: {error}")))
+        })
     }
 }
 
