@@ -17,10 +17,10 @@ mod mpi;
 mod reduced;
 pub mod sim;
 
-pub use agree::{agree, pack_bytes, text_of_first, unpack_bytes};
+pub use agree::{agree, first_other, pack_bytes, text_of_first, unpack_bytes};
 pub use message_buffer::MessageBuffer;
 pub use metered::{Metered, Traffic};
-pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, split_by_reducer};
+pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, combine, split_by_reducer};
 
 use bytemuck::Pod;
 use std::sync::Arc;

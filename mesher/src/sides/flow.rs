@@ -14,7 +14,7 @@ use crate::input::lattice::{Enclosed, Keep, Seed};
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use bricks::tree::{LEVELS, Tree};
-use ranks::{Comm, all_gather_reduced, gather};
+use ranks::{all_gather_reduced, gather};
 use std::collections::{HashMap, HashSet};
 
 /// Stands for the label of a component where a seed's leaf crosses. No component has it.
@@ -139,20 +139,19 @@ impl Verdict {
         }
     }
 
-    /// The enclosed components in numbers, of whose leaves this rank owns `leaves`; none if there are none.
-    /// Collective.
+    /// The enclosed components in numbers, of whose leaves this rank owns `leaves`. Collective.
     pub fn enclosed_components(
         &self,
         components: &[FirstLeaf],
         leaves: u64,
-        comm: &dyn Comm,
-    ) -> Option<EnclosedComponents> {
+        base: &Base,
+    ) -> EnclosedComponents {
         let enclosed = components.iter().filter(|(label, _)| self.enclosed.contains(label));
-        let first = enclosed.map(|&(_, first)| first).min()?;
-        Some(EnclosedComponents {
+        let first = enclosed.map(|&(_, first)| first).min();
+        EnclosedComponents {
             count: self.enclosed.len() as u64,
-            leaves: comm.sum(leaves),
-            example: first.centroid(),
-        })
+            leaves: first.map_or(0, |_| base.comm.sum(leaves)),
+            example: first.map(|leaf| base.rules.root.locate(leaf.centroid())),
+        }
     }
 }

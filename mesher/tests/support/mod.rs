@@ -101,16 +101,13 @@ impl Small {
     /// As [`Small::reference_outcome`], for cases that may have unusable seeds.
     pub fn try_reference_outcome(&self, ungraded: bool) -> Result<Outcome, reference::Error> {
         let mesh = self.reference_mesh(ungraded)?;
-        let on_lattice = |p: [f64; 3]| std::array::from_fn(|a| self.root.quantise(a, p[a]));
-        let ambiguous = mesh
-            .ambiguous
-            .map(|a| Ambiguous { count: a.components, example: on_lattice(a.example) });
-        let reference::Components { outside, inside, enclosed } = mesh.components;
-        let enclosed = enclosed.example.map(|example| EnclosedComponents {
-            count: enclosed.count,
-            leaves: enclosed.leaves,
-            example: on_lattice(example),
+        let ambiguous = mesh.ambiguous.map_or(Ambiguous::default(), |a| Ambiguous {
+            count: a.components,
+            example: Some(a.example),
         });
+        let reference::Components { outside, inside, enclosed } = mesh.components;
+        let reference::kept::EnclosedComponents { count, leaves, example } = enclosed;
+        let enclosed = EnclosedComponents { count, leaves, example };
         // All inside leaves are kept, and those made by gradation tile the same places.
         let reaches_boundary =
             |side| mesh.words.iter().any(|&word| word & 3 == side && is_at_boundary(word));
@@ -209,6 +206,17 @@ pub struct Outcome {
     pub words: Vec<u64>,
     pub summary: Summary,
     pub leaks: Vec<LeakEntry>,
+}
+
+impl Outcome {
+    /// The same with lattice coordinates of the examples.
+    pub fn on_lattice(mut self, root: &Root) -> Self {
+        let Summary { enclosed, ambiguous, .. } = &mut self.summary;
+        for p in [&mut enclosed.example, &mut ambiguous.example].into_iter().flatten() {
+            *p = root.nearest(*p).map(|c| c as f64);
+        }
+        self
+    }
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {

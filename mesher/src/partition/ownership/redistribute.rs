@@ -100,10 +100,10 @@ impl Ownership {
             for others in [0..local.start, local.end..set.len()] {
                 let mut first = others.start;
                 while first < others.end {
-                    let interval = self.intervals.at(brick_start(l, set.key_at(first)));
-                    let same_owner = first..position_of(set, self.intervals.end(interval));
+                    let interval = self.at(brick_start(l, set.key_at(first)));
+                    let same_owner = first..position_of(set, self.end(interval));
                     first = same_owner.end;
-                    out.queue(set_index, set, same_owner, self.intervals.owners[interval]);
+                    out.queue(set_index, set, same_owner, self.boundaries[interval].1);
                 }
             }
             return local;
@@ -112,8 +112,8 @@ impl Ownership {
             if l >= 2 && self.is_within(l, b.key) {
                 return b.bits;
             }
-            let owners = self.owners_of(l, b.key);
-            let placement = self.placement_among(l, owners);
+            let intervals = self.meeting_in(l, b.key);
+            let placement = self.placement_among(l, intervals);
             let entry = [(set_index as u64) << KEY_BITS | b.key, b.bits];
             if placement == Placement::FullyReplicated {
                 out.full.push(entry);
@@ -121,8 +121,8 @@ impl Ownership {
             }
             if placement != Placement::Local {
                 // Such bricks are few: queued as single entries.
-                let others = owners.iter().filter(|&&owner| Some(owner) != self.rank);
-                out.single.extend(others.map(|&owner| (owner, entry)));
+                let others = intervals.iter().filter(|i| Some(i.1) != self.rank);
+                out.single.extend(others.map(|&(_, owner)| (owner, entry)));
             }
             if matches!(placement, Placement::Local | Placement::PartiallyReplicated) {
                 b.bits
