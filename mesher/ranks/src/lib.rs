@@ -85,11 +85,6 @@ pub trait Comm {
     fn sum(&self, v: u64) -> u64 {
         self.sums(&[v])[0]
     }
-
-    /// The greatest value of any rank. Collective.
-    fn max(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).words().iter().copied().max().unwrap_or(v)
-    }
 }
 
 /// The values of all ranks, in the order of the ranks; a value takes 8 bytes or more. Collective.

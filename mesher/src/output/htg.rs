@@ -40,13 +40,13 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let failed = out.failed(TREE);
     let file = is_first.then(begin).transpose().map_err(&failed);
     let mut file = ranks::agree(comm, file)?;
-    let mut own = Source { siblings: own_siblings(mesh, &numbering).peekable(), last: None };
+    let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
     let mut begin = 0;
     while begin < shape.windows() {
         let windows = begin..shape.windows().min(begin + round);
-        let mine = comm.sparse_all_to_all(own.messages(windows.clone()));
+        let mine = comm.sparse_all_to_all(messages(&mut own, &mut last, windows.clone()));
         let mut chunks = MessageBuffer::default();
         let window = begin + comm.rank() as u64;
         if windows.contains(&window) {
@@ -62,38 +62,37 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
 }
 
-/// The nodes that this rank owns, sent window by window.
-struct Source<S: Iterator<Item = (u64, Siblings)>> {
-    siblings: Peekable<S>,
-    /// The last siblings sent: some of them may belong to the following window.
-    last: Option<(u64, Siblings)>,
-}
+/// Siblings with their number.
+type Numbered = (u64, Siblings);
 
-impl<S: Iterator<Item = (u64, Siblings)>> Source<S> {
-    /// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
-    /// runs of siblings: number of the first, and four bytes for each.
-    fn messages(&mut self, windows: Range<u64>) -> MessageBuffer {
-        let mut messages = MessageBuffer::default();
-        let mut found = Vec::new();
-        for (to, window) in windows.enumerate() {
-            let range = groups(window);
-            found.clear();
-            found.extend(self.last.filter(|(group, _)| range.contains(group)));
-            while let Some(next) = self.siblings.next_if(|(group, _)| *group < range.end) {
-                found.push(next);
-            }
-            self.last = found.last().copied();
-            for run in found.chunk_by(|a, b| a.0 + 1 == b.0) {
-                let of = |s: Siblings| [s.split, s.deleted, s.crossing, s.inside];
-                let bytes: Vec<u8> = run.iter().flat_map(|&(_, s)| of(s)).collect();
-                messages.append(to, |words| {
-                    words.push(run[0].0);
-                    pack_bytes(&bytes, words);
-                });
-            }
+/// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
+/// runs of siblings: number of the first, and four bytes for each. `last` are the last siblings sent: some of them may belong to the
+/// following window.
+fn messages(
+    own: &mut Peekable<impl Iterator<Item = Numbered>>,
+    last: &mut Option<Numbered>,
+    windows: Range<u64>,
+) -> MessageBuffer {
+    let mut messages = MessageBuffer::default();
+    let mut found = Vec::new();
+    for (to, window) in windows.enumerate() {
+        let range = groups(window);
+        found.clear();
+        found.extend(last.filter(|(group, _)| range.contains(group)));
+        while let Some(next) = own.next_if(|(group, _)| *group < range.end) {
+            found.push(next);
         }
-        messages
+        *last = found.last().copied();
+        for run in found.chunk_by(|a, b| a.0 + 1 == b.0) {
+            let of = |s: Siblings| [s.split, s.deleted, s.crossing, s.inside];
+            let bytes: Vec<u8> = run.iter().flat_map(|&(_, s)| of(s)).collect();
+            messages.append(to, |words| {
+                words.push(run[0].0);
+                pack_bytes(&bytes, words);
+            });
+        }
     }
+    messages
 }
 
 /// A window with the nodes that all ranks have sent for it.
@@ -193,7 +192,7 @@ impl<'a> Numbering<'a> {
 fn own_siblings<'a>(
     mesh: &'a Mesh,
     numbering: &'a Numbering<'a>,
-) -> impl Iterator<Item = (u64, Siblings)> + 'a {
+) -> impl Iterator<Item = Numbered> + 'a {
     let of_level = move |l: Level| {
         let mut path = Path::new(mesh, l);
         // The place of the last brick, and the number of the next siblings.

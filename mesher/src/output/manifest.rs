@@ -7,7 +7,7 @@ use crate::output::write::{Output, TREE, part_name};
 use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
 use bricks::digest::{Digests, hex};
-use bricks::octant::{LEVEL_MAX, Level};
+use bricks::octant::LEVEL_MAX;
 use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -28,7 +28,7 @@ pub struct MeshEntry {
     pub rules: Rules,
     geometry: Value,
     /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Vec<LeakEntry>,
+    pub leaks: Vec<Leak>,
     /// Leaves of the mesh.
     pub leaves: u64,
     /// Leaves by level, 0 to 19.
@@ -42,34 +42,6 @@ pub struct MeshEntry {
     pub digest: String,
 }
 
-/// A leak.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LeakEntry {
-    /// The spacing at which the region is closed.
-    pub spacing_coarse: f64,
-    /// The spacing of the mesh.
-    pub spacing_fine: f64,
-    /// The region's volume at the coarser spacing.
-    pub volume: f64,
-    /// A point in it.
-    pub point: [f64; 3],
-}
-
-impl LeakEntry {
-    /// The leaks of a mesh.
-    pub fn of(mesh: &Mesh) -> Vec<Self> {
-        let root = mesh.rules.root;
-        let edge_of = |l: Level| root.edge / f64::from(1u32 << l);
-        let entry = |leak: &Leak| Self {
-            spacing_coarse: edge_of(leak.level),
-            spacing_fine: edge_of(mesh.rules.level_surface),
-            volume: leak.volume as f64 * edge_of(LEVEL_MAX).powi(3),
-            point: root.locate(leak.first.centroid()),
-        };
-        mesh.leaks.0.iter().map(entry).collect()
-    }
-}
-
 impl MeshEntry {
     /// The mesh with these leaves on all ranks.
     pub fn new(mesh: &Mesh, counts: &Counts, digests: &Digests) -> Self {
@@ -81,7 +53,7 @@ impl MeshEntry {
             tree: if mesh.is_base { "base" } else { "final" },
             rules: rules.clone(),
             geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
-            leaks: LeakEntry::of(mesh),
+            leaks: mesh.leaks.0.clone(),
             leaves: counts.total(),
             leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
             leaves_by_side: SIDES.into_iter().zip(by_side).collect(),

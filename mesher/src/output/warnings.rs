@@ -2,8 +2,8 @@
 
 use crate::input::lattice::{ExtentBox, Keep, Rules};
 use crate::mesh::Mesh;
-use crate::output::manifest::LeakEntry;
 use crate::sides::Summary;
+use crate::sides::leaks::Leak;
 use bricks::octant::ROOT_EDGE;
 
 const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
@@ -39,9 +39,7 @@ pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
 /// The warning of a geometry that leaks, or that is open and bounds nothing.
 pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
-    let leaks = LeakEntry::of(mesh);
-    let largest = (0..leaks.len()).rev().max_by_key(|&i| mesh.leaks.0[i].volume);
-    let Some(largest) = largest else {
+    let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
         let is_inner = mesh.rules.keep == Keep::Inside;
         return match mesh.bounds_nothing {
@@ -49,9 +47,9 @@ pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
             false => empty.filter(|_| is_inner),
         };
     };
-    let LeakEntry { spacing_coarse, spacing_fine, volume, point: [x, y, z] } = leaks[largest];
+    let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;
     let has_seeds = !mesh.rules.seeds.is_empty();
-    let (before, after) = match mesh.leaks.0[largest].is_inside {
+    let (before, after) = match is_inside {
         _ if has_seeds && mesh.rules.keep != Keep::All => ("deleted", "kept"),
         true => ("outside", "inside"),
         false => ("inside", "outside"),

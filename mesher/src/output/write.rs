@@ -8,7 +8,7 @@
 
 use crate::error::Error;
 use files::{Claim, Draft};
-use ranks::{Comm, agree};
+use ranks::{Comm, agree, uncounted};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
@@ -75,8 +75,8 @@ impl OutDir {
                 _ => output(path, e),
             }),
         )?;
-        let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
-        comm.uncounted(&mut || is_new = comm.max(is_new));
+        let is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
+        let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
         let claim = match created {

@@ -166,28 +166,32 @@ impl Ownership {
             };
             for step in (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]) {
                 let touching: [i64; 3] = std::array::from_fn(|a| p[a] + i64::from(step[a]));
+                // After a step up only the lower children touch, after a step down only the upper ones.
+                let touches = |_, child: u64| {
+                    (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 })
+                };
                 if touching.iter().all(|c| (0..1 << l).contains(c)) {
-                    self.owners_touching(l, morton(touching.map(|c| c as u32)), step, &mut add);
+                    self.owners_in(l, morton(touching.map(|c| c as u32)), &touches, &mut add);
                 }
             }
         }
         neighbours
     }
 
-    /// Calls `add` with the owners, other than this rank, of the parts of an octant that touch the octant from which `step` leads to
-    /// it.
-    fn owners_touching(&self, l: Level, code: u64, step: [i8; 3], add: &mut impl FnMut(usize)) {
-        if self.own.start <= start57(l, code) && start57(l, code + 1) <= self.own.end {
-            return;
-        }
+    /// Calls `found` with the owners of an octant, where it has several of those descendants that are in accepted children only; with some
+    /// more than once. `accepts` is given the level and the code of a child.
+    pub fn owners_in(
+        &self,
+        l: Level,
+        code: u64,
+        accepts: &impl Fn(Level, u64) -> bool,
+        found: &mut impl FnMut(usize),
+    ) {
         if let Some(owner) = self.sole_owner(l, code) {
-            return add(owner);
+            return found(owner);
         }
-        // After a step up only the lower children touch, after a step down only the upper ones.
-        let touches =
-            |child: u64| (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 });
-        for child in (0..8).filter(|&child| touches(child)) {
-            self.owners_touching(l + 1, code << 3 | child, step, add);
+        for child in (code << 3..).take(8).filter(|&child| accepts(l + 1, child)) {
+            self.owners_in(l + 1, child, accepts, found);
         }
     }
 
@@ -196,10 +200,9 @@ impl Ownership {
         let mut top = Tree::default();
         for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
             for l in 0..=self.level_fully_replicated {
-                let bricks = from[l as usize].bricks();
                 let is_everywhere =
                     |b: &Brick| self.placement(l, b.key) == Placement::FullyReplicated;
-                bricks.filter(is_everywhere).for_each(|b| to[l as usize].push(b.key, b.bits));
+                to[l as usize] = from[l as usize].bricks().filter(is_everywhere).collect();
             }
         }
         top

@@ -268,7 +268,8 @@ impl Sides {
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
     pub fn check_invariants(&self, tree: &Tree) {
-        tree.check_open_leaves(&self.stored, "has a side, but is no leaf off the surface");
+        let others = [&tree.split, &tree.crossing];
+        tree.check_apart(&self.stored, &others, "has a side, but is no leaf off the surface");
     }
 }
 

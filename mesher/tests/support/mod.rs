@@ -7,7 +7,6 @@ use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
-use mesher::output::manifest::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use ranks::Solo;
@@ -122,12 +121,7 @@ impl Small {
             inside_reaches_boundary,
             flow_misses_boundary,
         };
-        let leak = |leak: reference::Leak| {
-            let reference::Leak { spacing_coarse, spacing_fine, volume, point } = leak;
-            LeakEntry { spacing_coarse, spacing_fine, volume, point }
-        };
-        let leaks = mesh.leaks.into_iter().map(leak).collect();
-        Ok(Outcome { words: mesh.words, summary, leaks })
+        Ok(Outcome { words: mesh.words, summary, leaks: mesh.leaks })
     }
 
     /// Leaf words by the mesher on one rank.
@@ -205,7 +199,7 @@ fn is_at_boundary(word: u64) -> bool {
 pub struct Outcome {
     pub words: Vec<u64>,
     pub summary: Summary,
-    pub leaks: Vec<LeakEntry>,
+    pub leaks: Vec<reference::Leak>,
 }
 
 impl Outcome {

@@ -76,9 +76,8 @@ impl Ownership {
         }
         received.sort_by_key(|e| e[0]);
         for entries in received.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
-            let mut set = BrickSet::default();
-            entries.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
-            parts[(entries[0][0] >> KEY_BITS) as usize].push(set);
+            let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
+            parts[(entries[0][0] >> KEY_BITS) as usize].push(entries.iter().map(brick).collect());
         }
         (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
