@@ -39,7 +39,7 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
     let Partition { mut ownership, level_base, partitioner } = match is_parallel {
-        false => Partition::solo(),
+        false => Partition { ownership: Ownership::solo(), level_base: 0, partitioner: None },
         true => job.phase("base tree", |comm| match division.partitioner {
             Partitioner::Paper => of_base_mesh((facets.borrow(), counts), &rules, division, comm),
             _ => Estimate { facets: facets.borrow(), rules: &rules, comm }.partition(division),

@@ -33,13 +33,6 @@ pub struct Partition {
     pub partitioner: Option<Partitioner>,
 }
 
-impl Partition {
-    /// The partition of a single rank.
-    pub fn solo() -> Self {
-        Self { ownership: Ownership::solo(), level_base: 0, partitioner: None }
-    }
-}
-
 /// The estimate of the leaves.
 #[derive(Clone, Copy)]
 pub struct Estimate<'a> {

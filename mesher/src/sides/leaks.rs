@@ -151,9 +151,9 @@ fn crossing_leaves(base: &Base) -> u64 {
 fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     let components = Components::new(base);
     let found = flow::find(base, &components);
-    let seeded: HashSet<Label> = found.values().copied().flatten().collect();
+    let seeded: HashSet<Label> = found.values().copied().collect();
     // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
-    let verdict = if found.is_empty() || found.values().any(Option::is_none) {
+    let verdict = if found.is_empty() || found.len() < base.rules.seeds.len() {
         vote::decide(&components.all, &components.candidates, base)
     } else {
         flow::decide(&components.all, seeded.clone(), base.rules.keep)
