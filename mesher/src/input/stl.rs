@@ -103,8 +103,8 @@ pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
     if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
         return Ok(());
     }
-    let bad =
-        facets.iter().position(|f| !f.as_flattened().iter().all(|x| x.is_finite())).unwrap_or(0);
+    let is_bad = |f: &Facet| !f.as_flattened().iter().all(|x| x.is_finite());
+    let bad = facets.iter().position(is_bad).expect("the sum is of coordinates");
     Err(Error::input(format!(
         "facet {} has a vertex that is not finite: {:?}: repair the geometry",
         first + bad as u64,

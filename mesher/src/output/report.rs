@@ -2,7 +2,8 @@
 //!
 //! Invariants of a report, which [`Report::check_invariants`] executes before it is returned:
 //! - leaves by level, by side and by rank add up to all leaves, and a rank's heaviest base leaf has no more than the rank;
-//! - no more components are enclosed than outside, each with a leaf, and no more decided by majority than there are;
+//! - no more components are enclosed than outside, each with a leaf, and no more decided by majority than there are; both have an example
+//!   if and only if there are any;
 //! - every quantity by rank has an entry for each rank; times are finite and not negative;
 //! - the wall time is that of the slowest rank.
 

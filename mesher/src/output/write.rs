@@ -38,8 +38,7 @@ pub fn part_name(rank: usize) -> String {
 
 /// The names of all files of a rank. They are removed if the run fails.
 fn names(rank: usize) -> impl Iterator<Item = String> {
-    let tree = (rank == 0).then(|| TREE.to_owned());
-    [part_name(rank)].into_iter().chain(tree)
+    [part_name(rank)].into_iter().chain((rank == 0).then(|| TREE.to_owned()))
 }
 
 /// The directory that a mesh is written to. Its files are removed, unless it is [kept](Self::keep).

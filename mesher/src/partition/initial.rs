@@ -11,7 +11,7 @@
 use crate::error::Error;
 use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::area::{self, FRACTIONS};
-use crate::partition::curve::{self, Bin, Boundary};
+use crate::partition::curve::{self, Bin};
 use crate::partition::metis;
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, Weights};
@@ -99,7 +99,7 @@ impl Estimate<'_> {
         };
         let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
         let along_curve = || curve::partition_known(&leaves, comm.size());
-        let boundaries = by_metis.or_else(along_curve).unwrap_or_else(all_to_rank_0);
+        let boundaries = by_metis.unwrap_or_else(along_curve);
         Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
     }
 
@@ -107,7 +107,7 @@ impl Estimate<'_> {
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
         let (bins, light) = self.all_bins(&local, coarse, 1);
-        let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
+        let boundaries = curve::partition_known(&bins, comm.size());
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
@@ -116,8 +116,7 @@ impl Estimate<'_> {
             area::add_boxes(&mut bins, self.rules, fine, light, &interval);
         }
         combine(&mut bins, u64::wrapping_add);
-        let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
-        Ownership::along(comm.rank(), comm.size(), boundaries)
+        Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm))
     }
 
     /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
@@ -139,10 +138,6 @@ impl Estimate<'_> {
 /// Deepest level that base leaves may have.
 pub fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
-}
-
-fn all_to_rank_0() -> Vec<Boundary> {
-    vec![(0, 0)]
 }
 
 #[cfg(test)]
@@ -244,7 +239,7 @@ mod tests {
         assert_ne!(unit.ownership.boundaries(), area.ownership.boundaries());
         for level in [0, 2] {
             let coarse = of(division(Weights::Rebalance, Some(level)));
-            let is_between = |&(at, _): &Boundary| at % start57(level, 1) == 0;
+            let is_between = |&(at, _): &(u64, usize)| at % start57(level, 1) == 0;
             assert!(
                 coarse.ownership.boundaries().iter().all(is_between) && coarse.level_base == level
             );
