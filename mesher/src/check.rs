@@ -23,7 +23,7 @@ use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
 use bricks::tree::{PerLevel, check_existing, check_split};
-use ranks::{Comm, MessageBuffer, gather, uncounted};
+use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -61,17 +61,12 @@ pub fn ownership(ownership: &Ownership, comm: &dyn Comm) {
     for i in intervals {
         assert_eq!(ownership.owner_at(i.start), comm.rank(), "a rank must own its intervals");
     }
-    let boundaries: Vec<_> = ownership.boundaries().collect();
-    same(&boundaries, "partition boundaries", comm);
+    same(&ownership.boundaries(), "partition boundaries", comm);
 }
 
 /// A value has the same hash on all ranks.
 fn same(value: &impl Hash, name: &str, comm: &dyn Comm) {
-    let all = comm.all_gather(&[hash(value)]);
-    assert!(
-        all.words().iter().all(|h| *h == all.words()[0]),
-        "{name} must be the same on all ranks"
-    );
+    assert_eq!(first_other(comm, value), None, "{name} must be the same on all ranks");
 }
 
 /// The rules and the facets are those of the case, each coordinate on the nearest lattice point, of two the even one.
@@ -170,7 +165,7 @@ fn hash(value: &impl Hash) -> u64 {
 /// Every rank that holds a brick has the same octants in it; no other rank has any. Owners and holders are found by the boundaries
 /// alone.
 fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
-    let boundaries: Vec<_> = ownership.boundaries().collect();
+    let boundaries = ownership.boundaries();
     // The owner of a brick, and all ranks that hold it.
     let holders = |l: Level, key: u64| -> (usize, BTreeSet<usize>) {
         let up = 3 * (LEVEL_MAX + 2 - l);

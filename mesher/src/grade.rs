@@ -126,13 +126,8 @@ impl Gradation<'_> {
 
     /// The parents of the split octants of level `l` in bricks that this rank owns.
     fn parents_of_split(&self, l: Level) -> BrickSet {
-        let split = &self.split[l as usize];
-        if !self.ownership.is_replicated(l) {
-            return split.coarsen();
-        }
-        let mut owned = split.clone();
-        owned.retain(|b| if self.ownership.owns(l, b.key) { b.bits } else { 0 });
-        owned.coarsen()
+        let split = self.split[l as usize].bricks();
+        split.filter(|b| self.ownership.owns(l, b.key)).map(Brick::parents).collect()
     }
 
     /// The octants of level `l - 1` that the kept leaves of level `l` in bricks that this rank owns

@@ -9,8 +9,7 @@ use crate::mesh::Mesh;
 use crate::output::warnings;
 use crate::partition::initial::{self, Estimate, Partition};
 use crate::partition::ownership::Ownership;
-use crate::partition::repartition;
-use crate::partition::{Division, PAPER_DEPTH, Partitioner};
+use crate::partition::{Division, PAPER_DEPTH, Partitioner, metis, repartition};
 use crate::record::{Job, Options, Recorder};
 use crate::refine;
 use crate::refine::voxelise::{self, BinnedFacets};
@@ -19,7 +18,7 @@ use bricks::facet::Facet;
 use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
 use bricks::tree::Tree;
-use ranks::{Comm, Solo, uncounted};
+use ranks::{Comm, Solo, agree, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
 
@@ -34,13 +33,13 @@ pub fn grow<F: Borrow<[Facet]>>(
 ) -> Result<Mesh, Error> {
     let (options, comm) = (job.options, job.comm);
     let division = &options.division;
-    let all = || uncounted(comm, || check::base::all_facets(facets.borrow(), comm));
+    let all = || uncounted(comm, || gather(comm, facets.borrow()));
     let all_facets = if options.checks() { all() } else { Vec::new() };
     let is_parallel = comm.size() > 1;
 
     // 3. Partition: the owner of every octant, by an estimate of the number of leaves.
     let Partition { mut ownership, level_base, partitioner } = match is_parallel {
-        false => Partition::solo(),
+        false => Partition { ownership: Ownership::solo(), level_base: 0, partitioner: None },
         true => job.phase("base tree", |comm| match division.partitioner {
             Partitioner::Paper => of_base_mesh((facets.borrow(), counts), &rules, division, comm),
             _ => Estimate { facets: facets.borrow(), rules: &rules, comm }.partition(division),
@@ -119,11 +118,10 @@ pub fn grow<F: Borrow<[Facet]>>(
         sides,
         leaks,
         bounds_nothing,
-        case_name: options.case_name.clone(),
         is_base: options.ungraded,
     };
     if options.strict
-        && let Some(warning) = warnings::of_leaks(&mesh)
+        && let Some(warning) = warnings::of_leaks(&mesh, &options.case_name)
     {
         return Err(Error::leak(warning));
     }
@@ -177,7 +175,7 @@ fn of_base_mesh(
         division.level_base.unwrap_or(PAPER_DEPTH).clamp(1, initial::level_last(rules).max(1));
     let mut base = Rules { level_surface: depth.min(rules.level_surface), ..rules.clone() };
     base.boxes.iter_mut().for_each(|b| b.level = b.level.min(depth));
-    let facets = check::base::all_facets(facets, comm);
+    let facets = gather(comm, facets);
     let options = Options { ungraded: true, ..Options::default() };
     let mut record = Recorder::default();
     let quantised = Quantised { rules: base, facets, counts };
@@ -197,7 +195,9 @@ fn of_base_mesh(
         let Ok(_) = mesh.emit(kept);
         leaves
     });
-    initial::of_base_mesh(leaves, depth, comm)
+    let boundaries = leaves.and_then(|leaves| metis::assign_equal(&leaves, comm.size()));
+    let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
+    Ok(Partition { ownership, level_base: depth, partitioner: Some(Partitioner::Paper) })
 }
 
 /// Repartitions by the numbers of leaves. Collective.

@@ -31,8 +31,6 @@ pub struct Mesh {
     pub leaks: Leaks,
     /// Whether the facets are an open body, and bound nothing although the outside is kept.
     pub bounds_nothing: bool,
-    /// Name of the case in advice to the user.
-    pub case_name: String,
     /// Whether the tree is T0, of which all leaves are in the mesh.
     pub is_base: bool,
 }

@@ -14,7 +14,7 @@ pub mod area;
 pub mod cost;
 pub mod curve;
 pub mod initial;
-mod metis;
+pub(crate) mod metis;
 pub mod ownership;
 pub mod repartition;
 

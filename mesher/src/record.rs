@@ -52,9 +52,29 @@ impl<'a> Job<'a> {
         Self { options, comm, record, counters: Counters::default() }
     }
 
-    /// Runs and times a phase, or part of it. Collective if `work` is.
+    /// Runs and times a phase, or part of it. The times of phases with the same name add up. Collective if `work` is.
     pub fn phase<T>(&mut self, name: &'static str, work: impl FnOnce(&dyn Comm) -> T) -> T {
-        self.record.phase(name, self.comm, || work(self.comm))
+        let (comm, record) = (self.comm, &mut *self.record);
+        record.report_status(name);
+        comm.enter(name);
+        stop_at(format_args!("{name}:{}", comm.rank()));
+        let before = comm.traffic();
+        let (wall, cpu) = (Instant::now(), ThreadTime::now());
+        let result = work(comm);
+        let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        let after = comm.traffic();
+        let index = record.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
+            record.phases.push(Phase { name, ..Phase::default() });
+            record.phases.len() - 1
+        });
+        let p = &mut record.phases[index];
+        p.time_wall_s += time_wall_s;
+        p.time_cpu_s += time_cpu_s;
+        p.traffic.messages += after.messages - before.messages;
+        p.traffic.bytes += after.bytes - before.bytes;
+        p.traffic.time_wall_s += after.time_wall_s - before.time_wall_s;
+        p.traffic.time_cpu_s += after.time_cpu_s - before.time_cpu_s;
+        result
     }
 
     /// Checks what a phase has made if checks are on. Messages are not counted. Collective if `check` is.
@@ -103,30 +123,6 @@ impl Recorder {
         Ok(())
     }
 
-    /// Runs and times a phase. The times of phases with the same name add up.
-    pub fn phase<T>(&mut self, name: &'static str, comm: &dyn Comm, work: impl FnOnce() -> T) -> T {
-        self.report_status(name);
-        comm.enter(name);
-        stop_at(format_args!("{name}:{}", comm.rank()));
-        let before = comm.traffic();
-        let (wall, cpu) = (Instant::now(), ThreadTime::now());
-        let result = work();
-        let (time_wall_s, time_cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        let after = comm.traffic();
-        let index = self.phases.iter().position(|p| p.name == name).unwrap_or_else(|| {
-            self.phases.push(Phase { name, ..Phase::default() });
-            self.phases.len() - 1
-        });
-        let p = &mut self.phases[index];
-        p.time_wall_s += time_wall_s;
-        p.time_cpu_s += time_cpu_s;
-        p.traffic.messages += after.messages - before.messages;
-        p.traffic.bytes += after.bytes - before.bytes;
-        p.traffic.time_wall_s += after.time_wall_s - before.time_wall_s;
-        p.traffic.time_cpu_s += after.time_cpu_s - before.time_cpu_s;
-        result
-    }
-
     /// Reports the current phase.
     pub fn report_status(&self, phase: &str) {
         if let Some(path) = &self.status {
@@ -172,9 +168,13 @@ pub struct Counters {
 /// Peak resident memory of this process, in bytes; 0 on systems that do not provide it.
 pub fn peak_rss_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
-    kib.unwrap_or(0) * 1024
+    kilobytes(&status, "VmHWM:").unwrap_or(0) * 1024
+}
+
+/// The number of kilobytes in a line of a file of the kernel.
+pub fn kilobytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|l| l.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
@@ -197,8 +197,10 @@ mod tests {
                 (0..calls).for_each(|_| comm.barrier());
                 since.elapsed().as_secs_f64()
             };
+            let options = Options::default();
+            let mut job = Job::new(&options, comm, &mut record);
             let worked_s = [("a", 1), ("b", 0), ("a", 2)]
-                .map(|(name, calls)| record.phase(name, comm, || work(calls)));
+                .map(|(name, calls)| job.phase(name, |_| work(calls)));
             let all_s = since.elapsed().as_secs_f64();
             let [a, b] = record.phases() else { panic!("two names: {record:?}") };
             assert_eq!((a.name, b.name), ("a", "b"));

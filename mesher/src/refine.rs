@@ -21,8 +21,9 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
     for (i, f) in (0u64..).zip(facets) {
         let Some(containing) = ContainingOctant::of(f) else { continue };
         let extent = std::array::from_fn(|a| f.range(a));
-        let code = containing.start() >> (3 * (LEVEL_MAX - containing.level()));
-        owners_reached(ownership, &extent, containing.level(), code, &mut |owner| {
+        let l = containing.level();
+        let code = containing.start() >> (3 * (LEVEL_MAX - l));
+        ownership.owners_in(l, code, &|l, code| reaches(&extent, l, code), &mut |owner| {
             if std::mem::replace(&mut latest[owner], i) != i {
                 to_rank[owner].push(*f);
             }
@@ -37,26 +38,10 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
     local
 }
 
-/// Calls `found` with the owners of all octants that an extent reaches within an octant; with some more than once.
-pub(crate) fn owners_reached(
-    ownership: &Ownership,
-    extent: &[(i64, i64); 3],
-    l: Level,
-    code: u64,
-    found: &mut impl FnMut(usize),
-) {
-    if let Some(owner) = ownership.sole_owner(l, code) {
-        return found(owner);
-    }
-    let (min, half) = (corner(l, code), edge(l + 1));
-    // For each axis, whether the extent reaches the lower and the upper half; the halves are closed.
-    let halves: [[bool; 2]; 3] =
-        std::array::from_fn(|a| [extent[a].0 <= min[a] + half, extent[a].1 >= min[a] + half]);
-    for child in 0..8 {
-        if (0..3).all(|a| halves[a][child >> a & 1]) {
-            owners_reached(ownership, extent, l + 1, code << 3 | child as u64, found);
-        }
-    }
+/// Whether an extent reaches a closed octant.
+fn reaches(extent: &[(i64, i64); 3], l: Level, code: u64) -> bool {
+    let (min, h) = (corner(l, code), edge(l));
+    (0..3).all(|a| extent[a].0 <= min[a] + h && extent[a].1 >= min[a])
 }
 
 #[cfg(test)]
@@ -93,7 +78,8 @@ mod tests {
             // Facets outside the root have no containing octant.
             prop_assume!(reached((0, 0)));
             let mut found = BTreeSet::new();
-            owners_reached(&ownership, &std::array::from_fn(|a| f.range(a)), 0, 0, &mut |b| _ = found.insert(b));
+            let extent = std::array::from_fn(|a| f.range(a));
+            ownership.owners_in(0, 0, &|l, code| reaches(&extent, l, code), &mut |b| _ = found.insert(b));
             let want = (0..).zip(&leaves).filter(|(_, leaf)| reached(**leaf)).map(|(owner, _)| owner);
             prop_assert!(found.into_iter().eq(want));
         }

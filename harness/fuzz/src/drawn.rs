@@ -66,10 +66,10 @@ impl Counts {
                 components(|outside, inside| outside > 0 && inside > 0),
             ),
             ("three components or more", components(|outside, inside| outside + inside > 2)),
-            ("enclosed components", summary.is_some_and(|s| s.enclosed.is_some())),
+            ("enclosed components", summary.is_some_and(|s| s.enclosed.count > 0)),
             (
                 "components decided by majority (leaks)",
-                summary.is_some_and(|s| s.ambiguous.is_some()),
+                summary.is_some_and(|s| s.ambiguous.count > 0),
             ),
             (
                 "inside reaches the root's boundary",

@@ -97,7 +97,6 @@ impl Phases {
             sides,
             leaks: Leaks::default(),
             bounds_nothing: false,
-            case_name: String::new(),
             is_base: false,
         };
         Self { given, facets, rules, ownership, binned, tree, mesh }

@@ -20,6 +20,14 @@ pub struct Brick {
     pub bits: u64,
 }
 
+impl Brick {
+    /// The parents of its octants, in the brick that they lie in.
+    #[inline]
+    pub fn parents(self) -> Self {
+        Self { key: self.key >> 3, bits: u64::from(parents(self.bits)) << (8 * (self.key & 7)) }
+    }
+}
+
 /// Masks of the octants whose x position in the brick is 0, 1, 2, 3.
 pub const X: [u64; 4] = axis_masks(0);
 /// The same by y position.

@@ -166,11 +166,7 @@ impl BrickSet {
 
     /// The parents of the set's octants.
     pub fn coarsen(&self) -> Self {
-        let mut set = Self::default();
-        for b in self.bricks() {
-            set.push(b.key >> 3, u64::from(brick::parents(b.bits)) << (8 * (b.key & 7)));
-        }
-        set
+        self.bricks().map(Brick::parents).collect()
     }
 
     /// The children of the set's octants, brick by brick in Morton order.
@@ -207,6 +203,16 @@ impl BrickSet {
             same.push(key, bits);
         }
         assert!(*self == same, "each brick must be in the run of its upper half");
+    }
+}
+
+/// The octants of some bricks in Morton order; those with the same key become one.
+impl FromIterator<Brick> for BrickSet {
+    #[inline]
+    fn from_iter<I: IntoIterator<Item = Brick>>(bricks: I) -> Self {
+        let mut set = Self::default();
+        bricks.into_iter().for_each(|b| set.push(b.key, b.bits));
+        set
     }
 }
 

@@ -63,16 +63,11 @@ impl Tree {
         self.check_apart(&self.crossing, &[&self.split], "is crossing, but no leaf");
     }
 
-    /// Checks that some sets hold leaves of this tree that do not cross.
+    /// Checks that some sets hold octants of this tree that are in none of `others`.
     ///
     /// # Panics
-    /// If an octant of `sets` is no such leaf; `violation` completes the sentence that names it.
-    pub fn check_open_leaves(&self, sets: &PerLevel, violation: &str) {
-        self.check_apart(sets, &[&self.split, &self.crossing], violation);
-    }
-
-    /// Checks that some sets hold octants of this tree that are in none of `others`.
-    fn check_apart(&self, sets: &PerLevel, others: &[&PerLevel], violation: &str) {
+    /// If they do not; `violation` completes the sentence that names an octant.
+    pub fn check_apart(&self, sets: &PerLevel, others: &[&PerLevel], violation: &str) {
         check_existing(&self.split, sets, violation);
         for other in others {
             for (l, (set, other)) in (0..).zip(sets.iter().zip(*other)) {
@@ -157,6 +152,7 @@ mod tests {
     fn a_deleted_leaf_that_crosses_is_found() {
         let mut deleted = per_level();
         deleted[3] = set(&[1, 2]);
-        small().check_open_leaves(&deleted, "is deleted");
+        let tree = small();
+        tree.check_apart(&deleted, &[&tree.split, &tree.crossing], "is deleted");
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::pilot::Amounts;
 use bytemuck::{Pod, Zeroable};
-use mesher::record::peak_rss_bytes;
+use mesher::record::{kilobytes, peak_rss_bytes};
 use ranks::{Comm, gather};
 use rustix::param::page_size;
 use rustix::process::{Resource, getrlimit};
@@ -92,9 +92,7 @@ pub fn address_space_left() -> f64 {
 }
 
 fn available(meminfo: &str) -> f64 {
-    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemAvailable:"));
-    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
-    kib.map_or(f64::INFINITY, |kib| kib * 1024.0)
+    kilobytes(meminfo, "MemAvailable:").map_or(f64::INFINITY, |kib| kib as f64 * 1024.0)
 }
 
 /// The least that the groups of this process leave, from its own group to the root of the hierarchy below `mount`. Inside a container

@@ -1,6 +1,7 @@
 //! Errors and texts that all ranks agree on.
 
-use crate::Comm;
+use crate::{Comm, gather};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Makes ranks agree on errors: all return the error of the lowest rank that has one. An error is an exit code and a sentence.
 /// Collective.
@@ -24,6 +25,14 @@ where
             Err(E::from((words[0] as i32, String::from_utf8_lossy(&sentence).into_owned())))
         }
     }
+}
+
+/// The first rank with another value than rank 0, by its hash. Collective.
+pub fn first_other(comm: &dyn Comm, value: &impl Hash) -> Option<usize> {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    let hashes = gather(comm, &[hasher.finish()]);
+    hashes.iter().position(|&hash| hash != hashes[0])
 }
 
 /// The text of rank 0. Collective.

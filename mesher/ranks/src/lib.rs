@@ -17,10 +17,10 @@ mod mpi;
 mod reduced;
 pub mod sim;
 
-pub use agree::{agree, pack_bytes, text_of_first, unpack_bytes};
+pub use agree::{agree, first_other, pack_bytes, text_of_first, unpack_bytes};
 pub use message_buffer::MessageBuffer;
 pub use metered::{Metered, Traffic};
-pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, split_by_reducer};
+pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, combine, split_by_reducer};
 
 use bytemuck::Pod;
 use std::sync::Arc;
@@ -84,11 +84,6 @@ pub trait Comm {
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
         self.sums(&[v])[0]
-    }
-
-    /// The greatest value of any rank. Collective.
-    fn max(&self, v: u64) -> u64 {
-        self.all_gather(&[v]).words().iter().copied().max().unwrap_or(v)
     }
 }
 

@@ -4,7 +4,7 @@
 //! times the result to every rank, and every rank would reduce it. Here *reducer ranks*, each for its part of the keys,
 //! reduce the entries before the allgather.
 
-use super::{Comm, MessageBuffer};
+use super::{Comm, MessageBuffer, gather};
 
 /// A key and a value.
 pub type Entry = [u64; 2];
@@ -20,12 +20,7 @@ pub fn all_gather_reduced(
     comm: &dyn Comm,
 ) -> Vec<Entry> {
     if let Some(entries) = split_by_reducer(&mut mine, merge, comm) {
-        mine = comm
-            .sparse_all_to_all(MessageBuffer::of_entries(entries))
-            .words()
-            .as_chunks()
-            .0
-            .to_vec();
+        mine = comm.sparse_all_to_all(MessageBuffer::of_entries(entries)).values().collect();
     }
     all_gather_from_reducers(mine, merge, comm)
 }
@@ -59,13 +54,13 @@ pub fn all_gather_from_reducers(
     comm: &dyn Comm,
 ) -> Vec<Entry> {
     combine(&mut mine, merge);
-    let mut all: Vec<Entry> = comm.all_gather(mine.as_flattened()).words().as_chunks().0.to_vec();
+    let mut all = gather(comm, &mine);
     combine(&mut all, merge);
     all
 }
 
-/// Sorts entries and reduces those with the same key.
-fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
+/// Sorts entries by key and reduces those with the same key.
+pub fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
     // A stable sort takes advantage of the sorted runs that ranks send.
     entries.sort_by_key(|e| e[0]);
     entries.dedup_by(|e, before| {

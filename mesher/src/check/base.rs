@@ -5,20 +5,7 @@ use crate::partition::ownership::Ownership;
 use crate::sides::Base;
 use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge, path, start57};
-use bytemuck::allocation::pod_collect_to_vec;
-use ranks::Comm;
 use std::ops::Range;
-
-/// The facets of all ranks, in their order. Collective.
-pub fn all_facets(slice: &[Facet], comm: &dyn Comm) -> Vec<Facet> {
-    let all = comm.all_gather(&pod_collect_to_vec::<Facet, u64>(slice));
-    let facets = |words: &[u64]| {
-        let mut facets = pod_collect_to_vec::<u64, Facet>(words);
-        facets.truncate(size_of_val(words) / size_of::<Facet>());
-        facets
-    };
-    all.messages().flat_map(|(_, words)| facets(words)).collect()
-}
 
 /// A rank has every facet whose extent reaches an octant that it owns, once, but those that miss the root.
 pub fn routed(facets: &[Facet], all: &[Facet], ownership: &Ownership) {

@@ -13,10 +13,8 @@ use ranks::Comm;
 /// level at most, and no octant is split without need. Collective.
 pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
     let Mesh { rules, split, crossing, sides, ownership, .. } = mesh;
-    let owned = |l: Level, set: &BrickSet| {
-        let mut owned = set.clone();
-        owned.retain(|b| if ownership.owns(l, b.key) { b.bits } else { 0 });
-        owned
+    let owned = |l: Level, set: &BrickSet| -> BrickSet {
+        set.bricks().filter(|b| ownership.owns(l, b.key)).collect()
     };
     let gather = |l: Level, set: BrickSet| to_owners(set, l, ownership, comm);
     // The kept leaves among some octants of level l.

@@ -52,7 +52,7 @@ fn run(ungraded: bool, corrupt: impl Fn(&mut Mesh) + Sync, check: impl Fn(Mesh, 
 }
 
 fn check_base_tree(mesh: Mesh, comm: &dyn Comm) {
-    let facets = base::all_facets(&local_facets(&mesh, comm), comm);
+    let facets = ranks::gather(comm, &local_facets(&mesh, comm));
     let Mesh { split, crossing, ownership, rules, .. } = mesh;
     let tree = Tree { split, crossing };
     let (tree, ownership, rules) = (&tree, &ownership, &rules);
@@ -130,7 +130,7 @@ fn different_rules_are_found() {
 #[should_panic(expected = "partition boundaries must be the same on all ranks")]
 fn different_partitions_are_found() {
     let corrupt = |m: &mut Mesh| {
-        let mut boundaries: Vec<_> = m.ownership.boundaries().collect();
+        let mut boundaries = m.ownership.boundaries().to_vec();
         // Not a boundary of rank 1, whose intervals must remain.
         boundaries[3].0 += 1;
         m.ownership = Ownership::along(1, RANKS, boundaries);
@@ -147,7 +147,7 @@ fn check_facets(corrupt: impl Fn(&mut Vec<Facet>) + Sync) {
         if comm.rank() == 1 {
             corrupt(&mut routed);
         }
-        base::routed(&routed, &base::all_facets(&local, comm), &mesh.ownership);
+        base::routed(&routed, &ranks::gather(comm, &local), &mesh.ownership);
     });
 }
 
@@ -204,7 +204,7 @@ fn a_crossing_leaf_that_no_facet_crosses_is_found() {
         add(&mut m.crossing[l], code);
     };
     let check = |m: Mesh, comm: &dyn Comm| {
-        let facets = base::all_facets(&local_facets(&m, comm), comm);
+        let facets = ranks::gather(comm, &local_facets(&m, comm));
         let tree = Tree { split: m.split, crossing: m.crossing };
         tree.check_structure();
         let (tree, ownership, rules) = (&tree, &m.ownership, &m.rules);
@@ -277,7 +277,7 @@ fn a_missing_replica_is_found() {
 #[should_panic(expected = "a rank must hold the bricks that it has")]
 fn a_brick_of_another_rank_is_found() {
     let check = |m: Mesh, comm: &dyn Comm| {
-        let boundaries: Vec<_> = m.ownership.boundaries().collect();
+        let boundaries = m.ownership.boundaries().to_vec();
         // Rank 1 takes itself for rank 2.
         let rank = if comm.rank() == 1 { 2 } else { comm.rank() };
         let crossing = if comm.rank() == 1 {

@@ -8,8 +8,8 @@
 use crate::error::Error;
 use crate::input::stl;
 use geometries::{Facet, Generator};
-use ranks::{Comm, MessageBuffer, agree, gather, uncounted};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use ranks::{Comm, MessageBuffer, agree, first_other, uncounted};
+use std::hash::Hash;
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -104,7 +104,7 @@ pub fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
     let Source::Stl(path) = source else { return Ok(()) };
     let other = uncounted(comm, || {
         // Copies on several machines differ in their times only.
-        other_rank(&identity(path), comm).and_then(|_| other_rank(&content(path), comm))
+        first_other(comm, &identity(path)).and_then(|_| first_other(comm, &content(path)))
     });
     other.map_or(Ok(()), |rank| {
         Err(Error::input(format!(
@@ -112,14 +112,6 @@ pub fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
             path.display()
         )))
     })
-}
-
-/// The first rank with another value than rank 0. Collective.
-fn other_rank(value: &impl Hash, comm: &dyn Comm) -> Option<usize> {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    let digests = gather(comm, &[hasher.finish()]);
-    digests.iter().position(|&digest| digest != digests[0])
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.

@@ -126,15 +126,13 @@ impl Root {
         let near = |c: f64, a: usize| off_centre(rounded(c, origin[a], scale)) <= limit;
         // Rounding is monotonic, so no vertex is too far if the bounds are not.
         if !facets.is_empty() && !(0..3).all(|a| near(bounds.lo[a], a) && near(bounds.hi[a], a)) {
-            let outside = |v: &[f32; 3]| !(0..3).all(|a| near(f64::from(v[a]), a));
-            let bad = facets.iter().position(|f| f.iter().any(outside)).unwrap_or(0);
-            let v = facets[bad].iter().find(|v| outside(v)).unwrap_or(&facets[bad][0]);
+            let is_far = |v: &[f32; 3]| !(0..3).all(|a| near(f64::from(v[a]), a));
+            let vertices = facets.as_flattened();
+            let far = vertices.iter().position(is_far).expect("the bounds are those of vertices");
+            let [x, y, z] = vertices[far];
             return Err(Error::input(format!(
-                "facet {} has a vertex at ({}, {}, {}), more than one root edge outside the root: enlarge or move the root",
-                first + bad as u64,
-                v[0],
-                v[1],
-                v[2]
+                "facet {} has a vertex at ({x}, {y}, {z}), more than one root edge outside the root: enlarge or move the root",
+                first + far as u64 / 3
             )));
         }
         quantise(&mut facets, &origin, scale);

@@ -17,7 +17,6 @@ const RECORD: u64 = 50;
 pub struct Stl {
     path: PathBuf,
     file: File,
-    length: u64,
     /// Number of facets if the file is binary.
     pub binary: Option<u64>,
 }
@@ -33,41 +32,28 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     };
     let file = files::open(path).map_err(fail)?;
     let length = file.metadata().map_err(fail)?.len();
-    if length == 0 {
-        return Err(Error::input(format!(
-            "{} is empty: give an STL file with facets",
-            path.display()
-        )));
+    let mut head = vec![0; length.min(1024) as usize];
+    file.read_exact_at(&mut head, 0).map_err(fail)?;
+    let count = head.get(80..).and_then(|after| after.first_chunk());
+    let count = count.map(|&bytes| u64::from(u32::from_le_bytes(bytes)));
+    let binary = count.filter(|count| length == HEADER + RECORD * count);
+    let stl = Stl { path: path.to_owned(), file, binary };
+    // The first word of a text, if it has one, is `solid`, and no byte is zero.
+    if binary.is_some() || may_begin_with_solid(&head) && !head.contains(&0) {
+        return Ok(stl);
     }
-    let mut stl = Stl { path: path.to_owned(), file, length, binary: None };
-    if length >= HEADER {
-        let mut count = [0; 4];
-        stl.file.read_exact_at(&mut count, 80).map_err(fail)?;
-        let count = u64::from(u32::from_le_bytes(count));
-        if length == HEADER + RECORD * count {
-            stl.binary = Some(count);
-        } else if !stl.looks_like_text()? {
-            let wanted = HEADER + RECORD * count;
-            let how = if length < wanted { "truncated" } else { "longer" };
-            return Err(Error::input(format!(
-                "{}: the header promises {count} facets, which take {wanted} bytes, but the file has {length}: it is {how} or not an STL; export it again",
-                path.display()
-            )));
-        }
-    }
-    Ok(stl)
+    Err(stl.fail(match count {
+        Some(count) => format!(
+            "the header promises {count} facets, which take {} bytes, but the file has {length}: it is truncated, longer or not an STL; export it again",
+            HEADER + RECORD * count
+        ),
+        None => "is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file".to_owned(),
+    }))
 }
 
 impl Stl {
     fn fail(&self, what: impl std::fmt::Display) -> Error {
         Error::input(format!("{}: {what}", self.path.display()))
-    }
-
-    /// Whether the beginning of the file may be that of text: the first word, if there is one, is `solid`, and no byte is zero.
-    fn looks_like_text(&self) -> Result<bool, Error> {
-        let mut head = vec![0; self.length.min(1024) as usize];
-        self.file.read_exact_at(&mut head, 0).map_err(|e| self.fail(e))?;
-        Ok(may_begin_with_solid(&head) && !head.contains(&0))
     }
 
     /// Facets `first..end` of a binary file.
@@ -94,9 +80,6 @@ impl Stl {
     /// # Errors
     /// If the file cannot be read, or is malformed or truncated.
     pub fn read_text(mut self) -> Result<Vec<Facet>, Error> {
-        if !self.looks_like_text()? {
-            return Err(self.fail("is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file"));
-        }
         let mut bytes = Vec::new();
         self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
         parse(&bytes).map_err(|why| self.fail(format!("{why}: export it again")))
@@ -120,8 +103,8 @@ pub fn check_finite(facets: &[Facet], first: u64) -> Result<(), Error> {
     if flat.iter().map(|x| 0.0 * x).sum::<f32>() == 0.0 {
         return Ok(());
     }
-    let bad =
-        facets.iter().position(|f| !f.as_flattened().iter().all(|x| x.is_finite())).unwrap_or(0);
+    let is_bad = |f: &Facet| !f.as_flattened().iter().all(|x| x.is_finite());
+    let bad = facets.iter().position(is_bad).expect("the sum is of coordinates");
     Err(Error::input(format!(
         "facet {} has a vertex that is not finite: {:?}: repair the geometry",
         first + bad as u64,

@@ -40,13 +40,13 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let failed = out.failed(TREE);
     let file = is_first.then(begin).transpose().map_err(&failed);
     let mut file = ranks::agree(comm, file)?;
-    let mut own = Source { siblings: own_siblings(mesh, &numbering).peekable(), last: None };
+    let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
     let mut begin = 0;
     while begin < shape.windows() {
         let windows = begin..shape.windows().min(begin + round);
-        let mine = comm.sparse_all_to_all(own.messages(windows.clone()));
+        let mine = comm.sparse_all_to_all(messages(&mut own, &mut last, windows.clone()));
         let mut chunks = MessageBuffer::default();
         let window = begin + comm.rank() as u64;
         if windows.contains(&window) {
@@ -62,48 +62,37 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
 }
 
-/// The nodes that this rank owns, sent window by window.
-struct Source<S: Iterator<Item = (u64, Siblings)>> {
-    siblings: Peekable<S>,
-    /// The last siblings sent: some of them may belong to the following window.
-    last: Option<(u64, Siblings)>,
-}
+/// Siblings with their number.
+type Numbered = (u64, Siblings);
 
-impl<S: Iterator<Item = (u64, Siblings)>> Source<S> {
-    /// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
-    /// runs of siblings: number of the first, how many, and the siblings in pairs.
-    fn messages(&mut self, windows: Range<u64>) -> MessageBuffer {
-        let mut messages = MessageBuffer::default();
-        let mut found = Vec::new();
-        for (to, window) in windows.enumerate() {
-            let range = groups(window);
-            found.clear();
-            found.extend(self.last.filter(|(group, _)| range.contains(group)));
-            while let Some(next) = self.siblings.next_if(|(group, _)| *group < range.end) {
-                found.push(next);
-            }
-            self.last = found.last().copied();
-            for run in found.chunk_by(|a, b| a.0 + 1 == b.0) {
-                messages.append(to, |words| {
-                    words.extend([run[0].0, run.len() as u64]);
-                    words.extend(run.chunks(2).map(|pair| {
-                        let code = |at: usize| pair.get(at).map_or(0, |&(_, s)| encode(s));
-                        code(0) | code(1) << 32
-                    }));
-                });
-            }
+/// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
+/// runs of siblings: number of the first, and four bytes for each. `last` are the last siblings sent: some of them may belong to the
+/// following window.
+fn messages(
+    own: &mut Peekable<impl Iterator<Item = Numbered>>,
+    last: &mut Option<Numbered>,
+    windows: Range<u64>,
+) -> MessageBuffer {
+    let mut messages = MessageBuffer::default();
+    let mut found = Vec::new();
+    for (to, window) in windows.enumerate() {
+        let range = groups(window);
+        found.clear();
+        found.extend(last.filter(|(group, _)| range.contains(group)));
+        while let Some(next) = own.next_if(|(group, _)| *group < range.end) {
+            found.push(next);
         }
-        messages
+        *last = found.last().copied();
+        for run in found.chunk_by(|a, b| a.0 + 1 == b.0) {
+            let of = |s: Siblings| [s.split, s.deleted, s.crossing, s.inside];
+            let bytes: Vec<u8> = run.iter().flat_map(|&(_, s)| of(s)).collect();
+            messages.append(to, |words| {
+                words.push(run[0].0);
+                pack_bytes(&bytes, words);
+            });
+        }
     }
-}
-
-fn encode(s: Siblings) -> u64 {
-    u64::from(u32::from_le_bytes([s.split, s.deleted, s.crossing, s.inside]))
-}
-
-fn decode(code: u32) -> Siblings {
-    let [split, deleted, crossing, inside] = code.to_le_bytes();
-    Siblings { split, deleted, crossing, inside }
+    messages
 }
 
 /// A window with the nodes that all ranks have sent for it.
@@ -111,14 +100,15 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer) -> Window {
     let mut filled = Window::new(window);
     if window == 0 {
         // All ranks hold the root.
-        filled.put_root(root(mesh));
+        let brick = Path::new(mesh, 0).load(0, 0);
+        filled.put_root(siblings(brick, 0, 1));
     }
     for (_, mut words) in messages.messages() {
-        while let [first, count, rest @ ..] = words {
-            let (pairs, after) = rest.split_at(count.div_ceil(2) as usize);
-            let codes = pairs.iter().flat_map(|&w| [w as u32, (w >> 32) as u32]);
-            for (group, code) in (*first..first + count).zip(codes) {
-                filled.put(group, decode(code));
+        while let [first, rest @ ..] = words {
+            let (bytes, after) = unpack_bytes(rest);
+            for (group, &[split, deleted, crossing, inside]) in (*first..).zip(bytes.as_chunks().0)
+            {
+                filled.put(group, Siblings { split, deleted, crossing, inside });
             }
             words = after;
         }
@@ -165,7 +155,7 @@ impl<'a> Numbering<'a> {
     /// Counts siblings by interval of the curve, and numbers them. Collective.
     fn new(mesh: &'a Mesh, comm: &dyn Comm) -> Self {
         let ownership = &mesh.ownership;
-        let intervals = ownership.boundaries().count();
+        let intervals = ownership.boundaries().len();
         let first = vec![0; LEVELS * intervals];
         let mut numbering = Self { nodes: vec![1], first, ownership };
         for l in 1..LEVELS as Level {
@@ -202,7 +192,7 @@ impl<'a> Numbering<'a> {
 fn own_siblings<'a>(
     mesh: &'a Mesh,
     numbering: &'a Numbering<'a>,
-) -> impl Iterator<Item = (u64, Siblings)> + 'a {
+) -> impl Iterator<Item = Numbered> + 'a {
     let of_level = move |l: Level| {
         let mut path = Path::new(mesh, l);
         // The place of the last brick, and the number of the next siblings.
@@ -215,32 +205,21 @@ fn own_siblings<'a>(
             }
             let (brick, groups, first) = (path.load(l, b.key), parents(b.bits), next);
             next += u64::from(groups.count_ones());
-            let of_group = move |j| siblings(brick, u64::from(j));
+            let of_group = move |j| siblings(brick, u64::from(j), 0xff);
             (first..).zip(ones(u64::from(groups)).map(of_group))
         })
     };
     (1..LEVELS as Level).flat_map(of_level)
 }
 
-/// The root.
-fn root(mesh: &Mesh) -> Siblings {
-    let root = siblings(Path::new(mesh, 0).load(0, 0), 0);
-    // The seven other octants of the brick do not exist.
-    let [split, deleted, crossing, inside] =
-        [root.split, root.deleted, root.crossing, root.inside].map(|bits| bits & 1);
-    Siblings { split, deleted, crossing, inside }
-}
-
-/// Siblings that exist: byte `j` of a brick.
+/// Siblings: byte `j` of a brick, of which those in the mask `exist` do.
 #[inline]
-fn siblings(Octants { split, crossing, inside, deleted }: Octants, j: u64) -> Siblings {
+fn siblings(brick: Octants, j: u64, exist: u8) -> Siblings {
+    let Octants { split, crossing, inside, deleted } = brick;
     let kept = !split & !deleted;
-    Siblings {
-        split: byte(split, j),
-        deleted: byte(deleted & !split, j),
-        crossing: byte(crossing & kept, j),
-        inside: byte(inside & kept, j),
-    }
+    let [split, deleted, crossing, inside] =
+        [split, deleted & !split, crossing & kept, inside & kept].map(|bits| byte(bits, j) & exist);
+    Siblings { split, deleted, crossing, inside }
 }
 
 /// The bricks that contain the current one, of all coarser levels, and readers of the sets.

@@ -4,14 +4,15 @@ use crate::input::lattice::Rules;
 use crate::mesh::Mesh;
 use crate::output::stream::Counts;
 use crate::output::write::{Output, TREE, part_name};
-use crate::sides::Summary;
 use crate::sides::leaks::Leak;
+use crate::sides::{Ambiguous, Summary};
 use bricks::digest::{Digests, hex};
-use bricks::octant::{LEVEL_MAX, Level};
+use bricks::octant::LEVEL_MAX;
 use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::iter::once;
 
 /// The sides of leaves, in the order of their numbers.
 pub const SIDES: [&str; 3] = ["outside", "inside", "crossing"];
@@ -27,48 +28,18 @@ pub struct MeshEntry {
     pub rules: Rules,
     geometry: Value,
     /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Vec<LeakEntry>,
+    pub leaks: Vec<Leak>,
     /// Leaves of the mesh.
     pub leaves: u64,
     /// Leaves by level, 0 to 19.
     pub leaves_by_level: Vec<u64>,
     /// Leaves by side.
     pub leaves_by_side: BTreeMap<&'static str, u64>,
-    components: Value,
-    components_ambiguous: Value,
+    /// The components of the base tree.
+    pub components: Summary,
+    components_ambiguous: Ambiguous,
     /// The mesh's digest.
     pub digest: String,
-    /// The components of the base tree.
-    #[serde(skip)]
-    pub summary: Summary,
-}
-
-/// A leak.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LeakEntry {
-    /// The spacing at which the region is closed.
-    pub spacing_coarse: f64,
-    /// The spacing of the mesh.
-    pub spacing_fine: f64,
-    /// The region's volume at the coarser spacing.
-    pub volume: f64,
-    /// A point in it.
-    pub point: [f64; 3],
-}
-
-impl LeakEntry {
-    /// The leaks of a mesh.
-    pub fn of(mesh: &Mesh) -> Vec<Self> {
-        let root = mesh.rules.root;
-        let edge_of = |l: Level| root.edge / f64::from(1u32 << l);
-        let entry = |leak: &Leak| Self {
-            spacing_coarse: edge_of(leak.level),
-            spacing_fine: edge_of(mesh.rules.level_surface),
-            volume: leak.volume as f64 * edge_of(LEVEL_MAX).powi(3),
-            point: root.locate(leak.first.centroid()),
-        };
-        mesh.leaks.0.iter().map(entry).collect()
-    }
 }
 
 impl MeshEntry {
@@ -77,32 +48,18 @@ impl MeshEntry {
         let Mesh { rules, sides, .. } = mesh;
         let by_level = &counts.by_level[..=LEVEL_MAX as usize];
         let by_side = [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum());
-        let Summary { outside, inside, enclosed, ambiguous, .. } = sides.summary;
-        let place = |q| rules.root.locate(q);
         Self {
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
             tree: if mesh.is_base { "base" } else { "final" },
             rules: rules.clone(),
             geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
-            leaks: LeakEntry::of(mesh),
+            leaks: mesh.leaks.0.clone(),
             leaves: counts.total(),
             leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
             leaves_by_side: SIDES.into_iter().zip(by_side).collect(),
-            components: json!({
-                "outside": outside,
-                "inside": inside,
-                "enclosed": {
-                    "count": enclosed.map_or(0, |e| e.count),
-                    "leaves": enclosed.map_or(0, |e| e.leaves),
-                    "example": enclosed.map(|e| place(e.example)),
-                },
-            }),
-            components_ambiguous: json!({
-                "count": ambiguous.map_or(0, |a| a.count),
-                "example": ambiguous.map(|a| place(a.example)),
-            }),
+            components: sides.summary,
+            components_ambiguous: sides.summary.ambiguous,
             digest: hex(digests.whole()),
-            summary: sides.summary,
         }
     }
 }
@@ -119,40 +76,30 @@ pub struct Manifest<'a> {
     hyper_tree_grid: Option<&'static str>,
 }
 
-/// A part: its number of leaves, and the upper and the lower half of its digest.
-pub type PartWords = [u64; 3];
+/// A part: its number of leaves and its digest.
+pub type Part = (u64, u128);
 
 /// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
-pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<PartWords>) {
-    let split = |d: u128| [(d >> 64) as u64, d as u64];
-    let whole = split(mine.whole());
-    let mut words = vec![leaves, whole[0], whole[1]];
+pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<Part>) {
+    let words = |number: u64, digest: u128| [number, (digest >> 64) as u64, digest as u64];
     // The leaves of a rank lie in few of the octants.
-    let octants = (0..).zip(&mine.octants).filter(|(_, d)| **d != 0);
-    words.extend(octants.flat_map(|(i, &d)| [i, split(d)[0], split(d)[1]]));
-    let mut digests = Digests::default();
-    let mut parts = Vec::new();
-    for (_, theirs) in comm.all_gather(&words).messages() {
-        let (whole, octants) = theirs.split_at(3);
-        parts.push([whole[0], whole[1], whole[2]]);
-        let octants = octants.chunks_exact(3);
-        digests.merge(octants.map(|w| (w[0] as usize, u128::from(w[1]) << 64 | u128::from(w[2]))));
+    let octants = (0..).zip(&mine.octants).filter(|(_, d)| **d != 0).map(|(i, d)| words(i, *d));
+    let mine: Vec<[u64; 3]> = once(words(leaves, mine.whole())).chain(octants).collect();
+    let (mut digests, mut parts) = (Digests::default(), Vec::new());
+    for (_, theirs) in comm.all_gather(mine.as_flattened()).messages() {
+        let theirs = theirs.as_chunks().0.iter();
+        let mut theirs =
+            theirs.map(|&[n, high, low]| (n, u128::from(high) << 64 | u128::from(low)));
+        parts.extend(theirs.next());
+        digests.merge(theirs.map(|(octant, digest)| (octant as usize, digest)));
     }
     (digests, parts)
 }
 
 impl<'a> Manifest<'a> {
     /// The manifest of a mesh with these digests and parts; parts and tree are named as far as `output` has them.
-    pub fn new(
-        output: &Output,
-        mesh: &'a MeshEntry,
-        digests: &Digests,
-        parts: &[PartWords],
-    ) -> Self {
-        let part = |(rank, &[leaves, high, low]): (usize, &PartWords)| {
-            let digest = hex(u128::from(high) << 64 | u128::from(low));
-            json!({ "file": part_name(rank), "leaves": leaves, "digest": digest })
-        };
+    pub fn new(output: &Output, mesh: &'a MeshEntry, digests: &Digests, parts: &[Part]) -> Self {
+        let part = |(rank, &(leaves, digest)): (usize, &Part)| json!({ "file": part_name(rank), "leaves": leaves, "digest": hex(digest) });
         Self {
             schema: "octree-leaf-set/1",
             mesh,

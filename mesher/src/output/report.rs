@@ -2,7 +2,8 @@
 //!
 //! Invariants of a report, which [`Report::check_invariants`] executes before it is returned:
 //! - leaves by level, by side and by rank add up to all leaves, and a rank's heaviest base leaf has no more than the rank;
-//! - no more components are enclosed than outside, each with a leaf, and no more decided by majority than there are;
+//! - no more components are enclosed than outside, each with a leaf, and no more decided by majority than there are; both have an example
+//!   if and only if there are any;
 //! - every quantity by rank has an entry for each rank; times are finite and not negative;
 //! - the wall time is that of the slowest rank.
 
@@ -107,7 +108,7 @@ impl Report {
             mesh: entry,
             level_base: mesh.level_base,
             partitioner: mesh.partitioner,
-            warnings: warnings::of(mesh),
+            warnings: warnings::of(mesh, &job.options.case_name),
             ranks: comm.size(),
             time_wall_s: (0..comm.size()).map(total).fold(0.0, f64::max),
             peak_rss_bytes,
@@ -137,14 +138,11 @@ impl Report {
                 "rank {rank}: a base leaf of {heaviest} of {leaves} leaves"
             );
         }
-        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.summary;
-        if let Some(e) = enclosed {
-            let is_right = (1..=outside.min(e.leaves)).contains(&e.count);
-            assert!(is_right, "{e:?} of {outside} outside components");
-        }
-        if let Some(a) = ambiguous {
-            assert!((1..=outside + inside).contains(&a.count), "{a:?} of all components");
-        }
+        let Summary { outside, inside, enclosed: e, ambiguous: a, .. } = mesh.components;
+        let is_right = e.count <= outside.min(e.leaves) && e.example.is_some() == (e.count > 0);
+        assert!(is_right, "{e:?} of {outside} outside components");
+        let is_right = a.count <= outside + inside && a.example.is_some() == (a.count > 0);
+        assert!(is_right, "{a:?} of all components");
         assert!(self.counters.values().all(|c| c.len() == self.ranks), "a counter for each rank");
         assert_eq!(self.peak_rss_bytes.len(), self.ranks, "a peak for each rank");
         let mut walls = vec![0.0; self.ranks];
@@ -184,11 +182,9 @@ impl fmt::Display for Report {
             let (cells, edge) = (grouped(n), edge / f64::from(1u32 << l));
             writeln!(f, "  level {l:>2}     {cells:>16}   edge {edge:e}")?;
         }
-        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.summary;
-        let (enclosed, ambiguous) =
-            (enclosed.map_or(0, |e| e.count), ambiguous.map_or(0, |a| a.count));
+        let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.components;
         let [outside, inside, enclosed, ambiguous] =
-            [outside, inside, enclosed, ambiguous].map(grouped);
+            [outside, inside, enclosed.count, ambiguous.count].map(grouped);
         writeln!(
             f,
             "components     outside {outside}, inside {inside}; deleted as enclosed {enclosed}, decided by majority {ambiguous}"
@@ -252,16 +248,19 @@ mod tests {
     fn a_wrong_report_is_not_returned() {
         let sound = report();
         sound.check_invariants();
-        let enclosed = |count, leaves| Some(EnclosedComponents { count, leaves, example: [0; 3] });
-        let corruptions: [&dyn Fn(&mut Report); 12] = [
+        let example = Some([0.0; 3]);
+        let enclosed = |count, leaves| EnclosedComponents { count, leaves, example };
+        let corruptions: [&dyn Fn(&mut Report); 14] = [
             &|r| r.cells += 1,
             &|r| r.mesh.leaves_by_level[3] += 1,
             &|r| *r.mesh.leaves_by_side.get_mut("inside").expect("a side") += 1,
             &|r| r.counters.get_mut("leaves").expect("a counter")[1] += 1,
             &|r| r.counters.get_mut("base_leaf_cells_max").expect("a counter")[0] = r.cells,
-            &|r| r.mesh.summary.enclosed = enclosed(2, 9),
-            &|r| r.mesh.summary.enclosed = enclosed(1, 0),
-            &|r| r.mesh.summary.ambiguous = Some(Ambiguous { count: 3, example: [0; 3] }),
+            &|r| r.mesh.components.enclosed = enclosed(2, 9),
+            &|r| r.mesh.components.enclosed = enclosed(1, 0),
+            &|r| r.mesh.components.enclosed = enclosed(0, 0),
+            &|r| r.mesh.components.ambiguous = Ambiguous { count: 3, example },
+            &|r| r.mesh.components.ambiguous = Ambiguous { count: 1, example: None },
             &|r| _ = r.peak_rss_bytes.pop(),
             &|r| r.phases[2].time_cpu_s[1] = f64::NAN,
             &|r| _ = r.phases[1].messages.pop(),
@@ -306,12 +305,12 @@ mod tests {
         report.mesh.leaves_by_side = SIDES.into_iter().zip([1000, 2000, 3]).collect();
         (report.mesh.rules.root.edge, report.mesh.rules.level_surface) = (8.0, 2);
         report.mesh.digest = "abc".into();
-        let example = [0; 3];
-        report.mesh.summary = Summary {
+        let example = Some([0.0; 3]);
+        report.mesh.components = Summary {
             outside: 1500,
             inside: 1,
-            enclosed: Some(EnclosedComponents { count: 1000, leaves: 2000, example }),
-            ambiguous: Some(Ambiguous { count: 7, example }),
+            enclosed: EnclosedComponents { count: 1000, leaves: 2000, example },
+            ambiguous: Ambiguous { count: 7, example },
             ..Summary::default()
         };
         (report.level_base, report.time_wall_s) = (1, 0.5);

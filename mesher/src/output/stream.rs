@@ -57,7 +57,7 @@ impl Mesh {
         };
         let root = walk.load(0, 0, 1, 0, 0);
         walk.group(0, &root, 0)?;
-        walk.flush()?;
+        walk.flush(1)?;
         Ok(walk.counts)
     }
 }
@@ -116,10 +116,8 @@ struct Loaded {
     key: u64,
     /// Leaves to emit.
     leaves: u64,
-    split: u64,
     /// Sides of the leaves; split octants pass theirs on to their descendants.
-    crossing: u64,
-    inside: u64,
+    octants: Octants,
 }
 
 struct Walk<'a, S> {
@@ -135,44 +133,41 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
         let (ownership, cursors) = (self.ownership, &mut self.levels[l as usize]);
-        let Octants { split, crossing, inside, deleted } = cursors.read(key, crossing, inside);
-        let split = split & exists;
+        let mut octants = cursors.read(key, crossing, inside);
+        octants.split &= exists;
+        let Octants { split, crossing, inside, deleted } = octants;
         let leaves = if ownership.owns(l, key) { exists & !split & !deleted } else { 0 };
         let counts = &mut self.counts.by_level[l as usize];
         let count = |side: u64| u64::from((leaves & side).count_ones());
         counts[Side::Crossing as usize] += count(crossing);
         counts[Side::Inside as usize] += count(inside);
         counts[Side::Outside as usize] += count(!(crossing | inside));
-        Loaded { key, leaves, split, crossing, inside }
+        Loaded { key, leaves, octants }
     }
 
     /// Emits eight siblings and their descendants.
     fn group(&mut self, l: Level, brick: &Loaded, j: u64) -> Result<(), E> {
-        let split = brick::byte(brick.split, j);
+        let Octants { split, crossing, inside, .. } = brick.octants;
+        let split = brick::byte(split, j);
         let parent = brick.key << 3 | j;
         if split == 0 {
             self.put(l, parent, brick, j, 0xff);
-            return if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) };
+            return self.flush(CHUNK);
         }
         let below = |sides: u64| brick::children(brick::byte(sides, j) & split);
-        let child = self.load(
-            l + 1,
-            parent,
-            brick::children(split),
-            below(brick.crossing),
-            below(brick.inside),
-        );
+        let exists = brick::children(split);
+        let child = self.load(l + 1, parent, exists, below(crossing), below(inside));
         for o in 0..8 {
             if split >> o & 1 == 0 {
                 self.put(l, parent, brick, j, 1 << o);
-            } else if child.split == 0 {
+            } else if child.octants.split == 0 {
                 // The usual case at the finest level: saves a call per group.
                 self.put(l + 1, parent << 3 | o, &child, o, 0xff);
             } else {
                 self.group(l + 1, &child, o)?;
             }
         }
-        if self.buffer.len() >= CHUNK { self.flush() } else { Ok(()) }
+        self.flush(CHUNK)
     }
 
     /// Appends the words of the leaves among the children, of level `l`, of octant `parent`. The children are
@@ -180,7 +175,8 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     #[inline]
     fn put(&mut self, l: Level, parent: u64, brick: &Loaded, j: u64, within: u8) {
         let leaves = brick::byte(brick.leaves, j) & within;
-        let (crossing, inside) = (brick::byte(brick.crossing, j), brick::byte(brick.inside, j));
+        let (crossing, inside) =
+            (brick::byte(brick.octants.crossing, j), brick::byte(brick.octants.inside, j));
         // The root has no parent; its code is 0 all the same.
         let base = start57(l, parent << 3) << 7 | u64::from(l) << 2;
         let step = start57(l, 1) << 7;
@@ -195,9 +191,13 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
         }
     }
 
-    fn flush(&mut self) -> Result<(), E> {
-        let result = if self.buffer.is_empty() { Ok(()) } else { (self.sink)(&self.buffer) };
-        self.buffer.clear();
-        result
+    /// Passes the buffer to the sink if it has as many words.
+    #[inline]
+    fn flush(&mut self, words: usize) -> Result<(), E> {
+        if self.buffer.len() >= words {
+            (self.sink)(&self.buffer)?;
+            self.buffer.clear();
+        }
+        Ok(())
     }
 }

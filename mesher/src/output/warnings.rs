@@ -1,9 +1,9 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
-use crate::input::lattice::{ExtentBox, Keep};
+use crate::input::lattice::{ExtentBox, Keep, Rules};
 use crate::mesh::Mesh;
-use crate::output::manifest::LeakEntry;
 use crate::sides::Summary;
+use crate::sides::leaks::Leak;
 use bricks::octant::ROOT_EDGE;
 
 const FLOW_AT_BOUNDARY: &str = "the flow reaches the root's boundary: right if the root cuts the geometry on purpose, such as the open ends of a duct; otherwise it \
@@ -15,7 +15,7 @@ const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts 
     extend beyond it";
 
 /// A sentence for each warning: what was found, and what to try.
-pub fn of(mesh: &Mesh) -> Vec<String> {
+pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
     if mesh.is_base {
         return Vec::new();
     }
@@ -24,7 +24,7 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
     // These two already advise to enlarge the root.
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
     let has_effect = |b: &ExtentBox| b.meets([0; 3], ROOT_EDGE);
-    let leaks = of_leaks(mesh);
+    let leaks = of_leaks(mesh, case_name);
     let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let others = [
         (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),
@@ -37,21 +37,19 @@ pub fn of(mesh: &Mesh) -> Vec<String> {
 }
 
 /// The warning of a geometry that leaks, or that is open and bounds nothing.
-pub fn of_leaks(mesh: &Mesh) -> Option<String> {
+pub fn of_leaks(mesh: &Mesh, case_name: &str) -> Option<String> {
     // A region that is closed at two coarser spacings has the most of its volume at the finer one, which comes first.
-    let leaks = LeakEntry::of(mesh);
-    let largest = (0..leaks.len()).rev().max_by_key(|&i| mesh.leaks.0[i].volume);
-    let Some(largest) = largest else {
+    let Some(largest) = mesh.leaks.0.iter().rev().max_by_key(|leak| leak.octants) else {
         let empty = empty_region(mesh.rules.keep, &mesh.sides.summary);
         let is_inner = mesh.rules.keep == Keep::Inside;
         return match mesh.bounds_nothing {
-            true => empty.or_else(|| Some(bounds_nothing(mesh))),
+            true => empty.or_else(|| Some(bounds_nothing(&mesh.rules, case_name))),
             false => empty.filter(|_| is_inner),
         };
     };
-    let LeakEntry { spacing_coarse, spacing_fine, volume, point: [x, y, z] } = leaks[largest];
-    let (case, has_seeds) = (&mesh.case_name, !mesh.rules.seeds.is_empty());
-    let (before, after) = match mesh.leaks.0[largest].is_inside {
+    let &Leak { spacing_coarse, spacing_fine, volume, point: [x, y, z], is_inside, .. } = largest;
+    let has_seeds = !mesh.rules.seeds.is_empty();
+    let (before, after) = match is_inside {
         _ if has_seeds && mesh.rules.keep != Keep::All => ("deleted", "kept"),
         true => ("outside", "inside"),
         false => ("inside", "outside"),
@@ -60,16 +58,15 @@ pub fn of_leaks(mesh: &Mesh) -> Option<String> {
     let end = if has_seeds { "to" } else { "from" };
     Some(format!(
         "the geometry leaks: a region with a volume of {volume:.4e} at ({x}, {y}, {z}), {before} at a spacing of {spacing_coarse}, became \
-         {after} at {spacing_fine}: close what `harness leak {case} --{end} {x},{y},{z}` finds, or increase spacing_min"
+         {after} at {spacing_fine}: close what `harness leak {case_name} --{end} {x},{y},{z}` finds, or increase spacing_min"
     ))
 }
 
-fn bounds_nothing(mesh: &Mesh) -> String {
-    let (case, rules) = (&mesh.case_name, &mesh.rules);
+fn bounds_nothing(rules: &Rules, case_name: &str) -> String {
     let spacing = rules.root.edge / f64::from(1u32 << rules.level_surface);
     format!(
         "the facets bound no inside at spacings of {spacing}, {} and {}, and are no sheet: either the flow fills the body through \
-         openings, which `harness leak {case} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as \
+         openings, which `harness leak {case_name} --from X,Y,Z` finds from a point in the body, or every facet appears twice, as \
          `harness geometry` states, or the body is thinner than its cells; close the openings, remove the copies, or change spacing_min",
         2.0 * spacing,
         4.0 * spacing
@@ -79,7 +76,7 @@ fn bounds_nothing(mesh: &Mesh) -> String {
 fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
     let &Summary { outside, inside, enclosed, .. } = summary;
     let kept = match keep {
-        Keep::Outside => outside - enclosed.map_or(0, |e| e.count),
+        Keep::Outside => outside - enclosed.count,
         Keep::Inside => inside,
         Keep::All => outside + inside,
     };
@@ -109,7 +106,7 @@ mod tests {
         let summary = |outside, inside, count| Summary {
             outside,
             inside,
-            enclosed: Some(EnclosedComponents { count, leaves: 9, example: [0; 3] }),
+            enclosed: EnclosedComponents { count, leaves: 9, example: Some([0.0; 3]) },
             ..Summary::default()
         };
         for (keep, empty, not_empty) in [

@@ -8,7 +8,7 @@
 
 use crate::error::Error;
 use files::{Claim, Draft};
-use ranks::{Comm, agree};
+use ranks::{Comm, agree, uncounted};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
@@ -31,14 +31,6 @@ pub struct Output {
     pub tree: bool,
 }
 
-/// A rank on another machine than rank 0, if the directory lies on a disk of that one alone.
-fn not_shared(path: &Path, rank: usize) -> Error {
-    let path = path.display();
-    Error::output(format!(
-        "{path}: rank {rank} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share"
-    ))
-}
-
 /// File name of a rank's part.
 pub fn part_name(rank: usize) -> String {
     format!("leaves-{rank:05}.npy")
@@ -46,8 +38,7 @@ pub fn part_name(rank: usize) -> String {
 
 /// The names of all files of a rank. They are removed if the run fails.
 fn names(rank: usize) -> impl Iterator<Item = String> {
-    let tree = (rank == 0).then(|| TREE.to_owned());
-    [part_name(rank)].into_iter().chain(tree)
+    [part_name(rank)].into_iter().chain((rank == 0).then(|| TREE.to_owned()))
 }
 
 /// The directory that a mesh is written to. Its files are removed, unless it is [kept](Self::keep).
@@ -55,7 +46,6 @@ fn names(rank: usize) -> impl Iterator<Item = String> {
 pub struct OutDir {
     /// The files that it gets.
     pub output: Output,
-    path: PathBuf,
     claim: Claim,
 }
 
@@ -84,18 +74,23 @@ impl OutDir {
                 _ => output(path, e),
             }),
         )?;
-        let mut is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
-        comm.uncounted(&mut || is_new = comm.max(is_new));
+        let is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
+        let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
         let claim = match created {
             Some(claim) => Ok(claim),
             None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| match e.kind() {
-                ErrorKind::NotFound => not_shared(path, comm.rank()),
+                // The directory lies on a disk of rank 0's machine alone.
+                ErrorKind::NotFound => Error::output(format!(
+                    "{}: rank {} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share",
+                    path.display(),
+                    comm.rank()
+                )),
                 _ => output(path, e),
             }),
         };
-        Ok(Self { output: files.clone(), path: path.clone(), claim: agree(comm, claim)? })
+        Ok(Self { output: files.clone(), claim: agree(comm, claim)? })
     }
 
     /// Begins a file of the mesh.
@@ -108,7 +103,7 @@ impl OutDir {
 
     /// What to report of a file of the mesh that cannot be written.
     pub fn failed(&self, name: &str) -> impl Fn(io::Error) -> Error {
-        let path = self.path.join(name);
+        let path = self.output.directory.join(name);
         move |e| output(&path, e)
     }
 
@@ -118,7 +113,7 @@ impl OutDir {
     /// If the file cannot be written.
     pub fn manifest(&self, manifest: &impl Serialize) -> Result<(), Error> {
         let write = |to: &mut dyn Write| write_json(to, manifest);
-        self.claim.commit(write).map_err(|e| output(&self.path, e))
+        self.claim.commit(write).map_err(|e| output(&self.output.directory, e))
     }
 
     /// Keeps the mesh. On all ranks, after the [manifest](Self::manifest).
@@ -197,7 +192,7 @@ mod tests {
             let mut part = Part::new(out.file(&part_name(3)).unwrap()).unwrap();
             words.chunks(1000).for_each(|c| part.add(c).unwrap());
             part.finish(n as u64).unwrap();
-            let bytes = std::fs::read(out.path.join(part_name(3))).unwrap();
+            let bytes = std::fs::read(out.output.directory.join(part_name(3))).unwrap();
             let file = npyz::NpyFile::new(&bytes[..]).unwrap();
             assert_eq!(file.shape(), [n as u64]);
             assert_eq!(file.into_vec::<u64>().unwrap(), words);

@@ -5,9 +5,10 @@
 //! cell. A facet larger than the octants of interest is split in four until it is not.
 
 use crate::input::lattice::{ExtentBox, Rules};
-use crate::partition::curve::{self, Bin};
+use crate::partition::curve::Bin;
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
+use ranks::combine;
 use std::ops::Range;
 
 /// Fractions of a leaf that leaves are counted in: sums of integers do not depend on their order.
@@ -49,7 +50,7 @@ pub fn add_boxes(
         }
         let inside = within.start <= span.start && span.end <= within.end;
         if l >= level || inside && leaves <= light {
-            bins.push((span.start, leaves.saturating_mul(FRACTIONS)));
+            bins.push([span.start, leaves.saturating_mul(FRACTIONS)]);
         } else {
             open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
         }
@@ -77,7 +78,7 @@ pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
     let each = leaves_per_surface_cell(rules);
     let mut add = |start: u64, area: f64| {
         let leaves = ((area * scale) as u64).saturating_mul(each);
-        bins.push((start >> shift << shift, leaves));
+        bins.push([start >> shift << shift, leaves]);
     };
     // Odd, as facets come in pairs.
     let every = (facets.len() / SAMPLE) | 1;
@@ -87,7 +88,7 @@ pub fn of(facets: &[Facet], rules: &Rules, level: Level) -> Vec<Bin> {
             spread(&some[0], size, &mut |start, area| add(start, area * every as f64));
         }
     }
-    curve::merge(&mut bins);
+    combine(&mut bins, u64::wrapping_add);
     bins
 }
 
@@ -128,6 +129,7 @@ fn centre(f: &Facet) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::input::lattice::Keep;
+    use crate::partition::curve;
     use crate::tests::rules as plain_rules;
 
     fn rules(level_surface: Level) -> Rules {
@@ -142,8 +144,8 @@ mod tests {
         let bins = of(&[f], &rules(6), 4);
         let cells = |l: Level, code: u64| {
             let span = start57(l, code)..start57(l, code + 1);
-            let inside = bins.iter().filter(|b| span.contains(&b.0));
-            inside.map(|b| b.1).sum::<u64>() / FRACTIONS / leaves_per_surface_cell(&rules(6))
+            let inside = bins.iter().filter(|b| span.contains(&b[0]));
+            inside.map(|b| b[1]).sum::<u64>() / FRACTIONS / leaves_per_surface_cell(&rules(6))
         };
         // 32 x 32 finest cells, half of them covered.
         assert_eq!((cells(0, 0), cells(1, 0), cells(1, 1)), (512, 512, 0));
@@ -173,13 +175,13 @@ mod tests {
         let sampled = of(&all, &rules(9), level);
         let mut exact: Vec<Bin> =
             all.chunks(SAMPLE / 2).flat_map(|f| of(f, &rules(9), level)).collect();
-        curve::merge(&mut exact);
+        combine(&mut exact, u64::wrapping_add);
         assert_eq!(sampled.len(), exact.len());
         for (s, e) in sampled.iter().zip(&exact) {
-            let tolerated = if s.0 >= start57(1, 3) { 0 } else { e.1 / 5 };
-            assert!(s.0 == e.0 && s.1.abs_diff(e.1) <= tolerated, "{s:?} for {e:?}");
+            let tolerated = if s[0] >= start57(1, 3) { 0 } else { e[1] / 5 };
+            assert!(s[0] == e[0] && s[1].abs_diff(e[1]) <= tolerated, "{s:?} for {e:?}");
         }
-        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
         assert!(sum(&sampled).abs_diff(sum(&exact)) < sum(&exact) / 100);
     }
 
@@ -201,14 +203,14 @@ mod tests {
         let weights = |level: Level, light: u64, within: &Range<u64>| {
             let mut bins = Vec::new();
             add_boxes(&mut bins, &rules, level, light, within);
-            curve::merge(&mut bins);
+            combine(&mut bins, u64::wrapping_add);
             bins
         };
-        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
         for (level, light) in [(2, 0), (5, 0), (6, 0), (5, 100), (5, 3300)] {
             let bins = weights(level, light, &curve::ALL);
             assert_eq!(sum(&bins), FRACTIONS * 5 * 20 * 33, "level {level}, light {light}");
-            assert!(bins.iter().all(|b| b.0.trailing_zeros() >= 3 * (LEVEL_MAX - level)));
+            assert!(bins.iter().all(|b| b[0].trailing_zeros() >= 3 * (LEVEL_MAX - level)));
             let middle = start57(5, 12_345);
             let halves =
                 [0..middle, middle..curve::ALL.end].map(|half| sum(&weights(5, light, &half)));

@@ -12,15 +12,12 @@ use bricks::tree::Tree;
 /// CPU times of the [`Counts`] on one rank, in units of 70 ns. Fitted to the CPU times of the ranks in several meshes, and rounded. On two
 /// meshes that were not used for a later fit, the median relative error per rank is 4 and 5 %, the greatest 15 and 20 %; a refit is no
 /// better there.
-const FITTED: Counts = Counts {
-    bricks: 2,
-    components: 2,
-    components_extra: 2,
-    components_single: 13,
-    // Two dozen messages to it and from it, with their payload. The owner of a mostly empty corner of the root has a hundred
-    // neighbours, other ranks have two dozen.
-    neighbours: 230,
-};
+const FITTED: Counts =
+    Counts { bricks: 2, components: 2, components_extra: 2, components_single: 13 };
+
+/// The weight of a neighbouring rank: two dozen messages to it and from it, with their payload. The owner of a mostly empty corner of the
+/// root has a hundred neighbours, other ranks have two dozen.
+pub const WEIGHT_OF_NEIGHBOUR: i64 = 230;
 
 /// The counts that the model multiplies by its times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,8 +30,6 @@ pub struct Counts {
     pub components_extra: u64,
     /// Local components of a single octant.
     pub components_single: u64,
-    /// Neighbouring ranks.
-    pub neighbours: u64,
 }
 
 impl Counts {
@@ -50,10 +45,9 @@ impl Counts {
         self.components_extra += u64::from(self.components > before + 1);
     }
 
-    /// The counts of a rank: the bricks of T0 that it owns, and its neighbours.
+    /// The counts of a rank: those of the bricks of T0 that it owns.
     pub fn of_rank(tree: &Tree, ownership: &Ownership) -> Self {
-        let neighbours = ownership.neighbours().len() as u64;
-        let mut counts = Self { neighbours, ..Self::default() };
+        let mut counts = Self::default();
         for l in 1..tree.split.len() as Level {
             let mut split = tree.split[l as usize].cursor();
             let mut crossing = tree.crossing[l as usize].cursor();
@@ -70,8 +64,7 @@ impl Counts {
         let weight = FITTED.bricks * self.bricks
             + FITTED.components * self.components
             + FITTED.components_extra * self.components_extra
-            + FITTED.components_single * self.components_single
-            + FITTED.neighbours * self.neighbours;
+            + FITTED.components_single * self.components_single;
         weight as i64
     }
 }
@@ -84,9 +77,6 @@ pub fn weight_of_brick(open: u64) -> i64 {
     counts.weight()
 }
 
-/// The weight of a neighbouring rank.
-pub const WEIGHT_OF_NEIGHBOUR: i64 = FITTED.neighbours as i64;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,13 +88,7 @@ mod tests {
         let mut counts = Counts::default();
         counts.add_brick(0);
         counts.add_brick(open);
-        let want = Counts {
-            bricks: 2,
-            components: 3,
-            components_extra: 1,
-            components_single: 2,
-            neighbours: 0,
-        };
+        let want = Counts { bricks: 2, components: 3, components_extra: 1, components_single: 2 };
         assert_eq!(counts, want);
         assert_eq!((weight_of_brick(0), weight_of_brick(open)), (2, 2 + 3 * 2 + 2 + 2 * 13));
     }

@@ -2,15 +2,15 @@
 //!
 //! Weights are summed in *bins*: octants of one level, small compared with the load of a rank. A partition of the curve is given by
 //! its *boundaries*: positions in ascending order, the first of which is 0, each with the rank that owns the curve
-//! from there to the next. Functions that return boundaries return none if all weights are zero.
+//! from there to the next. If all weights are zero, a first partition gives everything to rank 0, and a repartition changes nothing.
 
 use bricks::octant::LEVEL_MAX;
-use ranks::{Comm, gather};
+use ranks::{Comm, Entry, gather};
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
 /// The level-19 Morton code of a bin's minimum corner, and the bin's weight.
-pub type Bin = (u64, u64);
+pub type Bin = Entry;
 
 /// A position on the curve, as a level-19 Morton code, and the owner from there on.
 pub type Boundary = (u64, usize);
@@ -18,22 +18,11 @@ pub type Boundary = (u64, usize);
 /// The whole curve.
 pub const ALL: Range<u64> = 0..1 << (3 * LEVEL_MAX);
 
-/// Sorts bins, and adds up those at the same position.
-pub fn merge(bins: &mut Vec<Bin>) {
-    bins.sort_unstable_by_key(|b| b.0);
-    bins.dedup_by(|b, before| {
-        let same = b.0 == before.0;
-        if same {
-            before.1 += b.1;
-        }
-        same
-    });
-}
-
 /// The boundaries of intervals with equal weight: each bin goes to the rank in whose part its middle lies. The bins of a rank
 /// are in order, and come after all bins of lower ranks. Collective; the same on all ranks.
-pub fn partition(bins: &[Bin], comm: &dyn Comm) -> Option<Vec<Boundary>> {
-    partition_at(bins, comm, |loads| equal(loads.iter().sum(), comm.size()))
+pub fn partition(bins: &[Bin], comm: &dyn Comm) -> Vec<Boundary> {
+    let boundaries = partition_at(bins, comm, |loads| equal(loads.iter().sum(), comm.size()));
+    boundaries.unwrap_or(vec![(0, 0)])
 }
 
 /// The same for ranks that already own the octants of their bins. The least weight changes owner such that no load exceeds the
@@ -47,7 +36,7 @@ pub fn repartition(
 ) -> Option<Vec<Boundary>> {
     let mut bins = bins.to_vec();
     if let Some(first) = bins.first_mut() {
-        first.0 = first_own;
+        first[0] = first_own;
     }
     partition_at(&bins, comm, |loads| nearly_equal(loads, tolerance))
 }
@@ -58,7 +47,7 @@ fn partition_at(
     comm: &dyn Comm,
     begins: impl Fn(&[u128]) -> Vec<u128>,
 ) -> Option<Vec<Boundary>> {
-    let load: u64 = bins.iter().map(|b| b.1).sum();
+    let load: u64 = bins.iter().map(|b| b[1]).sum();
     let loads: Vec<u128> = gather(comm, &[load]).into_iter().map(u128::from).collect();
     if loads.iter().all(|&load| load == 0) {
         return None;
@@ -71,10 +60,11 @@ fn partition_at(
 }
 
 /// The same as [`partition`] for bins that are the same on all ranks. Not collective.
-pub fn partition_known(bins: &[Bin], ranks: usize) -> Option<Vec<Boundary>> {
-    let total = bins.iter().map(|b| u128::from(b.1)).sum();
-    let local = || boundaries(bins, 0, &equal(total, ranks));
-    (total > 0).then(|| without_repeats(local().into_iter()))
+pub fn partition_known(bins: &[Bin], ranks: usize) -> Vec<Boundary> {
+    match bins.iter().map(|b| u128::from(b[1])).sum::<u128>() {
+        0 => vec![(0, 0)],
+        total => without_repeats(boundaries(bins, 0, &equal(total, ranks)).into_iter()),
+    }
 }
 
 /// The cumulative weight at which each rank begins, where all loads are equal.
@@ -115,7 +105,7 @@ fn nearly_equal(loads: &[u128], tolerance: f64) -> Vec<u128> {
 fn boundaries(bins: &[Bin], mut before: u128, begins: &[u128]) -> Vec<Boundary> {
     let mut owner = begins.partition_point(|&b| b <= before).saturating_sub(1);
     let mut found: Vec<Boundary> = Vec::new();
-    for &(start, weight) in bins {
+    for &[start, weight] in bins {
         let middle = 2 * before + u128::from(weight);
         before += u128::from(weight);
         while begins.get(owner + 1).is_some_and(|b| 2 * b <= middle) {
@@ -149,23 +139,20 @@ mod tests {
     /// Bins of level 3, in order, some without weight.
     fn bins() -> impl Strategy<Value = Vec<Bin>> {
         prop::collection::btree_map(0u64..512, prop_oneof![4 => 0u64..1000, 1 => Just(0)], 1..60)
-            .prop_map(|all| all.into_iter().map(|(code, w)| (start57(3, code), w)).collect())
+            .prop_map(|all| all.into_iter().map(|(code, w)| [start57(3, code), w]).collect())
     }
 
     proptest! {
         #[test]
         fn loads_differ_from_the_mean_by_a_bin_at_most(bins in bins(), ranks in 1usize..9) {
-            let total: u64 = bins.iter().map(|b| b.1).sum();
-            let Some(boundaries) = partition_known(&bins, ranks) else {
-                prop_assert_eq!(total, 0);
-                return Ok(());
-            };
+            let total: u64 = bins.iter().map(|b| b[1]).sum();
+            let boundaries = partition_known(&bins, ranks);
             prop_assert_eq!(boundaries[0].0, 0);
             prop_assert!(boundaries.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1));
-            let heaviest = bins.iter().map(|b| b.1).max().unwrap_or(0) as f64;
+            let heaviest = bins.iter().map(|b| b[1]).max().unwrap_or(0) as f64;
             for rank in 0..ranks {
                 let owner = |start: u64| boundaries[boundaries.partition_point(|c| c.0 <= start) - 1].1;
-                let load: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
+                let load: u64 = bins.iter().filter(|b| owner(b[0]) == rank).map(|b| b[1]).sum();
                 prop_assert!((load as f64 - total as f64 / ranks as f64).abs() <= heaviest);
             }
         }
@@ -249,11 +236,11 @@ mod tests {
             };
             let found = sim::run(ranks, 3, |comm| {
                 let own = own(comm.rank());
-                let mine: Vec<Bin> = bins.iter().filter(|b| own.contains(&b.0)).copied().collect();
+                let mine: Vec<Bin> = bins.iter().filter(|b| own.contains(&b[0])).copied().collect();
                 repartition(&mine, own.start, tolerance, comm)
             });
             prop_assert!(found.iter().all(|f| *f == found[0]));
-            let total: u64 = bins.iter().map(|b| b.1).sum();
+            let total: u64 = bins.iter().map(|b| b[1]).sum();
             let Some(boundaries) = &found[0] else {
                 prop_assert_eq!(total, 0);
                 return Ok(());
@@ -261,16 +248,16 @@ mod tests {
             prop_assert_eq!(boundaries[0].0, 0);
             prop_assert!(boundaries.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1));
             let owner = |start: u64| boundaries[boundaries.partition_point(|c| c.0 <= start) - 1].1;
-            let heaviest = bins.iter().map(|b| b.1).max().unwrap_or(0) as f64;
+            let heaviest = bins.iter().map(|b| b[1]).max().unwrap_or(0) as f64;
             let most = (1.0 + tolerance) * total as f64 / ranks as f64;
             for rank in 0..ranks {
-                let load: u64 = bins.iter().filter(|b| owner(b.0) == rank).map(|b| b.1).sum();
+                let load: u64 = bins.iter().filter(|b| owner(b[0]) == rank).map(|b| b[1]).sum();
                 prop_assert!(load as f64 <= most + heaviest + 1.0);
                 // With that much tolerance nothing moves, nor does the curve between the last bin of a rank and its end.
-                let mut mine = bins.iter().filter(|b| own(rank).contains(&b.0));
-                if tolerance >= ranks as f64 - 1.0 && let Some(first) = mine.next() && first.1 > 0 {
-                    prop_assert_eq!((owner(own(rank).start), owner(first.0)), (rank, rank));
-                    prop_assert!(mine.all(|b| b.1 == 0 || owner(b.0) == rank));
+                let mut mine = bins.iter().filter(|b| own(rank).contains(&b[0]));
+                if tolerance >= ranks as f64 - 1.0 && let Some(first) = mine.next() && first[1] > 0 {
+                    prop_assert_eq!((owner(own(rank).start), owner(first[0])), (rank, rank));
+                    prop_assert!(mine.all(|b| b[1] == 0 || owner(b[0]) == rank));
                 }
             }
         }

@@ -11,13 +11,13 @@
 use crate::error::Error;
 use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::area::{self, FRACTIONS};
-use crate::partition::curve::{self, Bin, Boundary};
+use crate::partition::curve::{self, Bin};
 use crate::partition::metis;
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, Weights};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, edge};
-use ranks::{Comm, MessageBuffer, agree, all_gather_reduced};
+use ranks::{Comm, MessageBuffer, all_gather_reduced, combine};
 
 /// Fine octants per rank, about, which are the base leaves: boundaries lie between them.
 const FINE_PER_RANK: u64 = 16;
@@ -31,13 +31,6 @@ pub struct Partition {
     pub level_base: Level,
     /// The partitioner that was used; none for a single rank.
     pub partitioner: Option<Partitioner>,
-}
-
-impl Partition {
-    /// The partition of a single rank.
-    pub fn solo() -> Self {
-        Self { ownership: Ownership::solo(), level_base: 0, partitioner: None }
-    }
 }
 
 /// The estimate of the leaves.
@@ -98,7 +91,7 @@ impl Estimate<'_> {
         let (mut leaves, _) =
             self.all_bins(&area::of(self.facets, self.rules, level), level, FINE_PER_RANK);
         if division.weights == Weights::Unit {
-            leaves.iter_mut().for_each(|leaf| leaf.1 = 1);
+            leaves.iter_mut().for_each(|leaf| leaf[1] = 1);
         }
         let by_metis = match division.partitioner {
             Partitioner::Metis => metis::assign(&leaves, level, comm)?,
@@ -106,7 +99,7 @@ impl Estimate<'_> {
         };
         let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
         let along_curve = || curve::partition_known(&leaves, comm.size());
-        let boundaries = by_metis.or_else(along_curve).unwrap_or_else(all_to_rank_0);
+        let boundaries = by_metis.unwrap_or_else(along_curve);
         Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
     }
 
@@ -114,19 +107,16 @@ impl Estimate<'_> {
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
         let (bins, light) = self.all_bins(&local, coarse, 1);
-        let boundaries = curve::partition_known(&bins, comm.size()).unwrap_or_else(all_to_rank_0);
+        let boundaries = curve::partition_known(&bins, comm.size());
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
-        let entry = |(start, weight)| (rough.owner_at(start), [start, weight]);
+        let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
-        let received = comm.sparse_all_to_all(messages);
-        let mut bins: Vec<Bin> =
-            received.words().as_chunks().0.iter().map(|&[at, w]| (at, w)).collect();
+        let mut bins: Vec<Bin> = comm.sparse_all_to_all(messages).values().collect();
         for interval in rough.intervals() {
             area::add_boxes(&mut bins, self.rules, fine, light, &interval);
         }
-        curve::merge(&mut bins);
-        let boundaries = curve::partition(&bins, comm).unwrap_or_else(all_to_rank_0);
-        Ownership::along(comm.rank(), comm.size(), boundaries)
+        combine(&mut bins, u64::wrapping_add);
+        Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm))
     }
 
     /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
@@ -134,13 +124,12 @@ impl Estimate<'_> {
     fn all_bins(&self, local: &[Bin], level: Level, per_rank: u64) -> (Vec<Bin>, u64) {
         let comm = self.comm;
         let shift = 3 * (LEVEL_MAX - level);
-        let coarse = local.iter().map(|b| [b.0 >> shift << shift, b.1]).collect();
-        let all = all_gather_reduced(coarse, |a, b| a + b, comm);
-        let mut bins: Vec<Bin> = all.into_iter().map(|e| (e[0], e[1])).collect();
-        let leaves = |bins: &[Bin]| bins.iter().map(|b| b.1 / FRACTIONS).sum::<u64>();
+        let coarse = local.iter().map(|b| [b[0] >> shift << shift, b[1]]).collect();
+        let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
+        let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
         let light = leaves(&bins) / (comm.size() as u64 * per_rank);
         area::add_boxes(&mut bins, self.rules, level, light, &curve::ALL);
-        curve::merge(&mut bins);
+        combine(&mut bins, u64::wrapping_add);
         let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
         (bins, light)
     }
@@ -149,21 +138,6 @@ impl Estimate<'_> {
 /// Deepest level that base leaves may have.
 pub fn level_last(rules: &Rules) -> Level {
     rules.level_deepest().max(1) - 1
-}
-
-/// The partition of base leaves in their order along the curve, given by code and level, by METIS on every rank. Collective.
-pub fn of_base_mesh(
-    leaves: Result<Vec<(u64, Level)>, Error>,
-    level_base: Level,
-    comm: &dyn Comm,
-) -> Result<Partition, Error> {
-    let boundaries = leaves.and_then(|leaves| metis::assign_equal(&leaves, comm.size()));
-    let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
-    Ok(Partition { ownership, level_base, partitioner: Some(Partitioner::Paper) })
-}
-
-fn all_to_rank_0() -> Vec<Boundary> {
-    vec![(0, 0)]
 }
 
 #[cfg(test)]
@@ -214,7 +188,7 @@ mod tests {
         let mut bins = area::of(&sheet(), rules, FINE);
         area::add_boxes(&mut bins, rules, FINE, 0, &curve::ALL);
         let mut sums = vec![0; RANKS];
-        for (start, weight) in bins {
+        for [start, weight] in bins {
             sums[owners[(start / start57(FINE, 1)) as usize]] += weight;
         }
         sums
@@ -250,7 +224,7 @@ mod tests {
                 let estimate = Estimate { facets: &mine, rules: &rules, comm };
                 estimate.partition(&division).expect("no METIS")
             });
-            let same = |p: &Partition| p.ownership.boundaries().eq(known[0].ownership.boundaries());
+            let same = |p: &Partition| p.ownership.boundaries() == known[0].ownership.boundaries();
             assert!(known.iter().all(same), "all ranks have the same partition");
             known.into_iter().next().expect("a rank")
         };
@@ -262,11 +236,13 @@ mod tests {
         let mean = sums.iter().sum::<u64>() as f64 / RANKS as f64;
         assert!(sums.iter().all(|&w| (w as f64 / mean - 1.0).abs() < 0.1), "{sums:?}");
         let unit = of(division(Weights::Unit, Some(FINE)));
-        assert!(!unit.ownership.boundaries().eq(area.ownership.boundaries()));
+        assert_ne!(unit.ownership.boundaries(), area.ownership.boundaries());
         for level in [0, 2] {
             let coarse = of(division(Weights::Rebalance, Some(level)));
-            let is_between = |(at, _)| at % start57(level, 1) == 0;
-            assert!(coarse.ownership.boundaries().all(is_between) && coarse.level_base == level);
+            let is_between = |&(at, _): &(u64, usize)| at % start57(level, 1) == 0;
+            assert!(
+                coarse.ownership.boundaries().iter().all(is_between) && coarse.level_base == level
+            );
         }
     }
 

@@ -25,8 +25,8 @@ pub fn assign(
     if comm.size() == 1 || !has_enough(leaves, comm.size()) {
         return Ok(None);
     }
-    let octants: Vec<Leaf> = leaves.iter().map(|leaf| (leaf.0, level)).collect();
-    let weights: Vec<u64> = leaves.iter().map(|leaf| leaf.1).collect();
+    let octants: Vec<Leaf> = leaves.iter().map(|leaf| (leaf[0], level)).collect();
+    let weights: Vec<u64> = leaves.iter().map(|leaf| leaf[1]).collect();
     let on_rank_0 = || parts(&octants, &weights, comm.size());
     let parts = agree(comm, if comm.rank() == 0 { on_rank_0() } else { Ok(Vec::new()) })?;
     Ok(Some(boundaries(&octants, gather(comm, &parts))))
@@ -56,8 +56,8 @@ fn boundaries(leaves: &[Leaf], parts: Vec<u64>) -> Vec<Boundary> {
 /// Whether base leaves are enough for METIS, which bisects recursively, and prints complaints on standard
 /// output about empty parts. With few leaves per rank, or few that have nearly all the weight, intervals of the curve are as good.
 fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
-    let total: u128 = leaves.iter().map(|leaf| u128::from(leaf.1)).sum();
-    let even: f64 = leaves.iter().map(|leaf| (leaf.1 as f64 / total as f64).powi(2)).sum();
+    let total: u128 = leaves.iter().map(|leaf| u128::from(leaf[1])).sum();
+    let even: f64 = leaves.iter().map(|leaf| (leaf[1] as f64 / total as f64).powi(2)).sum();
     total > 0 && ((LEAVES_PER_RANK_MIN * ranks) as f64) * even <= 1.0
 }
 
@@ -125,11 +125,11 @@ mod tests {
     const LEVEL: Level = 3;
 
     fn cube(weight: u64) -> Vec<Bin> {
-        (0..512).map(|code| (start57(LEVEL, code), weight)).collect()
+        (0..512).map(|code| [start57(LEVEL, code), weight]).collect()
     }
 
     fn octants() -> Vec<Leaf> {
-        cube(1).into_iter().map(|leaf| (leaf.0, LEVEL)).collect()
+        cube(1).into_iter().map(|leaf| (leaf[0], LEVEL)).collect()
     }
 
     #[test]
@@ -148,7 +148,7 @@ mod tests {
         // As many equal leaves as 8 for each rank suffice.
         assert!(!has_enough(&cube(7)[..31], 4) && has_enough(&cube(7)[..32], 4));
         let mut heavy = cube(7);
-        heavy[99].1 = 512 * 7;
+        heavy[99][1] = 512 * 7;
         assert!(!has_enough(&heavy, 4), "half of the weight is in one leaf");
         assert!(!has_enough(&[], 1));
     }

@@ -42,7 +42,8 @@ pub struct Ownership {
     /// This rank; none in a view from outside all ranks.
     rank: Option<usize>,
     ranks: usize,
-    intervals: Arc<Intervals>,
+    /// Where the intervals of all ranks begin, and their owners.
+    boundaries: Arc<[Boundary]>,
     /// This rank's longest interval: most queries are for octants within it.
     own: Range<u64>,
     /// Whether this rank has exactly one interval.
@@ -51,14 +52,6 @@ pub struct Ownership {
     level_replicated: Level,
     /// Deepest level with a fully replicated brick.
     level_fully_replicated: Level,
-}
-
-/// The intervals of all ranks.
-#[derive(Debug, Default)]
-struct Intervals {
-    /// Level-19 codes at which the intervals begin; the first is 0.
-    starts: Vec<u64>,
-    owners: Vec<usize>,
 }
 
 impl Ownership {
@@ -76,30 +69,29 @@ impl Ownership {
         ranks: usize,
         boundaries: impl IntoIterator<Item = Boundary>,
     ) -> Self {
-        let mut intervals = Intervals::default();
+        let mut all: Vec<Boundary> = Vec::new();
         for (start, owner) in boundaries {
             assert!(owner < ranks, "an owner must be a rank");
-            let ascends = intervals.starts.last().map_or(start == 0, |&last| last < start);
+            let ascends = all.last().map_or(start == 0, |last| last.0 < start);
             assert!(ascends, "boundaries must ascend from 0");
-            if intervals.owners.last() != Some(&owner) {
-                intervals.starts.push(start);
-                intervals.owners.push(owner);
+            if all.last().is_none_or(|last| last.1 != owner) {
+                all.push((start, owner));
             }
         }
-        assert!(!intervals.starts.is_empty(), "every octant must have an owner");
-        let (level_replicated, level_fully_replicated) =
-            (intervals.deepest_brick_of(2), intervals.deepest_brick_of(OWNERS_MANY));
-        let is_single = intervals.of(rank).count() == 1;
-        let own = intervals.of(rank).max_by_key(|own| own.end - own.start).unwrap_or(0..0);
-        Self {
+        assert!(!all.is_empty(), "every octant must have an owner");
+        let mut ownership = Self {
             rank: Some(rank),
             ranks,
-            intervals: Arc::new(intervals),
-            own,
-            is_single,
-            level_replicated,
-            level_fully_replicated,
-        }
+            level_replicated: deepest_brick_of(2, &all),
+            level_fully_replicated: deepest_brick_of(OWNERS_MANY, &all),
+            boundaries: all.into(),
+            own: 0..0,
+            is_single: false,
+        };
+        let longest = ownership.intervals().max_by_key(|own| own.end - own.start);
+        ownership.own = longest.unwrap_or(0..0);
+        ownership.is_single = ownership.intervals().count() == 1;
+        ownership
     }
 
     /// The same partition seen from outside all ranks: every brick is fully replicated or remote.
@@ -124,7 +116,9 @@ impl Ownership {
 
     /// The level-19 codes that this rank owns, in order.
     pub fn intervals(&self) -> impl Iterator<Item = Range<u64>> + '_ {
-        self.rank.into_iter().flat_map(|rank| self.intervals.of(rank))
+        let owned = move |&(_, &(_, owner)): &(usize, &Boundary)| Some(owner) == self.rank;
+        let own = self.boundaries.iter().enumerate().filter(owned);
+        own.map(move |(interval, &(start, _))| start..self.end(interval))
     }
 
     /// The longest of them; at the start of the curve if this rank owns nothing.
@@ -133,27 +127,26 @@ impl Ownership {
     }
 
     /// The boundaries between the intervals of all ranks.
-    pub fn boundaries(&self) -> impl Iterator<Item = Boundary> + '_ {
-        self.intervals.starts.iter().copied().zip(self.intervals.owners.iter().copied())
+    pub fn boundaries(&self) -> &[Boundary] {
+        &self.boundaries
     }
 
     /// The index, among those of all ranks, of the interval that contains the minimum corner of a brick.
     pub fn interval(&self, l: Level, key: u64) -> usize {
-        self.intervals.at(brick_start(l, key))
+        self.at(brick_start(l, key))
     }
 
     /// The owner at a level-19 code.
     #[inline]
     pub fn owner_at(&self, start: u64) -> usize {
-        self.intervals.owners[self.intervals.at(start)]
+        self.boundaries[self.at(start)].1
     }
 
     /// The owner of all of an octant; none if it has several.
     #[inline]
     pub fn sole_owner(&self, l: Level, code: u64) -> Option<usize> {
-        let interval = self.intervals.at(start57(l, code));
-        (self.intervals.end(interval) >= start57(l, code + 1))
-            .then(|| self.intervals.owners[interval])
+        let interval = self.at(start57(l, code));
+        (self.end(interval) >= start57(l, code + 1)).then(|| self.boundaries[interval].1)
     }
 
     /// The ranks whose octants touch this rank's over a face, an edge or a corner; each with the level-19 code of one of this
@@ -173,28 +166,32 @@ impl Ownership {
             };
             for step in (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]) {
                 let touching: [i64; 3] = std::array::from_fn(|a| p[a] + i64::from(step[a]));
+                // After a step up only the lower children touch, after a step down only the upper ones.
+                let touches = |_, child: u64| {
+                    (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 })
+                };
                 if touching.iter().all(|c| (0..1 << l).contains(c)) {
-                    self.owners_touching(l, morton(touching.map(|c| c as u32)), step, &mut add);
+                    self.owners_in(l, morton(touching.map(|c| c as u32)), &touches, &mut add);
                 }
             }
         }
         neighbours
     }
 
-    /// Calls `add` with the owners, other than this rank, of the parts of an octant that touch the octant from which `step` leads to
-    /// it.
-    fn owners_touching(&self, l: Level, code: u64, step: [i8; 3], add: &mut impl FnMut(usize)) {
-        if self.own.start <= start57(l, code) && start57(l, code + 1) <= self.own.end {
-            return;
-        }
+    /// Calls `found` with the owners of an octant, where it has several of those descendants that are in accepted children only; with some
+    /// more than once. `accepts` is given the level and the code of a child.
+    pub fn owners_in(
+        &self,
+        l: Level,
+        code: u64,
+        accepts: &impl Fn(Level, u64) -> bool,
+        found: &mut impl FnMut(usize),
+    ) {
         if let Some(owner) = self.sole_owner(l, code) {
-            return add(owner);
+            return found(owner);
         }
-        // After a step up only the lower children touch, after a step down only the upper ones.
-        let touches =
-            |child: u64| (0..3).all(|a| step[a] != if child >> a & 1 == 1 { 1 } else { -1 });
-        for child in (0..8).filter(|&child| touches(child)) {
-            self.owners_touching(l + 1, code << 3 | child, step, add);
+        for child in (code << 3..).take(8).filter(|&child| accepts(l + 1, child)) {
+            self.owners_in(l + 1, child, accepts, found);
         }
     }
 
@@ -203,10 +200,9 @@ impl Ownership {
         let mut top = Tree::default();
         for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
             for l in 0..=self.level_fully_replicated {
-                let bricks = from[l as usize].bricks();
                 let is_everywhere =
                     |b: &Brick| self.placement(l, b.key) == Placement::FullyReplicated;
-                bricks.filter(is_everywhere).for_each(|b| to[l as usize].push(b.key, b.bits));
+                to[l as usize] = from[l as usize].bricks().filter(is_everywhere).collect();
             }
         }
         top
@@ -218,7 +214,7 @@ impl Ownership {
         match () {
             () if l < 2 => Placement::FullyReplicated,
             () if self.ranks == 1 || self.is_within(l, key) => Placement::Local,
-            () => self.placement_among(l, self.owners_of(l, key)),
+            () => self.placement_among(l, self.meeting_in(l, key)),
         }
     }
 
@@ -228,23 +224,23 @@ impl Ownership {
         self.own.start <= brick_start(l, key) && brick_start(l, key + 1) <= self.own.end
     }
 
-    /// The owners of the intervals that meet in a brick, in order; not all if there are many.
+    /// The intervals that meet in a brick, in order; not all if there are many.
     #[inline]
-    fn owners_of(&self, l: Level, key: u64) -> &[usize] {
-        &self.intervals.owners[self.intervals.of_brick(l, key)]
+    fn meeting_in(&self, l: Level, key: u64) -> &[Boundary] {
+        let first = self.at(brick_start(l, key));
+        let end = if l < 2 { 1 << (3 * LEVEL_MAX) } else { brick_start(l, key + 1) };
+        let more = self.boundaries[first + 1..].iter().take(OWNERS_MANY);
+        &self.boundaries[first..first + 1 + more.take_while(|b| b.0 < end).count()]
     }
 
     #[inline]
-    fn placement_among(&self, l: Level, owners: &[usize]) -> Placement {
-        match owners.len() {
-            _ if l < 2 => Placement::FullyReplicated,
-            1 if Some(owners[0]) == self.rank => Placement::Local,
-            1 => Placement::Remote(owners[0]),
-            OWNERS_MANY.. => Placement::FullyReplicated,
-            _ if self.rank.is_some_and(|rank| owners.contains(&rank)) => {
-                Placement::PartiallyReplicated
-            }
-            _ => Placement::Remote(owners[0]),
+    fn placement_among(&self, l: Level, intervals: &[Boundary]) -> Placement {
+        let is_own = |interval: &Boundary| Some(interval.1) == self.rank;
+        match intervals.len() {
+            n if l < 2 || n >= OWNERS_MANY => Placement::FullyReplicated,
+            1 if is_own(&intervals[0]) => Placement::Local,
+            _ if intervals.iter().any(is_own) => Placement::PartiallyReplicated,
+            _ => Placement::Remote(intervals[0].1),
         }
     }
 
@@ -274,56 +270,33 @@ impl Ownership {
     pub fn is_replicated(&self, l: Level) -> bool {
         self.ranks > 1 && l <= self.level_replicated
     }
-}
 
-/// Bits of a brick's key; the bits above hold the number of a set.
-pub const KEY_BITS: u32 = 54;
-
-impl Intervals {
     /// The index of the interval that contains a position.
     #[inline]
     fn at(&self, start: u64) -> usize {
-        self.starts.partition_point(|&s| s <= start) - 1
+        self.boundaries.partition_point(|b| b.0 <= start) - 1
     }
 
     /// The end of an interval.
     #[inline]
     fn end(&self, interval: usize) -> u64 {
-        self.starts.get(interval + 1).copied().unwrap_or(1 << (3 * LEVEL_MAX))
+        self.boundaries.get(interval + 1).map_or(1 << (3 * LEVEL_MAX), |next| next.0)
     }
+}
 
-    /// The intervals that a rank owns, in order.
-    fn of(&self, rank: usize) -> impl Iterator<Item = Range<u64>> + '_ {
-        let owners = self.owners.iter().enumerate();
-        owners.filter(move |o| *o.1 == rank).map(|(interval, _)| self.span(interval))
-    }
+/// Bits of a brick's key; the bits above hold the number of a set.
+pub const KEY_BITS: u32 = 54;
 
-    /// The positions in an interval.
-    fn span(&self, interval: usize) -> Range<u64> {
-        self.starts[interval]..self.end(interval)
-    }
-
-    /// The indices of the intervals that meet in a brick; not all if there are many.
-    #[inline]
-    fn of_brick(&self, l: Level, key: u64) -> Range<usize> {
-        let first = self.at(brick_start(l, key));
-        let end = if l < 2 { 1 << (3 * LEVEL_MAX) } else { brick_start(l, key + 1) };
-        let more =
-            self.starts[first + 1..].iter().take(OWNERS_MANY).take_while(|&&s| s < end).count();
-        first..first + 1 + more
-    }
-
-    /// The deepest level with a brick in which `n >= 2` intervals or more meet; 1 if none is deeper, as all ranks hold the bricks
-    /// of levels 0 and 1.
-    fn deepest_brick_of(&self, n: usize) -> Level {
-        let spanned = self.starts[1..].windows(n - 1).map(|inner| {
-            // The smallest octant that contains the end of the first interval and the start of the last.
-            let differ = (inner[0] - 1) ^ inner[n - 2];
-            let up = (64 - differ.leading_zeros()).div_ceil(3);
-            LEVEL_MAX - up + 2
-        });
-        spanned.max().unwrap_or(1)
-    }
+/// The deepest level with a brick in which `n >= 2` intervals or more meet; 1 if none is deeper, as all ranks hold the bricks
+/// of levels 0 and 1.
+fn deepest_brick_of(n: usize, boundaries: &[Boundary]) -> Level {
+    let spanned = boundaries[1..].windows(n - 1).map(|inner| {
+        // The smallest octant that contains the end of the first interval and the start of the last.
+        let differ = (inner[0].0 - 1) ^ inner[n - 2].0;
+        let up = (64 - differ.leading_zeros()).div_ceil(3);
+        LEVEL_MAX - up + 2
+    });
+    spanned.max().unwrap_or(1)
 }
 
 /// Level-19 Morton code of a brick's minimum corner.

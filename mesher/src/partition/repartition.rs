@@ -142,7 +142,7 @@ impl<'a> Loads<'a> {
         let mut sum = |all: &[(u64, i64)]| {
             let sum: i64 = deficit + all.iter().map(|b| b.1).sum::<i64>();
             deficit = sum.min(0);
-            (all[0].0, sum.max(0) as u64)
+            [all[0].0, sum.max(0) as u64]
         };
         self.bins.chunk_by(|a, b| a.0 == b.0).map(&mut sum).collect()
     }
@@ -184,12 +184,12 @@ mod tests {
         let mut counts = Loads::new(&solo, LEVEL);
         counts.add_leaves(&split, &[]);
         let bins = (0..).zip(exact).filter(|(_, leaves)| *leaves > 0);
-        let want: Vec<Bin> = bins.map(|(bin, leaves)| (start57(LEVEL, bin), leaves)).collect();
+        let want: Vec<Bin> = bins.map(|(bin, leaves)| [start57(LEVEL, bin), leaves]).collect();
         assert_eq!(counts.into_bins(), want);
         // The same at a level whose bins hold whole bricks.
         let mut coarse = Loads::new(&solo, LEVEL - 2);
         coarse.add_leaves(&split, &[]);
-        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
         let coarse = coarse.into_bins();
         assert_eq!((coarse.len(), sum(&coarse)), (1 << (3 * (LEVEL - 2)), sum(&want)));
     }
@@ -215,7 +215,7 @@ mod tests {
             }
         }
         let (some, all) = (some.into_bins(), all.into_bins());
-        let sum = |bins: &[Bin]| bins.iter().map(|b| b.1).sum::<u64>();
+        let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
         assert!(some.len() < all.len() / 5, "{} of {} bins sampled", some.len(), all.len());
         assert!(
             sum(&some).abs_diff(sum(&all)) < sum(&all) / 20,
@@ -226,7 +226,7 @@ mod tests {
         // The same in every eighth of the curve.
         for eighth in 0..8 {
             let within = |bins: &[Bin]| -> Vec<Bin> {
-                bins.iter().copied().filter(|b| b.0 >> (3 * LEVEL_MAX - 3) == eighth).collect()
+                bins.iter().copied().filter(|b| b[0] >> (3 * LEVEL_MAX - 3) == eighth).collect()
             };
             let (some, all) = (sum(&within(&some)), sum(&within(&all)));
             assert!(some.abs_diff(all) < all / 10, "eighth {eighth}: {some} for {all}");

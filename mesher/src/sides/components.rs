@@ -200,15 +200,21 @@ impl Walk<'_> {
             }
             Across::Here(n, exists) => {
                 if up == 1 {
-                    for (d, bits) in nodes.components(l, n) {
-                        if bits & faced != 0 {
-                            self.local.merged.unite(c, d);
-                        }
-                    }
+                    self.unite(c, l, n, faced);
                 }
                 if faced & !exists != 0 {
                     self.merge_coarser(l, c, frame.key, faced & !exists, Some((axis, up)));
                 }
+            }
+        }
+    }
+
+    /// Merges a component with those of a node of level `l` that have some of the octants `faced`.
+    #[inline]
+    fn unite(&mut self, c: Component, l: Level, node: Node, faced: u64) {
+        for (d, bits) in self.nodes.components(l, node) {
+            if bits & faced != 0 {
+                self.local.merged.unite(c, d);
             }
         }
     }
@@ -253,11 +259,7 @@ impl Walk<'_> {
                 },
             };
             if faced & exists != 0 {
-                for (d, bits) in self.nodes.components(m, node) {
-                    if bits & faced != 0 {
-                        self.local.merged.unite(c, d);
-                    }
-                }
+                self.unite(c, m, node, faced);
                 faced &= !exists;
             }
         }

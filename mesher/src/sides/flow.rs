@@ -14,27 +14,20 @@ use crate::input::lattice::{Enclosed, Keep, Seed};
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
 use bricks::tree::{LEVELS, Tree};
-use ranks::{Comm, all_gather_reduced, gather};
+use ranks::{all_gather_reduced, gather};
 use std::collections::{HashMap, HashSet};
 
-/// Stands for the label of a component where a seed's leaf crosses. No component has it.
-const CROSSING: Label = Label::MAX;
-
-/// The seeds that lie in the root, by number, each with the component that it lies in; none in a crossing leaf. Collective; the same
-/// on all ranks.
-pub(super) fn find(base: &Base, components: &Components) -> HashMap<u64, Option<Label>> {
+/// The seeds that lie in leaves that do not cross, by number, each with the component that it lies in. Collective; the same on all ranks.
+pub(super) fn find(base: &Base, components: &Components) -> HashMap<u64, Label> {
     let mut mine = Vec::new();
     for (number, seed) in (0..).zip(&base.rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
         let (l, code) = leaf_at(base.tree, seed);
         let (key, bit) = (code >> 6, code & 63);
         if base.ownership.owns(l, key) {
-            let mut found = CROSSING;
-            components.nodes.find(l, key, 1 << bit, |c| found = components.label(c));
-            mine.push([number, found]);
+            components.nodes.find(l, key, 1 << bit, |c| mine.push([number, components.label(c)]));
         }
     }
-    let found = gather(base.comm, &mine).into_iter();
-    found.map(|[number, label]| (number, (label != CROSSING).then_some(label))).collect()
+    gather(base.comm, &mine).into_iter().map(|[number, label]| (number, label)).collect()
 }
 
 /// Level and code of the leaf that contains a seed, or of an octant above it in a brick that this rank does not
@@ -51,12 +44,13 @@ fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
-pub fn of_seeds(found: &HashMap<u64, Option<Label>>, base: &Base) -> Result<HashSet<Label>, Error> {
-    for (number, seed) in (0..).zip(&base.rules.seeds) {
-        let problem = match found.get(&number) {
-            None => "lies outside the root",
-            Some(None) => "lies in a leaf that the geometry crosses",
-            Some(Some(_)) => continue,
+pub fn of_seeds(found: &HashMap<u64, Label>, base: &Base) -> Result<HashSet<Label>, Error> {
+    let seeds = (0..).zip(&base.rules.seeds);
+    if let Some((number, seed)) = seeds.into_iter().find(|(number, _)| !found.contains_key(number))
+    {
+        let problem = match seed.is_in_root() {
+            true => "lies in a leaf that the geometry crosses",
+            false => "lies outside the root",
         };
         let near = seed.lattice.map(|c| c.clamp(0, ROOT_EDGE));
         let nearest = gather(base.comm, nearest(base, near).as_slice()).into_iter().min();
@@ -70,7 +64,7 @@ pub fn of_seeds(found: &HashMap<u64, Option<Label>>, base: &Base) -> Result<Hash
         let [x, y, z] = seed.given;
         return Err(Error::input(format!("seed {number} at ({x}, {y}, {z}) {problem}; {advice}")));
     }
-    Ok(found.values().copied().flatten().collect())
+    Ok(found.values().copied().collect())
 }
 
 /// The non-crossing leaf, in bricks that this rank holds, whose centroid is nearest to a lattice point: its squared distance
@@ -139,20 +133,19 @@ impl Verdict {
         }
     }
 
-    /// The enclosed components in numbers, of whose leaves this rank owns `leaves`; none if there are none.
-    /// Collective.
+    /// The enclosed components in numbers, of whose leaves this rank owns `leaves`. Collective.
     pub fn enclosed_components(
         &self,
         components: &[FirstLeaf],
         leaves: u64,
-        comm: &dyn Comm,
-    ) -> Option<EnclosedComponents> {
+        base: &Base,
+    ) -> EnclosedComponents {
         let enclosed = components.iter().filter(|(label, _)| self.enclosed.contains(label));
-        let first = enclosed.map(|&(_, first)| first).min()?;
-        Some(EnclosedComponents {
+        let first = enclosed.map(|&(_, first)| first).min();
+        EnclosedComponents {
             count: self.enclosed.len() as u64,
-            leaves: comm.sum(leaves),
-            example: first.centroid(),
-        })
+            leaves: first.map_or(0, |_| base.comm.sum(leaves)),
+            example: first.map(|leaf| base.rules.root.locate(leaf.centroid())),
+        }
     }
 }

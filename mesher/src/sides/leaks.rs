@@ -16,11 +16,12 @@ use super::global::Label;
 use super::vote::{self, Candidate};
 use super::{Base, Components, flow};
 use crate::input::lattice::{Keep, Rules};
-use bricks::brick::{self, Brick};
+use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
 use ranks::{all_gather_reduced, uncounted};
+use serde::Serialize;
 use std::collections::HashSet;
 use std::mem::take;
 
@@ -32,20 +33,32 @@ const COARSER: Level = 2;
 const MOST_FOR_T0_1: u64 = 1 << 24;
 
 /// A region that has leaked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Leak {
+    /// The spacing at which the region is closed.
+    pub spacing_coarse: f64,
+    /// The spacing of the mesh.
+    pub spacing_fine: f64,
+    /// The region's volume at the coarser spacing.
+    pub volume: f64,
+    /// A point in it.
+    pub point: [f64; 3],
     /// The level of the coarser spacing.
+    #[serde(skip)]
     pub level: Level,
-    /// The region's volume at the coarser spacing, in octants of level 19.
-    pub volume: u64,
-    /// Its first leaf at that spacing, by level and Morton code.
+    /// The volume in octants of level 19.
+    #[serde(skip)]
+    pub octants: u64,
+    /// The region's first leaf at the coarser spacing, by level and Morton code.
+    #[serde(skip)]
     pub first: Candidate,
     /// Whether the region is inside at the spacing of the mesh.
+    #[serde(skip)]
     pub is_inside: bool,
 }
 
 /// All leaks. The same on all ranks.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Leaks(pub Vec<Leak>);
 
 /// One side of T0, cut at the level above the surface level, so that no octants deeper than the cut are stored.
@@ -79,8 +92,7 @@ impl Region {
         let mut walls =
             Brick { key, bits: crossing | if self.is_inside { open & !inside } else { inside } };
         for _ in self.cut..l {
-            let parents = u64::from(brick::parents(walls.bits));
-            walls = Brick { key: walls.key >> 3, bits: parents << (8 * (walls.key & 7)) };
+            walls = walls.parents();
         }
         self.walls[l as usize].push(walls.key, walls.bits);
     }
@@ -139,9 +151,9 @@ fn crossing_leaves(base: &Base) -> u64 {
 fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     let components = Components::new(base);
     let found = flow::find(base, &components);
-    let seeded: HashSet<Label> = found.values().copied().flatten().collect();
+    let seeded: HashSet<Label> = found.values().copied().collect();
     // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
-    let verdict = if found.is_empty() || found.values().any(Option::is_none) {
+    let verdict = if found.is_empty() || found.len() < base.rules.seeds.len() {
         vote::decide(&components.all, &components.candidates, base)
     } else {
         flow::decide(&components.all, seeded.clone(), base.rules.keep)
@@ -154,7 +166,18 @@ fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     }
     let volumes = components.volumes(base);
     let volume = |label| volumes[volumes.partition_point(|v| v[0] < label)][1];
-    let leak = |&&(label, first): &&_| Leak { level, volume: volume(label), first, is_inside };
+    let (root, level_fine) = (base.rules.root, base.rules.level_surface);
+    let spacing = |l: Level| root.edge / f64::from(1u32 << l);
+    let leak = |&&(label, first): &&(Label, Candidate)| Leak {
+        spacing_coarse: spacing(level),
+        spacing_fine: spacing(level_fine),
+        volume: volume(label) as f64 * spacing(LEVEL_MAX).powi(3),
+        point: root.locate(first.centroid()),
+        level,
+        octants: volume(label),
+        first,
+        is_inside,
+    };
     leaked.iter().map(leak).collect()
 }
 
@@ -196,14 +219,14 @@ impl Leaks {
                 "a leak of surface level {level} must have one of the {COARSER} levels above: {leak:?}"
             );
             assert!(
-                leak.volume >= volume(first) && leak.volume.is_multiple_of(volume(leak.level)),
+                leak.octants >= volume(first) && leak.octants.is_multiple_of(volume(leak.level)),
                 "a leak's volume must be that of leaves, its first among them: {leak:?}"
             );
             assert!(code >> (3 * first) == 0, "a leak's first leaf must lie in the root: {leak:?}");
         }
         for level in 0..rules.level_surface {
             let of_level = self.0.iter().filter(|leak| leak.level == level);
-            let sum: u64 = of_level.map(|leak| leak.volume).sum();
+            let sum: u64 = of_level.map(|leak| leak.octants).sum();
             assert!(
                 sum <= volume(0),
                 "the leaks of level {level} must fit into the root: {self:?}"
@@ -219,8 +242,16 @@ mod tests {
 
     /// A leak between level 2 and the surface level, 3: two octants of level 2.
     fn leak() -> Leak {
-        let volume = 2 << (3 * (LEVEL_MAX - 2));
-        Leak { level: 2, volume, first: Candidate::new(2, 5), is_inside: false }
+        Leak {
+            spacing_coarse: 0.25,
+            spacing_fine: 0.125,
+            volume: 2.0 / 64.0,
+            point: [0.5; 3],
+            level: 2,
+            octants: 2 << (3 * (LEVEL_MAX - 2)),
+            first: Candidate::new(2, 5),
+            is_inside: false,
+        }
     }
 
     fn check(leaks: &[Leak]) {
@@ -233,7 +264,7 @@ mod tests {
         let finer = Leak { first: Candidate::new(2, 9), ..leak() };
         let coarser = Leak {
             level: 1,
-            volume: 1 << (3 * (LEVEL_MAX - 1)),
+            octants: 1 << (3 * (LEVEL_MAX - 1)),
             first: Candidate::new(1, 1),
             ..leak()
         };
@@ -255,13 +286,13 @@ mod tests {
     #[test]
     #[should_panic(expected = "must be that of leaves")]
     fn a_volume_of_a_part_of_an_octant_is_found() {
-        check(&[Leak { volume: leak().volume + 1, ..leak() }]);
+        check(&[Leak { octants: leak().octants + 1, ..leak() }]);
     }
 
     #[test]
     #[should_panic(expected = "must be that of leaves")]
     fn a_volume_smaller_than_the_first_leaf_is_found() {
-        check(&[Leak { volume: 0, ..leak() }]);
+        check(&[Leak { octants: 0, ..leak() }]);
     }
 
     #[test]
@@ -273,6 +304,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "must fit into the root")]
     fn leaks_larger_than_the_root_are_found() {
-        check(&[Leak { volume: 65 << (3 * (LEVEL_MAX - 2)), ..leak() }]);
+        check(&[Leak { octants: 65 << (3 * (LEVEL_MAX - 2)), ..leak() }]);
     }
 }

@@ -34,6 +34,7 @@ use components::LocalMerge;
 use global::Label;
 use nodes::{Component, Nodes};
 use ranks::Comm;
+use serde::Serialize;
 use std::collections::HashSet;
 use std::sync::LazyLock;
 use vote::{FirstLeaf, FirstLeaves};
@@ -67,40 +68,43 @@ pub struct Sides {
 }
 
 /// The components of the base tree, in numbers. The same on all ranks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Number of outside components, enclosed ones included.
     pub outside: u64,
     /// Number of inside components.
     pub inside: u64,
     /// Outside components that are deleted because the far field does not reach them.
-    pub enclosed: Option<EnclosedComponents>,
+    pub enclosed: EnclosedComponents,
     /// Components that were decided by majority.
-    pub ambiguous: Option<Ambiguous>,
+    #[serde(skip)]
+    pub ambiguous: Ambiguous,
     /// Whether the inside is kept and reaches the root's boundary.
+    #[serde(skip)]
     pub inside_reaches_boundary: bool,
     /// Whether the outside is kept and seeds decide it, and none of it reaches the root's boundary.
+    #[serde(skip)]
     pub flow_misses_boundary: bool,
 }
 
 /// Outside components that are deleted because the far field does not reach them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EnclosedComponents {
     /// Number of such components.
     pub count: u64,
     /// Number of their leaves in the base tree.
     pub leaves: u64,
-    /// Centroid, in lattice units, of the first leaf of all of them, by level and Morton code.
-    pub example: [i64; 3],
+    /// Centroid of the first leaf of all of them, by level and Morton code; none if there are none.
+    pub example: Option<[f64; 3]>,
 }
 
 /// Components whose rays did not agree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Ambiguous {
     /// Number of such components.
     pub count: u64,
-    /// Centroid, in lattice units, of the first candidate leaf of all of them, by level and Morton code.
-    pub example: [i64; 3],
+    /// Centroid of the first candidate leaf of all of them, by level and Morton code; none if there are none.
+    pub example: Option<[f64; 3]>,
 }
 
 /// The sides of all components of the tree. The same on all ranks.
@@ -208,7 +212,7 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
     let leaves_enclosed = sides.store(base, &nodes, &of_local, &mut regions);
     let inside = verdict.inside.len() as u64;
     (sides.summary.inside, sides.summary.outside) = (inside, all.len() as u64 - inside);
-    sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, base.comm);
+    sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, base);
     Ok(Decided { sides, regions, components: all, verdict })
 }
 
@@ -264,7 +268,8 @@ impl Sides {
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
     pub fn check_invariants(&self, tree: &Tree) {
-        tree.check_open_leaves(&self.stored, "has a side, but is no leaf off the surface");
+        let others = [&tree.split, &tree.crossing];
+        tree.check_apart(&self.stored, &others, "has a side, but is no leaf off the surface");
     }
 }
 

@@ -96,16 +96,17 @@ fn loops(edges: impl Iterator<Item = [Vertex; 2]>) -> Vec<Vec<Vertex>> {
     let vertices: Vec<Vertex> = ends.keys().copied().collect();
     for start in vertices {
         while let Some(mut to) = ends.get_mut(&start).and_then(BTreeSet::pop_first) {
-            let mut path = vec![start];
-            while to != start {
-                let from = *path.last().expect("it has the start");
-                path.push(to);
+            let (mut path, mut from) = (Vec::new(), start);
+            loop {
+                path.push(from);
                 let of = ends.get_mut(&to).expect("every end is a vertex");
                 of.remove(&from);
+                if to == start {
+                    break;
+                }
+                from = to;
                 to = of.pop_first().expect("an even number of edges meets in a vertex");
             }
-            let last = path.last().expect("it has the start");
-            ends.get_mut(&start).expect("it is a vertex").remove(last);
             found.push(path);
         }
     }

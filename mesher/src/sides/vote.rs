@@ -122,8 +122,8 @@ pub fn decide(components: &[FirstLeaf], mine: &FirstLeaves, base: &Base) -> Verd
     }
     exhausted.extend(open);
     let first = exhausted.iter().map(|(label, _)| lists[label][0]).min();
-    verdict.summary.ambiguous =
-        first.map(|c| Ambiguous { count: exhausted.len() as u64, example: c.centroid() });
+    let example = first.map(|leaf| base.rules.root.locate(leaf.centroid()));
+    verdict.summary.ambiguous = Ambiguous { count: exhausted.len() as u64, example };
     let is_inside = |&(label, votes): &(Label, usize)| votes > 3 * lists[&label].len();
     verdict.inside.extend(exhausted.into_iter().filter(is_inside).map(|c| c.0));
     verdict

@@ -102,7 +102,7 @@ proptest! {
         let base = twice.outcome(&run, true);
         let want = all_outside(&case.outcome(&Run::SOLO, true).words);
         prop_assert!(base.words == want, "{}", first_difference(&base.words, &want));
-        prop_assert_eq!(base.summary.ambiguous, None);
+        prop_assert_eq!(base.summary.ambiguous.count, 0);
 
         let all = Small { keep: Keep::All, ..case.clone() };
         let want = all_outside(&all.outcome(&Run::SOLO, false).words);
@@ -143,7 +143,7 @@ proptest! {
             let (got, straight) = (turned.outcome(&run, ungraded), case.outcome(&Run::SOLO, ungraded));
             let want = symmetry.words(&straight.words);
             prop_assert!(got.words == want, "{}", first_difference(&got.words, &want));
-            prop_assert_eq!((got.summary.ambiguous, straight.summary.ambiguous), (None, None));
+            prop_assert_eq!((got.summary.ambiguous.count, straight.summary.ambiguous.count), (0, 0));
         }
     }
 
@@ -170,7 +170,8 @@ proptest! {
         run in run(),
     ) {
         let image = scaled(&case, power);
-        assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
+        let on_lattice = |case: &Small, run: &Run| case.outcome(run, false).on_lattice(&case.root);
+        assert_equal!(on_lattice(&image, &run), on_lattice(&case, &Run::SOLO));
     }
 
     #[test]
@@ -180,8 +181,10 @@ proptest! {
         run in run(),
     ) {
         let image = translated(&case, by);
-        assert_equal!(image.outcome(&run, true), case.outcome(&Run::SOLO, true));
-        assert_equal!(image.outcome(&run, false), case.outcome(&Run::SOLO, false));
+        for ungraded in [true, false] {
+            let on_lattice = |case: &Small, run: &Run| case.outcome(run, ungraded).on_lattice(&case.root);
+            assert_equal!(on_lattice(&image, &run), on_lattice(&case, &Run::SOLO));
+        }
     }
 
     #[test]

@@ -7,7 +7,6 @@ use mesher::error::Error;
 use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
-use mesher::output::manifest::LeakEntry;
 use mesher::partition::{Division, Partitioner, Weights};
 use mesher::sides::{Ambiguous, EnclosedComponents, Summary};
 use ranks::Solo;
@@ -101,16 +100,13 @@ impl Small {
     /// As [`Small::reference_outcome`], for cases that may have unusable seeds.
     pub fn try_reference_outcome(&self, ungraded: bool) -> Result<Outcome, reference::Error> {
         let mesh = self.reference_mesh(ungraded)?;
-        let on_lattice = |p: [f64; 3]| std::array::from_fn(|a| self.root.quantise(a, p[a]));
-        let ambiguous = mesh
-            .ambiguous
-            .map(|a| Ambiguous { count: a.components, example: on_lattice(a.example) });
-        let reference::Components { outside, inside, enclosed } = mesh.components;
-        let enclosed = enclosed.example.map(|example| EnclosedComponents {
-            count: enclosed.count,
-            leaves: enclosed.leaves,
-            example: on_lattice(example),
+        let ambiguous = mesh.ambiguous.map_or(Ambiguous::default(), |a| Ambiguous {
+            count: a.components,
+            example: Some(a.example),
         });
+        let reference::Components { outside, inside, enclosed } = mesh.components;
+        let reference::kept::EnclosedComponents { count, leaves, example } = enclosed;
+        let enclosed = EnclosedComponents { count, leaves, example };
         // All inside leaves are kept, and those made by gradation tile the same places.
         let reaches_boundary =
             |side| mesh.words.iter().any(|&word| word & 3 == side && is_at_boundary(word));
@@ -125,12 +121,7 @@ impl Small {
             inside_reaches_boundary,
             flow_misses_boundary,
         };
-        let leak = |leak: reference::Leak| {
-            let reference::Leak { spacing_coarse, spacing_fine, volume, point } = leak;
-            LeakEntry { spacing_coarse, spacing_fine, volume, point }
-        };
-        let leaks = mesh.leaks.into_iter().map(leak).collect();
-        Ok(Outcome { words: mesh.words, summary, leaks })
+        Ok(Outcome { words: mesh.words, summary, leaks: mesh.leaks })
     }
 
     /// Leaf words by the mesher on one rank.
@@ -208,7 +199,18 @@ fn is_at_boundary(word: u64) -> bool {
 pub struct Outcome {
     pub words: Vec<u64>,
     pub summary: Summary,
-    pub leaks: Vec<LeakEntry>,
+    pub leaks: Vec<reference::Leak>,
+}
+
+impl Outcome {
+    /// The same with lattice coordinates of the examples.
+    pub fn on_lattice(mut self, root: &Root) -> Self {
+        let Summary { enclosed, ambiguous, .. } = &mut self.summary;
+        for p in [&mut enclosed.example, &mut ambiguous.example].into_iter().flatten() {
+            *p = root.nearest(*p).map(|c| c as f64);
+        }
+        self
+    }
 }
 
 pub fn division(partitioner: Partitioner, level_base: Option<u32>) -> Division {

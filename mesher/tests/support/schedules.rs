@@ -6,9 +6,9 @@ use super::fibres;
 use super::{Outcome, Run, Small, options, small, words};
 use mesher::error::Error;
 use mesher::input::case::Case;
-use mesher::output::manifest::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
+use mesher::sides::leaks::Leak;
 use mesher::{Options, mesh};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -98,7 +98,7 @@ pub fn on_ranks(
 pub type Part = Result<(Vec<u64>, Common, Option<(String, u64)>), Error>;
 
 /// Components and leaks, the same on all ranks.
-pub type Common = (Summary, Vec<LeakEntry>);
+pub type Common = (Summary, Vec<Leak>);
 
 /// A rank's part of the mesh.
 pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Part {
@@ -130,6 +130,13 @@ pub fn merge(parts: Vec<Part>) -> Result<Meshed, Error> {
     }
     all.sort_unstable();
     let ((summary, leaks), reported) = same.expect("at least one rank")?;
+    let leak = |Leak { spacing_coarse, spacing_fine, volume, point, .. }| reference::Leak {
+        spacing_coarse,
+        spacing_fine,
+        volume,
+        point,
+    };
+    let leaks = leaks.into_iter().map(leak).collect();
     Ok(Meshed { outcome: Outcome { words: all, summary, leaks }, reported })
 }
 

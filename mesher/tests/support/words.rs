@@ -3,9 +3,9 @@
 
 use mesher::error::Error;
 use mesher::input::case::Case;
-use mesher::output::manifest::LeakEntry;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
+use mesher::sides::leaks::Leak;
 use mesher::{Job, Options, grow, quantised};
 use ranks::Comm;
 
@@ -15,7 +15,7 @@ pub fn words(
     case: &Case,
     options: &Options,
     comm: &dyn Comm,
-) -> Result<(Vec<u64>, Summary, Vec<LeakEntry>), Error> {
+) -> Result<(Vec<u64>, Summary, Vec<Leak>), Error> {
     let mut record = Recorder::default();
     let job = &mut Job::new(options, comm, &mut record);
     let mesh = grow(quantised(case, job)?, job, |_, _| {})?;
@@ -24,5 +24,5 @@ pub fn words(
         words.extend_from_slice(w);
         Ok::<(), Error>(())
     })?;
-    Ok((words, mesh.sides.summary, LeakEntry::of(&mesh)))
+    Ok((words, mesh.sides.summary, mesh.leaks.0))
 }

@@ -7,7 +7,6 @@ use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
 use bricks::tree::PerLevel;
 use ranks::{Comm, Entry, MessageBuffer, all_gather_from_reducers, split_by_reducer};
-use std::mem::take;
 use std::ops::Range;
 
 impl Ownership {
@@ -54,12 +53,12 @@ impl Ownership {
             self.select(index, *l, set, &mut out)
         };
         let retained: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
-        let mut full = take(&mut out.full);
+        let Outgoing { mut queue, mut full } = out;
         if any_full && let Some(to_reducers) = split_by_reducer(&mut full, |a, b| a | b, comm) {
             full.clear();
-            out.to_reducers = to_reducers;
+            queue.extend(to_reducers.into_iter().map(|(to, e)| (to, ENTRIES_TO_REDUCE, e)));
         }
-        let (messages, sent) = out.into_messages(&sets);
+        let (messages, sent) = messages(queue, &sets);
         let retained_part = |((_, mut set), range): ((Level, BrickSet), Range<usize>)| {
             set.keep(range);
             vec![set]
@@ -76,9 +75,8 @@ impl Ownership {
         }
         received.sort_by_key(|e| e[0]);
         for entries in received.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
-            let mut set = BrickSet::default();
-            entries.iter().for_each(|e| set.push(e[0] & ((1 << KEY_BITS) - 1), e[1]));
-            parts[(entries[0][0] >> KEY_BITS) as usize].push(set);
+            let brick = |e: &Entry| Brick { key: e[0] & ((1 << KEY_BITS) - 1), bits: e[1] };
+            parts[(entries[0][0] >> KEY_BITS) as usize].push(entries.iter().map(brick).collect());
         }
         (parts.into_iter().map(BrickSet::union_of).collect(), sent)
     }
@@ -100,10 +98,10 @@ impl Ownership {
             for others in [0..local.start, local.end..set.len()] {
                 let mut first = others.start;
                 while first < others.end {
-                    let interval = self.intervals.at(brick_start(l, set.key_at(first)));
-                    let same_owner = first..position_of(set, self.intervals.end(interval));
+                    let interval = self.at(brick_start(l, set.key_at(first)));
+                    let same_owner = first..position_of(set, self.end(interval));
                     first = same_owner.end;
-                    out.queue(set_index, set, same_owner, self.intervals.owners[interval]);
+                    out.queue(set_index, set, same_owner, self.boundaries[interval].1);
                 }
             }
             return local;
@@ -112,8 +110,8 @@ impl Ownership {
             if l >= 2 && self.is_within(l, b.key) {
                 return b.bits;
             }
-            let owners = self.owners_of(l, b.key);
-            let placement = self.placement_among(l, owners);
+            let intervals = self.meeting_in(l, b.key);
+            let placement = self.placement_among(l, intervals);
             let entry = [(set_index as u64) << KEY_BITS | b.key, b.bits];
             if placement == Placement::FullyReplicated {
                 out.full.push(entry);
@@ -121,8 +119,8 @@ impl Ownership {
             }
             if placement != Placement::Local {
                 // Such bricks are few: queued as single entries.
-                let others = owners.iter().filter(|&&owner| Some(owner) != self.rank);
-                out.single.extend(others.map(|&owner| (owner, entry)));
+                let others = intervals.iter().filter(|i| Some(i.1) != self.rank);
+                out.queue.extend(others.map(|&(_, owner)| (owner, ENTRIES, entry)));
             }
             if matches!(placement, Placement::Local | Placement::PartiallyReplicated) {
                 b.bits
@@ -142,63 +140,56 @@ const ENTRIES: u64 = 1 << 32;
 /// The same for fully replicated bricks, which the receiver reduces.
 const ENTRIES_TO_REDUCE: u64 = ENTRIES + 1;
 
-/// The queue of bricks to send. Entries store their set index in the bits above the key.
+/// What is sent to a rank: under the index of a set, the range of positions of some bricks; under another header, an entry.
+type Queued = (usize, u64, [u64; 2]);
+
+/// The bricks to send. Entries store their set index in the bits above the key.
 #[derive(Default)]
 struct Outgoing {
-    /// Receiver, set index, and range of the set's bricks.
-    packed: Vec<(usize, usize, Range<usize>)>,
-    /// Receiver and brick, for bricks sent as entries.
-    single: Vec<(usize, Entry)>,
+    queue: Vec<Queued>,
     /// Fully replicated bricks.
     full: Vec<Entry>,
-    /// Those that other ranks reduce, with their receivers.
-    to_reducers: Vec<(usize, Entry)>,
 }
 
 impl Outgoing {
     /// Queues bricks of a set for rank `to`.
     fn queue(&mut self, set_index: usize, set: &BrickSet, bricks: Range<usize>, to: usize) {
-        if bricks.len() <= ENTRIES_MAX {
-            let entry = |b: Brick| (to, [(set_index as u64) << KEY_BITS | b.key, b.bits]);
-            return self.single.extend(bricks.map(|position| entry(set.brick(position))));
+        if bricks.len() > ENTRIES_MAX {
+            let range = [bricks.start as u64, bricks.end as u64];
+            return self.queue.push((to, set_index as u64, range));
         }
-        self.packed.push((to, set_index, bricks));
+        let entry = |b: Brick| [(set_index as u64) << KEY_BITS | b.key, b.bits];
+        self.queue.extend(bricks.map(|position| (to, ENTRIES, entry(set.brick(position)))));
     }
+}
 
-    /// Serialises the queue, of bricks of `sets`. Also returns the number of bricks, without those to be reduced.
-    fn into_messages(mut self, sets: &[(Level, BrickSet)]) -> (MessageBuffer, u64) {
-        self.packed.sort_by_key(|block| block.0);
-        self.to_reducers.sort_by_key(|e| e.0);
-        self.single.sort_by_key(|e| e.0);
-        // With METIS a rank may own several intervals in a brick, which gives duplicates.
-        self.single.dedup();
-        let bricks_packed: usize = self.packed.iter().map(|block| block.2.len()).sum();
-        let entries = self.to_reducers.len() + self.single.len();
-        // A packed brick takes 1.5 words, an entry 2, the headers of a block about 8.
-        let words = 2 * entries + 8 * self.packed.len() + bricks_packed * 3 / 2;
-        let mut messages = MessageBuffer::with_capacity(words);
-        let mut packed = self.packed.into_iter().peekable();
-        let mut queues = [(ENTRIES_TO_REDUCE, &self.to_reducers[..]), (ENTRIES, &self.single[..])];
-        loop {
-            let first = queues.iter().filter_map(|queue| Some(queue.1.first()?.0));
-            let Some(to) = first.chain(packed.peek().map(|block| block.0)).min() else { break };
-            messages.append(to, |words| {
-                while let Some((_, set_index, bricks)) = packed.next_if(|block| block.0 == to) {
-                    words.push(set_index as u64);
-                    sets[set_index].1.pack(bricks, words);
-                }
-                for (header, rest) in &mut queues {
-                    let (entries, others) = rest.split_at(rest.partition_point(|e| e.0 == to));
-                    if !entries.is_empty() {
-                        words.extend([*header, entries.len() as u64]);
-                        entries.iter().for_each(|e| words.extend(e.1));
-                    }
-                    *rest = others;
-                }
-            });
-        }
-        (messages, (bricks_packed + self.single.len()) as u64)
+/// Serialises a queue of bricks of `sets`. Also returns the number of bricks, without those to be reduced.
+fn messages(mut queue: Vec<Queued>, sets: &[(Level, BrickSet)]) -> (MessageBuffer, u64) {
+    queue.sort_by_key(|&(to, header, _)| (to, header));
+    // With METIS a rank may own several intervals in a brick, which gives duplicates.
+    queue.dedup();
+    let bricks = |&(_, header, [start, end]): &Queued| match header {
+        ENTRIES_TO_REDUCE => 0,
+        ENTRIES => 1,
+        _ => end - start,
+    };
+    let sent: u64 = queue.iter().map(bricks).sum();
+    // A packed brick takes 1.5 words, an entry 2.
+    let mut messages = MessageBuffer::with_capacity(2 * (sent as usize + queue.len()));
+    for run in queue.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let (to, header, _) = run[0];
+        messages.append(to, |words| match sets.get(header as usize) {
+            Some((_, set)) => run.iter().for_each(|&(_, _, [start, end])| {
+                words.push(header);
+                set.pack(start as usize..end as usize, words);
+            }),
+            None => {
+                words.extend([header, run.len() as u64]);
+                run.iter().for_each(|queued| words.extend(queued.2));
+            }
+        });
     }
+    (messages, sent)
 }
 
 /// Reads a message: parts of sets, entries, and entries of fully replicated bricks that this rank reduces.
