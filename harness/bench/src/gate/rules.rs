@@ -115,7 +115,7 @@ impl GateCase {
     fn find(mut self, programs: &Programs) -> Result<Self, Failure> {
         if self.file.as_os_str().is_empty() {
             let found = programs.paths.catalogue.named(&self.name)?;
-            (self.file, self.absent) = (found.path.clone(), found.absent.clone());
+            (self.file, self.absent) = (found.path, found.absent);
         }
         self.file = std::path::absolute(&self.file)?;
         let engine = &programs.engine.description;
