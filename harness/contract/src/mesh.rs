@@ -227,7 +227,9 @@ impl Mesh {
             format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
         };
         let geometry = self.manifest.geometry;
-        let of_mesh = stated(self.manifest.root, self.manifest.level_surface, geometry);
+        let Manifest { root, lacks_inputs, level_surface, .. } = self.manifest;
+        let level = if lacks_inputs { case.level_surface } else { level_surface };
+        let of_mesh = stated(root, level, geometry);
         let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
         let of_case = stated(case.root, case.level_surface, geometry);
         if of_mesh == of_case {
