@@ -2,7 +2,7 @@
 
 use crate::options::Input;
 use bench::experiments::entry;
-use bench::experiments::entry::{Entry, Line};
+use bench::experiments::entry::Line;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::benchmark::numbers::{Checked, Number, check};
