@@ -61,7 +61,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let program_id = |digest: &str| format!("#program-{digest}");
     let program = |(engine, digest): &(String, String)| {
         json!({"@id": program_id(digest), "@type": "SoftwareApplication", "name": engine, "identifier": digest,
-            "description": "The identifier is the digest of the program's file."})
+            "description": "The identifier is the digest of the program's files."})
     };
     let sessions = by_key(lines, |line| line.session.as_str());
     let action = |(name, of): &(&str, Vec<&Line>)| {

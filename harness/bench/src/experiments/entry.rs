@@ -302,7 +302,7 @@ pub struct Run {
     pub oversubscribed: bool,
     /// The command line.
     pub command: String,
-    /// Digest of the program's file; empty in old records.
+    /// Digest of the program's files; empty in old records.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub program: String,
     /// Facets of the geometry.

@@ -7,7 +7,7 @@ use super::paths::{Input, Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use super::service::{self, Services};
-use super::templates::{LAUNCHER, Values, fill};
+use super::templates::{LAUNCHER, Templates, Values, fill};
 use crate::import;
 use clap::Args;
 use contract::failure::named;
@@ -85,6 +85,20 @@ impl Engine {
     /// The name or path by which the engine was found.
     pub fn name(&self) -> &str {
         &self.description.name
+    }
+
+    /// The files that the engine consists of: its program, and those that its commands name, such as the script of an interpreter.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let Templates { serial, parallel, simulated, .. } = &self.description.run;
+        let words = [serial, parallel, simulated].into_iter().flatten();
+        let named = words.map(|word| PathBuf::from(fill(word, &self.places)));
+        let mut files = vec![self.program.clone()];
+        for file in named.filter(|file| file.is_file()) {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+        files
     }
 
     /// Refuses to go on if the program is missing.
