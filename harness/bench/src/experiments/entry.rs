@@ -74,6 +74,14 @@ impl Line {
         }
     }
 
+    /// Returns the network of the line, if it states one, with its session.
+    pub fn network(&self) -> Option<(&str, Network)> {
+        match &self.entry {
+            Entry::Network(network) => Some((&self.session, *network)),
+            _ => None,
+        }
+    }
+
     /// Returns the run of the line, if it has one.
     pub fn run(&self) -> Option<&Run> {
         match &self.entry {

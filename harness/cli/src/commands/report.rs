@@ -2,7 +2,7 @@
 
 use crate::options::Input;
 use bench::experiments::entry;
-use bench::experiments::entry::{Entry, Line};
+use bench::experiments::entry::Line;
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::benchmark::numbers::{Checked, Number, check};
@@ -64,6 +64,7 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     if lines.iter().all(|line| line.run().is_none()) {
         return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
+    written.notes.iter().for_each(|note| println!("{note}"));
     for (rule, why) in &written.broken {
         println!("rule {rule} broken: {why}");
     }
