@@ -213,7 +213,8 @@ impl Groups {
             assert!(has_one_time || setup.comm == Comm::Sim && !*by_rank, "{name} has one time");
             assert!((0.0..=1.0).contains(&t.coverage), "{name}: {t:?} is a coverage");
             for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
-                spread.check_invariants();
+                let is_right = spread.is_possible();
+                assert!(is_right, "sum and maximum are those of the ranks: {name}, {spread:?}");
             }
         }
     }

@@ -206,7 +206,13 @@ fn impossible_numbers_of_a_line_are_named() {
         line_of(run).fault()
     };
     assert_eq!(fault(|_| ()), None);
-    let faults: [fn(&mut Run); 5] = [
+    let faults: [fn(&mut Run); 11] = [
+        |run| run.phases[0].messages.sum = -1e6,
+        |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
+        |run| run.peak_rss_bytes.sum = 1.0,
+        |run| run.time_launch_s = -1.0,
+        |run| run.useful_s.max *= 100.0,
+        |run| run.phases[0].useful_s = Spread::of(&[0.0, 0.0]),
         |run| run.time_wall_s = 0.0,
         |run| run.time_wall_s = 1e308,
         |run| run.phases[0].useful_s.by_rank[1] = -1.0,
