@@ -82,6 +82,15 @@ impl Group {
         bytes.expect("a group has runs")
     }
 
+    /// Returns the load imbalance of useful time, max / mean. The interval of the repetitions is extended to that of the typical run.
+    pub fn imbalance(&self) -> Median {
+        let of = |run: &Run| run.useful_s.lambda(run.setup.ranks).max(1.0);
+        let repeated = self.median_of(|run| Some(of(run))).expect("a group has runs");
+        let value = of(&self.typical);
+        let (low, high) = (repeated.low.min(value), repeated.high.max(value));
+        Median { value, low, high, ..repeated }
+    }
+
     /// Returns the CPU time of the whole process, in seconds; `None` if a run does not have it.
     pub fn cpu_s(&self) -> Option<Median> {
         self.median_of(|run| Some(run.time_cpu_s).filter(|time| *time != 0.0))
@@ -248,6 +257,12 @@ impl Groups {
         let base = self.reference(group);
         let base_s = base.time_s.value * base.setup.ranks as f64;
         group.time_s.falling(|time_s| base_s / time_s)
+    }
+
+    /// Returns the efficiency of a group with the interval that follows from that of its time.
+    pub fn global_efficiency(&self, group: &Group) -> Median {
+        let useful_s = self.efficiency(group).global() * group.time_s.value;
+        group.time_s.falling(|time_s| useful_s / time_s)
     }
 
     /// Whether a group has a reference on fewer ranks, or is on one.

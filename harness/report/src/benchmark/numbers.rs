@@ -43,7 +43,6 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     };
     let names = [&s.engine, &s.case, &experiment].map(|name| file_name(name)).join("/");
     let setup = format!("{names}/{}/{}/{}", group.cells(), s.ranks, group.how());
-    let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
     let base = groups.reference(group);
     let scales = base.setup.ranks < s.ranks;
     let is_speedup = scales && base.cells() == group.cells();
@@ -54,7 +53,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         ("rate", Some(group.time_s.falling(rate)), "10^6 cells/s/rank"),
         ("memory", Some(group.bytes_per_cell()), "B/cell"),
         ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
-        ("efficiency", scales.then(|| single(groups.efficiency(group).global())), ""),
+        ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
         let Median { value, low, high, count, .. } = median.filter(|m| m.value.is_finite())?;

@@ -334,3 +334,15 @@ fn a_speedup_is_over_one_rank_and_a_measured_one_has_no_projected_base() {
     let groups = Groups::of(&[free(), of(Comm::Sim, &[4.0]), of(Comm::Mpi, &[2.0; 2])]);
     assert!(!groups.has_reference(&groups.all[1]));
 }
+
+#[test]
+fn efficiency_and_imbalance_have_the_intervals_of_the_repetitions() {
+    let of = |times: &[f64]| line_of(run(Comm::Mpi, 9, &[("a", times)]));
+    let groups = Groups::of(&[of(&[4.0]), of(&[2.0, 2.0]), of(&[4.0, 2.0]), of(&[3.0, 1.0])]);
+    let two = &groups.all[1];
+    let (efficiency, imbalance) = (groups.global_efficiency(two), two.imbalance());
+    let found = [efficiency, imbalance].map(|of| [of.low, of.value, of.high]);
+    let expected = [[0.5, 4.0 / 6.0, 1.0], [1.0, 1.2, 1.5]];
+    let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-9, "{found:?}");
+}
