@@ -38,7 +38,7 @@ pub fn route(facets: &[Facet], ownership: &Ownership, comm: &dyn Comm) -> Vec<Fa
     local
 }
 
-/// Whether an extent reaches a closed octant.
+/// Whether an extent reaches an octant, which is closed.
 fn reaches(extent: &[(i64, i64); 3], l: Level, code: u64) -> bool {
     let (min, h) = (corner(l, code), edge(l));
     (0..3).all(|a| extent[a].0 <= min[a] + h && extent[a].1 >= min[a])

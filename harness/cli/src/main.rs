@@ -27,7 +27,7 @@ static HEAP: Heap = Heap {
 
 fn main() -> ExitCode {
     // Before the outputs are checked, which begins them.
-    interrupt::install();
+    let _ = interrupt::install();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return refuse(&error),

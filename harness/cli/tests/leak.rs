@@ -202,7 +202,7 @@ fn an_audit_with_the_case_finds_leaks_that_the_manifest_conceals() {
         leaks.pop();
         fs::write(&path, manifest.to_string()).unwrap();
         let (code, text) = audit();
-        assert!(code == Some(1) && text.contains("the manifest states the leaks ["), "{text}");
+        assert!(code == Some(1) && text.contains("leaks: ["), "{text}");
     }
 }
 

@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
-use crate::stl;
+use crate::stl::{self, Body, Solid};
 
 pub use geometries::Facet;
 
@@ -21,8 +21,8 @@ pub use geometries::Facet;
 pub struct Case {
     /// Name of the case file without its extension.
     pub name: String,
-    /// The STL file; none of a generated body, or of one in memory.
-    pub geometry: Option<PathBuf>,
+    /// The solids of the STL file; none of a generated body, or of one in memory.
+    pub solids: Vec<Solid>,
     /// The body, in the user's units.
     pub facets: Vec<Facet>,
     /// The body on the lattice.
@@ -85,18 +85,16 @@ impl Case {
         let file: CaseFile =
             toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
         let directory = path.parent().unwrap_or(Path::new(""));
-        let geometry = file.geometry.as_ref().map(|stl| directory.join(stl));
-        let facets = match (&geometry, &file.generator) {
-            (Some(stl), None) => {
-                stl::read(stl)
-                    .map_err(|why| Failure::input(format!("{} {why}", stl.display())))?
-                    .facets
+        let Body { facets, solids } = match (&file.geometry, &file.generator) {
+            (Some(stl), None) => stl::read(&directory.join(stl))?,
+            (None, Some(generator)) => {
+                let facets = generator.facets().map_err(|e| Failure::about(path, e))?;
+                Body { facets, solids: Vec::new() }
             }
-            (None, Some(generator)) => generator.facets().map_err(|e| Failure::about(path, e))?,
             _ => return Err(wrong("give exactly one of `geometry` and `[generator]`".to_owned())),
         };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { geometry, ..Self::build(name, &file, facets).map_err(wrong)? })
+        Ok(Self { solids, ..Self::build(name, &file, facets).map_err(wrong)? })
     }
 
     /// A case from the text of a case file without geometry, and from a body in memory.
@@ -109,9 +107,11 @@ impl Case {
     }
 
     fn build(name: String, file: &CaseFile, facets: Vec<Facet>) -> Result<Self, String> {
-        if let Some((i, [x, y, z])) = not_finite(&facets) {
+        let mut vertices = facets.as_flattened().iter().enumerate();
+        if let Some((i, [x, y, z])) = vertices.find(|(_, v)| !v.iter().all(|c| c.is_finite())) {
+            let facet = i / 3;
             return Err(format!(
-                "facet {i} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry"
+                "facet {facet} has a vertex that is not finite, ({x}, {y}, {z}): repair the geometry"
             ));
         }
         let root = root(file, &facets)?;
@@ -148,7 +148,7 @@ impl Case {
             ..Manifest::without_leaves(Tree::Final, root, String::new())
         };
         let (facets_lattice, seeds) = (on_lattice(&root, &facets)?, file.seeds.clone());
-        let case = Self { name, geometry: None, facets, facets_lattice, seeds, rules };
+        let case = Self { name, solids: Vec::new(), facets, facets_lattice, seeds, rules };
         case.refuse_crossing_seeds()?;
         Ok(case)
     }
@@ -209,32 +209,21 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
 }
 
 fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String> {
-    let on_lattice = |(i, facet): (usize, &Facet)| {
-        let mut on = FacetLattice::default();
-        for (q, vertex) in on.iter_mut().zip(facet) {
-            let [x, y, z] = vertex;
-            let far = || {
-                format!(
-                    "facet {i} has a vertex at ({x}, {y}, {z}), more than one root edge outside the root: enlarge or move the root"
-                )
-            };
-            *q = root.quantise(vertex.map(f64::from)).ok_or_else(far)?;
-        }
-        Ok(on)
+    let on_lattice = |(i, vertex): (usize, &[f32; 3])| {
+        let ([x, y, z], facet) = (vertex, i / 3);
+        root.quantise(vertex.map(f64::from)).ok_or_else(|| {
+            format!(
+                "facet {facet} has a vertex at ({x}, {y}, {z}), more than one root edge outside the root: enlarge or move the root"
+            )
+        })
     };
-    facets.iter().enumerate().map(on_lattice).collect()
+    let vertices = facets.as_flattened().iter().enumerate().map(on_lattice);
+    Ok(vertices.collect::<Result<Vec<_>, String>>()?.as_chunks().0.to_vec())
 }
 
 /// A point as text.
 fn shown([x, y, z]: [f64; 3]) -> String {
     format!("({x}, {y}, {z})")
-}
-
-/// The first vertex with a coordinate that is not finite, and its facet.
-fn not_finite(facets: &[Facet]) -> Option<(usize, &[f32; 3])> {
-    let mut vertices = facets.as_flattened().iter().enumerate();
-    let (i, vertex) = vertices.find(|(_, vertex)| !vertex.iter().all(|c| c.is_finite()))?;
-    Some((i / 3, vertex))
 }
 
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {

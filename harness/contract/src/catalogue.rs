@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 /// Size class of a case in the catalogue.
 #[derive(
@@ -39,13 +38,9 @@ pub struct Selected {
     pub absent: Option<String>,
 }
 
-/// The catalogue. Its file is parsed at most once, on the first look-up that needs it: a user's own case file
-/// can be selected without a catalogue.
+/// The catalogue. Its file is read by a look-up that needs it: a user's own case file can be selected without a catalogue.
 #[derive(Clone, Debug)]
-pub struct Catalogue {
-    path: PathBuf,
-    cases: OnceLock<Result<Vec<Selected>, String>>,
-}
+pub struct Catalogue(PathBuf);
 
 #[derive(Debug, Deserialize)]
 struct CatalogueFile {
@@ -55,12 +50,12 @@ struct CatalogueFile {
 impl Catalogue {
     /// The catalogue in this file, which is not opened yet.
     pub fn new(path: PathBuf) -> Self {
-        Self { path, cases: OnceLock::new() }
+        Self(path)
     }
 
     /// The catalogue's file.
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.0
     }
 
     /// The selected cases, in the order of `arguments`, which are names or paths of case files. Without
@@ -70,14 +65,21 @@ impl Catalogue {
     /// One sentence, if an argument is neither in the catalogue nor a file, or if the catalogue cannot be read.
     pub fn select(&self, arguments: &[String], sizes: &[Size]) -> Result<Vec<Selected>, String> {
         if arguments.is_empty() {
-            let of_size = |case: &&Selected| case.size.is_some_and(|size| sizes.contains(&size));
-            return Ok(self.cases()?.iter().filter(of_size).cloned().collect());
+            let of_size = |case: &Selected| case.size.is_some_and(|size| sizes.contains(&size));
+            return Ok(self.cases()?.into_iter().filter(of_size).collect());
         }
         let mut selected: Vec<Selected> = Vec::new();
         for argument in arguments {
             let mut case = match is_path(argument) {
-                true => from_path(argument)?,
-                false => self.named(argument)?.clone(),
+                // A missing geometry is an error of a user's own case, and not a reason to leave it out.
+                true => {
+                    let path =
+                        fs::canonicalize(argument).map_err(|e| format!("{argument}: {e}"))?;
+                    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                    let argument = path.to_string_lossy().into_owned();
+                    Selected { name, argument, path, size: None, absent: None }
+                }
+                false => self.named(argument)?,
             };
             // A directory of results has the name of its case, so names must be unique.
             if selected.iter().any(|other| other.name == case.name) {
@@ -94,9 +96,9 @@ impl Catalogue {
     ///
     /// # Errors
     /// One sentence, if there is none, or if the catalogue cannot be read.
-    pub fn named(&self, name: &str) -> Result<&Selected, String> {
+    pub fn named(&self, name: &str) -> Result<Selected, String> {
         let cases = self.cases()?;
-        cases.iter().find(|case| case.name == name).ok_or_else(|| {
+        cases.iter().find(|case| case.name == name).cloned().ok_or_else(|| {
             if name.to_lowercase().ends_with(".stl") {
                 return format!(
                     "{name} is a geometry: give a case file, CASE.toml, with its name in `geometry` and a `spacing_min` (reference/DEFINITION.md, section 9)"
@@ -110,7 +112,7 @@ impl Catalogue {
             let near = near.map_or(String::new(), |near| format!("; the most similar name there is {}", near.name));
             format!(
                 "{name}: no such file or directory exists, nor a case of this name in {}{near}",
-                self.path.display()
+                self.0.display()
             )
         })
     }
@@ -122,50 +124,33 @@ impl Catalogue {
     pub fn case_file(&self, argument: &str, directory: &Path) -> Result<PathBuf, String> {
         match is_path(argument) {
             true => Ok(directory.join(argument)),
-            false => self.named(argument).map(|case| case.path.clone()),
+            false => self.named(argument).map(|case| case.path),
         }
     }
 
-    fn cases(&self) -> Result<&[Selected], String> {
-        let cases = self.cases.get_or_init(|| read(&self.path));
-        cases.as_deref().map_err(Clone::clone)
+    fn cases(&self) -> Result<Vec<Selected>, String> {
+        let wrong = |why: String| format!("{}: {why}", self.0.display());
+        let missing = "the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository";
+        let text = files::read_text(&self.0).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => wrong(missing.to_owned()),
+            _ => wrong(error.to_string()),
+        })?;
+        let file: CatalogueFile =
+            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let mut cases = file.case;
+        for case in &mut cases {
+            case.argument.clone_from(&case.name);
+            case.path = self.0.with_file_name(&case.path);
+            case.absent = missing_geometry(&case.path);
+            case.size.ok_or_else(|| wrong(format!("the case {} has no size", case.name)))?;
+        }
+        Ok(cases)
     }
 }
 
 /// Whether an argument is the path of a case file and not a name.
 fn is_path(argument: &str) -> bool {
     Path::new(argument).extension().is_some_and(|extension| extension == "toml")
-}
-
-/// A user's own case. A missing geometry is not recorded: that is an error of the case, and not a reason to
-/// leave it out.
-fn from_path(argument: &str) -> Result<Selected, String> {
-    let path = fs::canonicalize(argument).map_err(|error| format!("{argument}: {error}"))?;
-    Ok(Selected {
-        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        argument: path.to_string_lossy().into_owned(),
-        path,
-        ..Selected::default()
-    })
-}
-
-fn read(path: &Path) -> Result<Vec<Selected>, String> {
-    let wrong = |why: String| format!("{}: {why}", path.display());
-    let missing = "the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository";
-    let text = files::read_text(path).map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => wrong(missing.to_owned()),
-        _ => wrong(error.to_string()),
-    })?;
-    let file: CatalogueFile = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-    let directory = path.parent().unwrap_or(Path::new("."));
-    let mut cases = file.case;
-    for case in &mut cases {
-        case.argument.clone_from(&case.name);
-        case.path = directory.join(&case.path);
-        case.absent = missing_geometry(&case.path);
-        case.size.ok_or_else(|| wrong(format!("the case {} has no size", case.name)))?;
-    }
-    Ok(cases)
 }
 
 /// A sentence if the case file names a geometry file that does not exist. An unreadable case file is reported

@@ -79,11 +79,11 @@ impl Staging {
     pub fn inside(directory: &Path) -> io::Result<Self> {
         // An interrupt waits until the directory is known.
         let mut staged = publications();
-        let mut builder = tempfile::Builder::new();
-        let builder = builder.permissions(Permissions::from_mode(0o777));
         // Errors of `tempdir_in` name the temporary directory, which means nothing to the user.
         fs::metadata(directory)?;
-        let dir = builder.tempdir_in(directory).map_err(|error| error.kind())?;
+        let mut builder = tempfile::Builder::new();
+        let dir = builder.permissions(Permissions::from_mode(0o777)).tempdir_in(directory);
+        let dir = dir.map_err(|error| error.kind())?;
         staged.push(dir.path().to_owned());
         ::files::interrupt::stop_at(format_args!("staged"));
         Ok(Self(dir))
@@ -113,9 +113,7 @@ fn directory_of(path: &Path) -> &Path {
 
 /// The nearest directory above a path that exists.
 pub fn nearest_directory(path: &Path) -> &Path {
-    let above = path.ancestors().skip(1);
-    let named = above.map(|dir| if dir.as_os_str().is_empty() { Path::new(".") } else { dir });
-    named.into_iter().find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
+    path.ancestors().map(directory_of).find(|dir| dir.is_dir()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]

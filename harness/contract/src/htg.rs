@@ -29,7 +29,8 @@ pub use vtkhdf::tree::SIDE;
 /// A hyper-tree grid whose structure was read and is valid.
 #[derive(Debug)]
 pub struct TreeFile {
-    path: PathBuf,
+    /// Its path.
+    pub path: PathBuf,
     file: TreeReader,
     /// The root cube.
     pub root: Root,
@@ -66,7 +67,7 @@ impl TreeFile {
         let described = levels.last().map_or(0, |last| last.start);
         let split = Bits::read(&file, &file.split, described)?;
         let masked = Bits::read(&file, &file.masked, end)?;
-        if !split.are_disjoint(&masked) {
+        if split.0.iter().zip(&masked.0).any(|(split, masked)| split & masked != 0) {
             return Err(TreeError::Damaged("a node is masked and split".to_owned()));
         }
         let mut leaves = end - masked.ones(0..end);
@@ -82,11 +83,6 @@ impl TreeFile {
         }
         let (path, root) = (path.to_owned(), Root { origin, edge });
         Ok(Self { path, file, root, leaves, with_sides, levels, split, masked })
-    }
-
-    /// Its path.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
@@ -204,10 +200,5 @@ impl Bits {
     fn ones(&self, Range { start, end }: Range<u64>) -> u64 {
         let bits = |first: u64| self.get(first, (end - first).min(8) as u32).count_ones();
         (start..end).step_by(8).map(|first| u64::from(bits(first))).sum()
-    }
-
-    /// Whether no bit is set in both.
-    fn are_disjoint(&self, other: &Self) -> bool {
-        self.0.iter().zip(&other.0).all(|(a, b)| a & b == 0)
     }
 }

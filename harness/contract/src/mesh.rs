@@ -15,7 +15,7 @@ use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
 use crate::octant::Octant;
 use crate::tree::{Builder, Tree};
-use crate::word::{self, Side};
+use crate::word::{self, Order, Side};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fs;
@@ -116,7 +116,7 @@ impl Mesh {
         match &self.tree_file {
             Some(tree) => {
                 let read = tree.words(&mut |words| run(0, words));
-                read.map_err(|why| damaged_tree(tree.path(), &why))
+                read.map_err(|why| damaged_tree(&tree.path, &why))
             }
             None => merge(&self.parts, run),
         }
@@ -140,10 +140,12 @@ impl Mesh {
     ) -> Result<(), Failure> {
         let (mut order, mut visited) = (Order::default(), Ok(()));
         self.stream(&mut |part, words| {
-            visited = match words.iter().find_map(|&word| order.fault(word)) {
-                Some(why) => Err(self.not_linear(&why)),
-                None => visit(part, words),
-            };
+            let linear = words.iter().try_for_each(|&word| order.add(word));
+            let linear = linear.map_err(|why| {
+                let why = format!("not a linear oct-tree, because {why}: run harness audit on it");
+                Failure::about(&self.dir, why)
+            });
+            visited = linear.and_then(|()| visit(part, words));
             visited.is_ok()
         })?;
         visited
@@ -208,28 +210,24 @@ impl Mesh {
         Ok(found)
     }
 
-    /// The error of words that are not a linear oct-tree.
-    fn not_linear(&self, why: &str) -> Failure {
-        let why = format!("not a linear oct-tree, because {why}: run harness audit on it");
-        Failure::about(&self.dir, why)
-    }
-
     /// Refuses a case that was not meshed here, by its root, its surface level and its facets.
     ///
     /// # Errors
     /// If the mesh cannot be one of the case.
     pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
-        let stated = |root: Root, level: u8, geometry: Option<Geometry>| {
+        let stated = |Manifest { root, level_surface, .. }: &Manifest,
+                      geometry: Option<Geometry>| {
             let Root { origin: [x, y, z], edge } = root;
             let facets = geometry.map_or(String::new(), |Geometry { facets, digest }| {
                 format!(", with {facets} facets of the digest {digest}")
             });
-            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
+            format!(
+                "a root of edge {edge} at ({x}, {y}, {z}) and surface level {level_surface}{facets}"
+            )
         };
         let geometry = self.manifest.geometry;
-        let of_mesh = stated(self.manifest.root, self.manifest.level_surface, geometry);
-        let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
-        let of_case = stated(case.root, case.level_surface, geometry);
+        let of_mesh = stated(&self.manifest, geometry);
+        let of_case = stated(case, geometry.map(|_| Geometry::of(&case.facets_lattice)));
         if of_mesh == of_case {
             return Ok(());
         }
@@ -276,25 +274,6 @@ pub(crate) fn part_names(dir: &Path) -> Result<Vec<String>, Failure> {
     }
     names.sort_unstable();
     Ok(names)
-}
-
-/// The end of the leaves so far, as a Morton code.
-#[derive(Clone, Copy, Debug, Default)]
-struct Order(u64);
-
-impl Order {
-    /// Why a word does not follow the words before it in a linear oct-tree.
-    fn fault(&mut self, word: u64) -> Option<String> {
-        if let Some(why) = word::fault(word) {
-            return Some(format!("the word {word:#018x} is not a leaf: {why}"));
-        }
-        let begin = word::key(word);
-        if begin < self.0 {
-            return Some(format!("{} overlaps or precedes the leaf before it", word::octant(word)));
-        }
-        self.0 = begin + word::span(word::level(word));
-        None
-    }
 }
 
 /// Words per read: large enough for streaming, small enough for thousands of parts.

@@ -9,7 +9,9 @@ use std::sync::LazyLock;
 const SELF: usize = 13;
 
 /// Offsets of the 27 octants from the one in the middle, in edges.
-pub const OFFSETS: [[i32; 3]; 27] = offsets();
+pub static OFFSETS: LazyLock<[[i32; 3]; 27]> = LazyLock::new(|| {
+    array::from_fn(|i| [i as i32 % 3 - 1, i as i32 / 3 % 3 - 1, i as i32 / 9 - 1])
+});
 
 /// For each child and each of its 27 neighbours: the index of the neighbour's parent in the parent's
 /// neighbourhood, and the neighbour's digit.
@@ -25,18 +27,8 @@ static DESCENT: LazyLock<[[(usize, u8); 27]; 8]> = LazyLock::new(|| {
 });
 
 /// The index of the octant at an offset in edges.
-const fn index([x, y, z]: [i32; 3]) -> usize {
+fn index([x, y, z]: [i32; 3]) -> usize {
     (SELF as i32 + x + 3 * y + 9 * z) as usize
-}
-
-const fn offsets() -> [[i32; 3]; 27] {
-    let mut all = [[0; 3]; 27];
-    let mut i = 0;
-    while i < 27 {
-        all[i] = [i as i32 % 3 - 1, i as i32 / 3 % 3 - 1, i as i32 / 9 - 1];
-        i += 1;
-    }
-    all
 }
 
 /// The contents of an octant and of its neighbours.
@@ -102,7 +94,7 @@ impl Neighbourhood {
     pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Coarsest {
         let mut found = Coarsest { level: bound, cell: None };
         let edge = i64::from(self.octant.edge());
-        for (&handle, offset) in self.handles.iter().zip(&OFFSETS) {
+        for (&handle, offset) in self.handles.iter().zip(OFFSETS.iter()) {
             let corner: [i64; 3] = std::array::from_fn(|a| {
                 i64::from(self.octant.corner[a]) + i64::from(offset[a]) * edge
             });

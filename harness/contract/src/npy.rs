@@ -61,13 +61,9 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be read, or ends too early.
     pub fn read_at(&self, first: u64, words: &mut [u64]) -> Result<(), Failure> {
-        let mut bytes = vec![0; words.len() * 8];
-        let read = self.file.read_exact_at(&mut bytes, self.offset + 8 * first);
-        read.map_err(|error| Failure::about(&self.path, Failure::unreadable(error)))?;
-        for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(8)) {
-            *word = u64::from_le_bytes(chunk.try_into().expect("chunks of eight"));
-        }
-        Ok(())
+        let bytes = bytemuck::cast_slice_mut(words);
+        let read = self.file.read_exact_at(bytes, self.offset + 8 * first);
+        read.map_err(|error| Failure::about(&self.path, Failure::unreadable(error)))
     }
 
     /// All words.
@@ -75,8 +71,8 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be read.
     pub fn read_all(&self) -> Result<Vec<u64>, Failure> {
-        let mut words =
-            vec![0; usize::try_from(self.leaves).expect("a part fits the address space")];
+        let leaves = usize::try_from(self.leaves).expect("a part fits the address space");
+        let mut words = vec![0; leaves];
         self.read_at(0, &mut words)?;
         Ok(words)
     }
@@ -85,6 +81,7 @@ impl PartFile {
 /// The type and the dimensions in the npy header at the beginning of a file, and the header's length. It is read as NumPy writes it: a dictionary of Python, with its keys in
 /// alphabetical order.
 fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), String> {
+    const { assert!(cfg!(target_endian = "little"), "words are cast to bytes and back") };
     let wrong = |why: &str| why.to_owned();
     let [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, low, high, ..] = *head else {
         return Err(wrong("it is too short, or not of version 1"));
@@ -114,9 +111,7 @@ pub fn write(path: &Path, words: &[u64]) -> std::io::Result<()> {
 
 /// The bytes of a part file.
 pub fn bytes(words: &[u64]) -> Vec<u8> {
-    let mut bytes = header("<u8", &format!("({},)", words.len()));
-    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-    bytes
+    [&header("<u8", &format!("({},)", words.len())), bytemuck::cast_slice(words)].concat()
 }
 
 /// An npy header of version 1.0, padded to a multiple of 64 bytes as NumPy does.

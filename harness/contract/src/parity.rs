@@ -61,7 +61,13 @@ fn crosses(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     if edges.iter().filter(crossed).count() != 1 {
         return None;
     }
-    is_positive(facet, point, axis)
+    let normal = normal(facet);
+    let height = dot(normal, difference(point, facet[0]));
+    let perturbed = [height, normal[(axis + 1) % 3].into(), normal[(axis + 2) % 3].into()];
+    // None if the plane contains the perturbed point, too.
+    let sign = perturbed.into_iter().map(i128::signum).find(|&s| s != 0)?;
+    // The plane lies in the positive direction iff the height decreases in that direction.
+    Some(sign != i128::from(normal[axis].signum()))
 }
 
 /// Whether the edge crosses the horizontal line through the perturbed point, to the right of the point. The
@@ -74,17 +80,6 @@ fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
     let (low, high) = if a[1] < b[1] { (a, b) } else { (b, a) };
     // The point is left of the upward edge iff the turn from the edge to the point is counter-clockwise.
     (high[0] - low[0]) * (point[1] - low[1]) - (high[1] - low[1]) * (point[0] - low[0]) > 0
-}
-
-/// Whether a line that crosses the facet does so in the positive direction from the point; `None` if the plane
-/// contains the point.
-fn is_positive(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
-    let normal = normal(facet);
-    let height = dot(normal, difference(point, facet[0]));
-    let perturbed = [height, normal[(axis + 1) % 3].into(), normal[(axis + 2) % 3].into()];
-    let sign = perturbed.into_iter().map(i128::signum).find(|&s| s != 0)?;
-    // The plane lies in the positive direction iff the height decreases in that direction.
-    Some(sign != i128::from(normal[axis].signum()))
 }
 
 impl Grid {

@@ -32,9 +32,10 @@ pub struct Body {
 /// Reads a binary or ASCII STL file into memory.
 ///
 /// # Errors
-/// If the file cannot be read, or is not an STL file.
+/// A sentence that begins with the path, if the file cannot be read, or is not an STL file.
 pub fn read(path: &Path) -> Result<Body, Failure> {
-    parse(&files::read(path).map_err(Failure::unreadable)?)
+    let body = files::read(path).map_err(Failure::unreadable).and_then(|bytes| parse(&bytes));
+    body.map_err(|why| Failure::input(format!("{} {why}", path.display())))
 }
 
 /// Parses the bytes of an STL file.

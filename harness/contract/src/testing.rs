@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
 
+use crate::import::cells::Cells;
 use crate::lattice::{FacetLattice, Root};
 use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Tree};
@@ -107,6 +108,16 @@ pub fn leaf_set(parts: Vec<Vec<u64>>) -> LeafSet {
     let root = Root { origin: [0.0; 3], edge: 8.0 };
     let empty = Manifest::without_leaves(Tree::Final, root, "test".to_owned());
     LeafSet::new(empty, Vec::new()).with_parts(parts)
+}
+
+/// The cells of leaf words.
+pub fn cells_of(words: &[u64], root: &Root) -> Cells {
+    let mut cells = Cells::default();
+    for octant in words.iter().map(|&w| word::octant(w)) {
+        cells.push(root.to_user(octant.bounds().0), root.edge_of(octant.level));
+    }
+    cells.sides = Some(words.iter().map(|&w| word::side(w)).collect());
+    cells
 }
 
 /// The octants of the leaves and all their ancestors, without duplicates.

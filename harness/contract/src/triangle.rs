@@ -39,8 +39,10 @@ impl Triangle {
         if self.corners.iter().any(within) {
             return true;
         }
-        // If both ends of the diagonal are on one side of the plane, so is the box.
-        let (near, far) = self.diagonal(low, high);
+        // If both ends of the diagonal along which the height increases most are on one side of the plane, so is the box.
+        let up = |a: usize| self.normal[a] >= 0;
+        let near = std::array::from_fn(|a| if up(a) { low[a] } else { high[a] });
+        let far = std::array::from_fn(|a| if up(a) { high[a] } else { low[a] });
         let above = |point| dot(self.normal, point) - self.height;
         if above(near) > 0 || above(far) < 0 {
             return false;
@@ -48,14 +50,6 @@ impl Triangle {
         let [a, b, c] = self.corners;
         [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| segment_meets(from, to, low, high))
             || self.pierced(near, far)
-    }
-
-    /// The ends of the box diagonal along which the height increases most.
-    fn diagonal(&self, low: [i64; 3], high: [i64; 3]) -> ([i64; 3], [i64; 3]) {
-        let up = |a: usize| self.normal[a] >= 0;
-        let near = std::array::from_fn(|a| if up(a) { low[a] } else { high[a] });
-        let far = std::array::from_fn(|a| if up(a) { high[a] } else { low[a] });
-        (near, far)
     }
 
     /// Whether the line through two points on opposite sides of the plane intersects the triangle: seen along

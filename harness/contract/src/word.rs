@@ -108,6 +108,27 @@ pub fn fault(word: u64) -> Option<String> {
     }
 }
 
+/// The end of the leaves so far, as a Morton code.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Order(u64);
+
+impl Order {
+    /// Adds the next word of a linear oct-tree.
+    ///
+    /// # Errors
+    /// Why the word is none.
+    pub fn add(&mut self, word: u64) -> Result<(), String> {
+        if let Some(why) = fault(word) {
+            return Err(format!("the word {word:#018x} is not a leaf: {why}"));
+        }
+        if key(word) < self.0 {
+            return Err(format!("{} overlaps or precedes the leaf before it", octant(word)));
+        }
+        self.0 = key(word) + span(level(word));
+        Ok(())
+    }
+}
+
 /// Packs a leaf.
 pub fn encode(leaf: &Leaf) -> u64 {
     key_of(leaf.octant.corner) << 7 | u64::from(leaf.octant.level) << 2 | leaf.side as u64

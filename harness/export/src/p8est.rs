@@ -42,7 +42,11 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let mut ends = vec![0; export.mesh.parts.len().max(1)];
     let start = |ends: &[u64]| {
         let mut bytes = connectivity(&export.mesh.manifest.root);
-        bytes.extend(header(ends));
+        // Format; bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; parts.
+        let header = [FORMAT, 4, QUADRANT_STRUCT_BYTES, 1, 1, ends.len() as u64];
+        // The end of the last part is that of the only tree.
+        let numbers = [&header[..], ends, &ends[ends.len() - 1..]].concat();
+        bytes.extend_from_slice(bytemuck::cast_slice(&numbers));
         pad(&mut bytes);
         bytes
     };
@@ -56,8 +60,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
             ends[part as usize] += 1;
             written.add(&octant, data != FILLER);
             let Octant { corner: [x, y, z], level } = octant;
-            let numbers = [x, y, z, level.into()].map(u32::to_le_bytes);
-            out.write_all(numbers.as_flattened()).map_err(named)?;
+            let numbers = [x, y, z, level.into()];
+            out.write_all(bytemuck::bytes_of(&numbers)).map_err(named)?;
             out.write_all(&[data]).map_err(named)
         })?;
         written.check_invariants(export, leaves);
@@ -128,12 +132,11 @@ fn connectivity(root: &Root) -> Vec<u8> {
     let opposite = root.to_user([UNITS_PER_EDGE; 3]);
     let is_lost = opposite[0] - root.origin[0] != root.edge;
     let attribute = if is_lost { &root.edge.to_le_bytes()[..] } else { &[] };
-    numbers(&mut bytes, &[FORMAT, 4, 8, 1, 0, 0, 0, 0, attribute.len() as u64, 0]);
+    let numbers = [FORMAT, 4, 8, 1, 0, 0, 0, 0, attribute.len() as u64, 0];
+    bytes.extend_from_slice(bytemuck::bytes_of(&numbers));
     for vertex in 0..8 {
         let corner = std::array::from_fn(|a| (vertex >> a & 1) * UNITS_PER_EDGE);
-        for coordinate in root.to_user(corner) {
-            bytes.extend(coordinate.to_le_bytes());
-        }
+        bytes.extend_from_slice(bytemuck::bytes_of(&root.to_user(corner)));
     }
     // Vertices of the tree; its neighbours across faces, which are itself; their faces; offsets of no edges and corners.
     (0..8u32).for_each(|vertex| bytes.extend(vertex.to_le_bytes()));
@@ -143,21 +146,6 @@ fn connectivity(root: &Root) -> Vec<u8> {
     bytes.extend([0; 2 * 4]);
     pad(&mut bytes);
     bytes
-}
-
-/// The header of the forest, given the number of quadrants up to the end of each part.
-fn header(ends: &[u64]) -> Vec<u8> {
-    let quadrants = ends[ends.len() - 1];
-    let mut bytes = Vec::new();
-    // Bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; parts.
-    numbers(&mut bytes, &[FORMAT, 4, QUADRANT_STRUCT_BYTES, 1, 1, ends.len() as u64]);
-    numbers(&mut bytes, ends);
-    numbers(&mut bytes, &[quadrants]);
-    bytes
-}
-
-fn numbers(bytes: &mut Vec<u8>, numbers: &[u64]) {
-    numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
 }
 
 /// Appends zero bytes up to a multiple of [`ALIGNMENT`].

@@ -1,6 +1,6 @@
 //! The position of the body in the root.
 
-use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::lattice::UNITS_PER_EDGE;
 use serde::Serialize;
 
 use super::finding::{Finding, Kind, Place};
@@ -29,8 +29,10 @@ pub fn extent(input: &Input) -> Extent {
 /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.
 pub fn findings(input: &Input, first: usize) -> [Finding; 2] {
     let mut findings = [Kind::OutsideRoot, Kind::TouchingRoot].map(Finding::new);
-    for (i, facet) in input.lattice.iter().enumerate() {
-        let at = match margin(facet) {
+    for (i, facet) in input.facets_lattice.iter().enumerate() {
+        let corners = facet.as_flattened().iter();
+        let margin = corners.map(|&c| c.min(UNITS_PER_EDGE - c)).fold(i64::MAX, i64::min);
+        let at = match margin {
             ..0 => 0,
             0 => 1,
             1.. => continue,
@@ -38,10 +40,4 @@ pub fn findings(input: &Input, first: usize) -> [Finding; 2] {
         findings[at].add(first, || Place::new(vec![i as u32], input.centroid(i as u32)));
     }
     findings
-}
-
-/// The least distance of a corner to a face of the root, negative beyond it.
-fn margin(facet: &FacetLattice) -> i64 {
-    let corners = facet.as_flattened().iter();
-    corners.map(|&c| c.min(UNITS_PER_EDGE - c)).fold(i64::MAX, i64::min)
 }

@@ -91,11 +91,6 @@ impl Finding {
 }
 
 impl Kind {
-    /// The heading of the kind's row.
-    pub fn title(self) -> &'static str {
-        self.row().0
-    }
-
     /// Whether every occurrence can change the mesh's region. Openings and intersections are judged one by one.
     pub fn changes_region(self, keep: Keep) -> bool {
         match self {
@@ -108,7 +103,7 @@ impl Kind {
 
     /// Heading and effect on the mesh.
     #[rustfmt::skip]
-    fn row(self) -> (&'static str, &'static str) {
+    pub(super) fn row(self) -> (&'static str, &'static str) {
         match self {
             Self::Openings => ("openings",
                 "Inside and outside become one component where a cell fits through."),
@@ -191,8 +186,9 @@ mod tests {
     fn input(with_cell: bool) -> Input {
         let edge = f64::from(CELLS_PER_EDGE);
         let root = Some(Root { origin: [0.0; 3], edge });
-        let requested = Requested { spacing_min: with_cell.then_some(4.0), root, root_scale: None };
-        Input::new(vec![[[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]]], &requested).unwrap()
+        let requested =
+            Requested { spacing_min: with_cell.then_some(4.0), root, ..Requested::default() };
+        Input::new(vec![[[8.0; 3], [16.0, 8.0, 8.0], [8.0, 16.0, 8.0]]], requested).unwrap()
     }
 
     /// The meaning of places of which the first is this wide.
@@ -269,7 +265,7 @@ mod tests {
         meanings.sort();
         meanings.dedup();
         assert_eq!(meanings.len(), kinds.len() + 1);
-        let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.title()).collect();
+        let titles: std::collections::HashSet<_> = kinds.iter().map(|kind| kind.row().0).collect();
         assert_eq!(titles.len(), kinds.len());
         let changing = |keep| {
             kinds.into_iter().filter(move |kind| kind.changes_region(keep)).collect::<Vec<_>>()

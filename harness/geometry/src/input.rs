@@ -1,14 +1,17 @@
 //! A geometry with its root and the cell's edge length, from an STL file or from a case.
 
+use std::ops::Deref;
 use std::path::Path;
 
 use contract::case::{Case, Facet};
-use contract::lattice::{FacetLattice, Root};
+use contract::failure::Failure;
+use contract::lattice::Root;
 use contract::manifest::Keep;
-use contract::stl::{self, Body, Solid};
+use contract::stl;
+use serde::Serialize;
 
-/// Root and spacing given by the user, in the user's units. They take precedence over a case file.
-#[derive(Clone, Copy, Debug, Default)]
+/// What a case file would have, in the user's units. It takes precedence over that of a case.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Requested {
     /// Upper bound on the edge length of a cell at the surface.
     pub spacing_min: Option<f64>,
@@ -16,54 +19,50 @@ pub struct Requested {
     pub root: Option<Root>,
     /// Edge length of the root, in longest edges of the bounding box.
     pub root_scale: Option<f64>,
+    /// The side that is kept.
+    pub keep: Keep,
 }
 
 /// A geometry, ready for diagnosis.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// The facets as read, at most 2^32 / 3.
-    pub facets: Vec<Facet>,
-    /// The facets on the lattice.
-    pub lattice: Vec<FacetLattice>,
-    /// The solids of the file; none for a generated body.
-    pub solids: Vec<Solid>,
-    /// The root cube.
-    pub root: Root,
+    /// A case of at least one and at most 2^31 / 3 facets, without boxes and seeds.
+    case: Case,
     /// Edge length of the cells at the surface, in the user's units; none if no spacing was given.
     pub cell: Option<f64>,
-    /// The side that the case keeps; outside for an STL file.
-    pub keep: Keep,
+}
+
+impl Deref for Input {
+    type Target = Case;
+
+    fn deref(&self) -> &Case {
+        &self.case
+    }
 }
 
 impl Input {
     /// Reads an STL file, or a case file if the name ends in `.toml`.
     ///
     /// # Errors
-    /// One sentence if a file cannot be read or the geometry cannot be meshed.
-    pub fn read(path: &Path, requested: &Requested) -> Result<Self, String> {
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-            return Self::from_case(path, requested);
-        }
-        let named = |error: String| format!("{}: {error}", path.display());
-        let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
-        let Body { facets, solids } = body;
-        let input = Self::new(facets, requested).map_err(named)?;
-        Ok(Self { solids, ..input })
-    }
-
-    fn from_case(path: &Path, requested: &Requested) -> Result<Self, String> {
-        let case = Case::read(path).map_err(|error| error.to_string())?;
-        let cell = case.root.edge / f64::from(1u32 << case.level_surface);
-        let explicit =
-            (requested.root.is_none() && requested.root_scale.is_none()).then_some(case.root);
-        let requested = Requested {
-            spacing_min: requested.spacing_min.or(Some(cell)),
-            root: requested.root.or(explicit),
-            ..*requested
+    /// If a file cannot be read or the geometry cannot be meshed.
+    pub fn read(path: &Path, mut requested: Requested) -> Result<Self, Failure> {
+        let (facets, solids) = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            let case = Case::read(path)?;
+            let cell = case.root.edge_of(case.level_surface);
+            requested.keep = case.keep;
+            requested.spacing_min = requested.spacing_min.or(Some(cell));
+            if requested.root_scale.is_none() {
+                requested.root = requested.root.or(Some(case.root));
+            }
+            (case.facets, case.solids)
+        } else {
+            let body = stl::read(path)?;
+            (body.facets, body.solids)
         };
-        let input = Self::new(case.facets, &requested)
-            .map_err(|error| format!("{}: {error}", path.display()))?;
-        Ok(Self { keep: case.rules.keep, ..input })
+        let input = Self::new(facets, requested);
+        let mut input = input.map_err(|error| Failure::about(path, error))?;
+        input.case.solids = solids;
+        Ok(input)
     }
 
     /// A geometry in memory.
@@ -71,7 +70,7 @@ impl Input {
     /// # Errors
     /// One sentence if the geometry cannot be meshed: it has no facets or too many, a vertex is not finite or too
     /// far outside the root, or root and spacing contradict the definition.
-    pub fn new(facets: Vec<Facet>, requested: &Requested) -> Result<Self, String> {
+    pub fn new(facets: Vec<Facet>, requested: Requested) -> Result<Self, String> {
         if facets.is_empty() {
             return Err("the geometry has no facets".to_owned());
         }
@@ -79,24 +78,11 @@ impl Input {
             return Err(format!("{} facets exceed the limit of {FACETS_MAX}", facets.len()));
         }
         // A spacing above every root edge stands for level 0.
-        let spacing = requested.spacing_min.unwrap_or(f64::MAX);
-        let mut text = format!("spacing_min = {spacing:?}\n");
-        if let Some(scale) = requested.root_scale {
-            text += &format!("root_scale = {scale:?}\n");
-        }
-        if let Some(Root { origin, edge }) = requested.root {
-            text += &format!("[root]\norigin = {origin:?}\nedge = {edge:?}\n");
-        }
-        let case = Case::from_parts(&text, facets)?;
-        let cell = case.root.edge / f64::from(1u32 << case.level_surface);
-        Ok(Self {
-            facets: case.facets,
-            lattice: case.facets_lattice,
-            solids: Vec::new(),
-            root: case.rules.root,
-            cell: requested.spacing_min.map(|_| cell),
-            keep: case.rules.keep,
-        })
+        let spacing_min = requested.spacing_min.or(Some(f64::MAX));
+        let text = toml::to_string(&Requested { spacing_min, ..requested });
+        let case = Case::from_parts(&text.expect("numbers are representable in TOML"), facets)?;
+        let cell = requested.spacing_min.map(|_| case.root.edge_of(case.level_surface));
+        Ok(Self { case, cell })
     }
 
     /// The centroid of a facet, in the user's units.
@@ -119,10 +105,10 @@ mod tests {
     fn root_and_cell_follow_the_definition() {
         let requested =
             Requested { spacing_min: Some(0.3), root_scale: Some(2.0), ..Requested::default() };
-        let input = Input::new(vec![FACET], &requested).unwrap();
+        let input = Input::new(vec![FACET], requested).unwrap();
         assert_eq!(input.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
         assert_eq!(input.cell, Some(0.25));
-        assert_eq!(Input::new(vec![FACET], &Requested::default()).unwrap().cell, None);
+        assert_eq!(Input::new(vec![FACET], Requested::default()).unwrap().cell, None);
     }
 
     #[test]
@@ -137,7 +123,7 @@ mod tests {
         );
         std::fs::write(&path, text).unwrap();
         let read = |requested| {
-            let input = Input::read(&path, &requested).unwrap();
+            let input = Input::read(&path, requested).unwrap();
             assert_eq!((input.keep, input.facets.len()), (Keep::Inside, 12));
             (input.root, input.cell)
         };
@@ -156,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_geometry_that_cannot_be_meshed_is_refused() {
-        let why = |facets: Vec<Facet>, requested| Input::new(facets, &requested).unwrap_err();
+        let why = |facets: Vec<Facet>, requested| Input::new(facets, requested).unwrap_err();
         let mut broken = FACET;
         broken[1][2] = f32::NAN;
         let root = Some(Root { origin: [0.0; 3], edge: 4.0 });
@@ -166,7 +152,8 @@ mod tests {
         let both = Requested { root, root_scale: Some(2.0), ..Requested::default() };
         assert!(why(vec![FACET], both).contains("exclude"));
         for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12] {
-            why(vec![FACET], Requested { spacing_min: Some(spacing), root, root_scale: None });
+            let spacing_min = Some(spacing);
+            why(vec![FACET], Requested { spacing_min, root, ..Requested::default() });
         }
     }
 }

@@ -19,10 +19,10 @@ const PAIRS_MAX: usize = 1 << 22;
 
 /// Pairs of facets whose interiors intersect. Degenerate facets and pairs of facets with the same vertices are left out.
 pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
-    let facet = |f: u32| &input.lattice[f as usize];
+    let facet = |f: u32| &input.facets_lattice[f as usize];
     let are_same = |a: &FacetLattice, b: &FacetLattice| a.iter().all(|v| b.contains(v));
     let mut pairs: Vec<(u32, u32)> = Vec::new();
-    for f in (0..input.lattice.len() as u32).filter(|&f| !is_degenerate(facet(f))) {
+    for f in (0..input.facets_lattice.len() as u32).filter(|&f| !is_degenerate(facet(f))) {
         for g in tree.overlapping(f).into_iter().filter(|&g| f < g && !is_degenerate(facet(g))) {
             let is_pair = !are_same(facet(f), facet(g)) && intersect(facet(f), facet(g));
             pairs.extend(is_pair.then_some((f, g)));
@@ -93,7 +93,7 @@ fn range(facet: &FacetLattice, from: [i64; 3], axis: [i64; 3]) -> (i128, i128) {
 
 /// The centre of the common part of the bounding boxes.
 fn place(input: &Input, f: u32, g: u32) -> Place {
-    let (a, b) = (&input.lattice[f as usize], &input.lattice[g as usize]);
+    let (a, b) = (&input.facets_lattice[f as usize], &input.facets_lattice[g as usize]);
     let middle = std::array::from_fn(|x| {
         let low = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MAX, i64::min);
         let high = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MIN, i64::max);

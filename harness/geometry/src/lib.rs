@@ -26,24 +26,46 @@ mod width;
 use edges::Edges;
 use finding::Finding;
 use input::Input;
-use report::Diagnosis;
+use report::{Diagnosis, SCHEMA};
 use shells::Shells;
 use tree::FacetTree;
 
 /// Diagnoses a geometry and lists the first places of each finding. The counts do not depend on the order of the facets or of a facet's vertices.
 pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let edges = Edges::new(&input.facets);
-    let shells = Shells::new(&edges, &input.lattice);
+    let shells = Shells::new(&edges, &input.facets_lattice);
     let mut findings: Vec<Finding> = Vec::new();
     findings.push(openings::openings(input, &edges, first));
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     findings.push(edges::duplicates(input, &edges, first));
-    let tree = FacetTree::new(&input.lattice);
+    let tree = FacetTree::new(&input.facets_lattice);
     findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
     }
     findings.extend(extent::findings(input, first));
-    Diagnosis::new(input, &edges, &shells.all, findings)
+    for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
+        if finding.kind.changes_region(input.keep) {
+            finding.count_changing = finding.count;
+        }
+        finding.meaning = finding::meaning(finding, input);
+    }
+    let closed = shells.all.iter().filter(|shell| shell.is_closed).count() as u64;
+    let of_shells = shells.all.iter().map(|shell| u64::from(shell.facets)).sum();
+    let diagnosis = Diagnosis {
+        schema: SCHEMA,
+        facets: input.facets.len() as u64,
+        vertices: edges.points.len() as u64,
+        edges: edges.counts(),
+        solids: input.solids.clone(),
+        shells: report::Shells { count: shells.all.len() as u64, closed, facets: of_shells },
+        root: input.root,
+        cell: input.cell,
+        extent: extent::extent(input),
+        changes_region: findings.iter().any(|finding| finding.count_changing > 0),
+        findings,
+    };
+    diagnosis.check_invariants();
+    diagnosis
 }

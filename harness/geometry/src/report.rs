@@ -12,11 +12,9 @@ use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::stl::Solid;
 use serde::Serialize;
 
-use super::edges::{EdgeCounts, Edges};
-use super::extent::{self, Extent};
-use super::finding::{self, Finding, Kind};
-use super::input::Input;
-use super::shells::Shell;
+use super::edges::EdgeCounts;
+use super::extent::Extent;
+use super::finding::{Finding, Kind};
 
 /// Name and version of the JSON form.
 pub const SCHEMA: &str = "octree-geometry/4";
@@ -60,37 +58,6 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    pub(super) fn new(
-        input: &Input,
-        edges: &Edges,
-        shells: &[Shell],
-        mut findings: Vec<Finding>,
-    ) -> Self {
-        for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
-            if finding.kind.changes_region(input.keep) {
-                finding.count_changing = finding.count;
-            }
-            finding.meaning = finding::meaning(finding, input);
-        }
-        let closed = shells.iter().filter(|shell| shell.is_closed).count() as u64;
-        let of_shells = shells.iter().map(|shell| u64::from(shell.facets)).sum();
-        let diagnosis = Self {
-            schema: SCHEMA,
-            facets: input.facets.len() as u64,
-            vertices: edges.points.len() as u64,
-            edges: edges.counts(),
-            solids: input.solids.clone(),
-            shells: Shells { count: shells.len() as u64, closed, facets: of_shells },
-            root: input.root,
-            cell: input.cell,
-            extent: extent::extent(input),
-            changes_region: findings.iter().any(|finding| finding.count_changing > 0),
-            findings,
-        };
-        diagnosis.check_invariants();
-        diagnosis
-    }
-
     /// Asserts the invariants.
     ///
     /// # Panics
@@ -168,7 +135,7 @@ mod tests {
     use super::*;
     use crate::diagnose;
     use crate::finding::Place;
-    use crate::input::Requested;
+    use crate::input::{Input, Requested};
     use geometries::{Generator, Shape};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -180,8 +147,9 @@ mod tests {
         facets.push(facets[100]);
         facets[200].swap(0, 1);
         let root = Root { origin: [0.0; 3], edge: 8.0 };
-        let requested = Requested { spacing_min: Some(4.0), root: Some(root), root_scale: None };
-        let right = diagnose(&Input::new(facets, &requested).unwrap(), 5);
+        let requested =
+            Requested { spacing_min: Some(4.0), root: Some(root), ..Requested::default() };
+        let right = diagnose(&Input::new(facets, requested).unwrap(), 5);
         let index = |kind| right.findings.iter().position(|f| f.kind == kind).unwrap();
         let [openings, walls, winding] =
             [Kind::Openings, Kind::ThinWalls, Kind::Winding].map(index);

@@ -53,7 +53,7 @@ pub fn sheets(
     let unit = input.root.edge / UNITS_PER_EDGE as f64;
     [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
         let may_be = |a: u32, b: u32| {
-            let [p, q] = [a, b].map(|facet| shells.of(facet as usize));
+            let [p, q] = [a, b].map(|facet| shells.of[facet as usize]);
             kind == Kind::ThinGaps || !shells.are_different_solids(p, q)
         };
         let mut hits = hits(tree, edges, side, cell / unit, may_be);

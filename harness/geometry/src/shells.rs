@@ -37,10 +37,6 @@ impl Shell {
         }
     }
 
-    fn is_wound_inward(&self) -> bool {
-        self.is_oriented && self.volume_sixfold < 0
-    }
-
     /// Whether the bounding box lies in the interior of that of the other shell.
     fn may_be_in(&self, other: &Self) -> bool {
         let (inner, outer) = (self.bounds, other.bounds);
@@ -54,7 +50,7 @@ pub struct Shells {
     /// All shells, in the order of their first facets.
     pub all: Vec<Shell>,
     /// The index of every facet's shell; [`u32::MAX`] for a facet with a repeated vertex, which belongs to none.
-    of: Vec<u32>,
+    pub of: Vec<u32>,
 }
 
 impl Shells {
@@ -95,11 +91,6 @@ impl Shells {
         Self { all, of }
     }
 
-    /// The index of a facet's shell; [`u32::MAX`] for a facet that belongs to none.
-    pub fn of(&self, facet: usize) -> u32 {
-        self.of[facet]
-    }
-
     /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
     pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
         let shell = |index: u32| self.all.get(index as usize);
@@ -119,13 +110,17 @@ impl Shells {
             let around: Vec<usize> =
                 closed().filter(|(_, other)| shell.may_be_in(other)).map(|(i, _)| i).collect();
             let facet = shell.facet_first;
-            let corner = input.lattice[facet as usize][0];
+            let corner = input.facets_lattice[facet as usize][0];
             let mut contains = |other: &&usize| {
-                let interior = interiors.entry(**other);
-                let interior = interior.or_insert_with(|| self.interior(**other as u32, input));
+                let interior = interiors.entry(**other).or_insert_with(|| {
+                    let facets = input.facets_lattice.iter().zip(&self.of);
+                    let own = facets.filter(|(_, of)| **of as usize == **other);
+                    Parity::new(&own.map(|(facet, _)| *facet).collect::<Vec<_>>())
+                });
                 interior.inside(corner) == [true; 6]
             };
-            let at = match shell.is_wound_inward() {
+            let is_wound_inward = shell.is_oriented && shell.volume_sixfold < 0;
+            let at = match is_wound_inward {
                 true => usize::from(!around.is_empty()),
                 false if around.iter().filter(&mut contains).count() % 2 == 1 => {
                     findings[1].count_changing += u64::from(input.keep != Keep::Outside);
@@ -136,11 +131,5 @@ impl Shells {
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
         findings
-    }
-
-    /// The interior of a shell.
-    fn interior(&self, shell: u32, input: &Input) -> Parity {
-        let of_shell = input.lattice.iter().zip(&self.of).filter(|(_, of)| **of == shell);
-        Parity::new(&of_shell.map(|(facet, _)| *facet).collect::<Vec<_>>())
     }
 }

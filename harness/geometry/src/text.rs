@@ -51,7 +51,7 @@ impl Diagnosis {
             0 => String::new(),
             changing => format!("; {changing} can change the mesh's region"),
         };
-        writeln!(f, "\n{}: {least}{count}{effect}\n  {meaning}", kind.title())?;
+        writeln!(f, "\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0)?;
         for Place { facets, at, width } in places {
             let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
             let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };

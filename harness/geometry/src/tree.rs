@@ -34,26 +34,20 @@ impl FacetTree {
 
     /// Distance from a point to the nearest facet; infinite without facets.
     pub fn distance(&self, at: Point) -> f64 {
-        self.nearest(at).map_or(f64::INFINITY, |(_, distance)| distance)
-    }
-
-    /// A nearest facet and its distance.
-    pub fn nearest(&self, at: Point) -> Option<(u32, f64)> {
-        self.nearest_by(at, at, |facet| from_point(at, facet))
+        self.least(at, at, |facet| from_point(at, facet))
     }
 
     /// Distance to the nearest facet from a square that none enters; infinite without facets. The square has its corners in order
     /// around it, and lies in a plane normal to an axis.
     pub fn distance_of_square(&self, corners: &[Point; 4]) -> f64 {
         let (low, high) = (corners[0].min(corners[2]), corners[0].max(corners[2]));
-        let nearest = self.nearest_by(low, high, |facet| {
+        self.least(low, high, |facet| {
             let of_corners = corners.iter().map(|&corner| from_point(corner, facet));
             let of_vertices = facet.vertices().iter().map(|v| v.distance(v.clamp(low, high)));
             let edges = (0..4).map(|i| Segment::new(corners[i], corners[(i + 1) % 4]));
             let of_edges = edges.map(|edge| from_edges(&edge, facet));
             of_corners.chain(of_vertices).chain(of_edges).fold(f64::INFINITY, f64::min)
-        });
-        nearest.map_or(f64::INFINITY, |(_, distance)| distance)
+        })
     }
 
     /// The facets no farther than `radius`, each with its distance, nearest first.
@@ -97,18 +91,14 @@ impl FacetTree {
         (first, least)
     }
 
-    /// The facet nearest to anything in a box, by its distance from a triangle.
-    fn nearest_by(
-        &self,
-        low: Point,
-        high: Point,
-        distance: impl Fn(&Triangle) -> f64,
-    ) -> Option<(u32, f64)> {
+    /// The least distance of a facet to something in a box.
+    fn least(&self, low: Point, high: Point, distance: impl Fn(&Triangle) -> f64) -> f64 {
         let from_box = |node: &BvhNode, _| {
             (node.mins() - high).max(low - node.maxs()).max(Point::ZERO).length()
         };
-        self.boxes
-            .find_best(f64::INFINITY, from_box, |facet, _| Some(distance(self.triangle(facet))))
+        let of_facet = |facet, _| Some(distance(self.triangle(facet)));
+        let nearest = self.boxes.find_best(f64::INFINITY, from_box, of_facet);
+        nearest.map_or(f64::INFINITY, |(_, distance)| distance)
     }
 }
 

@@ -1,91 +1,46 @@
-//! The free width of an opening: the least width of the convex hull of its points, projected on the plane that they span. A ball that is
-//! wider does not pass through a flat opening.
+//! The free width of an opening: the least distance of two parallel lines that enclose its points, projected on the plane that they span.
+//! A ball that is wider does not pass through a flat opening.
 
 use super::tree::Point;
 
-/// Of more vertices of a hull, only some are used, evenly spread.
-const VERTICES_MAX: usize = 1024;
+/// Directions on either side of the middle one that are tried at once.
+const STEPS: i32 = 200;
+/// Times that directions are tried, the next time between the neighbours of the best. The first leaves an error of 4 % at most; the
+/// others make it small where the best direction is not one of two that are nearly as good.
+const ROUNDS: usize = 4;
 
-/// The width of a set of at least one point.
+/// The width of a set of at least one point, or slightly more.
 pub fn width(points: &[[f64; 3]]) -> f64 {
     let points: Vec<Point> = points.iter().map(|&p| Point::from(p)).collect();
-    let (from, to) = farthest(&points);
-    let diameter = from.distance(to);
-    if diameter == 0.0 {
-        return 0.0;
-    }
-    let u = (to - from) / diameter;
-    let across = |p: &Point| (*p - from) - (*p - from).dot(u) * u;
-    let far = points.iter().map(across).max_by(|a, b| a.length().total_cmp(&b.length()));
-    let far = far.expect("at least one point");
-    let height = far.length();
-    // Rounding leaves points of one line at a distance from it.
-    if height <= 1e-12 * diameter {
-        return 0.0;
-    }
-    let v = far / height;
-    let flat = points.iter().map(|p| [(*p - from).dot(u), (*p - from).dot(v)]).collect();
-    width_of_hull(&hull(flat), diameter)
-}
-
-/// Two points neither of which has a farther one than the other.
-fn farthest(points: &[Point]) -> (Point, Point) {
-    let from = |p: Point| {
-        let farthest = points.iter().max_by(|a, b| p.distance(**a).total_cmp(&p.distance(**b)));
-        *farthest.expect("at least one point")
+    let farthest = |offset: &dyn Fn(Point) -> Point| {
+        let offsets = points.iter().map(|&p| offset(p));
+        offsets.max_by(|a, b| a.length().total_cmp(&b.length())).expect("at least one point")
     };
-    let (mut p, mut q) = (points[0], from(points[0]));
-    loop {
-        let next = from(q);
-        if next.distance(q) <= p.distance(q) {
-            return (p, q);
-        }
-        (p, q) = (q, next);
+    let from = points[0] + farthest(&|p| p - points[0]);
+    let along = farthest(&|p| p - from);
+    let u = along.normalize_or_zero();
+    let across = farthest(&|p| (p - from).reject_from_normalized(u));
+    let (length, height) = (along.length(), across.length());
+    // Rounding leaves points of one line at a distance from it.
+    if height <= 1e-12 * length {
+        return 0.0;
     }
-}
-
-/// The convex hull, counter-clockwise (Andrew's monotone chain).
-fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    points.dedup();
-    let mut hull: Vec<[f64; 2]> = Vec::new();
-    let forward: Vec<_> = points.clone();
-    points.reverse();
-    for chain in [forward, points] {
-        let start = hull.len();
-        for p in chain {
-            while hull.len() >= start + 2
-                && turn(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0.0
-            {
-                hull.pop();
-            }
-            hull.push(p);
-        }
-        hull.pop();
-    }
-    hull
-}
-
-/// The least distance of two parallel lines that enclose a convex polygon of this diameter; one of them contains an edge.
-fn width_of_hull(hull: &[[f64; 2]], diameter: f64) -> f64 {
-    let vertices: Vec<_> = hull.iter().step_by(hull.len().div_ceil(VERTICES_MAX)).collect();
-    let across = |i: usize| {
-        let (p, q) = (vertices[i], vertices[(i + 1) % vertices.len()]);
-        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
-        // The direction of a shorter edge is a rounding error.
-        if length <= 1e-9 * diameter {
-            return f64::INFINITY;
-        }
-        let heights = vertices.iter().map(|r| turn(*p, *q, **r) / length);
+    let v = across / height;
+    let width = |angle: f64| {
+        let heights = points.iter().map(|&p| (p - from).dot(v * angle.cos() + u * angle.sin()));
         let (low, high) = heights.fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
         high - low
     };
-    (0..vertices.len()).map(across).fold(f64::INFINITY, f64::min)
-}
-
-/// Twice the signed area of a triangle.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    // Across `v`, the points are at most twice as wide as the height; at a greater angle, `along` alone is wider.
+    let (mut best, mut reach) = ((width(0.0), 0.0), (2.0 * height / length).min(1.0).asin());
+    for _ in 0..ROUNDS {
+        let angles =
+            (-STEPS..=STEPS).map(|step| best.1 + reach * f64::from(step) / f64::from(STEPS));
+        let tried = angles.map(|angle| (width(angle), angle));
+        best = tried.fold(best, |best, next| if next.0 < best.0 { next } else { best });
+        reach /= f64::from(STEPS);
+    }
+    best.0
 }
 
 #[cfg(test)]
@@ -104,7 +59,7 @@ mod tests {
     #[test]
     fn a_slit_is_as_wide_as_its_short_side() {
         let slit = width(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 0.5], [0.0, 0.0, 0.5]]);
-        assert!((slit - 0.5).abs() < 1e-12, "{slit}");
+        assert!((slit - 0.5).abs() < 1e-9, "{slit}");
     }
 
     #[test]
@@ -118,7 +73,7 @@ mod tests {
     proptest! {
         /// The least distance of two parallel lines, one through two of the points, with all points between them.
         #[test]
-        fn the_width_of_flat_points_is_that_of_a_search_among_all_pairs(
+        fn the_width_of_flat_points_is_at_most_4_percent_above_that_of_a_search_among_all_pairs(
             flat in prop::collection::vec(prop::array::uniform2(-9i32..9), 1..14), turn in 0usize..3,
         ) {
             let flat: Vec<[f64; 2]> = flat.into_iter().map(|p| p.map(f64::from)).collect();
@@ -140,7 +95,8 @@ mod tests {
             }).collect();
             let found = width(&points);
             let expected = if least.is_finite() { least } else { 0.0 };
-            prop_assert!((found - expected).abs() < 1e-9, "{} instead of {}", found, expected);
+            let range = expected - 1e-9..=1.04 * expected + 1e-9;
+            prop_assert!(range.contains(&found), "{} instead of {}", found, expected);
         }
     }
 

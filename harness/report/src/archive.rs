@@ -53,12 +53,13 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let id = |id: &str| json!({ "@id": id });
     let file = |(path, bytes): &Member| json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string()});
     let files: Vec<Value> = members.iter().map(file).collect();
-    let programs = distinct(lines.iter().filter_map(|line| match &line.entry {
+    let of_run = |line: &&Line| match &line.entry {
         Entry::Run(run) if !run.program.is_empty() => {
             Some((run.setup.engine.clone(), run.program.clone()))
         }
         _ => None,
-    }));
+    };
+    let programs = |of: &[&Line]| distinct(of.iter().filter_map(of_run));
     let program_id = |digest: &str| format!("#program-{digest}");
     let program = |(engine, digest): &(String, String)| {
         json!({"@id": program_id(digest), "@type": "SoftwareApplication", "name": engine, "identifier": digest,
@@ -67,11 +68,8 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let sessions = by_key(lines, |line| line.session.as_str());
     let action = |(name, of): &(&str, Vec<&Line>)| {
         let opening = of.iter().find_map(|line| line.session())?;
-        let is_used = |digest: &str| {
-            of.iter().any(|l| matches!(&l.entry, Entry::Run(run) if run.program == digest))
-        };
-        let used = programs.iter().filter(|(_, digest)| is_used(digest));
-        let used: Vec<Value> = used.map(|(_, digest)| id(&program_id(digest))).collect();
+        let used = programs(of).into_iter().map(|(_, digest)| id(&program_id(&digest)));
+        let used: Vec<Value> = used.collect();
         Some(json!({
             "@id": format!("#session-{name}"), "@type": "CreateAction",
             "name": shlex::try_join(opening.command.iter().map(String::as_str)).unwrap_or_default(),
@@ -96,12 +94,9 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
         "description": "The licence of this archive; those of geometries are in study/",
     });
     let author = json!({"@id": AUTHOR, "@type": "Person", "name": about.author});
-    let graph: Vec<Value> = [head, root, of_licence, author]
-        .into_iter()
-        .chain(files)
-        .chain(programs.iter().map(program))
-        .chain(actions)
-        .collect();
+    let all: Vec<&Line> = lines.iter().collect();
+    let programs = programs(&all).iter().map(program).collect();
+    let graph = [vec![head, root, of_licence, author], files, programs, actions].concat();
     json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
 }
 

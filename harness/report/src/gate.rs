@@ -31,11 +31,8 @@ pub fn text(report: &GateReport) -> String {
 
 /// The report as Markdown, for the summary page of a CI system.
 pub fn markdown(report: &GateReport) -> String {
-    format!(
-        "## harness gate\n\n**{}**\n\n```text\n{}```\n",
-        escaped(&verdict(report)),
-        text(report)
-    )
+    let verdict = escaped(&verdict(report));
+    format!("## harness gate\n\n**{verdict}**\n\n```text\n{}```\n", text(report))
 }
 
 /// The report as JUnit XML: a suite per layer, a test per metric. Inconclusive metrics are skipped tests with a reason.

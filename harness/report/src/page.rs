@@ -1,5 +1,6 @@
 //! The HTML page that every report is put into: self-contained, without scripts, light and dark, narrow and wide.
 
+use crate::figure::Figure;
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 const STYLE: &str = include_str!("page.css");
@@ -33,13 +34,13 @@ pub fn table<T: Render>(columns: &[&str], rows: &[Vec<T>]) -> Markup {
 }
 
 /// A figure with its heading, drawing and caption.
-pub fn figure(id: &str, title: &str, svg: &str, caption: &Markup) -> Markup {
+pub(crate) fn figure(figure: &Figure, svg: &str) -> Markup {
     html! {
         "\n"
-        figure id=(id) {
-            h3 { (title) }
+        figure id=(figure.id) {
+            h3 { (figure.title) }
             div.plot { (PreEscaped(svg)) }
-            figcaption { (caption) }
+            figcaption { (figure.caption) }
         }
     }
 }

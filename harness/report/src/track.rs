@@ -33,7 +33,7 @@ pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
         (changes(records, all, link))
         h2 { "Metrics, those with changes first" }
         @for f in sorted.into_iter().map(|series| of_metric(records, series)) {
-            (figure(&f.id, &f.title, &svg(&f), &html! {}))
+            (figure(&f, &svg(&f)))
         }
     };
     whole_page("Trend", &content)
@@ -186,10 +186,8 @@ fn range(series: &Series) -> (f64, f64) {
     let mut sorted: Vec<f64> = series.points.iter().map(|p| p.1).collect();
     sorted.sort_by(f64::total_cmp);
     let cut = (sorted.len() as f64 * OUTLIERS).ceil() as usize;
-    let kept = match sorted.len() > 2 * cut {
-        true => &sorted[cut..sorted.len() - cut],
-        false => &sorted[..],
-    };
+    let kept = sorted.get(cut..sorted.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
+    let kept = kept.unwrap_or(&sorted);
     let levels = series.changes.iter().flat_map(|change| [change.before, change.after]);
     let shown = || kept.iter().copied().chain(levels.clone());
     let low = shown().fold(f64::INFINITY, f64::min);

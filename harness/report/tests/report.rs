@@ -273,13 +273,23 @@ fn an_efficiency_above_one_has_its_reason_in_figure_table_and_summary() {
     let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
     let reason =
         "Computation scaling is above 1 where all ranks together take less CPU time per cell";
-    // The figure of the efficiency, the table of the experiment, and the causes on 16, 32 and 64 ranks.
-    assert_eq!(page.matches(reason).count(), 5, "{page}");
+    // The figure of the efficiency, the table of the experiment, and the causes on 2, 4, 16, 32 and 64 ranks.
+    assert_eq!(page.matches(reason).count(), 7, "{page}");
     assert!(
         !std::fs::read_to_string(report(place.path(), &record()).unwrap().page)
             .unwrap()
             .contains(reason)
     );
+}
+
+/// The page had no causes where no ranks were simulated, although the terminal listed them.
+#[test]
+fn measured_runs_have_their_causes_on_the_page() {
+    let mut lines = record();
+    lines.retain(|line| !matches!(&line.entry, Entry::Run(run) if run.setup.comm == Comm::Sim));
+    let place = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(report(place.path(), &lines).unwrap().page).unwrap();
+    assert!(page.contains("uav by mesher, strong, 50,000,000 cells, measured: "), "{page}");
 }
 
 #[test]

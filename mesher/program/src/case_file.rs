@@ -7,6 +7,7 @@ use mesher::input::case::{BoxSpec, Case, RootSpec};
 use mesher::input::ingest::Source;
 use mesher::input::lattice::{Enclosed, Keep, Root};
 use serde::Deserialize;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 const LAYER_CELLS_MIN: u32 = 4;
@@ -91,8 +92,11 @@ pub fn read(path: &Path) -> Result<Case, Error> {
 /// # Errors
 /// If the file cannot be read.
 pub fn read_text(path: &Path) -> Result<String, Error> {
-    files::read_text(path)
-        .map_err(|e| Error::input(format!("{}: {e}: give a readable case file", path.display())))
+    files::read_text(path).map_err(|e| {
+        let is_output = e.kind() == ErrorKind::InvalidInput;
+        let advice = if is_output { "" } else { ": give a readable case file" };
+        Error::input(format!("{}: {e}{advice}", path.display()))
+    })
 }
 
 /// The case of a file with this text.

@@ -178,8 +178,8 @@ impl Ownership {
         neighbours
     }
 
-    /// Calls `found` with the owners of an octant, where it has several of those descendants that are in accepted children only; with some
-    /// more than once. `accepts` is given the level and the code of a child.
+    /// Calls `found` with the owner of an octant. If it has several, the same for each of its children that is accepted, given by level and
+    /// code; some owners are found more than once.
     pub fn owners_in(
         &self,
         l: Level,

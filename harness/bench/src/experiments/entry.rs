@@ -44,13 +44,8 @@ impl Line {
     pub fn fault(&self) -> Option<String> {
         let times: Vec<f64> = match &self.entry {
             _ if self.schema != SCHEMA => return Some(format!("its schema is {}", self.schema)),
-            Entry::Network(network) => {
-                let bandwidth = network.bandwidth_bytes_per_s;
-                if bandwidth <= 0.0 || !bandwidth.is_finite() {
-                    return Some(format!("a bandwidth of {bandwidth:e} is not possible"));
-                }
-                vec![network.latency_s]
-            }
+            // Of an empty message, and of one more byte.
+            Entry::Network(network) => vec![network.latency_s, 1.0 / network.bandwidth_bytes_per_s],
             Entry::Run(run) if run.time_wall_s == 0.0 || run.setup.ranks == 0 => {
                 return Some("it has no wall time, or no ranks".to_owned());
             }

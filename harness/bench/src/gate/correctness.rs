@@ -31,7 +31,7 @@ pub fn layer(bench: &Bench, layer: &mut Layer) -> Result<(), Failure> {
             Some(subject) => Some(verified(bench, &subject.engine, case)?),
             None => None,
         };
-        layer.findings.extend(findings(&case.name, &case.mpi, &report, baseline.as_ref()));
+        layer.findings.extend(findings(case, &report, baseline.as_ref()));
     }
     Ok(())
 }
@@ -63,8 +63,7 @@ fn is_unchecked(check: &Check) -> bool {
 
 /// A finding for each check that was run, and for the serial mesh or a number of ranks without one.
 fn findings(
-    case: &str,
-    mpi: &[usize],
+    GateCase { name: case, mpi, .. }: &GateCase,
     report: &CaseReport,
     baseline: Option<&CaseReport>,
 ) -> Vec<GateFinding> {
@@ -136,6 +135,11 @@ fn count(check: &Check) -> Option<u64> {
 mod tests {
     use super::*;
 
+    /// The case, on these ranks of MPI.
+    fn on(mpi: &[usize]) -> GateCase {
+        GateCase { name: "c".to_owned(), mpi: mpi.to_vec(), ..GateCase::default() }
+    }
+
     fn case(failed: &[(&str, u64)]) -> CaseReport {
         let check = |&(name, findings): &(&str, u64)| Check {
             findings,
@@ -152,7 +156,7 @@ mod tests {
 
     /// The worst finding.
     fn against(case: &CaseReport, baseline: &CaseReport) -> GateFinding {
-        let all = findings("c", &[], case, Some(baseline));
+        let all = findings(&on(&[]), case, Some(baseline));
         all.into_iter().max_by_key(|finding| finding.verdict).unwrap()
     }
 
@@ -164,7 +168,7 @@ mod tests {
         assert_eq!(of(&[("layer", 6), ("spacing", 2)]), Verdict::Unchanged);
         assert_eq!(of(&[("layer", 8), ("spacing", 1)]), Verdict::Regression);
         assert_eq!(of(&[("layer", 1), ("sides", 1)]), Verdict::Regression);
-        let better = findings("c", &[], &case(&[("layer", 6)]), Some(&baseline));
+        let better = findings(&on(&[]), &case(&[("layer", 6)]), Some(&baseline));
         let improved = better.iter().filter(|found| found.verdict == Verdict::Improvement);
         assert_eq!(improved.count(), 2);
         let worse = against(&case(&[("sides", 1)]), &baseline);
@@ -174,7 +178,7 @@ mod tests {
     #[test]
     fn without_a_baseline_a_failed_check_is_a_regression() {
         let verdicts = |of: &CaseReport| -> Vec<Verdict> {
-            findings("c", &[], of, None).iter().map(|found| found.verdict).collect()
+            findings(&on(&[]), of, None).iter().map(|found| found.verdict).collect()
         };
         assert_eq!(verdicts(&case(&[])), [Verdict::Unchanged; 3]);
         assert!(verdicts(&case(&[("layer", 1)])).contains(&Verdict::Regression));
@@ -193,7 +197,7 @@ mod tests {
         let mut none = case(&[]);
         none.checks.iter_mut().for_each(|check| check.outcome = Outcome::left_out("no mesh"));
         assert_eq!(against(&none, &none).verdict, Verdict::Missing, "nothing was checked");
-        let ranks = findings("c", &[2], &all, Some(&all));
+        let ranks = findings(&on(&[2]), &all, Some(&all));
         assert!(ranks.iter().any(|found| found.metric == "2 MPI ranks/checks"), "{ranks:?}");
     }
 

@@ -78,7 +78,7 @@ impl Default for TimeRules {
 }
 
 /// A case.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GateCase {
     /// Name in the catalogue. The file may have the path of a case file here, whose stem becomes the name: records must not depend on the
@@ -115,7 +115,7 @@ impl GateCase {
     fn find(mut self, programs: &Programs) -> Result<Self, Failure> {
         if self.file.as_os_str().is_empty() {
             let found = programs.paths.catalogue.named(&self.name)?;
-            (self.file, self.absent) = (found.path.clone(), found.absent.clone());
+            (self.file, self.absent) = (found.path, found.absent);
         }
         self.file = std::path::absolute(&self.file)?;
         let engine = &programs.engine.description;
@@ -128,9 +128,7 @@ impl GateCase {
             let more: Vec<usize> = self.ranks.drain(..).filter(unknown).collect();
             self.mpi.extend(more);
         }
-        if !self.mpi.is_empty() {
-            self.no_mpi = programs.engine.lacks_mpi();
-        }
+        self.no_mpi = programs.engine.lacks_mpi().filter(|_| !self.mpi.is_empty());
         if self.no_mpi.is_some() {
             self.mpi.clear();
         }

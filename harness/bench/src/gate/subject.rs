@@ -89,7 +89,7 @@ impl Subject {
             }
             // A link may lead to a program that behaves by its own name, as those of a virtual environment do.
             let program = std::path::absolute(named)?;
-            return Ok(Self::new(engine.with_program(program), named.to_owned(), None));
+            return Ok(Self::new(engine.with_program(program)?, named.to_owned(), None));
         }
         let build = description.build.as_ref().ok_or_else(|| {
             let name = &description.name;
@@ -107,7 +107,7 @@ impl Subject {
         })?;
         let built = (named != WORKING_TREE).then_some(revision.as_str());
         let program = program(build, built, repository)?;
-        Ok(Self::new(engine.with_program(program), named.to_owned(), Some(revision)))
+        Ok(Self::new(engine.with_program(program)?, named.to_owned(), Some(revision)))
     }
 }
 

@@ -6,13 +6,12 @@
 use super::measure::{self, Input, Measure};
 use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
-use crate::refuse;
+use crate::{name_of, refuse};
 use run::engine::description::{Description, is_own};
 use run::engine::report::one_or_many;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -157,12 +156,6 @@ pub enum Experiment {
     Weights,
 }
 
-impl fmt::Display for Experiment {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&crate::name_of(self))
-    }
-}
-
 /// A series of runs on one case.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -221,7 +214,7 @@ impl Study {
         let of_row = |Row { name, run, .. }: &Row| {
             [name, name.strip_suffix(&format!(": {}", run[0])).unwrap_or(name)].map(str::to_owned)
         };
-        let of_series = |series: &Series| series.experiment.to_string();
+        let of_series = |series: &Series| name_of(&series.experiment);
         let rows = self.row.iter().flat_map(of_row);
         let known: Vec<String> = rows.chain(self.series.iter().map(of_series)).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(name)) {
@@ -382,7 +375,7 @@ impl Series {
             (is_about_ranks && ranks.is_empty(), "give ranks"),
             (what == Layers && self.layers.is_empty(), "give layers"),
         ];
-        refuse(&wrong).map_err(|why| format!("series {what} of {}: {why}", self.case))
+        refuse(&wrong).map_err(|why| format!("series {} of {}: {why}", name_of(&what), self.case))
     }
 }
 

@@ -12,7 +12,7 @@ use crate::experiments::entry::{
 use crate::experiments::execute::{Runner, excess};
 use crate::experiments::group::{Meshes, another_mesh};
 use crate::experiments::{machine, network};
-use crate::jsonl;
+use crate::{jsonl, name_of};
 use clap::Args;
 use contract::case::Case;
 use contract::failure::Failure;
@@ -213,7 +213,7 @@ impl Session<'_> {
     /// Plans the runs of a series at one size.
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>, Failure> {
         use Experiment::{Spacing, Strong, Weak, Weights};
-        let experiment = series.experiment;
+        let (experiment, named) = (series.experiment, name_of(&series.experiment));
         let base = self.base(&series.case)?;
         let of_case = [base.layer_cells_min];
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
@@ -222,7 +222,7 @@ impl Session<'_> {
             let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
             if layouts.is_empty() {
-                (self.progress)(&format!("{engine} cannot run the series {experiment}"));
+                (self.progress)(&format!("{engine} cannot run the series {named}"));
             }
             let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
             for (n, (comm, ranks)) in all {
@@ -236,7 +236,7 @@ impl Session<'_> {
                 let halvings = (target / 1e5).log(4.0).max(0.0) as i32;
                 for spacing in (0..=halvings).rev().map(|k| finest * 2f64.powi(k)) {
                     let of_mesh = Setup {
-                        experiment: experiment.to_string(),
+                        experiment: named.clone(),
                         engine: engine.clone(),
                         ranks,
                         comm,

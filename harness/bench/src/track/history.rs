@@ -14,7 +14,7 @@
 //! "metrics": {"CASE/METRIC": number}, "accepted": true (absent
 //! if false)}`.
 
-use super::unit;
+use super::{plain, unit};
 use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::report::{GateFinding, GateReport};
@@ -154,8 +154,7 @@ pub fn read(path: &Path) -> Result<History, String> {
 
 /// Whether a metric depends on the machine, besides the program and the case.
 fn is_of_machine(name: &str) -> bool {
-    let plain = name.rsplit('/').next().unwrap_or(name);
-    unit(name) == "s" || [MEMORY, "instructions", "allocations"].contains(&plain)
+    unit(name) == "s" || [MEMORY, "instructions", "allocations"].contains(&plain(name))
 }
 
 /// Returns one record for every commit.

@@ -49,7 +49,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
 /// Number of coarser neighbours across faces (index 1), edges (2) and corners (3).
 fn coarser_neighbours(neighbourhood: &Neighbourhood) -> [usize; 4] {
     let mut count = [0; 4];
-    for (handle, offset) in neighbourhood.handles.iter().zip(&OFFSETS) {
+    for (handle, offset) in neighbourhood.handles.iter().zip(OFFSETS.iter()) {
         let axes = offset.iter().filter(|&&o| o != 0).count();
         count[axes] += usize::from(handle.as_coarser_leaf().is_some());
     }

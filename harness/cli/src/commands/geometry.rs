@@ -39,7 +39,8 @@ pub struct Arguments {
 /// If the geometry cannot be meshed, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { spacing_min, root, root_scale, .. } = *arguments;
-    let input = Input::read(&arguments.file, &Requested { spacing_min, root, root_scale })?;
+    let requested = Requested { spacing_min, root, root_scale, ..Requested::default() };
+    let input = Input::read(&arguments.file, requested)?;
     let diagnosis = diagnose(&input, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {

@@ -95,7 +95,7 @@ fn a_tree_in_several_chunks_is_read_as_a_whole() {
     assert!(nodes.split.len() as u64 > 2 * WINDOW && nodes.by_level.len() == 8);
     let file = file_of(&nodes);
     let tree = TreeFile::open(file.path(), true).unwrap();
-    assert_eq!((tree.root, tree.path()), (ROOT, file.path()));
+    assert_eq!((tree.root, &*tree.path), (ROOT, file.path()));
     assert_eq!(words_in(&tree).unwrap(), words);
     assert_eq!(tree.leaves, words.len() as u64);
     let without_sides = TreeFile::open(file.path(), false).unwrap();

@@ -46,25 +46,29 @@ impl Cells {
     /// # Errors
     /// If a cell is not a leaf of an oct-tree with this root, or overlaps another.
     pub fn words(&self, root: &Root) -> Result<Vec<u64>, Failure> {
-        let mut words = self.words_in_order(root)?;
-        self.agree_with_levels(&words)?;
-        words.sort_unstable();
-        let overlaps =
-            |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
-        match words.windows(2).find(overlaps) {
-            None => Ok(words),
-            Some(pair) => Err(self.overlap(&self.words_in_order(root)?, pair)),
-        }
-    }
-
-    fn words_in_order(&self, root: &Root) -> Result<Vec<u64>, Failure> {
+        let cell =
+            |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
         let word = |i: usize| {
-            let octant = octant(self.corners[i], self.edges[i], root)
-                .map_err(|why| self.misfit(i, root, &why))?;
+            let octant = octant(self.corners[i], self.edges[i], root).map_err(|why| {
+                format!(
+                    "{} {why}, where the root has the corner {:?} and the edge {}: correct the mesh, or the root with --root \
+                     X,Y,Z,EDGE",
+                    cell(i), root.origin, root.edge
+                )
+            })?;
             let side = self.sides.as_ref().map_or(Side::Outside, |sides| sides[i]);
             Ok(word::encode(&Leaf { octant, side }))
         };
-        (0..self.count()).map(word).collect()
+        let in_order = (0..self.count()).map(word).collect::<Result<Vec<u64>, String>>()?;
+        self.agree_with_levels(&in_order)?;
+        let mut words = in_order.clone();
+        words.sort_unstable();
+        let overlaps =
+            |w: &&[u64]| word::key(w[1]) < word::key(w[0]) + word::span(word::level(w[0]));
+        let Some(pair) = words.windows(2).find(overlaps) else { return Ok(words) };
+        let both = (0..self.count()).filter(|&i| pair.contains(&in_order[i])).map(cell);
+        let both: Vec<String> = both.collect();
+        Err(Failure::input(format!("{} overlaps {}: remove one of them", both[1], both[0])))
     }
 
     /// The levels of the words differ from those of the file by one constant.
@@ -79,22 +83,6 @@ impl Cells {
                 levels[i], self.edges[i], levels[0], self.edges[0]
             ))),
         }
-    }
-
-    fn misfit(&self, i: usize, root: &Root, why: &str) -> Failure {
-        let (corner, edge, Root { origin, edge: root }) = (self.corners[i], self.edges[i], root);
-        Failure::input(format!(
-            "cell {i} (corner {corner:?}, edge {edge}) {why}, where the root has the corner {origin:?} and the edge {root}: \
-             correct the mesh, or the root with --root X,Y,Z,EDGE"
-        ))
-    }
-
-    /// The error for two words that overlap; `words` are those of the cells in the order of the file.
-    fn overlap(&self, words: &[u64], pair: &[u64]) -> Failure {
-        let at =
-            |i: usize| format!("cell {i} (corner {:?}, edge {})", self.corners[i], self.edges[i]);
-        let both: Vec<_> = (0..words.len()).filter(|&i| pair.contains(&words[i])).map(at).collect();
-        Failure::input(format!("{} overlaps {}: remove one of them", both[1], both[0]))
     }
 
     /// The least root in which the cells can be leaves of one oct-tree, for a file that states none: its edge is a power of two of the coarsest
@@ -182,7 +170,7 @@ fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::testing::cells_of;
+    use crate::testing::cells_of;
     use crate::testing::random_words;
     use proptest::prelude::*;
 
@@ -268,8 +256,7 @@ mod tests {
 #[cfg(test)]
 mod roots {
     use super::*;
-    use crate::import::testing::cells_of;
-    use crate::testing::words_of;
+    use crate::testing::{cells_of, words_of};
 
     const ROOT: Root = Root { origin: [-1.0, 2.0, 0.5], edge: 4.0 };
 

@@ -10,6 +10,7 @@
 
 use crate::failure::Failure;
 use crate::files;
+use bytemuck::{Pod, pod_collect_to_vec};
 use std::path::Path;
 
 /// `P4EST_ONDISK_FORMAT` and `P8EST_ONDISK_FORMAT`, by the dimension.
@@ -88,11 +89,6 @@ impl Forest {
     }
 }
 
-/// Whether a file with this head may be a forest.
-pub fn is_head(head: &[u8]) -> bool {
-    head.starts_with(b"p4est\0\0\0") || head.starts_with(b"p8est\0\0\0")
-}
-
 /// Reads a forest or a connectivity.
 ///
 /// # Errors
@@ -118,7 +114,7 @@ pub fn read(path: &Path) -> Result<Forest, Failure> {
         let stride = own_bytes as u64 + data_bytes;
         let records = input.items(count, stride)?.chunks_exact(stride as usize);
         let quadrant = |record: &[u8]| {
-            let numbers: Vec<i32> = integers(&record[..own_bytes]).collect();
+            let numbers: Vec<i32> = pod_collect_to_vec(&record[..own_bytes]);
             let z = if dimension == 3 { numbers[2] } else { 0 };
             let data = record.get(own_bytes).copied().unwrap_or(0);
             Quadrant { corner: [numbers[0], numbers[1], z], level: numbers[dimension], data }
@@ -134,10 +130,6 @@ pub fn read(path: &Path) -> Result<Forest, Failure> {
 
 pub(super) fn damaged(why: &str) -> Failure {
     Failure::input(format!("is not a usable file of p4est, because {why}"))
-}
-
-fn integers(bytes: &[u8]) -> impl Iterator<Item = i32> {
-    bytes.as_chunks().0.iter().map(|four| i32::from_le_bytes(*four))
 }
 
 /// The bytes of the file, and how many have been read.
@@ -159,29 +151,20 @@ impl<'a> Input<'a> {
         Ok(items)
     }
 
-    fn numbers(&mut self, count: u64) -> Result<Vec<u64>, Failure> {
-        let (numbers, _) = self.items(count, 8)?.as_chunks::<8>();
-        Ok(numbers.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
+    /// As many numbers for each of `count` items.
+    fn numbers<T: Pod>(&mut self, count: u64, each: u64) -> Result<Vec<T>, Failure> {
+        Ok(pod_collect_to_vec(self.items(count, each * size_of::<T>() as u64)?))
     }
 
     fn array<const N: usize>(&mut self) -> Result<[u64; N], Failure> {
-        Ok(self.numbers(N as u64)?.try_into().expect("as many numbers as were read"))
-    }
-
-    /// As many indices for each of `count` items.
-    fn indices(&mut self, count: u64, each: u64) -> Result<Vec<i32>, Failure> {
-        Ok(integers(self.items(count, 4 * each)?).collect())
-    }
-
-    fn small(&mut self, count: u64, each: u64) -> Result<Vec<i8>, Failure> {
-        Ok(self.items(count, each)?.iter().map(|&byte| byte.cast_signed()).collect())
+        Ok(self.numbers(N as u64, 1)?.try_into().expect("as many numbers as were read"))
     }
 
     /// The lists of `count` edges or corners, but for `of_tree`.
     fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Failure> {
-        let offsets = self.indices(count.saturating_add(1), 1)?;
+        let offsets = self.numbers(count.saturating_add(1), 1)?;
         let pairs = if count > 0 { pairs } else { 0 };
-        let (trees, places) = (self.indices(pairs, 1)?, self.small(pairs, 1)?);
+        let (trees, places) = (self.numbers(pairs, 1)?, self.numbers(pairs, 1)?);
         Ok(Lists { of_tree: Vec::new(), offsets, trees, places })
     }
 
@@ -213,13 +196,12 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
     }
     let if_any = |count: u64| if count > 0 { trees } else { 0 };
     let (children, faces) = (1 << dimension, 2 * dimension as u64);
-    let (points, _) = input.items(vertices, 24)?.as_chunks::<8>();
-    let coordinates: Vec<f64> = points.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-    let tree_to_edge = input.indices(if_any(edges), 12)?;
-    let tree_to_vertex = input.indices(if_any(vertices), children)?;
-    let tree_to_corner = input.indices(if_any(corners), children)?;
-    let tree_to_tree = input.indices(trees, faces)?;
-    let tree_to_face = input.small(trees, faces)?;
+    let coordinates = input.numbers(vertices, 1)?;
+    let tree_to_edge = input.numbers(if_any(edges), 12)?;
+    let tree_to_vertex = input.numbers(if_any(vertices), children)?;
+    let tree_to_corner = input.numbers(if_any(corners), children)?;
+    let tree_to_tree = input.numbers(trees, faces)?;
+    let tree_to_face = input.numbers(trees, faces)?;
     let attributes = input.items(trees, attribute_bytes)?.to_vec();
     // p4est writes no offsets of edges in two dimensions.
     let edge_lists =
@@ -228,7 +210,7 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
     let connectivity = Connectivity {
         dimension,
         trees: trees as usize,
-        vertices: coordinates.as_chunks().0.to_vec(),
+        vertices: coordinates,
         tree_to_vertex,
         tree_to_tree,
         tree_to_face,
@@ -249,8 +231,8 @@ fn forest_header(
     if format != expected || coordinate_bytes != 4 {
         return Err(damaged("the header of the forest has another format than the connectivity"));
     }
-    let of_ranks = input.numbers(ranks)?;
-    let of_trees = input.numbers(trees as u64)?;
+    let of_ranks: Vec<u64> = input.numbers(ranks, 1)?;
+    let of_trees = input.numbers(trees as u64, 1)?;
     if data_bytes > input.bytes.len() as u64 {
         return Err(damaged(&format!("it states {data_bytes} bytes of data per quadrant")));
     }

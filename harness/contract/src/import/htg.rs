@@ -93,8 +93,7 @@ impl ImportedTree {
             let (mut found, mut written) = (Digest::default(), Ok(()));
             let read = self.tree.words(&mut |run| {
                 run.iter().for_each(|&word| found.add(word));
-                let bytes: Vec<u8> = run.iter().flat_map(|word| word.to_le_bytes()).collect();
-                written = out.write_all(&bytes);
+                written = out.write_all(bytemuck::cast_slice(run));
                 written.is_ok()
             });
             written?;
@@ -111,7 +110,7 @@ impl ImportedTree {
     /// # Errors
     /// If a file cannot be written.
     pub fn link(&self, dir: &Path) -> io::Result<()> {
-        symlink(fs::canonicalize(self.tree.path())?, dir.join(TREE))?;
+        symlink(fs::canonicalize(&self.tree.path)?, dir.join(TREE))?;
         Manifest { hyper_tree_grid: Some(TREE.to_owned()), ..self.manifest.clone() }.write(dir)
     }
 }

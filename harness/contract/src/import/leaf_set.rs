@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::leafset::LeafSet;
 use crate::manifest::{Manifest, Sides, Tree};
-use crate::word;
+use crate::word::{self, Order};
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
 ///
@@ -57,15 +57,8 @@ pub(super) fn manifest(root: Root, finest: u8, case: Option<&Case>, program: Str
 pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let LeafSet { manifest, words, .. } = set;
     assert_eq!(cells.count(), words.len(), "cells and leaves");
-    let mut end = 0;
-    for &leaf in words {
-        let fault = word::fault(leaf);
-        assert!(
-            fault.is_none() && word::key(leaf) >= end,
-            "the leaf {leaf:#018x} after {end:#x}: {fault:?}"
-        );
-        end = word::key(leaf) + word::span(word::level(leaf));
-    }
+    let mut order = Order::default();
+    words.iter().try_for_each(|&leaf| order.add(leaf)).expect("a linear oct-tree");
     let of_cells = cells.edges.iter().map(|edge| (edge / manifest.root.edge).powi(3)).sum::<f64>();
     let span = |&leaf: &u64| word::span(word::level(leaf)) as f64 / word::KEY_END as f64;
     let of_leaves = words.iter().map(span).sum::<f64>();
@@ -85,8 +78,7 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::testing::cells_of;
-    use crate::testing::words_of;
+    use crate::testing::{cells_of, words_of};
 
     const ROOT: Root = Root { origin: [1.0; 3], edge: 0.3 };
 

@@ -13,8 +13,6 @@ pub mod forest;
 pub mod htg;
 mod leaf_set;
 pub mod p4est;
-#[cfg(test)]
-mod testing;
 pub mod words;
 
 use crate::failure::Failure;
@@ -127,7 +125,7 @@ fn of_content(head: &[u8]) -> Option<Format> {
     }
     // Binary data may follow XML in the same file.
     let is_xml = || head.windows(8).any(|bytes| bytes == b"<VTKFile");
-    if forest::is_head(head) {
+    if starts(b"p4est\0\0\0") || starts(b"p8est\0\0\0") {
         return Some(Format::P4est);
     }
     if starts(b"# vtk DataFile") || starts(b"\x89HDF\r\n\x1a\n") || is_xml() {

@@ -38,7 +38,16 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
         return Err(damaged("it is a connectivity without leaves"));
     }
     let trees = placed_trees(&forest.connectivity)?;
-    let with_sides = sides_requested(request, forest.data_bytes)?;
+    let with_sides = match (request.sides.as_deref(), forest.data_bytes) {
+        (None, _) => false,
+        (Some(SIDES), 1) => true,
+        (Some(name), data_bytes) => {
+            return Err(Failure::input(format!(
+                "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides \
+                 {SIDES} if the quadrants have one byte of data, their side"
+            )));
+        }
+    };
     let stated = match (trees.corners.as_slice(), trees.edges.as_slice()) {
         (&[origin], &[edge]) => Root { origin, edge },
         _ => trees.least_root()?,
@@ -64,41 +73,17 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     Ok(cells)
 }
 
-/// Whether the sides are to be read from the quadrants' data.
-fn sides_requested(request: &Request, data_bytes: u64) -> Result<bool, Failure> {
-    match (request.sides.as_deref(), data_bytes) {
-        (None, _) => Ok(false),
-        (Some(SIDES), 1) => Ok(true),
-        (Some(name), _) => Err(Failure::input(format!(
-            "has no sides called {name:?}, but {data_bytes} bytes of data per quadrant: omit --sides, or choose --sides {SIDES} \
-             if the quadrants have one byte of data, their side"
-        ))),
-    }
-}
-
 /// The trees as cells.
 fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
     let Connectivity { vertices, tree_to_vertex, attributes, .. } = connectivity;
-    match (vertices.len(), connectivity.trees) {
-        (0, 1) => Ok(Cells { corners: vec![[0.0; 3]], edges: vec![1.0], ..Cells::default() }),
-        (0, _) => Err(damaged("it has several trees and no vertices that place them")),
-        _ => {
-            let mut trees = cubes(vertices, tree_to_vertex)?;
-            if let (Ok(bytes), [edge]) = (attributes.as_slice().try_into(), &mut trees.edges[..]) {
-                // Any program may have attributes of eight bytes.
-                let exact = f64::from_le_bytes(bytes);
-                let is_edge = (exact - *edge).abs() <= 1e-9 * *edge;
-                *edge = if is_edge { exact } else { *edge };
-            }
-            Ok(trees)
-        }
-    }
-}
-
-/// The cubes of the trees, from the coordinates of all vertices and the eight vertices of each tree.
-fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Failure> {
-    let vertex = |&index: &i32| coordinates.get(usize::try_from(index).ok()?);
     let mut trees = Cells::default();
+    if vertices.is_empty() {
+        if connectivity.trees != 1 {
+            return Err(damaged("it has several trees and no vertices that place them"));
+        }
+        trees.push([0.0; 3], 1.0);
+    }
+    let vertex = |&index: &i32| vertices.get(usize::try_from(index).ok()?);
     for (tree, indices) in tree_to_vertex.chunks_exact(8).enumerate() {
         let corners: Option<Vec<_>> = indices.iter().map(vertex).collect();
         let corners = corners
@@ -116,6 +101,12 @@ fn cubes(coordinates: &[[f64; 3]], tree_to_vertex: &[i32]) -> Result<Cells, Fail
             )));
         }
         trees.push(origin, edge);
+    }
+    if let (Ok(bytes), [edge]) = (attributes.as_slice().try_into(), &mut trees.edges[..]) {
+        // Any program may have attributes of eight bytes.
+        let exact = f64::from_le_bytes(bytes);
+        let is_edge = (exact - *edge).abs() <= 1e-9 * *edge;
+        *edge = if is_edge { exact } else { *edge };
     }
     Ok(trees)
 }

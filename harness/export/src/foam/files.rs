@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
+use bytemuck::NoUninit;
 use contract::manifest::Sides;
 use contract::octant::UNITS_PER_CELL;
 use contract::word;
@@ -56,8 +57,7 @@ impl Mesh {
         file.labels(vertices, faces.all().flatten().map(|&point| point.into()))?;
         file.finish()?;
         let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
-        let units = |at: &Point| at.map(|c| i64::from(c) * UNITS_PER_CELL);
-        let place = |at: &Point| manifest.root.to_user(units(at)).map(f64::to_le_bytes);
+        let place = |at: &Point| manifest.root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
         file.list(points, self.points.all.iter().map(place))?;
         file.finish()?;
         self.write_boundary(options.label, dir)
@@ -114,22 +114,22 @@ impl<'a> ListFile<'a> {
     /// Adds a list of `count` labels.
     fn labels(&mut self, count: u64, labels: impl Iterator<Item = i64>) -> Result<(), Failure> {
         match self.options.label {
-            Label::Bits32 => self.list(count, labels.map(|label| [(label as i32).to_le_bytes()])),
-            Label::Bits64 => self.list(count, labels.map(|label| [label.to_le_bytes()])),
+            Label::Bits32 => self.list(count, labels.map(|label| label as i32)),
+            Label::Bits64 => self.list(count, labels),
         }
     }
 
-    /// Adds a list of `count` items, of which each has `K` numbers of `N` bytes. A list without items has no parentheses.
-    fn list<const N: usize, const K: usize>(
+    /// Adds a list of `count` items. A list without items has no parentheses.
+    fn list<T: NoUninit>(
         &mut self,
         count: u64,
-        items: impl Iterator<Item = [[u8; N]; K]>,
+        items: impl Iterator<Item = T>,
     ) -> Result<(), Failure> {
         let [begin, end] = if count == 0 { [""; 2] } else { ["(", ")"] };
         write!(self.out, "{count}\n{begin}")?;
         for (item, number) in items.zip(0..) {
             self.options.check_at(number)?;
-            self.out.write_all(item.as_flattened())?;
+            self.out.write_all(bytemuck::bytes_of(&item))?;
         }
         Ok(writeln!(self.out, "{end}")?)
     }

@@ -97,7 +97,7 @@ fn read(export: &Export<'_>) -> Result<Mesh, Failure> {
     })?;
     export.require_some(leaves.count().into())?;
     let patches = Patches::new(options.case, !export.is_of_all());
-    Mesh::new(leaves, ranks, patches.map_err(Failure::input)?, options)
+    Mesh::new(leaves, ranks, patches, options)
 }
 
 /// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then by cells.

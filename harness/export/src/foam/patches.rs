@@ -1,11 +1,9 @@
 //! The patches of a mesh: the root's sides, the body or its solids, and the cut.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use contract::case::Case;
 use contract::octant::UNITS_PER_CELL;
-use contract::stl;
 use geometry::tree::{FacetTree, Point};
 
 use crate::leaves::{Content, Square};
@@ -30,31 +28,27 @@ pub struct Patches {
 
 impl Patches {
     /// The patches of a mesh. Without a case, its body is one patch.
-    ///
-    /// # Errors
-    /// If the case's geometry can no longer be read.
-    pub fn new(case: Option<&Case>, has_cut: bool) -> Result<Self, String> {
+    pub fn new(case: Option<&Case>, has_cut: bool) -> Self {
         let mut patches = Self {
             names: SIDES.map(str::to_owned).to_vec(),
             has_cut,
             of_facet: Vec::new(),
             facets: None,
         };
-        if let Some((case, path)) = case.and_then(|case| Some((case, case.geometry.as_ref()?))) {
-            patches.add_solids(case, path)?;
+        if let Some(case) = case {
+            patches.add_solids(case);
         }
         if patches.names.len() == SIDES.len() {
             patches.names.push(BODY.to_owned());
         }
         patches.names.extend(has_cut.then(|| CUT.to_owned()));
-        Ok(patches)
+        patches
     }
 
-    fn add_solids(&mut self, case: &Case, path: &Path) -> Result<(), String> {
-        let body = stl::read(path).map_err(|error| format!("{} {error}", path.display()))?;
+    fn add_solids(&mut self, case: &Case) {
         let mut patch_of = HashMap::new();
-        for solid in body.solids.into_iter().filter(|solid| solid.facets > 0) {
-            let patch = *patch_of.entry(solid.name.clone()).or_insert_with(|| {
+        for solid in case.solids.iter().filter(|solid| solid.facets > 0) {
+            let patch = *patch_of.entry(&solid.name).or_insert_with(|| {
                 let name = patch_name(solid.name.as_deref().unwrap_or_default());
                 let numbered = (2..).map(|number| format!("{name}_{number}"));
                 let mut names = std::iter::once(name.clone()).chain(numbered);
@@ -66,7 +60,6 @@ impl Patches {
         if self.names.len() > SIDES.len() + 1 {
             self.facets = Some(FacetTree::new(&case.facets_lattice));
         }
-        Ok(())
     }
 
     /// The type of a patch.

@@ -44,14 +44,6 @@ const ARRAYS: [Array; 9] = [
     ("CellData", "side", "UInt8"),
 ];
 
-/// What a file states about itself before it has leaves.
-#[derive(Debug)]
-struct Content {
-    root: Root,
-    /// Those of [`ARRAYS`] that it has.
-    arrays: Vec<Array>,
-}
-
 /// Writes the file. The XML precedes the data that it describes. Its place is reserved for as many pieces as there will be, and it is
 /// written last.
 ///
@@ -68,14 +60,14 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let offsets = vec![u64::MAX; arrays.len()];
     let mut longest = Piece { points: u64::MAX, offsets, ..Piece::default() };
     longest.written.cells = u64::MAX;
-    let content = Content { root: mesh.manifest.root, arrays };
+    let root = &mesh.manifest.root;
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
         let (mut pieces, mut data_bytes) = (Vec::new(), 0);
         let longest = vec![longest; leaves.div_ceil(PIECE as u64) as usize];
-        let header_bytes = content.header(&longest, 0).len();
+        let header_bytes = header(root, &arrays, &longest, 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
-        encode(export, leaves, &content, &mut |mut piece| {
+        encode(export, leaves, &arrays, &mut |mut piece| {
             // The user's interrupt waits for a flush to end, so none may have much to flush.
             file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
             piece.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
@@ -83,7 +75,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
             pieces.push(Piece { bytes: Vec::new(), ..piece });
             Ok(())
         })?;
-        let header = content.header(&pieces, header_bytes);
+        let header = header(root, &arrays, &pieces, header_bytes);
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
@@ -97,16 +89,17 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
 fn encode(
     export: &Export<'_>,
     leaves: u64,
-    content: &Content,
+    arrays: &[Array],
     take: &mut dyn FnMut(Piece) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let (mut written, options) = (Written::default(), export.options);
+    let root = &export.mesh.manifest.root;
     let mut flush = |encoders: &mut [Encoder]| {
         options.check()?;
         let filled = encoders.iter_mut().filter(|encoder| !encoder.leaves.is_empty());
         let pieces: Vec<Piece> = thread::scope(|scope| {
             let threads: Vec<_> =
-                filled.map(|encoder| scope.spawn(|| encoder.encode(content))).collect();
+                filled.map(|encoder| scope.spawn(|| encoder.encode(root, arrays))).collect();
             threads.into_iter().map(|thread| thread.join().expect("it does not panic")).collect()
         });
         for piece in pieces {
@@ -134,51 +127,51 @@ fn encode(
     Ok(())
 }
 
-impl Content {
-    /// The file up to the appended data, filled up with blanks to `length` bytes.
-    fn header(&self, pieces: &[Piece], length: usize) -> String {
-        let Root { origin: [x, y, z], edge } = self.root;
-        let mut digest = Digest::default();
-        pieces.iter().for_each(|piece| digest.merge(piece.digest));
-        // VTK reads text as the codes of its characters.
-        let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
-        let mut xml = format!(
-            "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
-             <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
-             compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n    <FieldData>\n      \
-             <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
-             {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
-             <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
-             </FieldData>\n"
-        );
-        for piece in pieces {
-            self.piece(piece, &mut xml);
-        }
-        let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
-        let blanks = length.saturating_sub(xml.len() + end.len());
-        xml + &" ".repeat(blanks) + end
+/// The file up to the appended data, filled up with blanks to `length` bytes.
+fn header(root: &Root, arrays: &[Array], pieces: &[Piece], length: usize) -> String {
+    let Root { origin: [x, y, z], edge } = root;
+    let mut digest = Digest::default();
+    pieces.iter().for_each(|piece| digest.merge(piece.digest));
+    // VTK reads text as the codes of its characters.
+    let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
+    let mut xml = format!(
+        "<?xml version=\"1.0\"?>\n<!-- Written by harness export. -->\n\
+         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+         compressor=\"vtkZLibDataCompressor\">\n  <UnstructuredGrid>\n    <FieldData>\n      \
+         <DataArray type=\"Float64\" Name=\"root\" NumberOfComponents=\"4\" NumberOfTuples=\"1\" format=\"ascii\">\
+         {x:?} {y:?} {z:?} {edge:?}</DataArray>\n      \
+         <DataArray type=\"String\" Name=\"digest\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</DataArray>\n    \
+         </FieldData>\n"
+    );
+    for piece in pieces {
+        describe(arrays, piece, &mut xml);
     }
+    let end = "  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _";
+    let blanks = length.saturating_sub(xml.len() + end.len());
+    xml + &" ".repeat(blanks) + end
+}
 
-    fn piece(&self, Piece { points, written, offsets, .. }: &Piece, xml: &mut String) {
-        let cells = written.cells;
-        *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
-        let arrays: Vec<_> = self.arrays.iter().zip(offsets).collect();
-        for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {
-            let section = arrays[0].0.0;
-            let (scalars, components) = match section {
-                "CellData" => (" Scalars=\"level\"", ""),
-                "Points" => ("", " NumberOfComponents=\"3\""),
-                _ => ("", ""),
-            };
-            *xml += &format!("      <{section}{scalars}>\n");
-            for ((_, name, kind), offset) in arrays {
-                let _ = writeln!(
-                    xml,
-                    "        <DataArray type=\"{kind}\" Name=\"{name}\"{components} format=\"appended\" offset=\"{offset}\"/>"
-                );
-            }
-            *xml += &format!("      </{section}>\n");
+/// Appends the description of a piece.
+fn describe(arrays: &[Array], piece: &Piece, xml: &mut String) {
+    let Piece { points, written, offsets, .. } = piece;
+    let cells = written.cells;
+    *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
+    let arrays: Vec<_> = arrays.iter().zip(offsets).collect();
+    for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {
+        let section = arrays[0].0.0;
+        let (scalars, components) = match section {
+            "CellData" => (" Scalars=\"level\"", ""),
+            "Points" => ("", " NumberOfComponents=\"3\""),
+            _ => ("", ""),
+        };
+        *xml += &format!("      <{section}{scalars}>\n");
+        for ((_, name, kind), offset) in arrays {
+            let _ = writeln!(
+                xml,
+                "        <DataArray type=\"{kind}\" Name=\"{name}\"{components} format=\"appended\" offset=\"{offset}\"/>"
+            );
         }
-        *xml += "    </Piece>\n";
+        *xml += &format!("      </{section}>\n");
     }
+    *xml += "    </Piece>\n";
 }

@@ -5,13 +5,15 @@
 //! An array is stored in blocks, each compressed by zlib (`vtkZLibDataCompressor`): a header of 64-bit numbers - blocks, bytes per block, bytes of
 //! the last block if it is shorter and otherwise 0, and the compressed bytes of each - followed by the compressed blocks.
 
+use bytemuck::NoUninit;
 use contract::digest::Digest;
+use contract::lattice::Root;
 use contract::mesh::Leaf;
 use contract::octant::UNITS_PER_CELL;
 use contract::word;
 use libdeflater::{CompressionLvl, Compressor};
 
-use super::Content;
+use super::Array;
 use crate::options::Written;
 use crate::points::{Point, Points};
 
@@ -49,7 +51,7 @@ pub struct Encoder {
 
 impl Encoder {
     /// Encodes the leaves, and removes them.
-    pub fn encode(&mut self, content: &Content) -> Piece {
+    pub fn encode(&mut self, root: &Root, arrays: &[Array]) -> Piece {
         self.connect();
         self.check_invariants();
         let (mut written, mut digest) = (Written::default(), Digest::default());
@@ -58,29 +60,24 @@ impl Encoder {
             digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
         }
         let Self { leaves, points, connectivity, zlib } = self;
-        let (root, points) = (content.root, &points.all);
+        let points = &points.all;
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);
-        let point = |at: &Point| {
-            root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL)).map(f64::to_le_bytes)
-        };
+        let point = |at: &Point| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
         let cells = 0..leaves.len();
         let (mut bytes, mut offsets) = (Vec::new(), Vec::new());
-        for (_, name, _) in &content.arrays {
+        for (_, name, _) in arrays {
             offsets.push(bytes.len() as u64);
             let to = &mut bytes;
             match *name {
                 "Points" => zlib.append(points.iter().map(point), to),
-                "connectivity" => {
-                    zlib.append(connectivity.iter().map(|&i| [u64::from(i).to_le_bytes()]), to)
-                }
-                "offsets" => zlib
-                    .append(cells.clone().map(|i| [8 * (i as u64 + 1)].map(u64::to_le_bytes)), to),
-                "types" => zlib.append(cells.clone().map(|_| [[HEXAHEDRON]]), to),
-                "level" => zlib.append(leaves.iter().map(|leaf| [[leaf.octant.level]]), to),
-                "rank" => zlib.append(leaves.iter().map(|leaf| [leaf.rank.to_le_bytes()]), to),
-                "spacing" => zlib.append(leaves.iter().map(|leaf| [edge(leaf).to_le_bytes()]), to),
-                "id" => zlib.append(leaves.iter().map(|leaf| [leaf.index.to_le_bytes()]), to),
-                _ => zlib.append(leaves.iter().map(|leaf| [[leaf.side as u8]]), to),
+                "connectivity" => zlib.append(connectivity.iter().map(|&i| u64::from(i)), to),
+                "offsets" => zlib.append(cells.clone().map(|i| 8 * (i as u64 + 1)), to),
+                "types" => zlib.append(cells.clone().map(|_| HEXAHEDRON), to),
+                "level" => zlib.append(leaves.iter().map(|leaf| leaf.octant.level), to),
+                "rank" => zlib.append(leaves.iter().map(|leaf| leaf.rank), to),
+                "spacing" => zlib.append(leaves.iter().map(edge), to),
+                "id" => zlib.append(leaves.iter().map(|leaf| leaf.index), to),
+                _ => zlib.append(leaves.iter().map(|leaf| leaf.side as u8), to),
             }
         }
         leaves.clear();
@@ -136,22 +133,21 @@ impl Default for Zlib {
 }
 
 impl Zlib {
-    /// Appends an array of values, which consist of `K` numbers of `N` bytes.
-    fn append<const N: usize, const K: usize>(
+    /// Appends an array of values.
+    fn append<T: NoUninit>(
         &mut self,
-        values: impl ExactSizeIterator<Item = [[u8; N]; K]>,
+        mut values: impl ExactSizeIterator<Item = T>,
         out: &mut Vec<u8>,
     ) {
-        const { assert!(BLOCK.is_multiple_of(N * K)) };
-        let bytes = values.len() * N * K;
-        let mut values = values;
+        const { assert!(BLOCK.is_multiple_of(size_of::<T>())) };
+        let bytes = values.len() * size_of::<T>();
         let mut numbers = vec![bytes.div_ceil(BLOCK), BLOCK, bytes % BLOCK];
         let header = out.len();
         out.resize(header + 8 * (numbers.len() + numbers[0]), 0);
         for begin in (0..bytes).step_by(BLOCK) {
             let block = &mut self.block[..BLOCK.min(bytes - begin)];
-            let slots = block.chunks_exact_mut(N * K).zip(&mut values);
-            slots.for_each(|(slot, value)| slot.copy_from_slice(value.as_flattened()));
+            let slots = block.chunks_exact_mut(size_of::<T>()).zip(&mut values);
+            slots.for_each(|(slot, value)| slot.copy_from_slice(bytemuck::bytes_of(&value)));
             let start = out.len();
             out.resize(start + self.compressor.zlib_compress_bound(block.len()), 0);
             let written = self.compressor.zlib_compress(block, &mut out[start..]);
@@ -245,7 +241,7 @@ mod tests {
     fn an_array_is_the_content_of_its_blocks() {
         let mut zlib = Zlib::default();
         for count in [0, 1, 5, BLOCK / 8 - 1, BLOCK / 8, BLOCK / 8 + 1, BLOCK / 4] {
-            let values = |i: usize| [((i * i) as u64).to_le_bytes()];
+            let values = |i: usize| (i * i) as u64;
             let mut out = b"before".to_vec();
             zlib.append((0..count).map(values), &mut out);
             let mut number = out[6..].chunks(8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
@@ -262,7 +258,8 @@ mod tests {
                 at += compressed;
             }
             assert_eq!(at, out.len());
-            assert!(content == (0..count).flat_map(values).flatten().collect::<Vec<u8>>());
+            let expected: Vec<u64> = (0..count).map(values).collect();
+            assert!(content == bytemuck::cast_slice::<u64, u8>(&expected));
         }
     }
 }

@@ -69,7 +69,6 @@ fn passing(from: &Place, to: &Place) -> f64 {
 
 /// A search between two places.
 struct Search<'a> {
-    facets: &'a FacetTree,
     space: Space<'a>,
     ends: Ends,
     /// Number of searches so far.
@@ -91,7 +90,7 @@ pub fn widest(
     let before = approach(&space, from);
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
     let ends = (before[before.len() - 1], after.last().copied());
-    let mut search = Search { facets, space, ends, searches: 0, watch };
+    let mut search = Search { space, ends, searches: 0, watch };
     let leaf = UNITS_PER_EDGE as f64 / f64::from(1u32 << level);
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
@@ -112,7 +111,9 @@ fn approach(space: &Space, from: Point) -> Vec<Point> {
     let mut points = vec![from];
     let mut clearance = space.facets.distance(from);
     let mut step = clearance / 2.0;
-    let is_free = |at: Point| is_in_root(at) && space.cells[space.locate(at) as usize].is_open;
+    let is_free = |at: Point| {
+        root().contains_local_point(at) && space.cells[space.locate(at) as usize].is_open
+    };
     while step > SMALL * clearance {
         let at = points[points.len() - 1];
         let axes = [Point::X, Point::Y, Point::Z].into_iter();
@@ -130,8 +131,9 @@ fn approach(space: &Space, from: Point) -> Vec<Point> {
     points
 }
 
-fn is_in_root(at: Point) -> bool {
-    at.min_element() >= 0.0 && at.max_element() <= UNITS_PER_EDGE as f64
+/// The root as a box.
+fn root() -> Aabb {
+    Aabb::new(Point::ZERO, Point::splat(UNITS_PER_EDGE as f64))
 }
 
 impl Search<'_> {
@@ -164,9 +166,11 @@ impl Search<'_> {
             points.extend(next.map(|&next| (self.space.between(cell, next), next)));
         }
         let end = cells[cells.len() - 1];
-        points.push((self.ends.1.unwrap_or_else(|| at_boundary(centre(end))), end));
+        // To the far field, the nearest point of the root's boundary.
+        let far = || root().project_local_point(centre(end), false).point;
+        points.push((self.ends.1.unwrap_or_else(far), end));
         points.dedup_by_key(|(at, _)| *at);
-        let place = |(at, cell)| Place { at, clearance: self.facets.distance(at), cell };
+        let place = |(at, cell)| Place { at, clearance: self.space.facets.distance(at), cell };
         points.into_iter().map(place).collect()
     }
 
@@ -221,12 +225,6 @@ impl Search<'_> {
     }
 }
 
-/// The point of the root's boundary nearest to a point of the root.
-fn at_boundary(at: Point) -> Point {
-    let root = Aabb::new(Point::ZERO, Point::splat(UNITS_PER_EDGE as f64));
-    root.project_local_point(at, false).point
-}
-
 /// The path in the user's units, with the ways from its start and to its end, which lead to its first and from its last point.
 fn described(
     (case, facets): (&Case, &FacetTree),
@@ -242,11 +240,10 @@ fn described(
     let passing = way.points.windows(2).map(|leg| passing(&leg[0], &leg[1]));
     let first = before.len() - 1;
     let inner = (first, first + way.points.len() - 1);
-    let ends = if after.is_empty() {
-        &way.points[..1]
-    } else {
-        &[way.points[0], way.points[way.points.len() - 1]]
-    };
+    // A path to the far field counts to its end.
+    let last = if after.is_empty() { 0 } else { way.points.len() - 1 };
+    let rim = facets.within(at, RIM * clearance);
+    let stop = |at| Stop { at: to_user(&case.root, at), width: 2.0 * unit * facets.distance(at) };
     let inside = way.points.iter().map(|place| place.at);
     let points =
         before[..first].iter().copied().chain(inside).chain(after.iter().rev().skip(1).copied());
@@ -258,18 +255,12 @@ fn described(
             width,
             width_min: 2.0 * unit * passing.fold(clearance, f64::min),
             width_max: 2.0 * unit * way.bound,
-            width_cells: width / Spacing::of(case.level_surface, &case.root).spacing,
-            facets: facets
-                .within(at, RIM * clearance)
-                .into_iter()
-                .map(|(facet, _)| facet)
-                .collect(),
+            width_cells: width / case.root.edge_of(case.level_surface),
+            facets: rim.into_iter().map(|(facet, _)| facet).collect(),
             index: first + narrowest,
-            is_end: ends.iter().any(|end| end.clearance <= PRECISION * clearance),
+            is_end: [0, last].iter().any(|&end| way.points[end].clearance <= PRECISION * clearance),
         },
         inner,
-        points: points
-            .map(|at| Stop { at: to_user(&case.root, at), width: 2.0 * unit * facets.distance(at) })
-            .collect(),
+        points: points.map(stop).collect(),
     }
 }

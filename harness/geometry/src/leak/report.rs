@@ -23,7 +23,7 @@ pub struct Spacing {
 impl Spacing {
     /// The spacing of a level.
     pub fn of(level: u8, root: &Root) -> Self {
-        Self { level, spacing: root.edge / f64::from(1u32 << level) }
+        Self { level, spacing: root.edge_of(level) }
     }
 }
 

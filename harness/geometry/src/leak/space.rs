@@ -7,12 +7,13 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::Ends;
+use super::ends::is_free;
 use crate::tree::{FacetTree, Point};
 use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::watch::Watch;
-use contract::word::{self, KEY_END, Side};
+use contract::word::{self, KEY_END, Order};
 
 /// A cell; lengths are in lattice units.
 #[derive(Clone, Copy, Debug)]
@@ -62,21 +63,18 @@ impl<'a> Space<'a> {
     /// # Errors
     /// One sentence, if the words are not leaves that tile the root.
     pub fn new(words: &[u64], facets: &'a FacetTree) -> Result<Self, String> {
-        let mut end = 0;
-        let mut cells = Vec::with_capacity(words.len());
-        for (i, &w) in words.iter().enumerate() {
-            if word::fault(w).is_some() || word::key(w) != end {
-                return Err(format!("the base tree is not a tree: leaf {i} is wrong"));
-            }
-            end += word::span(word::level(w));
-            let (low, high) = word::octant(w).bounds();
-            let is_open = word::side(w) != Side::Crossing;
-            let (low, edge) = (low.map(|c| c as u32), (high[0] - low[0]) as u32);
-            cells.push(Cell { low, edge, is_open, clearance: f32::NAN });
-        }
-        if end != KEY_END {
+        let mut linear = Order::default();
+        let added = words.iter().try_for_each(|&word| linear.add(word));
+        added.map_err(|why| format!("the base tree is not a tree: {why}"))?;
+        if words.iter().map(|&word| word::span(word::level(word))).sum::<u64>() != KEY_END {
             return Err("the base tree is not a tree: it does not fill the root".to_owned());
         }
+        let cell = |&word: &u64| {
+            let (low, high) = word::octant(word).bounds();
+            let (low, edge) = (low.map(|c| c as u32), (high[0] - low[0]) as u32);
+            Cell { low, edge, is_open: is_free(word), clearance: f32::NAN }
+        };
+        let cells: Vec<Cell> = words.iter().map(cell).collect();
         let order = cells.iter().zip(0..).map(|(cell, i)| (key(cell.low), i)).collect();
         Ok(Self { cells, order, facets })
     }
@@ -95,15 +93,13 @@ impl<'a> Space<'a> {
     /// Calls `visit` with every cell that shares part of a face with this one.
     pub fn neighbours(&self, cell: u32, visit: &mut impl FnMut(u32)) {
         let Cell { low, edge, .. } = self.cells[cell as usize];
-        for axis in 0..3 {
-            let (below, above) = (low[axis].checked_sub(edge), low[axis] + edge);
-            let above = (i64::from(above) < UNITS_PER_EDGE).then_some(above);
-            for (across, is_upper) in [(below, true), (above, false)] {
+        for (axis, is_below) in (0..6).map(|face| (face / 2, face % 2 == 0)) {
+            let across =
+                if is_below { low[axis].checked_sub(edge) } else { Some(low[axis] + edge) };
+            if let Some(across) = across.filter(|&c| i64::from(c) < UNITS_PER_EDGE) {
                 let mut at = low;
-                if let Some(across) = across {
-                    at[axis] = across;
-                    self.facing((at, edge), axis, is_upper, visit);
-                }
+                at[axis] = across;
+                self.facing((at, edge), axis, is_below, visit);
             }
         }
     }

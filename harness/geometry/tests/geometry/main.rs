@@ -14,8 +14,8 @@ use geometry::report::Diagnosis;
 const ROOT: Root = Root { origin: [-16.0; 3], edge: 32.0 };
 
 fn diagnosis(facets: Vec<Facet>, spacing_min: Option<f64>) -> Diagnosis {
-    let requested = Requested { spacing_min, root: Some(ROOT), root_scale: None };
-    diagnose(&Input::new(facets, &requested).unwrap(), 5)
+    let requested = Requested { spacing_min, root: Some(ROOT), ..Requested::default() };
+    diagnose(&Input::new(facets, requested).unwrap(), 5)
 }
 
 fn count(diagnosis: &Diagnosis, kind: Kind) -> u64 {
@@ -208,8 +208,8 @@ fn a_vertex_farther_from_an_edge_than_two_lattice_units_leaves_an_opening() {
                 origin: [-1.0; 3].map(|c| c * f64::from(scale)),
                 edge: f64::from(edge),
             });
-            let requested = Requested { spacing_min: None, root, root_scale: None };
-            let input = Input::new(facets, &requested).unwrap();
+            let requested = Requested { spacing_min: None, root, ..Requested::default() };
+            let input = Input::new(facets, requested).unwrap();
             let found = count(&diagnose(&input, 5), Kind::Openings);
             assert_eq!(found, openings, "{units} units, {scale}");
         }
@@ -326,8 +326,9 @@ fn the_diagnosis_of_a_body_with_every_defect_is_the_expected_text() {
     .concat();
     let mut texts = String::new();
     for (spacing, first, name) in [(Some(0.25), 5, "cells"), (None, 1, "no cells")] {
-        let requested = Requested { spacing_min: spacing, root: Some(ROOT), root_scale: None };
-        let input = Input::new(facets.clone(), &requested).unwrap();
+        let requested =
+            Requested { spacing_min: spacing, root: Some(ROOT), ..Requested::default() };
+        let input = Input::new(facets.clone(), requested).unwrap();
         texts += &format!("== {name}\n{}", diagnose(&input, first));
     }
     assert_text(&texts, "tests/geometry/expected.txt");

@@ -37,31 +37,27 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
 
 /// The figure with a sentence on the paper, if it is of the counterpart of the paper's case; and with the runs of which the paper's text
 /// states cells, ranks and time, if a value of them is given.
-fn with_paper(figure: Figure, subject: &Subject, sentence: &str, value: Option<Value>) -> Figure {
+fn with_paper(mut figure: Figure, subject: &Subject, note: &str, value: Option<Value>) -> Figure {
     if !is_counterpart(subject.case) {
         return figure;
     }
-    let (mut series, mut caption) = (figure.series, figure.caption + sentence);
-    if let Some(value) = value {
-        let run = |cells: &str, ranks: f64, time_s: f64| {
-            (number(cells), value(number(cells), ranks, time_s))
-        };
-        let [second, parallel, most] =
-            ["second_ranks", "parallel_ranks", "largest_ranks"].map(number);
-        let runs = [
-            run("serial_cells", 1.0, 60.0 * number("serial_min")),
-            run("second_cells", second, 60.0 * number("second_min")),
-            run("serial_cells", parallel, number("parallel_s")),
-            run("largest_cells", most, 60.0 * number("largest_min")),
-        ];
-        let name = format!("the paper: 1, {second}, {parallel} and {most} ranks");
-        series.push(cited(&name, runs));
-        caption += &format!(
-            " The points of the paper are from its text (sections IV.B and V), not from its figures: around another UAV, on Intel X5355 CPUs; of n, nothing is \
-             stated. The time on {second} ranks is a lower bound, that on {most} an upper bound."
-        );
-    }
-    Figure { series, caption, ..figure }
+    figure.caption += note;
+    let Some(value) = value else { return figure };
+    let [second, parallel, most] = ["second_ranks", "parallel_ranks", "largest_ranks"].map(number);
+    let runs = [
+        ("serial_cells", 1.0, 60.0 * number("serial_min")),
+        ("second_cells", second, 60.0 * number("second_min")),
+        ("serial_cells", parallel, number("parallel_s")),
+        ("largest_cells", most, 60.0 * number("largest_min")),
+    ];
+    let points = runs.map(|(cells, ranks, s)| (number(cells), value(number(cells), ranks, s)));
+    let name = format!("the paper: 1, {second}, {parallel} and {most} ranks");
+    figure.series.push(cited(&name, points));
+    figure.caption += &format!(
+        " The points of the paper are from its text (sections IV.B and V), not from its figures: around another UAV, on Intel X5355 CPUs; of n, nothing is \
+         stated. The time on {second} ranks is a lower bound, that on {most} an upper bound."
+    );
+    figure
 }
 
 /// A value of cells, ranks and time in seconds.

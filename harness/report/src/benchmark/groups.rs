@@ -34,25 +34,20 @@ pub fn repetitions(groups: &[&Group]) -> String {
     };
     format!(
         "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{projected}.",
-        counts(groups),
+        range(groups, |g| g.time_s.count as u64),
         covered * 100.0
     )
 }
 
 /// The origin of the times of single ranks, as a sentence.
 pub fn rank_times(groups: &[&Group]) -> String {
-    let n = counts(groups);
+    let n = range(groups, |g| g.time_s.count as u64);
     match groups.iter().all(|g| g.by_rank) {
         true => format!("Times of a rank in a phase are medians of {n} runs."),
         false => format!(
             "Times of a rank in a phase are those of the run of median time among {n}, or medians where all runs report them."
         ),
     }
-}
-
-/// The number of repetitions, or the range of numbers.
-fn counts(groups: &[&Group]) -> String {
-    range(groups, |g| g.time_s.count as u64)
 }
 
 /// The least and the greatest value, or the only one.
@@ -107,12 +102,6 @@ impl fmt::Display for Subject<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} by {}", self.mesh(), self.engine)
     }
-}
-
-/// Whether a group is in the summary and in the tables of phases: scaling on at least 16 simulated ranks.
-pub fn is_summarised(group: &Group) -> bool {
-    let scales = ["strong", "weak"].contains(&group.setup.experiment.as_str());
-    scales && group.setup.comm == Comm::Sim && group.setup.ranks >= 16
 }
 
 /// A number of cells to two digits, for names of files.

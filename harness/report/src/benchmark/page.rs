@@ -1,13 +1,11 @@
 //! The page of a benchmark report, and which of the twelve rules of Hoefler and Belli, "Scientific Benchmarking of Parallel Computing
 //! Systems" (SC15), a record breaks. reports/README.md lists the rules, and how every report keeps those that no record can break.
 
-use super::groups::{Subject, is_summarised};
 use super::tables;
 use crate::figure::Figure;
 use crate::page::{figure, page as whole_page, with_code};
 use bench::experiments::entry::{Entry, Line, Machine};
 use bench::experiments::group::Groups;
-use bench::experiments::number::grouped;
 use bench::order::distinct;
 use maud::html;
 
@@ -26,27 +24,20 @@ pub fn page(
         }
         ul { @for note in &groups.notes { li { (note) } } }
         nav {
-            a href="#figures" { "figures" } " " a href="#tables" { "tables" } " "
+            a href="#figures" { "figures" } " " a href="#tables" { "tables" } " " a href="#causes" { "causes" } " "
             a href="#rules" { "twelve rules" } " " a href="#machine" { "machine and commands" }
-        }
-        h2 { "Causes of lost efficiency" }
-        ul {
-            @for group in groups.all.iter().filter(|group| is_summarised(group)) {
-                li {
-                    b { (Subject::of(&group.setup)) } ", " (group.setup.experiment) " scaling, " (grouped(group.cells())) " cells: "
-                    (with_code(&groups.cause(group)))
-                }
-            }
         }
         h2 id="figures" { "Figures" }
         p {
             "Filled markers were measured with at most one rank per core. Hollow markers were measured with more ranks than \
              cores, projected from simulated ranks, or quoted from the paper."
         }
-        @for (f, svg) in drawn { (figure(&f.id, &f.title, svg, &html! { (f.caption) })) }
+        @for (f, svg) in drawn { (figure(f, svg)) }
         h2 id="tables" { "Tables" }
         p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." }
         @for table in tables::tables(groups) { (table.html()) }
+        h2 id="causes" { "Causes of lost efficiency" }
+        ul { @for cause in tables::causes(groups) { li { (with_code(&cause)) } } }
         h2 id="rules" { "The twelve rules of Hoefler and Belli" }
         @if broken.is_empty() { p { "The record breaks none of them." } }
         ul { @for (rule, why) in broken { li { strong { "Rule " (rule) " is broken" } ": " (why) } } }

@@ -117,13 +117,8 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
 }
 
 /// Global efficiency and its factors on simulated ranks.
-fn efficiency(
-    groups: &Groups,
-    subject: Subject,
-    simulated: &[&Group],
-    file: &str,
-) -> Option<Figure> {
-    let last = simulated.last().filter(|_| simulated.len() > 1)?;
+fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) -> Option<Figure> {
+    let last = sims.last().filter(|_| sims.len() > 1)?;
     let factors: [(&str, Factor); 5] = [
         ("global", Efficiency::global),
         ("parallel", Efficiency::parallel),
@@ -131,20 +126,20 @@ fn efficiency(
         ("communication", Efficiency::communication),
         ("computation scaling", |e| e.computation_scaling),
     ];
-    let efficiencies: Vec<_> = simulated.iter().map(|group| groups.efficiency(group)).collect();
-    let mut series = vec![ideal(simulated, |_| 1.0)];
+    let efficiencies: Vec<_> = sims.iter().map(|group| groups.efficiency(group)).collect();
+    let mut series = vec![ideal(sims, |_| 1.0)];
     for (style, (name, value)) in factors.into_iter().enumerate() {
         let factor = |(g, e): (&&Group, &Efficiency)| Point::exact(g.setup.ranks as f64, value(e));
-        let points = simulated.iter().zip(&efficiencies).map(factor).collect();
+        let points = sims.iter().zip(&efficiencies).map(factor).collect();
         let name = format!("{}: {name}", subject.engine);
         series.push(Series::new(&name, Provenance::Projected, style, points));
     }
     let experiment = &last.setup.experiment;
     let size = match experiment.as_str() {
         "weak" => {
-            let cells = range(simulated, |g| g.cells() / g.setup.ranks as u64);
+            let cells = range(sims, |g| g.cells() / g.setup.ranks as u64);
             // Fixed facets cost less and less per cell.
-            format!("{cells} cells per rank, {} facets", range(simulated, |g| g.typical.facets))
+            format!("{cells} cells per rank, {} facets", range(sims, |g| g.typical.facets))
         }
         _ => format!("{} cells", grouped(last.cells())),
     };
@@ -153,14 +148,14 @@ fn efficiency(
          ranks. {} Lines join powers of two. {}",
         last.setup.layer_cells_min,
         base_cases(groups, &[last]),
-        rank_times(simulated),
+        rank_times(sims),
         above_one(&efficiencies).unwrap_or_default()
     );
     let highest = series.iter().flat_map(|s| &s.points).map(|p| p.y).fold(1.0, f64::max);
     let id = format!("efficiency-{experiment}-{file}");
     let title = format!("Efficiency in {experiment} scaling: {subject}, {size}");
     let caption = caption.trim_end().to_owned();
-    let x = ranks_axis(simulated);
+    let x = ranks_axis(sims);
     let y = Axis { range: Some((0.0, highest * 1.1)), ..Axis::linear("efficiency") };
     Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }

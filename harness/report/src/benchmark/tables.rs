@@ -1,6 +1,6 @@
 //! The tables of a record, for the page of a report and as text.
 
-use super::groups::{Subject, is_summarised};
+use super::groups::Subject;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
@@ -13,9 +13,10 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     let experiments = distinct(groups.all.iter().map(|group| group.setup.experiment.as_str()));
     let mut all: Vec<Table> =
         experiments.into_iter().map(|name| experiment(groups, name)).collect();
-    all.extend(projections(groups));
+    all.push(projections(groups));
     all.extend(largest(groups).into_iter().map(phases));
     all.extend(groups.comparisons().iter().map(programs));
+    all.retain(|table| !table.rows.is_empty());
     all
 }
 
@@ -25,11 +26,18 @@ pub fn text(groups: &Groups) -> String {
     lines.extend(groups.notes.iter().cloned());
     lines.extend(tables(groups).iter().map(|table| format!("\n{}", table.text().trim_end())));
     lines.push("\ncauses of lost efficiency".to_owned());
-    for group in groups.all.iter().filter(|group| group.setup.ranks > 1) {
-        let (subject, cause) = (Subject::of(&group.setup), groups.cause(group));
-        lines.push(format!("  {subject}, {}, {}: {cause}", group.setup.experiment, group.how()));
-    }
+    lines.extend(causes(groups).into_iter().map(|cause| "  ".to_owned() + &cause));
     lines.into_iter().map(|line| line + "\n").collect()
+}
+
+/// The causes of lost efficiency of all runs on several ranks.
+pub fn causes(groups: &Groups) -> Vec<String> {
+    let cause = |group: &Group| {
+        let (s, cells, how) = (&group.setup, grouped(group.cells()), group.how());
+        let (subject, cause) = (Subject::of(s), groups.cause(group));
+        format!("{subject}, {}, {cells} cells, {how}: {cause}", s.experiment)
+    };
+    groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
 }
 
 /// Time, load imbalance λ = max/mean, POP efficiencies, rate and memory of every group.
@@ -74,12 +82,12 @@ fn experiment(groups: &Groups, name: &str) -> Table {
     Table { notes: above_one(&efficiencies).into_iter().collect(), ..table }
 }
 
-/// Projected and measured times of the same meshes on equally many ranks; `None` if the record has no such pairs.
-fn projections(groups: &Groups) -> Option<Table> {
+/// Projected and measured times of the same meshes on equally many ranks.
+fn projections(groups: &Groups) -> Table {
     let pairs = groups.projections();
     let time = |group: &Group| format!("{:.3}", group.time_s.value);
     let error = |[sim, measured]: &[&Group; 2]| sim.time_s.value / measured.time_s.value - 1.0;
-    let table = Table::of(
+    Table::of(
         "projected and measured times".to_owned(),
         &pairs,
         &[
@@ -92,17 +100,20 @@ fn projections(groups: &Groups) -> Option<Table> {
             ("measured / s", &|[_, measured]| time(measured)),
             ("error", &|pair| format!("{:+.1} %", error(pair) * 100.0)),
         ],
-    );
-    (!pairs.is_empty()).then_some(table)
+    )
 }
 
-/// The first simulated run on the most ranks of every strong or weak scaling study.
+/// The first run on the most ranks of every strong or weak scaling study, if these are at least 16 simulated ones.
 fn largest<'a>(groups: &'a Groups) -> Vec<&'a Group> {
     let study = |group: &'a Group| {
         let weak = group.setup.experiment == "weak";
         (weak, Subject::of(&group.setup).to_string(), (!weak).then(|| group.cells()))
     };
-    let studies = by_key(groups.all.iter().filter(|g| is_summarised(g)), study);
+    let is_shown = |g: &&Group| {
+        let scales = ["strong", "weak"].contains(&g.setup.experiment.as_str());
+        scales && g.setup.comm == Comm::Sim && g.setup.ranks >= 16
+    };
+    let studies = by_key(groups.all.iter().filter(is_shown), study);
     let largest = |of: Vec<&'a Group>| of.into_iter().rev().max_by_key(|g| g.setup.ranks);
     studies.into_iter().filter_map(|(_, of)| largest(of)).collect()
 }

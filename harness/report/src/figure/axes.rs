@@ -96,7 +96,7 @@ fn range(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Range<f64> {
 /// The positions of ticks: those that the axis has; else at most eight multiples of 1, 2 or 5 times a power of ten; on a logarithmic axis
 /// powers of ten and, where there are less than three of them, multiples.
 fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
-    let (low, high) = (range.start.min(range.end), range.start.max(range.end));
+    let (low, high) = (range.start, range.end);
     let slack = |v: f64| if axis.log { v.abs() * 1e-9 } else { (high - low) * 1e-9 };
     let inside = |v: &f64| (low - slack(low)..=high + slack(high)).contains(v);
     if !axis.ticks.is_empty() {
@@ -109,7 +109,7 @@ fn ticks(axis: &Axis, range: &Range<f64>) -> Vec<f64> {
         let numbers = (low / step).ceil() as i64..=(high / step).floor() as i64;
         return numbers.map(|number| number as f64 * step).collect();
     }
-    let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let multiples = |factors: &[f64]| -> Vec<f64> {
         let all = decades.clone().flat_map(|d| factors.iter().map(move |f| f * 10f64.powi(d)));
         all.filter(inside).collect()

@@ -134,19 +134,18 @@ fn axis_options(name: &str, axis: &Axis, scale: &Scale) -> String {
 
 /// The figures with captions and labels, for `\input` in a document.
 pub fn fragment(figures: &[Figure]) -> String {
-    let mut out = format!(
-        "% Made by `harness report`. Requires {PREAMBLE}.\n\
-         % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
-         \\providecommand{{\\figures}}{{figures}}\n"
-    );
-    for Figure { id, caption, .. } in figures {
-        let _ = write!(
-            out,
+    let included = |Figure { id, caption, .. }: &Figure| {
+        format!(
             "\n\\begin{{figure}}\n  \\centering\n  \\input{{\\figures/{id}.tex}}\n  \\caption{{{}}}\n  \\label{{fig:{id}}}\n\\end{{figure}}\n",
             escape(caption)
-        );
-    }
-    out
+        )
+    };
+    format!(
+        "% Made by `harness report`. Requires {PREAMBLE}.\n\
+         % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
+         \\providecommand{{\\figures}}{{figures}}\n{}",
+        figures.iter().map(included).collect::<String>()
+    )
 }
 
 /// The text with what is special to LaTeX escaped.

@@ -23,6 +23,7 @@ pub use axes::tick_label;
 use map::Map;
 
 use std::collections::BTreeSet;
+use std::iter;
 
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -195,12 +196,9 @@ pub fn file_name(text: &str) -> String {
 pub fn name_apart<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut taken = BTreeSet::new();
     for name in names {
-        let plain = name.clone();
-        let mut number = 1;
-        while !taken.insert(name.clone()) {
-            number += 1;
-            *name = format!("{plain}-{number}");
-        }
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let mut all = iter::once(name.clone()).chain(numbered);
+        *name = all.find(|free| taken.insert(free.clone())).expect("numbers do not end");
     }
 }
 

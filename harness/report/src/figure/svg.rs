@@ -7,6 +7,7 @@ use super::axes::{BELOW, Scale};
 use super::canvas::{BESIDE, COLOURS, FONT, INK, SIZE, SYMBOL, WIDTH, legend};
 use super::map::{CAPTION, outline, paint, size};
 use super::{Figure, Kind, Provenance, Series};
+use bench::order::by_key;
 use maud::html;
 use plotters::coord::Shift;
 use plotters::element::{DashedPathElement, DynElement, IntoDynElement};
@@ -37,6 +38,7 @@ const GAP: f64 = 0.2;
 const DRAWN: &str = "a string accepts every element";
 
 type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Place = (f64, f64);
 
 /// What is beside a name in the legend.
 enum Symbol<'a> {
@@ -90,9 +92,8 @@ fn entries(figure: &Figure) -> Vec<(&str, Symbol<'_>)> {
         all.extend(map.key.iter().map(|(name, fill)| (name.as_str(), Symbol::Cell(*fill))));
         all.extend(map.section.iter().map(|_| ("geometry", Symbol::Section)));
     }
-    let is_first = |i: &usize| series[..*i].iter().all(|other| other.name != series[*i].name);
-    let firsts = (0..series.len()).filter(is_first).map(|i| &series[i]);
-    all.extend(firsts.map(|s| (s.name.as_str(), Symbol::Series(s))));
+    let named = by_key(series, |s| s.name.as_str()).into_iter();
+    all.extend(named.map(|(name, of)| (name, Symbol::Series(of[0]))));
     all
 }
 
@@ -165,7 +166,7 @@ fn chart(
     }
     let mut begins = vec![0.0; figure.y.names.len()];
     for s in &figure.series {
-        let points: Vec<(f64, f64)> = s.points.iter().map(|p| at(p.x, p.y)).collect();
+        let points: Vec<Place> = s.points.iter().map(|p| at(p.x, p.y)).collect();
         if s.kind == Kind::Bars {
             chart.draw_series(segments(&points, &mut begins, s.style)).expect(DRAWN);
             continue;
@@ -258,11 +259,7 @@ fn bar<C: Clone>(corners: [C; 2], style: usize) -> [Rectangle<C>; 2] {
 }
 
 /// The segments of bars that begin where the ones before them end.
-fn segments(
-    lengths: &[(f64, f64)],
-    begins: &mut [f64],
-    style: usize,
-) -> Vec<Rectangle<(f64, f64)>> {
+fn segments(lengths: &[Place], begins: &mut [f64], style: usize) -> Vec<Rectangle<Place>> {
     let half = (1.0 - GAP) / 2.0;
     let mut drawn = Vec::new();
     for ((length, middle), begin) in lengths.iter().zip(begins).filter(|(of, _)| of.0 > 0.0) {

@@ -89,17 +89,15 @@ fn median(facets: &[Facet], axis: usize) -> Option<f64> {
     };
     let mut facets: Vec<(f64, f64)> = facets.iter().map(weighed).collect();
     facets.sort_unstable_by(|p, q| p.0.total_cmp(&q.0));
-    let total: f64 = facets.iter().map(|f| f.1).sum();
-    // The mean of the lower and the upper median, up to rounding.
-    let reaching = |part: f64| {
-        let mut sum = 0.0;
-        let reaches = |f: &&(f64, f64)| {
-            sum += f.1;
-            sum >= part * total
-        };
-        facets.iter().find(reaches).map(|f| f.0)
+    let mut total = 0.0;
+    let add = |facet: &(f64, f64)| {
+        total += facet.1;
+        total
     };
-    (total > 0.0).then_some((reaching(0.5 - 1e-9)? + reaching(0.5 + 1e-9)?) / 2.0)
+    let sums: Vec<f64> = facets.iter().map(add).collect();
+    // The mean of the lower and the upper median, up to rounding.
+    let reaching = |part: f64| facets.get(sums.partition_point(|sum| *sum < part * total));
+    (total > 0.0).then_some((reaching(0.5 - 1e-9)?.0 + reaching(0.5 + 1e-9)?.0) / 2.0)
 }
 
 /// The bounding box of the body, or the root.

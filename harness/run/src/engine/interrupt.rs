@@ -36,12 +36,10 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 static TEMPORARY: OnceLock<PathBuf> = OnceLock::new();
 
 /// Makes signals a request to stop. Once per process, before anything makes a temporary file.
-pub fn install() {
-    // Without handlers, a signal ends the harness without cleaning up; that does not prevent a run.
-    let _ = watch();
-}
-
-fn watch() -> io::Result<()> {
+///
+/// # Errors
+/// If a handler cannot be installed. Without one, a signal ends the harness without cleaning up; that does not prevent a run.
+pub fn install() -> io::Result<()> {
     // Processes that an engine detaches become children of this one, which ends them.
     let _ = set_child_subreaper(Some(getpid()));
     let (mut received, sent) = UnixStream::pair()?;

@@ -114,7 +114,7 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     let outputs = outputs.each_ref();
     let ended = watch.until(start, &outputs, || {
         if let Some(sampler) = &mut sampler {
-            sampler.sample(session.id());
+            sampler.sample(session.leader);
         }
         let ended = session.wait(pause);
         pause = (pause * 2).min(longest);

@@ -14,7 +14,9 @@ use contract::failure::named;
 use contract::leafset::{self, LeafSet};
 use contract::mesh::Mesh;
 use contract::plain::{PlainCase, StlForm};
+use std::collections::BTreeSet;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -50,7 +52,7 @@ impl Engine {
     /// file names.
     ///
     /// # Errors
-    /// One sentence, if the engine file is missing or wrong.
+    /// One sentence, if the engine file is missing or wrong, or if the command writes one of the engine's files.
     pub fn find(name: &str, given: Option<&Path>, paths: &Paths) -> Result<Self, String> {
         let description = Description::find(name, paths)?;
         if description.run.serial.is_empty() {
@@ -69,12 +71,28 @@ impl Engine {
             }
         };
         let launcher = Launcher::mpirun(&paths.mpirun);
-        Ok(Self { description, program, is_given: given.is_some(), places, launcher })
+        let engine = Self { description, program, is_given: given.is_some(), places, launcher };
+        for file in engine.files() {
+            files::register_input(&file).map_err(|error| named(&file, &error).to_string())?;
+        }
+        Ok(engine)
     }
 
     /// The same engine with another program: another revision of it.
-    pub fn with_program(&self, program: PathBuf) -> Self {
-        Self { program, is_given: true, ..self.clone() }
+    ///
+    /// # Errors
+    /// If the command writes that program.
+    pub fn with_program(&self, program: PathBuf) -> io::Result<Self> {
+        files::register_input(&program).map_err(|error| named(&program, &error))?;
+        Ok(Self { program, is_given: true, ..self.clone() })
+    }
+
+    /// The files that make the engine what it is: its program and what its commands name beside it, such as a script.
+    pub fn files(&self) -> BTreeSet<PathBuf> {
+        let Templates { serial, parallel, simulated, .. } = &self.description.run;
+        let words = [serial, parallel, simulated].into_iter().flatten();
+        let named = words.map(|word| PathBuf::from(fill(word, &self.places)));
+        named.chain([self.program.clone()]).filter(|path| path.is_file()).collect()
     }
 
     /// The same engine, whose ranks on MPI are started by another launcher.

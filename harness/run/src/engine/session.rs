@@ -20,9 +20,9 @@ pub(super) const PATIENCE: Duration = Duration::from_millis(350);
 const ATTEMPTS: usize = 500;
 
 /// The leaders of all sessions.
-static RUNNING: Mutex<Vec<u32>> = Mutex::new(Vec::new());
+static RUNNING: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
 
-fn running() -> MutexGuard<'static, Vec<u32>> {
+fn running() -> MutexGuard<'static, Vec<Pid>> {
     RUNNING.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
@@ -32,7 +32,7 @@ pub(super) type Ended = (ExitStatus, f64);
 /// The session of a child.
 #[derive(Debug)]
 pub(super) struct Session {
-    leader: u32,
+    pub(super) leader: Pid,
     /// What the thread sends that waits for the leader. A pause of fixed length would round the leader's wall time up to a multiple of it.
     waited: Receiver<Ended>,
     ended: Option<Ended>,
@@ -47,18 +47,13 @@ impl Session {
         // Either `end_all` finds the child, or it was started after that.
         let mut running = running();
         let child = command.spawn()?;
-        let leader = child.id();
+        let leader = Pid::from_child(&child);
         running.push(leader);
         drop(running);
         let session = Self { leader, waited, ended: None };
         let wait = move || wait_for(leader).and_then(|ended| sender.send(ended).ok());
         thread::Builder::new().name("wait".into()).stack_size(64 << 10).spawn(wait)?;
         Ok((session, child))
-    }
-
-    /// The leader's process.
-    pub(super) fn id(&self) -> u32 {
-        self.leader
     }
 
     /// How the leader ended; `None` if it runs for longer than this.
@@ -95,8 +90,8 @@ impl Drop for Session {
 }
 
 /// Waits for a child. `Child::wait` gives no CPU time.
-fn wait_for(child: u32) -> Option<Ended> {
-    let id = libc::pid_t::try_from(child).ok()?;
+fn wait_for(child: Pid) -> Option<Ended> {
+    let id = child.as_raw_nonzero().get();
     let mut status = 0;
     // SAFETY: all bits zero are a valid `rusage`, which contains only integers.
     let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
@@ -113,14 +108,14 @@ fn wait_for(child: u32) -> Option<Ended> {
 }
 
 /// Ends all sessions at the same time, and removes what they left. None is started as long as the result exists.
-pub(super) fn end_all() -> MutexGuard<'static, Vec<u32>> {
+pub(super) fn end_all() -> MutexGuard<'static, Vec<Pid>> {
     let running = running();
     end(&running, &running);
     kill(&running, &[]);
     running
 }
 
-fn end(leaders: &[u32], running: &[u32]) {
+fn end(leaders: &[Pid], running: &[Pid]) {
     signal(leaders, Signal::TERM);
     let patience = Instant::now() + PATIENCE;
     while leaders.iter().any(|&leader| !members(leader).is_empty()) && Instant::now() < patience {
@@ -131,7 +126,7 @@ fn end(leaders: &[u32], running: &[u32]) {
 
 /// Kills every process of these sessions, and those that this process has adopted: its children in other sessions than those that are
 /// `kept`. Processes may be started meanwhile, and the children of adopted ones are adopted in turn, so this repeats until none is found.
-fn kill(leaders: &[u32], kept: &[u32]) {
+fn kill(leaders: &[Pid], kept: &[Pid]) {
     for _ in 0..ATTEMPTS {
         let adopted = adopted(kept);
         for &process in &adopted {
@@ -146,7 +141,7 @@ fn kill(leaders: &[u32], kept: &[u32]) {
 }
 
 /// Sends a signal to every process of these sessions. Returns whether there are any.
-fn signal(leaders: &[u32], signal: Signal) -> bool {
+fn signal(leaders: &[Pid], signal: Signal) -> bool {
     let members: Vec<Pid> = leaders.iter().flat_map(|&leader| members(leader)).collect();
     for &member in &members {
         // It may have ended since then.
@@ -156,37 +151,34 @@ fn signal(leaders: &[u32], signal: Signal) -> bool {
 }
 
 /// The live processes of a session. The leader is no longer among them after it was waited for.
-fn members(leader: u32) -> Vec<Pid> {
+fn members(leader: Pid) -> Vec<Pid> {
+    let leader = leader.as_raw_nonzero().get();
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
-    let ids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
+    let ids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
     // A machine has hundreds of processes. To read a file of each takes longer than to mesh a small case.
-    let of_session = ids.filter(|&id| session(id) == Some(leader)).filter(|&id| {
+    let of_session = ids.filter(|&id| session(id) == leader).filter(|id| {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
         is_alive(&stat)
     });
-    of_session.filter_map(pid_of).collect()
+    of_session.filter_map(Pid::from_raw).collect()
 }
 
-fn adopted(kept: &[u32]) -> Vec<Pid> {
+fn adopted(kept: &[Pid]) -> Vec<Pid> {
     let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let children = threads.flat_map(|thread| {
         let text = fs::read_to_string(thread.path().join("children")).unwrap_or_default();
-        text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>()
+        text.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<i32>>()
     });
     let own = session(0);
-    let adopted = children.filter(|&child| session(child) != own && !kept.contains(&child));
-    adopted.filter_map(pid_of).collect()
+    let others = children.filter(|&child| session(child) != own).filter_map(Pid::from_raw);
+    others.filter(|child| !kept.contains(child)).collect()
 }
 
-fn pid_of(id: u32) -> Option<Pid> {
-    i32::try_from(id).ok().and_then(Pid::from_raw)
-}
-
-/// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container.
-fn session(id: u32) -> Option<u32> {
-    let id = libc::pid_t::try_from(id).ok()?;
+/// The session of a process, with 0 for this one itself. It is 0 for kernel threads and for sessions whose leader is outside of a container,
+/// and negative if there is no such process.
+fn session(id: i32) -> i32 {
     // SAFETY: getsid touches no memory. That of rustix panics where the session is 0.
-    u32::try_from(unsafe { libc::getsid(id) }).ok()
+    unsafe { libc::getsid(id) }
 }
 
 /// Whether a process is alive (not a zombie), by the text of `/proc/ID/stat`.
@@ -213,7 +205,7 @@ impl MemorySampler {
 
     /// Takes a sample of the session, unless one was taken a short time ago. The system keeps the peak of each
     /// process, so only memory that is first used after the last sample is missed.
-    pub(super) fn sample(&mut self, leader: u32) {
+    pub(super) fn sample(&mut self, leader: Pid) {
         /// Longest time between samples.
         const PERIOD: Duration = Duration::from_millis(100);
         /// Samples of a program of any age, at least, up to that period: what a short run uses last is missed as seldom as in a long one.
@@ -275,7 +267,7 @@ mod tests {
         let mut sampler = MemorySampler::new();
         // The last bytes may still be in the pipe.
         while sampler.peak_bytes < 29_000_000 {
-            sampler.sample(child.id());
+            sampler.sample(Pid::from_child(&child));
         }
         drop(child.stdin.take());
         assert!(child.wait().unwrap().success());

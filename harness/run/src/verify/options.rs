@@ -50,7 +50,7 @@ pub struct Options {
     #[arg(long, value_delimiter = ',', default_value = "small")]
     pub size: Vec<Size>,
     /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
-    #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub ranks: Option<Vec<usize>>,
     /// Partitioners, each at every rank count
     #[arg(long, value_delimiter = ',', default_value = "metis,morton")]

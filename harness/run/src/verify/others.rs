@@ -23,6 +23,7 @@ use contract::parity::Parity;
 use contract::plain::{PlainCase, StlForm};
 use contract::word::{self, Side};
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -41,29 +42,26 @@ impl CaseRun<'_> {
     /// Has the other programs judge a serial mesh of the definition and its base tree.
     pub(super) fn verify_by_others(&mut self, case: &Case, serial: &Meshed, base: &Meshed) {
         for &(step, need) in steps(self.engine()) {
-            match self.all.needs.lacks(need) {
-                Some(why) => self.leave_out(step, why),
-                None => self.judge(step, |run| match need {
-                    Need::Proof => run.prove(step, serial, base),
-                    Need::Oracles => run.vote(step, case, &base.mesh),
-                    _ => run.balance(step, base),
-                }),
+            if let Some(why) = self.all.needs.lacks(need) {
+                self.leave_out(step, why);
+                continue;
             }
+            self.step(step.0);
+            let start = Instant::now();
+            let judged = match need {
+                Need::Proof => self.prove(step, serial, base),
+                Need::Oracles => self.vote(step, case, &base.mesh),
+                _ => self.balance(step, base),
+            };
+            let mut check = match judged {
+                Ok(check) => check,
+                Err(failure) if failure.is_interrupt() => return,
+                // Without an answer nothing is shown about the mesh, and that must not count as agreement.
+                Err(failure) => Check::new(step.0, step.1, Outcome::fail(failure.to_string())),
+            };
+            check.time_s = start.elapsed().as_secs_f64();
+            self.add(check, None);
         }
-    }
-
-    /// Adds the check of a program.
-    fn judge(&mut self, step: Step, check: impl FnOnce(&Self) -> Result<Check, Failure>) {
-        self.step(step.0);
-        let start = Instant::now();
-        let mut check = match check(self) {
-            Ok(check) => check,
-            Err(failure) if failure.is_interrupt() => return,
-            // Without an answer nothing is shown about the mesh, and that must not count as agreement.
-            Err(failure) => Check::new(step.0, step.1, Outcome::fail(failure.to_string())),
-        };
-        check.time_s = start.elapsed().as_secs_f64();
-        self.add(check, None);
     }
 
     /// Has the proven checker judge the mesh, given its base tree.
@@ -139,8 +137,7 @@ impl CaseRun<'_> {
     /// The leaf words of the same case with n = 1 and all leaves kept.
     fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
         let place = self.place.join("plain-case");
-        let unusable = |why: String| Failure::new("the harness", End::Unusable(why));
-        let case = PlainCase::read(&self.file).map_err(unusable)?;
+        let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
         let written = plain(case).write(&place, StlForm::Any)?;
         Ok(self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh.words)
     }

@@ -187,7 +187,7 @@ fn different_solids_have_patches_of_their_own() {
     fs::write(dir.path().join("body.stl"), solids.concat()).unwrap();
     let case = dir.path().join("case.toml");
     fs::write(&case, "geometry = \"body.stl\"\nspacing_min = 1.0\n").unwrap();
-    let patches = Patches::new(Some(&Case::read(&case).unwrap()), false).unwrap();
+    let patches = Patches::new(Some(&Case::read(&case).unwrap()), false);
     assert_eq!(patches.names[6..], ["a_b", "a_b_2", "body_xMin", "body_xMin_2"]);
 }
 

@@ -79,7 +79,7 @@ fn leaves_of(words: &[u64], is_cut: impl Fn(u64) -> bool) -> Leaves {
 
 /// The mesh of these leaves.
 pub fn mesh_of(words: &[u64], is_cut: impl Fn(u64) -> bool, options: &Options<'_>) -> Mesh {
-    let patches = Patches::new(None, true).unwrap();
+    let patches = Patches::new(None, true);
     Mesh::new(leaves_of(words, is_cut), None, patches, options).unwrap()
 }
 

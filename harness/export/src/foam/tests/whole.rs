@@ -61,7 +61,7 @@ proptest! {
         let region = sets[(0..cells).find(|&cell| size_of(cell) == largest).unwrap()];
         options.regions = Regions::Largest;
         let ranks = Some((0..cells as u32).map(|cell| cell % 7).collect());
-        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true).unwrap(), &options).unwrap();
+        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true), &options).unwrap();
         prop_assert_eq!(mesh.regions, expected.len());
         prop_assert_eq!(u64::from(mesh.leaves.count()), largest.1);
         // Its cells keep their ranks.
