@@ -78,7 +78,7 @@ impl Runner<'_> {
         let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         Ok(Run {
-            program: machine::digest_of(&engine.files()),
+            program: machine::digest_of(engine.files()),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
@@ -296,7 +296,7 @@ mod tests {
             let file = place.path().join("scripted.toml");
             std::fs::write(&file, words).unwrap();
             let engine = Engine::find(file.to_str().unwrap(), None, &Paths::find()).unwrap();
-            machine::digest_of(&engine.files())
+            machine::digest_of(engine.files())
         };
         assert!(program("a") == program("a") && program("a") != program("b"));
     }

@@ -46,7 +46,7 @@ pub struct Subject {
 
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
-        let program = digest_of(&engine.files());
+        let program = digest_of(engine.files());
         let measured = Measured { named, revision, program };
         Self { engine, measured, counted: RefCell::default() }
     }

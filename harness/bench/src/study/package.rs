@@ -149,7 +149,7 @@ mod tests {
         fs::remove_dir_all(at("here")).unwrap();
         let study = Study::read(&at("there").join(STUDY)).unwrap();
         let engine = Engine::find(&study.series[0].engines[1], None, &Paths::find()).unwrap();
-        assert_eq!(engine.files()[1], at("there/bin/mesh.sh").canonicalize().unwrap());
+        assert!(engine.files().contains(&at("there/bin/mesh.sh").canonicalize().unwrap()));
     }
 
     #[test]

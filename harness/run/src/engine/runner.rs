@@ -105,20 +105,6 @@ impl Engine {
         &self.description.name
     }
 
-    /// The files that the engine consists of: its program, and those that its commands name, such as the script of an interpreter.
-    pub fn files(&self) -> Vec<PathBuf> {
-        let Templates { serial, parallel, simulated, .. } = &self.description.run;
-        let words = [serial, parallel, simulated].into_iter().flatten();
-        let named = words.map(|word| PathBuf::from(fill(word, &self.places)));
-        let mut files = vec![self.program.clone()];
-        for file in named.filter(|file| file.is_file()) {
-            if !files.contains(&file) {
-                files.push(file);
-            }
-        }
-        files
-    }
-
     /// Refuses to go on if the program is missing.
     ///
     /// # Errors
