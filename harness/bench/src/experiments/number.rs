@@ -8,10 +8,11 @@ pub fn grouped(n: u64) -> String {
     }
 }
 
-/// Returns a duration in seconds up to two minutes, and in whole minutes beyond, rounded up.
+/// Returns a duration in seconds up to two minutes, and in minutes beyond, rounded up.
 pub fn duration(seconds: f64) -> String {
-    match seconds {
-        ..=120.0 => format!("{:.0} seconds", seconds.ceil()),
-        _ => format!("{:.0} minutes", (seconds / 60.0).ceil()),
+    match seconds.ceil() {
+        ..=1.0 => "1 second".to_owned(),
+        short @ ..=120.0 => format!("{short} seconds"),
+        _ => format!("{} minutes", (seconds / 60.0).ceil()),
     }
 }
