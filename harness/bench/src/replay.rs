@@ -6,6 +6,7 @@
 
 use crate::experiments::entry::{Line, Run};
 use crate::experiments::group::{Group, Groups};
+use crate::experiments::number::duration;
 use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
 use serde::Serialize;
@@ -101,8 +102,8 @@ impl Expected {
         }
         match (limit_s / self.seconds_once) as u16 {
             0 => Err(Failure::input(format!(
-                "one run of each took {:.0} minutes on the archive's machine: give --minutes",
-                (self.seconds_once / 60.0).ceil()
+                "one run of each took {} on the archive's machine: give --minutes",
+                duration(self.seconds_once)
             ))),
             repeats => Ok(Some(repeats)),
         }
@@ -223,13 +224,12 @@ fn values(groups: &Groups, group: &Group) -> Vec<Value> {
         }
     }
     let base = groups.reference(group);
-    let (scales, efficiency) = (base.setup.ranks < group.setup.ranks, groups.efficiency(group));
-    let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
+    let scales = base.setup.ranks < group.setup.ranks;
     let ratios = [
         ("bytes per cell", Some(group.bytes_per_cell())),
-        ("load imbalance", (group.setup.ranks > 1).then(|| single(1.0 / efficiency.load_balance))),
+        ("load imbalance", (group.setup.ranks > 1).then(|| group.imbalance())),
         ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
-        ("efficiency", scales.then(|| single(efficiency.global()))),
+        ("efficiency", scales.then(|| groups.global_efficiency(group))),
     ];
     for (quantity, ratio) in ratios {
         if let Some(Median { value, low, high, .. }) = ratio.filter(|of| of.value.is_finite()) {
@@ -331,7 +331,8 @@ mod tests {
         assert_eq!((expected.seconds, expected.seconds_once), (40.0, 20.0));
         let of = |limit_s: f64| expected.repeats_within(limit_s);
         assert_eq!((of(40.0), of(39.0)), (Ok(None), Ok(Some(1))));
-        assert!(of(19.0).unwrap_err().why.contains("1 minutes"));
+        assert_eq!([52.0, 121.0].map(duration), ["52 seconds", "3 minutes"]);
+        assert!(of(19.0).unwrap_err().why.contains("took 20 seconds"));
     }
 
     proptest! {

@@ -117,6 +117,26 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
     }
 }
 
+/// A network that is assumed instead would change the projections of the record.
+#[test]
+fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
+    let fixture = Fixture::new();
+    fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+    fixture.program("pingpong", "");
+    let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [2]\n";
+    fs::write(fixture.path().join("study.toml"), series).unwrap();
+    let launcher = ["--launcher", "./mesher {ranks}", "--mesher", "./mesher"];
+    let bench = ["bench", "study.toml", "--record", "record.jsonl"];
+    let mut run = fixture.start(&[&bench[..], &launcher].concat());
+    while fixture.ids().len() < 2 {
+        assert!(run.try_wait().unwrap().is_none(), "it ended before the ping-pong");
+        sleep(Duration::from_millis(5));
+    }
+    fixture.interrupt(run, &["INT"]);
+    let record = fs::read_to_string(fixture.path().join("record.jsonl")).unwrap();
+    assert!(record.contains("session") && !record.contains("network"), "{record}");
+}
+
 #[test]
 fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
     let fixture = Fixture::new();

@@ -2,6 +2,7 @@
 
 use crate::benchmark::machines;
 use bench::experiments::entry::{Entry, Line, now_utc};
+use bench::experiments::number::duration;
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;
@@ -62,7 +63,7 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let program_id = |digest: &str| format!("#program-{digest}");
     let program = |(engine, digest): &(String, String)| {
         json!({"@id": program_id(digest), "@type": "SoftwareApplication", "name": engine, "identifier": digest,
-            "description": "The identifier is the digest of the program's file."})
+            "description": "The identifier is the digest of the program's files."})
     };
     let sessions = by_key(lines, |line| line.session.as_str());
     let action = |(name, of): &(&str, Vec<&Line>)| {
@@ -108,17 +109,16 @@ pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
         machine.commit.trim_end_matches("-dirty").to_owned()
     });
     let commits = distinct(commits.collect::<Vec<_>>()).join(" or ");
-    let minutes = |seconds: f64| (seconds / 60.0).ceil();
     let _ = write!(
         text,
         "\nTo repeat it, in a clone of the programs' repository at commit {commits}:\n\n```\nharness replay THIS_DIRECTORY\n```\n\n\
          It prints expected values beside measured ones: digests, cells and counters must be equal; ratios (speedup, efficiency, load \
          imbalance, bytes per cell) lie within the interval of their repetitions and {:.0} % beyond it; times are those of a machine, and \
-         are not compared. All runs took {} minutes, and one run of each {}.\n\n\
-         `study/` has the study with its cases and geometries, `record.jsonl` every run, `expected.json` the values and bands.\n",
+         are not compared. All runs took {}, and one run of each {}.\n\n\
+         `study/` has the study with its cases, geometries and engines, `record.jsonl` every run, `expected.json` the values and bands.\n",
         TOLERANCE * 100.0,
-        minutes(expected.seconds),
-        minutes(expected.seconds_once)
+        duration(expected.seconds),
+        duration(expected.seconds_once)
     );
     text
 }

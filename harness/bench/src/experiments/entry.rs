@@ -50,10 +50,20 @@ impl Line {
                 return Some("it has no wall time, or no ranks".to_owned());
             }
             Entry::Run(run) => {
-                let phases = run.phases.iter().flat_map(|phase| [&phase.useful_s, &phase.wall_s]);
-                let of_ranks = phases.chain([&run.useful_s]);
-                let times = of_ranks.flat_map(|s| s.by_rank.iter().chain([&s.sum, &s.max]));
-                times.chain([&run.time_wall_s]).copied().collect()
+                if let Some(Spread { sum, max, .. }) =
+                    run.spreads().into_iter().find(|of| !of.is_possible())
+                {
+                    return Some(format!(
+                        "a sum of {sum:e} over the ranks, with {max:e} on one, is not possible"
+                    ));
+                }
+                if !run.has_times_of_phases() {
+                    return Some("the times of its phases are not those of the run".to_owned());
+                }
+                let times = run.phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
+                times
+                    .chain([run.useful_s.sum, run.time_wall_s, run.time_launch_s, run.time_cpu_s])
+                    .collect()
             }
             _ => return None,
         };
@@ -65,6 +75,14 @@ impl Line {
     pub fn session(&self) -> Option<&Session> {
         match &self.entry {
             Entry::Session(session) => Some(session),
+            _ => None,
+        }
+    }
+
+    /// Returns the network of the line, if it states one, with its session.
+    pub fn network(&self) -> Option<(&str, Network)> {
+        match &self.entry {
+            Entry::Network(network) => Some((&self.session, *network)),
             _ => None,
         }
     }
@@ -160,6 +178,11 @@ pub enum Comm {
     Sim,
 }
 
+/// How far a sum may be from that of so many stored values.
+fn rounding(count: usize, sum: f64) -> f64 {
+    1e-6 * (1 + count) as f64 + 1e-9 * sum
+}
+
 /// A quantity over the ranks.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
@@ -193,17 +216,18 @@ impl Spread {
         Self { by_rank: Vec::new(), ..Self::of(values) }
     }
 
-    /// Sum and maximum are those of the values rank by rank, as far as these are stored, to their rounding.
-    pub(crate) fn check_invariants(&self) {
+    /// Whether no value is negative, and sum and maximum are those of the values rank by rank, as far as these are stored, to their
+    /// rounding.
+    pub(crate) fn is_possible(&self) -> bool {
         let Self { sum, max, at, by_rank } = self;
-        if !by_rank.is_empty() {
-            let total: f64 = by_rank.iter().sum();
-            let off = 1e-6 * (1 + by_rank.len()) as f64 + 1e-9 * sum.abs();
-            let is_right = (sum - total).abs() <= off && by_rank.get(*at) == Some(max);
-            let most = by_rank.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            assert!(is_right && *max == most, "sum and maximum are those of the ranks: {self:?}");
-        }
-        assert!(max <= &(sum + 1e-6) || *sum < 0.0, "no rank has more than all together: {self:?}");
+        let is = |value: f64, of: f64| (value - of).abs() <= rounding(by_rank.len(), of);
+        let is_of_ranks = by_rank.is_empty() || {
+            let most = by_rank.iter().copied().fold(0.0, f64::max);
+            let at = by_rank.get(*at).is_some_and(|value| is(*value, *max));
+            at && is(*max, most) && is(*sum, by_rank.iter().sum())
+        };
+        let mut all = by_rank.iter().chain([sum, max]);
+        is_of_ranks && all.all(|v| *v >= 0.0 && v.is_finite()) && *max <= sum + rounding(1, *sum)
     }
 
     /// Maximum over mean: 1 if all values are equal, also if all are 0.
@@ -297,7 +321,7 @@ pub struct Run {
     pub oversubscribed: bool,
     /// The command line.
     pub command: String,
-    /// Digest of the program's file; empty in old records.
+    /// Digest of the program's files; empty in old records.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub program: String,
     /// Facets of the geometry.
@@ -324,6 +348,26 @@ pub struct Run {
     pub phases: Vec<Phase>,
     /// The program's counters.
     pub counters: BTreeMap<String, Spread>,
+}
+
+impl Run {
+    /// All quantities over the ranks.
+    fn spreads(&self) -> Vec<&Spread> {
+        let phases = self.phases.iter();
+        let of_phases =
+            phases.flat_map(|p| [&p.useful_s, &p.wall_s, &p.messages, &p.message_bytes]);
+        let counters = self.counters.values();
+        of_phases.chain(counters).chain([&self.useful_s, &self.peak_rss_bytes]).collect()
+    }
+
+    /// Whether the useful time is that of the phases, if these state that of every rank.
+    fn has_times_of_phases(&self) -> bool {
+        let Self { phases, useful_s, setup, .. } = self;
+        let is_stated = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
+        let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
+        let off = rounding(setup.ranks * phases.len(), total);
+        phases.is_empty() || !is_stated || (useful_s.sum - total).abs() <= off
+    }
 }
 
 /// A run without a result: one that failed, or was not made.

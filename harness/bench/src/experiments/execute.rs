@@ -78,7 +78,7 @@ impl Runner<'_> {
         let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         Ok(Run {
-            program: machine::digest_of_file(&engine.program),
+            program: machine::digest_of(engine.files()),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
             oversubscribed: setup.comm == Comm::Mpi && setup.ranks > machine::cores(),
@@ -196,6 +196,7 @@ mod tests {
     use crate::testing::{line, run};
     use contract::octant::Octant;
     use contract::word::{self, Leaf, Side};
+    use run::engine::paths::Paths;
     use run::engine::runner::Given;
 
     #[test]
@@ -284,6 +285,20 @@ mod tests {
         let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
         assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
+    }
+
+    #[test]
+    fn another_script_of_an_interpreter_is_another_program() {
+        let place = tempfile::tempdir().unwrap();
+        let program = |script: &str| {
+            std::fs::write(place.path().join("engine.sh"), script).unwrap();
+            let words = "[run]\nserial = ['sh', '{here}/engine.sh', '{case}', '{out}']\n";
+            let file = place.path().join("scripted.toml");
+            std::fs::write(&file, words).unwrap();
+            let engine = Engine::find(file.to_str().unwrap(), None, &Paths::find()).unwrap();
+            machine::digest_of(engine.files())
+        };
+        assert!(program("a") == program("a") && program("a") != program("b"));
     }
 
     #[test]

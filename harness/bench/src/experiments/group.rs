@@ -1,7 +1,8 @@
 //! Repetitions of the same setup, and the statistics of each such group.
 //!
-//! Only runs of one machine, one build of the program and one geometry are repetitions of each other. Those of a second
-//! machine or build are runs of another program, `mesher [2]`, and those of a second geometry are runs on another case, `cube [2]`.
+//! Only runs of one machine, one build of the program, one network that was given, and one geometry are repetitions of each other. Those
+//! of a second machine, build or network are runs of another program, `mesher [2]`, and those of a second geometry are runs on another
+//! case, `cube [2]`.
 //!
 //! Invariants, executed by [`Groups::check_invariants`] before anything is computed from them: a group has runs, all of its
 //! setup and with its number of cells if the mesh is the same; its time lies in its interval, and that in the range of the
@@ -34,17 +35,21 @@ pub struct Group {
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
-    /// The network of projected times: the last one that a session on the machine of the runs states.
+    /// The network of projected times: that of the session; of several measured ones, the one of median latency.
     pub network: Network,
 }
 
 impl Group {
     /// Groups the repetitions of one setup; `None` for no repetitions.
-    fn of(setup: Setup, runs: Vec<Run>, network: Network) -> Option<Self> {
-        let times: Vec<f64> = runs.iter().map(|r| pop::time_s(r, &network)).collect();
-        let mut time_s = median(&times)?;
-        let off = |run: &&Run| (pop::time_s(run, &network) - time_s.value).abs();
-        let mut typical = runs.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.clone();
+    fn of(setup: Setup, repetitions: &[&(Run, Network)]) -> Option<Self> {
+        let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &of.1);
+        let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
+        let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
+        let mut typical = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.0.clone();
+        let mut networks: Vec<Network> = repetitions.iter().map(|of| of.1).collect();
+        networks.sort_by(|a, b| a.latency_s.total_cmp(&b.latency_s));
+        let network = networks[networks.len() / 2];
+        let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
             typical.time_wall_s = time_s.value;
@@ -75,6 +80,15 @@ impl Group {
     pub fn bytes_per_cell(&self) -> Median {
         let bytes = self.median_of(|r| Some(r.peak_rss_bytes.sum / r.cells.max(1) as f64));
         bytes.expect("a group has runs")
+    }
+
+    /// Returns the load imbalance of useful time, max / mean. The interval of the repetitions is extended to that of the typical run.
+    pub fn imbalance(&self) -> Median {
+        let of = |run: &Run| run.useful_s.lambda(run.setup.ranks).max(1.0);
+        let repeated = self.median_of(|run| Some(of(run))).expect("a group has runs");
+        let value = of(&self.typical);
+        let (low, high) = (repeated.low.min(value), repeated.high.max(value));
+        Median { value, low, high, ..repeated }
     }
 
     /// Returns the CPU time of the whole process, in seconds; `None` if a run does not have it.
@@ -144,22 +158,23 @@ pub struct Groups {
     pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
     pub lacks: Lacks,
-    /// A sentence for every program and case of which there are several series.
-    pub origins: Vec<String>,
+    /// A sentence for every program and case of which there are several series, for nodes whose runs are pooled, and for every run with
+    /// another mesh.
+    pub notes: Vec<String>,
 }
 
 impl Groups {
     /// Groups the runs of a record's lines.
     pub fn of(lines: &[Line]) -> Self {
-        let (mut sessions, mut networks) = (HashMap::new(), HashMap::new());
-        let (mut origins, mut digests) = (<[Origins; 2]>::default(), HashMap::new());
-        let (mut left_out, mut lacks) = (Vec::new(), BTreeMap::new());
-        let mut runs: Vec<(Run, Option<String>)> = Vec::new();
+        let mut sessions = HashMap::new();
+        let networks: HashMap<&str, Network> = lines.iter().filter_map(Line::network).collect();
+        let (mut origins, mut meshes) = (<[Origins; 2]>::default(), Meshes::new());
+        let (mut left_out, mut lacks, mut notes) = (Vec::new(), BTreeMap::new(), Vec::new());
+        let mut runs: Vec<(Run, Network)> = Vec::new();
         for line in lines {
             let session: Option<&Session> = sessions.get(&line.session).copied();
-            let machine = session.map(|session| session.machine.label());
+            let network = networks.get(line.session.as_str());
             match &line.entry {
-                Entry::Network(network) => _ = networks.insert(machine, *network),
                 Entry::Session(session) => {
                     lacks.extend(session.lacks.clone());
                     sessions.insert(&line.session, session);
@@ -170,27 +185,27 @@ impl Groups {
                     left_out.push(NoResult { setup: setup.clone(), why });
                 }
                 Entry::Run(run) => {
-                    let setup = apart(run, session, &mut origins);
+                    let setup = apart(run, session, network, &mut origins);
                     let run = Run { setup, ..(**run).clone() };
                     if run.warm_up {
                         continue;
                     }
-                    match another_mesh(&run, &lacks, &mut digests) {
-                        None => runs.push((run, machine)),
-                        Some(why) => left_out.push(NoResult { setup: run.setup, why }),
+                    match another_mesh(&run, &lacks, &mut meshes) {
+                        None => runs.push((run, network.copied().unwrap_or(ASSUMED))),
+                        Some(why) => {
+                            notes.push(format!("a run is left out, {}: {why}", run.setup));
+                            left_out.push(NoResult { setup: run.setup, why });
+                        }
                     }
                 }
-                Entry::Former => {}
+                Entry::Network(_) | Entry::Former => {}
             }
         }
-        let group = |(setup, runs): (Setup, Vec<&(Run, Option<String>)>)| {
-            // All are of one machine.
-            let network = networks.get(&runs[0].1).copied().unwrap_or(ASSUMED);
-            Group::of(setup, runs.into_iter().map(|(run, _)| run.clone()).collect(), network)
-        };
-        let all = by_key(&runs, |(run, _)| run.setup.clone()).into_iter().filter_map(group);
+        let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
+        let all = by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
         let origins = origins.each_ref().map(Origins::described).concat();
-        let groups = Self { all: all.collect(), left_out, lacks, origins };
+        let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(distinct(notes)).collect();
+        let groups = Self { all, left_out, lacks, notes };
         groups.check_invariants();
         groups
     }
@@ -207,7 +222,8 @@ impl Groups {
             assert!(has_one_time || setup.comm == Comm::Sim && !*by_rank, "{name} has one time");
             assert!((0.0..=1.0).contains(&t.coverage), "{name}: {t:?} is a coverage");
             for spread in typical.phases.iter().map(|p| &p.useful_s).chain([&typical.useful_s]) {
-                spread.check_invariants();
+                let is_right = spread.is_possible();
+                assert!(is_right, "sum and maximum are those of the ranks: {name}, {spread:?}");
             }
         }
     }
@@ -243,6 +259,12 @@ impl Groups {
         group.time_s.falling(|time_s| base_s / time_s)
     }
 
+    /// Returns the efficiency of a group with the interval that follows from that of its time.
+    pub fn global_efficiency(&self, group: &Group) -> Median {
+        let useful_s = self.efficiency(group).global() * group.time_s.value;
+        group.time_s.falling(|time_s| useful_s / time_s)
+    }
+
     /// Whether a group has a reference on fewer ranks, or is on one.
     pub fn has_reference(&self, group: &Group) -> bool {
         group.setup.ranks == 1 || self.reference(group).setup.ranks < group.setup.ranks
@@ -256,7 +278,7 @@ impl Groups {
     /// Returns the networks of these groups, as text.
     pub fn networks<'a>(groups: impl IntoIterator<Item = &'a Group>) -> String {
         let networks = groups.into_iter().map(|group| group.network.to_string());
-        distinct(networks).join("; on another machine ")
+        distinct(networks).join("; in another session ")
     }
 
     /// Returns the largest loss of efficiency of a group in one sentence.
@@ -275,31 +297,68 @@ impl Groups {
     }
 }
 
-/// Digests by mesh.
-pub(crate) type Digests = HashMap<String, String>;
+/// What the runs on a mesh report of it: facets, cells, digest; empty where none of them does.
+pub(crate) type Meshes = HashMap<String, [String; 3]>;
 
 /// Returns why a run has another mesh than an earlier one of which it must have the mesh, although it may be of another session.
-pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, digests: &mut Digests) -> Option<String> {
+pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Option<String> {
     let s = &run.setup;
     let engine = s.engine.split(" [").next().unwrap_or_default();
-    let lacks = lacks.get(engine).map_or(&[][..], Vec::as_slice);
-    if run.digest.is_empty() || lacks.iter().any(|what| what == EQUAL_RUNS) {
-        return None;
-    }
+    let lacks = |of: &str| lacks.get(engine).is_some_and(|all| all.iter().any(|what| what == of));
     let mut mesh = format!("{} {} {:e} {}", s.engine, s.case, s.spacing_min, s.layer_cells_min);
-    if lacks.iter().any(|what| what == EQUAL_RANKS) {
+    if lacks(EQUAL_RANKS) {
         mesh += &format!(" {} {}", s.ranks, s.partitioner);
     }
-    let first = digests.entry(mesh).or_insert_with(|| run.digest.clone());
-    let digest = &run.digest;
-    (first != digest)
-        .then(|| format!("its mesh has the digest {digest}, and that of an earlier run {first}"))
+    let [facets, cells] = [run.facets, run.cells].map(|count| match count {
+        0 => String::new(),
+        _ => count.to_string(),
+    });
+    let known = meshes.entry(mesh).or_default();
+    let names = ["number of facets", "number of cells", "digest"];
+    let all = names.into_iter().zip(known).zip([facets, cells, run.digest.clone()]);
+    // Any mesh is of the facets that were given.
+    for ((what, first), here) in all.take(if lacks(EQUAL_RUNS) { 1 } else { 3 }) {
+        if first.is_empty() {
+            *first = here;
+        } else if !here.is_empty() && *first != here {
+            return Some(format!(
+                "its mesh has the {what} {here}, and that of an earlier run {first}"
+            ));
+        }
+    }
+    None
 }
 
-/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build or geometry before.
-fn apart(run: &Run, session: Option<&Session>, [programs, geometries]: &mut [Origins; 2]) -> Setup {
+/// A sentence for every machine whose runs are of several nodes. Names of nodes do not make series: those of a cloud are new in every
+/// session.
+fn pooled_nodes(lines: &[Line]) -> Vec<String> {
+    let sessions = lines.iter().filter_map(Line::session).filter(|of| !of.nodes.is_empty());
+    let by_machine = by_key(sessions, |session| session.machine.label());
+    let nodes =
+        by_machine.into_iter().map(|(_, of)| distinct(of.into_iter().map(|s| s.nodes.as_str())));
+    let several = nodes.filter(|nodes| nodes.len() > 1);
+    let sentence = |nodes: Vec<&str>| {
+        let names: Vec<String> = nodes.iter().map(|name| name.chars().take(24).collect()).collect();
+        let shown = names[..names.len().min(3)].join(", ");
+        let more = if names.len() > 3 { ", ..." } else { "" };
+        format!("runs of {} nodes are taken for those of one machine: {shown}{more}", names.len())
+    };
+    several.map(sentence).collect()
+}
+
+/// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network or geometry
+/// before.
+fn apart(
+    run: &Run,
+    session: Option<&Session>,
+    network: Option<&Network>,
+    [programs, geometries]: &mut [Origins; 2],
+) -> Setup {
     let mut setup = run.setup.clone();
-    let machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
+    let mut machine = session.map_or(String::new(), |s| format!("{}; ", s.machine.label()));
+    if let Some(given) = network.filter(|network| !network.measured) {
+        machine += &format!("{given}; ");
+    }
     // Old records have no digest of the program: the commit stands for it.
     let origin = match (session, run.program.as_str()) {
         (None, "") => machine,

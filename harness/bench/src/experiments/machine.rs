@@ -5,7 +5,7 @@ use crate::{git, printed};
 use contract::digest::mix;
 use std::fmt;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Describes this machine; `mpirun` is the launcher's program, `place` a directory of the repository.
@@ -38,12 +38,16 @@ impl fmt::Display for Machine {
     }
 }
 
-/// Returns the digest of a program's file, which names a build of it; empty if it cannot be read.
-pub fn digest_of_file(program: &Path) -> String {
-    let Ok(bytes) = fs::read(program) else { return String::new() };
+/// Returns the digest of a program's files, which names a build of it; empty if there are none, or one cannot be read.
+pub fn digest_of(files: impl IntoIterator<Item = PathBuf>) -> String {
     let word = |chunk: &[u8]| chunk.iter().fold(1, |word, byte| word << 8 | u64::from(*byte));
     let step = |state: u128, chunk: &[u8]| mix(word(chunk) ^ state as u64) ^ state.rotate_left(64);
-    format!("{:032x}", bytes.chunks(7).fold(bytes.len() as u128, step))
+    let digest = files.into_iter().try_fold(None, |state: Option<u128>, file| {
+        let bytes = fs::read(file).ok()?;
+        let start = state.unwrap_or(0) ^ bytes.len() as u128;
+        Some(Some(bytes.chunks(7).fold(start, step)))
+    });
+    digest.flatten().map_or(String::new(), |digest| format!("{digest:032x}"))
 }
 
 /// Returns the number of cores that this process may use.
@@ -103,7 +107,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let of = |bytes: &[u8]| {
             std::fs::write(place.path().join("p"), bytes).unwrap();
-            digest_of_file(&place.path().join("p"))
+            digest_of([place.path().join("p")])
         };
         let some = [7u8; 40];
         let mut others = [some; 3];
@@ -111,7 +115,7 @@ mod tests {
         let all = [&some[..], &others[1], &others[2], &some[..39], b""].map(of);
         assert_eq!(of(&some), all[0]);
         assert!((1..5).all(|i| !all[..i].contains(&all[i])), "{all:?}");
-        assert_eq!(digest_of_file(Path::new("no/such/program")), "");
+        assert_eq!(digest_of([PathBuf::from("no/such/program")]), "");
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use super::GateOptions;
 use super::measures::{CaseMeasures, Measured};
-use crate::experiments::machine::digest_of_file;
+use crate::experiments::machine::digest_of;
 use crate::git;
 use contract::failure::Failure;
 use run::engine::description::Build;
@@ -46,7 +46,7 @@ pub struct Subject {
 
 impl Subject {
     fn new(engine: Engine, named: String, revision: Option<String>) -> Self {
-        let program = digest_of_file(&engine.program);
+        let program = digest_of(engine.files());
         let measured = Measured { named, revision, program };
         Self { engine, measured, counted: RefCell::default() }
     }

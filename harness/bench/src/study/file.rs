@@ -168,7 +168,8 @@ pub struct Series {
     /// If empty, the case's own spacing.
     #[serde(default)]
     pub cells: Vec<f64>,
-    /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files.
+    /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files, whose paths in the file are relative to
+    /// it.
     #[serde(default = "mesher")]
     pub engines: Vec<String>,
     /// Values of n; if empty, that of the case.
@@ -196,6 +197,10 @@ impl Study {
         let mut study: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         study.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
         study.check().map_err(wrong)?;
+        let engines = study.series.iter_mut().flat_map(|series| &mut series.engines);
+        for file in engines.filter(|name| name.ends_with(".toml")) {
+            *file = study.directory.join(&*file).to_string_lossy().into_owned();
+        }
         study.row = study.row.iter().flat_map(each_run).collect();
         Ok(study)
     }

@@ -5,7 +5,7 @@
 
 use super::file::{Row, Study};
 use super::measure::Sample;
-use crate::experiments::entry::{Entry, Line};
+use crate::experiments::entry::{Entry, Line, Network};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
 use std::collections::HashMap;
@@ -44,8 +44,8 @@ pub fn judged(study: &Study, lines: &[Line]) -> Vec<Judged> {
     study.row.iter().map(|row| judge(study, row, &lines)).collect()
 }
 
-/// Returns the lines of sessions on the same machine and commit as the last one, without runs of other builds of a program than in its
-/// last run.
+/// Returns the lines of sessions on the same machine, commit and given network as the last one, without runs of other builds of a program
+/// than in its last run.
 pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin =
         |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
@@ -53,7 +53,13 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let built: HashMap<&String, &String> =
         lines.iter().filter_map(Line::run).map(|run| (&run.setup.engine, &run.program)).collect();
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
-    let sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
+    let mut sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
+    let given = |(session, network)| (session, Some(network).filter(|of: &Network| !of.measured));
+    let networks: Vec<_> = lines.iter().filter_map(Line::network).map(given).collect();
+    if let Some((_, last)) = networks.iter().rfind(|(session, _)| sessions.contains(session)) {
+        sessions
+            .retain(|session| networks.iter().all(|(of, given)| of != session || given == last));
+    }
     let is_of = |line: &&Line| {
         sessions.contains(&line.session.as_str())
             && line.run().is_none_or(|run| *built[&run.setup.engine] == run.program)

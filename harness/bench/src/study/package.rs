@@ -1,31 +1,44 @@
-//! A study with its cases and geometries in one directory, so that it can be executed elsewhere.
+//! A study with its cases, geometries and engines in one directory, so that it can be executed elsewhere.
 
 use super::Study;
-use contract::catalogue::Catalogue;
 use contract::failure::Failure;
 use contract::files::{self, read_text, write_atomically};
+use run::engine::paths::Paths;
+use run::engine::runner::Engine;
+use std::fs;
 use std::path::Path;
 use toml::{Table, Value};
 
 /// Name of the study's file in the directory.
 pub const STUDY: &str = "study.toml";
 
-/// Copies a study, and the cases and geometry files that it names, into a directory. Cases that generate their geometry have none.
+/// Copies a study, and the cases, geometry files and engine files that it names, into a directory. Cases that generate their geometry
+/// have none; of an engine's programs and scripts, those in the directory of its file and below are copied.
 ///
 /// # Errors
 /// If the study is invalid, a file cannot be read or written, or two files have one name.
-pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Failure> {
+pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
     let directory = Study::read(study)?.directory;
     let mut table = read(study)?;
     for (key, value) in &mut table {
-        let with_cases: Vec<&mut Value> = match (key.as_str(), value) {
+        let parts: Vec<&mut Value> = match (key.as_str(), value) {
             ("mesh", Value::Table(meshes)) => meshes.iter_mut().map(|(_, mesh)| mesh).collect(),
             ("series", Value::Array(series)) => series.iter_mut().collect(),
             _ => Vec::new(),
         };
-        for value in with_cases {
+        for value in parts {
+            let engines = value.get_mut("engines").and_then(Value::as_array_mut);
+            for engine in engines.into_iter().flatten() {
+                if let Value::String(file) = engine
+                    && file.ends_with(".toml")
+                {
+                    let path = directory.join(&*file);
+                    copy_engine(&path, paths, out)?;
+                    *file = file_name(&path);
+                }
+            }
             let Some(Value::String(case)) = value.get_mut("case") else { continue };
-            let path = catalogue.case_file(case, &directory)?;
+            let path = paths.catalogue.case_file(case, &directory)?;
             *case = file_name(&path);
             let mut of_case = read(&path)?;
             if let Some(Value::String(geometry)) = of_case.get_mut("geometry") {
@@ -37,6 +50,20 @@ pub fn package(study: &Path, catalogue: &Catalogue, out: &Path) -> Result<(), Fa
         }
     }
     put(&out.join(STUDY), table.to_string().as_bytes())
+}
+
+/// Copies an engine file with the program and the scripts beside it. What it runs from elsewhere is of the machine.
+fn copy_engine(path: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
+    copy(path, &out.join(file_name(path)))?;
+    let engine = Engine::find(&path.to_string_lossy(), None, paths)?;
+    for file in engine.files() {
+        let Ok(below) = file.strip_prefix(&engine.description.here) else { continue };
+        let to = out.join(below);
+        fs::create_dir_all(to.parent().unwrap_or(out))?;
+        copy(&file, &to)?;
+        fs::set_permissions(&to, fs::metadata(&file)?.permissions())?;
+    }
+    Ok(())
 }
 
 fn file_name(path: &Path) -> String {
@@ -59,7 +86,7 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
 
 /// Writes a file unless it is there.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    match std::fs::read(path) {
+    match fs::read(path) {
         Ok(before) if before == bytes => return Ok(()),
         Ok(_) => return Err(Failure::about(path, "two files have this name: rename one")),
         Err(_) => {}
@@ -70,7 +97,11 @@ fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use contract::catalogue::Catalogue;
+
+    fn paths(place: &Path) -> Paths {
+        Paths { catalogue: Catalogue::new(place.join("none.toml")), ..Paths::find() }
+    }
 
     #[test]
     fn a_study_elsewhere_has_its_own_cases() {
@@ -88,8 +119,7 @@ mod tests {
             "[[series]]\nexperiment = \"strong\"\ncase = \"a wing.toml\"\n[[series]]\nexperiment = \"spacing\"\ncase = \"a wing.toml\"\n\
              [mesh.ball]\ncase = \"ball.toml\"\n",
         );
-        let catalogue = Catalogue::new(at("none.toml"));
-        package(&here.join("s.toml"), &catalogue, &there).unwrap();
+        package(&here.join("s.toml"), &paths(place.path()), &there).unwrap();
         fs::remove_dir_all(&here).unwrap();
         let study = Study::read(&there.join(STUDY)).unwrap();
         assert_eq!((study.series.len(), study.series[1].case.as_str()), (2, "a wing.toml"));
@@ -99,6 +129,27 @@ mod tests {
             read(&there.join("a wing.toml")).unwrap()["geometry"].as_str() == Some("a wing.stl")
         );
         assert!(there.join("ball.toml").is_file());
+    }
+
+    #[test]
+    fn a_study_elsewhere_has_its_own_engines() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        fs::create_dir_all(at("here/bin")).unwrap();
+        fs::create_dir(at("there")).unwrap();
+        let put = |name: &str, text: &str| fs::write(at(name), text).unwrap();
+        put("here/ball.toml", "spacing_min = 0.1\n[generator]\nshape = \"sphere\"\nfacets = 80\n");
+        put("here/bin/mesh.sh", "true");
+        put("here/e.toml", "[run]\nserial = ['sh', '{here}/bin/mesh.sh', '{case}', '{out}']\n");
+        put(
+            "here/s.toml",
+            "[[series]]\nexperiment = 'strong'\ncase = 'ball.toml'\nengines = ['mesher', 'e.toml']\n",
+        );
+        package(&at("here/s.toml"), &paths(place.path()), &at("there")).unwrap();
+        fs::remove_dir_all(at("here")).unwrap();
+        let study = Study::read(&at("there").join(STUDY)).unwrap();
+        let engine = Engine::find(&study.series[0].engines[1], None, &Paths::find()).unwrap();
+        assert!(engine.files().contains(&at("there/bin/mesh.sh").canonicalize().unwrap()));
     }
 
     #[test]
@@ -116,7 +167,7 @@ mod tests {
             let series = "[[series]]\nexperiment = 'strong'\ncase = 'a/ball.toml'\n";
             let text = series.to_owned() + &mesh("one", "a") + &mesh("two", second);
             fs::write(at("s.toml"), text).unwrap();
-            package(&at("s.toml"), &Catalogue::new(at("none.toml")), &at("out"))
+            package(&at("s.toml"), &paths(place.path()), &at("out"))
         };
         assert_eq!(package("a"), Ok(()));
         assert!(package("b").unwrap_err().why.contains("rename one"));

@@ -10,7 +10,7 @@ use crate::experiments::entry::{
     Comm, Entry, Line, Network, NoResult, Run, Session as Opening, Setup, now_utc,
 };
 use crate::experiments::execute::{Runner, excess};
-use crate::experiments::group::{Digests, another_mesh};
+use crate::experiments::group::{Meshes, another_mesh};
 use crate::experiments::{machine, network};
 use crate::{jsonl, name_of};
 use clap::Args;
@@ -108,7 +108,7 @@ pub fn measure(
         lines: Vec::new(),
         bases: BTreeMap::new(),
         sizes: BTreeMap::new(),
-        digests: Digests::new(),
+        meshes: Meshes::new(),
         made: BTreeSet::new(),
         warm: BTreeSet::new(),
     };
@@ -141,8 +141,8 @@ struct Session<'a> {
     bases: BTreeMap<String, Base>,
     /// The known sizes of meshes, by case and n.
     sizes: BTreeMap<(String, u32), Sizes>,
-    /// Digests of the meshes.
-    digests: Digests,
+    /// What is known of the meshes.
+    meshes: Meshes,
     /// Runs that are complete.
     made: BTreeSet<String>,
     /// Programs and cases that have been run at least once.
@@ -327,7 +327,7 @@ impl Session<'_> {
     /// Executes runs, each mesh of every program after an uncounted one that fills the file cache. A program that declines
     /// a mesh, or would exceed the time or the memory, is not run on it.
     fn make(&mut self, points: &mut [Planned]) -> Result<(), Failure> {
-        let is_known = self.lines.iter().any(|line| matches!(line.entry, Entry::Network(_)));
+        let is_known = self.lines.iter().any(|line| line.network().is_some());
         if points.iter().any(|p| p.setup.comm == Comm::Sim) && !is_known {
             self.measure_network()?;
         }
@@ -359,10 +359,14 @@ impl Session<'_> {
     /// Records the cost of messages, on which all projections depend.
     fn measure_network(&mut self) -> Result<(), Failure> {
         let measured = || network::measured(&self.runner);
-        let network = self.options.network.map_or_else(measured, Ok).unwrap_or_else(|why| {
-            (self.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
-            network::ASSUMED
-        });
+        let network = match self.options.network.map_or_else(measured, Ok) {
+            Ok(network) => network,
+            Err(_) if interrupt::requested() => return Err(Failure::interrupted()),
+            Err(why) => {
+                (self.progress)(&format!("latency 2 us and bandwidth 10 GB/s are assumed: {why}"));
+                network::ASSUMED
+            }
+        };
         self.append(Entry::Network(network))
     }
 
@@ -384,7 +388,7 @@ impl Session<'_> {
         }
     }
 
-    /// Requires runs that must have the same mesh to have the same digest: the time of a wrong mesh is not a result. The mesh of an
+    /// Requires runs that must have the same mesh to report the same: the time of a wrong mesh is not a result. The mesh of an
     /// engine that promises the definition must be that of the mesher, which is made once for each mesh.
     fn check_mesh(&mut self, point: &Planned, run: &Run) -> Result<(), Failure> {
         let engine = self.runner.programs.named(&point.setup.engine);
@@ -401,7 +405,7 @@ impl Session<'_> {
             }
         }
         let lacks = self.lines.iter().find_map(Line::session).map(|opening| opening.lacks.clone());
-        let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.digests);
+        let other = another_mesh(run, &lacks.unwrap_or_default(), &mut self.meshes);
         other.map_or(Ok(()), |why| Err(Failure::input(why)))
     }
 }

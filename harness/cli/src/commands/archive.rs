@@ -75,9 +75,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     put(EXPECTED, pretty(&expected))?;
     let of_study = place.join(STUDY);
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
-    let catalogue = Paths::find().catalogue;
-    package(study, &catalogue, &of_study)?;
-    let sources = catalogue.path().with_file_name("SOURCES.md");
+    let paths = Paths::find();
+    package(study, &paths, &of_study)?;
+    let sources = paths.catalogue.path().with_file_name("SOURCES.md");
     if sources.is_file() {
         copy(&sources, &of_study.join("SOURCES.md"))?;
     }

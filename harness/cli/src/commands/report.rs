@@ -4,7 +4,7 @@ use crate::options::Input;
 use bench::experiments::entry::{self, Line};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
-use report::benchmark::numbers::{Checked, Number, check};
+use report::benchmark::numbers::{Checked, Number, check, included};
 use report::benchmark::report;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,8 @@ pub struct Arguments {
     /// A record of `harness bench`; may be repeated
     #[arg(long, value_name = "FILE")]
     pub record: Vec<PathBuf>,
-    /// Compare the numbers of this LaTeX text with the record; exit code 1 if one is not there or differs. May be repeated
+    /// Compare the numbers of this LaTeX text, and of those that it includes, with the record; exit code 1 if one is not there or
+    /// differs. May be repeated
     #[arg(long, value_name = "FILE")]
     pub check: Vec<Input>,
 }
@@ -29,21 +30,50 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let numbers = write(&arguments.directory, &arguments.record)?;
     let mut code = EXIT_HOLDS;
-    for path in &arguments.check {
-        let shown = path.display();
-        let text = files::read_text(path).map_err(|error| Failure::at(path, error))?;
-        let Checked { compared, findings } = check(&text, &numbers);
-        if compared == 0 {
-            let why = "has no number that the record could have, so nothing was compared";
-            return Err(Failure::missing(format!("{shown} {why}")));
+    for main in &arguments.check {
+        let mut all = 0;
+        for (path, text) in texts(main, &arguments.directory)? {
+            let shown = path.display();
+            let Checked { compared, findings } = check(&text, &numbers);
+            findings.iter().for_each(|finding| println!("{shown}, {finding}"));
+            println!("{shown}: {compared} numbers compared, {} findings", findings.len());
+            if !findings.is_empty() {
+                code = EXIT_FAILED;
+            }
+            all += compared;
         }
-        findings.iter().for_each(|finding| println!("{shown}, {finding}"));
-        println!("{shown}: {compared} numbers compared, {} findings", findings.len());
-        if !findings.is_empty() {
-            code = EXIT_FAILED;
+        if all == 0 {
+            let (shown, why) = (main.display(), "so nothing was compared");
+            let why = format!("{shown} has no number that the record could have, {why}");
+            return Err(Failure::missing(why));
         }
     }
     Ok(code)
+}
+
+/// Reads a text and those that it includes, without the files that the report in `directory` has just written.
+fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>, Failure> {
+    let own = ["numbers.tex", "figures.tex", "figures"].map(|name| directory.join(name));
+    let own = own.map(|path| path.canonicalize().unwrap_or(path));
+    let is_own = |path: &PathBuf| {
+        path.canonicalize().is_ok_and(|path| own.iter().any(|own| path.starts_with(own)))
+    };
+    let mut paths = vec![main.to_owned()];
+    let mut all: Vec<(PathBuf, String)> = Vec::new();
+    while let Some(path) = paths.get(all.len()).cloned() {
+        let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+        for name in included(&text) {
+            // As LaTeX does: relative to the main text, whichever includes it.
+            let [named, with_end] =
+                ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
+            let file = if named.is_file() || name.ends_with(".tex") { named } else { with_end };
+            if !paths.contains(&file) && !is_own(&file) {
+                paths.push(file);
+            }
+        }
+        all.push((path, text));
+    }
+    Ok(all)
 }
 
 /// Reads records, writes the report into `directory` and prints a summary; returns the results.
@@ -63,6 +93,7 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     if lines.iter().all(|line| line.run().is_none()) {
         return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
+    written.notes.iter().for_each(|note| println!("{note}"));
     for (rule, why) in &written.broken {
         println!("rule {rule} broken: {why}");
     }

@@ -27,6 +27,8 @@ pub struct Written {
     pub page: PathBuf,
     /// Number of figures.
     pub figures: usize,
+    /// How runs were grouped, and which are left out.
+    pub notes: Vec<String>,
     /// The rules that are broken.
     pub broken: Vec<Broken>,
     /// The results in `numbers.tex`.
@@ -54,7 +56,7 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     let numbers = numbers(&groups);
     write(&directory.join("numbers.tex"), numbers::tex(&numbers))?;
-    Ok(Written { page, figures: figures.len(), broken, numbers })
+    Ok(Written { page, figures: figures.len(), notes: groups.notes, broken, numbers })
 }
 
 /// Writes a figure in all formats; returns it with its SVG.

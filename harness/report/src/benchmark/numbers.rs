@@ -6,7 +6,7 @@
 //!
 //! `harness report DIR --check paper.tex` compares the numbers of a text with the record. A finding is a `\result` of a key that the record
 //! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
-//! more significant digits that is written by hand and that no result rounds to.
+//! more significant digits that is written by hand and that no result rounds to. Texts that it includes are compared as well.
 
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
@@ -43,7 +43,6 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     };
     let names = [&s.engine, &s.case, &experiment].map(|name| file_name(name)).join("/");
     let setup = format!("{names}/{}/{}/{}", group.cells(), s.ranks, group.how());
-    let single = |value: f64| Median { value, low: value, high: value, coverage: 1.0, count: 1 };
     let base = groups.reference(group);
     let scales = base.setup.ranks < s.ranks;
     let is_speedup = scales && base.cells() == group.cells();
@@ -54,7 +53,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         ("rate", Some(group.time_s.falling(rate)), "10^6 cells/s/rank"),
         ("memory", Some(group.bytes_per_cell()), "B/cell"),
         ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
-        ("efficiency", scales.then(|| single(groups.efficiency(group).global())), ""),
+        ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
         let Median { value, low, high, count, .. } = median.filter(|m| m.value.is_finite())?;
@@ -104,7 +103,7 @@ pub fn tex(numbers: &[Number]) -> String {
 
 /// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths.
 const NOT_READ: [&str; 3] = [
-    r"\\[a-zA-Z]*(?:label|ref|cite|input|result|includegraphics|url|usepackage|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
+    r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
     r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
@@ -121,7 +120,7 @@ pub struct Checked {
 /// Compares the numbers of a LaTeX text with the results of a record.
 pub fn check(text: &str, numbers: &[Number]) -> Checked {
     let mut found: Vec<(usize, Option<String>)> = Vec::new();
-    let code = without(r"(?m)%.*$", &without(r"\\%", text));
+    let code = without_comments(text);
     for definition in all(r"(?m)^\s*\\defresult.*$", &code) {
         found.push((definition.start(), defines_otherwise(definition.as_str(), numbers)));
     }
@@ -145,6 +144,18 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
         why.as_ref().map(|why| format!("line {}: {why}", line(*at)))
     };
     Checked { compared: found.len(), findings: found.iter().filter_map(finding).collect() }
+}
+
+/// The texts that a text includes, as it names them, without the figures of a report.
+pub fn included(text: &str) -> Vec<String> {
+    let uses = pattern(r"\\(?:input|include)\s*\{\s*([^}]*?)\s*\}");
+    let code = without_comments(text);
+    let names = uses.captures_iter(&code).map(|of| of[1].to_owned());
+    names.filter(|name| !name.starts_with(r"\figures/")).collect()
+}
+
+fn without_comments(text: &str) -> String {
+    without(r"(?m)%.*$", &without(r"\\%", text))
 }
 
 fn pattern(text: &str) -> Regex {
@@ -238,6 +249,12 @@ mod tests {
     fn three_digits_are_significant() {
         let shown = [0.0, 0.012345, 1.0, 99.96, 123456.0].map(digits);
         assert_eq!(shown, ["0", "0.0123", "1.00", "100.0", "123456"]);
+    }
+
+    #[test]
+    fn included_texts_are_found() {
+        let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}";
+        assert_eq!(included(text), ["a", "c.tex", "e"]);
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {

@@ -22,6 +22,7 @@ pub fn page(
             (runs) " runs of " (groups.all.len()) " configurations, " (failures(lines)) " more failed. For simulated ranks, time is the critical path: \
              the sum over phases of the CPU time of the slowest rank, plus " (Groups::networks(&groups.all)) "."
         }
+        ul { @for note in &groups.notes { li { (note) } } }
         nav {
             a href="#figures" { "figures" } " " a href="#tables" { "tables" } " " a href="#causes" { "causes" } " "
             a href="#rules" { "twelve rules" } " " a href="#machine" { "machine and commands" }

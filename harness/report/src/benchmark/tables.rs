@@ -23,7 +23,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
 /// All tables as text, with the causes of lost efficiency.
 pub fn text(groups: &Groups) -> String {
     let mut lines = vec![format!("network: {}", Groups::networks(&groups.all))];
-    lines.extend(groups.origins.iter().cloned());
+    lines.extend(groups.notes.iter().cloned());
     lines.extend(tables(groups).iter().map(|table| format!("\n{}", table.text().trim_end())));
     lines.push("\ncauses of lost efficiency".to_owned());
     lines.extend(causes(groups).into_iter().map(|cause| "  ".to_owned() + &cause));

@@ -48,8 +48,81 @@ fn runs_of_another_machine_program_or_geometry_are_not_pooled() {
         ("mesher", "cube [2]", 0.7, 1),
     ];
     assert_eq!(found, expected);
-    assert_eq!(groups.origins.len(), 2);
-    assert!(groups.origins[0].contains("[2]: slow"), "{:?}", groups.origins);
+    assert_eq!(groups.notes.len(), 2);
+    assert!(groups.notes[0].contains("[2]: slow"), "{:?}", groups.notes);
+}
+
+/// The names of nodes are new in every session of a cloud, so they do not make series.
+#[test]
+fn runs_of_several_nodes_are_pooled_and_the_nodes_named() {
+    let on = |session: &str, nodes: &str| {
+        let mut line = of_machine(session, "cpu");
+        if let Entry::Session(of) = &mut line.entry {
+            of.nodes = nodes.into();
+        }
+        line
+    };
+    let of = |session: &str| {
+        let line = line_of(run(Comm::Solo, 9, &[("a", &[1.0])]));
+        Line { session: session.into(), ..line }
+    };
+    let long = "x".repeat(100);
+    let groups = Groups::of(&[on("1", "a"), of("1"), on("2", &long), of("2"), on("3", "a")]);
+    assert_eq!((groups.all.len(), groups.all[0].runs.len()), (1, 2));
+    let [note] = &groups.notes[..] else { panic!("{:?}", groups.notes) };
+    assert!(note.contains("2 nodes") && note.ends_with(&format!("a, {}", &long[..24])), "{note}");
+    assert!(Groups::of(&[on("1", "a"), of("1"), on("3", "a")]).notes.is_empty());
+}
+
+#[test]
+fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
+    let of = |change: fn(&mut Run)| {
+        let mut run = run(Comm::Solo, 9, &[("a", &[1.0])]);
+        run.digest.clear();
+        change(&mut run);
+        line_of(run)
+    };
+    let with = |change: fn(&mut Run), lacks: &[&str]| {
+        let lacks = [("mesher".to_owned(), lacks.iter().map(|of| (*of).to_owned()).collect())];
+        let session =
+            Entry::Session(Box::new(Session { lacks: lacks.into(), ..Session::default() }));
+        let groups = Groups::of(&[line(session), of(|_| ()), of(change)]);
+        (groups.all[0].runs.len(), groups.left_out.len(), groups.notes.len())
+    };
+    let (kept, left_out) = ((2, 0, 0), (1, 1, 1));
+    assert_eq!(with(|_| (), &[]), kept);
+    assert_eq!(with(|run| run.cells = 18, &[]), left_out);
+    assert_eq!(with(|run| run.facets = 13, &[]), left_out);
+    assert_eq!(with(|run| run.facets = 0, &[]), kept, "one that does not report them");
+    assert_eq!(with(|run| run.cells = 18, &[EQUAL_RUNS]), kept);
+    assert_eq!(with(|run| run.facets = 13, &[EQUAL_RUNS]), left_out);
+}
+
+/// A later session without runs, or with another network, changes nothing of an earlier one.
+#[test]
+fn a_session_has_its_own_network() {
+    let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
+    let network = |latency_s: f64, measured: bool| {
+        Entry::Network(Network { latency_s, bandwidth_bytes_per_s: 1e30, measured })
+    };
+    let mut sim = run(Comm::Sim, 9, &[("a", &[1.0, 1.0])]);
+    sim.phases[0].messages = Spread::of(&[1.0, 1.0]);
+    let ran = || Entry::Run(Box::new(sim.clone()));
+    let mut lines = vec![
+        of_machine("1", "cpu"),
+        of("1", network(1.0, true)),
+        of("1", ran()),
+        of_machine("2", "cpu"),
+        of("2", network(9.0, false)),
+    ];
+    let found = |lines: &[Line]| -> Vec<(f64, usize)> {
+        Groups::of(lines).all.iter().map(|of| (of.time_s.value, of.runs.len())).collect()
+    };
+    assert_eq!(found(&lines), [(2.0, 1)]);
+    lines.push(of("2", ran()));
+    assert_eq!(found(&lines), [(2.0, 1), (10.0, 1)], "a network that was given is another series");
+    lines.extend([of_machine("3", "cpu"), of("3", network(2.0, true)), of("3", ran())]);
+    assert_eq!(found(&lines), [(3.0, 2), (10.0, 1)]);
 }
 
 proptest! {
@@ -133,7 +206,13 @@ fn impossible_numbers_of_a_line_are_named() {
         line_of(run).fault()
     };
     assert_eq!(fault(|_| ()), None);
-    let faults: [fn(&mut Run); 5] = [
+    let faults: [fn(&mut Run); 11] = [
+        |run| run.phases[0].messages.sum = -1e6,
+        |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
+        |run| run.peak_rss_bytes.sum = 1.0,
+        |run| run.time_launch_s = -1.0,
+        |run| run.useful_s.max *= 100.0,
+        |run| run.phases[0].useful_s = Spread::of(&[0.0, 0.0]),
         |run| run.time_wall_s = 0.0,
         |run| run.time_wall_s = 1e308,
         |run| run.phases[0].useful_s.by_rank[1] = -1.0,
@@ -254,4 +333,16 @@ fn a_speedup_is_over_one_rank_and_a_measured_one_has_no_projected_base() {
     assert_eq!([0, 1].map(|i| groups.has_reference(&groups.all[i])), [false, true]);
     let groups = Groups::of(&[free(), of(Comm::Sim, &[4.0]), of(Comm::Mpi, &[2.0; 2])]);
     assert!(!groups.has_reference(&groups.all[1]));
+}
+
+#[test]
+fn efficiency_and_imbalance_have_the_intervals_of_the_repetitions() {
+    let of = |times: &[f64]| line_of(run(Comm::Mpi, 9, &[("a", times)]));
+    let groups = Groups::of(&[of(&[4.0]), of(&[2.0, 2.0]), of(&[4.0, 2.0]), of(&[3.0, 1.0])]);
+    let two = &groups.all[1];
+    let (efficiency, imbalance) = (groups.global_efficiency(two), two.imbalance());
+    let found = [efficiency, imbalance].map(|of| [of.low, of.value, of.high]);
+    let expected = [[0.5, 4.0 / 6.0, 1.0], [1.0, 1.2, 1.5]];
+    let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-9, "{found:?}");
 }
