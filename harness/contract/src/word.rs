@@ -196,6 +196,8 @@ mod tests {
     #[test]
     fn each_invalid_field_has_its_own_error() {
         assert_eq!(fault(20 << 2).unwrap(), "level 20 is deeper than 19");
+        let swapped = fault(0x1234_5670_0000_004c_u64.swap_bytes()).unwrap();
+        assert!(swapped.ends_with("; with its bytes swapped it would be a leaf"), "{swapped}");
         assert_eq!(fault(3).unwrap(), "side 3 does not exist");
         assert!(fault(1 << 7).unwrap().starts_with("the corner"));
         assert_eq!(fault(1 << 7 | 19 << 2), None);

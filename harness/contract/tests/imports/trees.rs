@@ -11,7 +11,7 @@ fn tree(path: &Path) -> Result<Option<ImportedTree>, Failure> {
 fn a_tree_of_the_mesher_has_the_leaves_of_the_reference_as_words_and_as_a_link() {
     let imported = tree(&sample("sphere.vtkhdf")).unwrap().unwrap();
     assert_eq!(imported.manifest.digest.to_string(), "f15f7dd9863232f4ff3c659161a5c2e9");
-    assert_eq!((imported.manifest.leaves, imported.manifest.level_surface), (9056, 5));
+    assert_eq!((imported.manifest.leaves, imported.manifest.lacks_inputs), (9056, true));
     assert_eq!(imported.manifest.root, root([-2.0, -2.0, -2.0, 4.0]));
     let place = tempfile::tempdir().unwrap();
     let (words, link) = (place.path().join("new/words"), place.path().join("link"));

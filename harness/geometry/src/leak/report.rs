@@ -123,8 +123,8 @@ const CLOSE: &str =
     "close it wherever the lattice lies; a finer one may close it on this lattice only.";
 const END: &str = "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends.\n";
 /// What follows where no path explains that the start is outside.
-const ENCLOSED: &str = ", but the start is outside by its rays: the facets enclose it, and the majority of the rays calls it outside, as where bodies \
-    overlap or facets appear twice. If the mesher reports a leak there, this has changed its side; `harness geometry` finds such facets";
+const ENCLOSED: &str = ": the facets enclose the start, although by its rays it is outside, as beside openings, overlaps and facets that appear \
+    twice (`harness geometry`). If the mesher reports that it leaked, its rays have changed their verdict, and no path has opened";
 const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
 
 impl fmt::Display for Answers {
@@ -279,7 +279,7 @@ mod tests {
         (report.is_leak, report.closes, report.passage) = (false, None, None);
         assert_eq!(report.to_string(), format!("{HEAD}no leak at this spacing\n"));
         report.is_enclosed = true;
-        assert!(report.to_string().contains("no leak at this spacing, but the start is outside"));
+        assert!(report.to_string().contains("no leak at this spacing: the facets enclose"));
     }
 
     #[test]
