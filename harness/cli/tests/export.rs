@@ -241,6 +241,10 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
         output,
         "front.stl: 24 faces, 2484 bytes (103.50 per face)\n  a surface of area 24.0, closed\n"
     );
+    // Nothing shows that it is no body.
+    let (code, output, error) = export(&place, "front.stl", &[]);
+    assert_eq!((code, output.as_str()), (2, ""));
+    assert_eq!(error, "harness: front.stl exists: remove it, or choose another name\n");
     assert_eq!(export(&place, "front.vtp", &["--case", "case.toml"]).0, 0);
     let (code, output, _) = export(&place, "part.vtp", &["--clip", "0,0,0,8,8,4"]);
     assert!(

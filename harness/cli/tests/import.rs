@@ -101,6 +101,23 @@ fn a_case_gives_root_and_requirements() {
         output.lines().any(|line| line.starts_with("balance") && line.contains("holds")),
         "{output}"
     );
+    // A file that states no inputs claims none that differ from those of the case.
+    let mesh = place.path().join("mesh");
+    let mesh = mesh.to_str().unwrap();
+    let forest = sample("unitcube.p8est");
+    assert_eq!(result(&["import", &forest, "--root", "-4,-4,-4,8", "--out", mesh]).0, 0);
+    let (code, output, _) = result(&["audit", mesh, "--case", case]);
+    assert!(code == 1 && output.contains("manifest   holds"), "{output}");
+    let (code, output, _) = result(&["audit", mesh]);
+    let lines = ["spacing    nothing to check: the inputs of the mesh are", "layer      nothing"];
+    assert!(code == 0 && lines.iter().all(|line| output.contains(line)), "{output}");
+    let stated = place.path().join("stated");
+    let stated = stated.to_str().unwrap();
+    assert_eq!(result(&["import", &forest, "--case", case, "--out", stated]).0, 0);
+    let (code, output, _) = result(&["diff", mesh, stated]);
+    assert!(code == 0 && output.contains("layer_cells_min: not stated in A; 3 in B"), "{output}");
+    let (code, _, error) = result(&["why", mesh, "0,0,0"]);
+    assert!(code == 2 && error.contains("states no inputs"), "{error}");
     let (code, _, error) = result(&["audit", &sample("unitcube.p8est"), "--case", "no-such-case"]);
     assert!(code == 2 && error.contains("no-such-case"), "{error}");
 }

@@ -206,7 +206,7 @@ fn an_audit_with_the_case_finds_leaks_that_the_manifest_conceals() {
     }
 }
 
-/// What the mesher advises finds the opening of the box with a hole in its lid, for every kind of seed.
+/// What the mesher advises finds the opening of the box with a hole in its lid, for every kind of seed, and if the root cuts the box.
 #[test]
 fn the_command_of_a_warning_finds_the_opening() {
     let mesher = Path::new(env!("CARGO_BIN_EXE_harness")).with_file_name("mesher");
@@ -216,14 +216,17 @@ fn the_command_of_a_warning_finds_the_opening() {
     }
     let fixture = Fixture::new();
     let (in_box, far) = ("[0.1, 0.1, 0.1]", "[5.0, 5.0, 5.0]");
-    for (keep, seeds) in [
-        ("inside", in_box.to_owned()),
-        ("outside", in_box.to_owned()),
-        ("outside", far.to_owned()),
-        ("all", far.to_owned()),
+    let cut = &ROOT.replace("-8.1", "-1.4");
+    for (keep, seeds, root) in [
+        ("inside", in_box, ROOT),
+        ("outside", in_box, ROOT),
+        ("outside", far, ROOT),
+        ("all", far, ROOT),
+        ("outside", "", cut),
+        ("inside", "", cut),
     ] {
         let text = format!(
-            "geometry = \"box.stl\"\nspacing_min = 0.5\nkeep = \"{keep}\"\nseeds = [{seeds}]\n{ROOT}"
+            "geometry = \"box.stl\"\nspacing_min = 0.5\nkeep = \"{keep}\"\nseeds = [{seeds}]\n{root}"
         );
         fs::write(fixture.path("case.toml"), text).unwrap();
         let mut command = Command::new(&mesher);
@@ -235,10 +238,15 @@ fn the_command_of_a_warning_finds_the_opening() {
         for arguments in [&arguments[..], &[]] {
             let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
             command.args(["leak", "case.toml", "--mesher"]).arg(&mesher).args(arguments);
+            command.args(["--json", "leak.json"]);
             let output = command.current_dir(fixture.0.path()).output().unwrap();
             let text = String::from_utf8_lossy(&output.stdout);
             let is_found = output.status.code() == Some(1) && text.matches("LEAK: ").count() == 1;
             assert!(is_found, "{keep}, {seeds}, {arguments:?}: {output:?}");
+            let json = fs::read_to_string(fixture.path("leak.json")).unwrap();
+            let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+            let at = json["examined"][0]["passage"]["narrowest"]["at"][2].as_f64().unwrap();
+            assert!((at - 2.0).abs() < 0.2, "{keep}, {seeds}, {arguments:?}: {text}");
         }
     }
 }

@@ -196,6 +196,10 @@ pub struct Manifest {
     pub tree: Tree,
     /// The root cube.
     pub root: Root,
+    /// Whether the other inputs, from the surface level to the treatment of enclosed components, are unknown, as in a mesh from a format
+    /// that stores cells only: their values mean nothing. Written only if they are.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lacks_inputs: bool,
     /// D: the level of crossing leaves.
     pub level_surface: u8,
     /// n: minimum thickness of a layer, in cells.

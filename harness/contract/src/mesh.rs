@@ -215,19 +215,17 @@ impl Mesh {
     /// # Errors
     /// If the mesh cannot be one of the case.
     pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
-        let stated = |Manifest { root, level_surface, .. }: &Manifest,
-                      geometry: Option<Geometry>| {
-            let Root { origin: [x, y, z], edge } = root;
+        let stated = |&Root { origin: [x, y, z], edge }, level: u8, geometry: Option<Geometry>| {
             let facets = geometry.map_or(String::new(), |Geometry { facets, digest }| {
                 format!(", with {facets} facets of the digest {digest}")
             });
-            format!(
-                "a root of edge {edge} at ({x}, {y}, {z}) and surface level {level_surface}{facets}"
-            )
+            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
         };
-        let geometry = self.manifest.geometry;
-        let of_mesh = stated(&self.manifest, geometry);
-        let of_case = stated(case, geometry.map(|_| Geometry::of(&case.facets_lattice)));
+        let &Manifest { ref root, lacks_inputs, level_surface, geometry, .. } = &self.manifest;
+        let level = if lacks_inputs { case.level_surface } else { level_surface };
+        let of_mesh = stated(root, level, geometry);
+        let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
+        let of_case = stated(&case.root, case.level_surface, geometry);
         if of_mesh == of_case {
             return Ok(());
         }

@@ -94,8 +94,14 @@ pub fn level(word: u64) -> u8 {
     (word >> 2 & 31) as u8
 }
 
-/// The reason why a word is not a leaf; `None` if it is one.
+/// The reason why a word is not a leaf, and whether its bytes may be swapped; `None` if it is one.
 pub fn fault(word: u64) -> Option<String> {
+    let why = violation(word)?;
+    let is_swapped = violation(word.swap_bytes()).is_none();
+    Some(why + if is_swapped { "; with its bytes swapped it would be a leaf" } else { "" })
+}
+
+fn violation(word: u64) -> Option<String> {
     let level = level(word);
     if level > LEVEL_MAX {
         Some(format!("level {level} is deeper than {LEVEL_MAX}"))

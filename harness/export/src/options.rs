@@ -6,6 +6,7 @@
 //! - cells are as many as were selected, which another pass over the mesh has counted, and all leaves of the mesh if there is no selection;
 //! - in a format without holes, octants and fillers tile the root.
 
+use std::fs;
 use std::num::NonZero;
 use std::path::Path;
 
@@ -130,6 +131,19 @@ impl Options<'_> {
             self.watch.progress(done, total);
         }
     }
+}
+
+/// Refuses to replace a file, or a directory with something in it: what exists may be the only copy of a body, or the case of a solver.
+///
+/// # Errors
+/// If it exists.
+pub(crate) fn require_new(path: &Path) -> Result<(), Failure> {
+    let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
+    if has_content {
+        let why = format!("{} exists: remove it, or choose another name", path.display());
+        return Err(Failure::input(why));
+    }
+    Ok(())
 }
 
 /// Writes to a path. After an error, nothing exists under a final name.

@@ -14,17 +14,17 @@ const BOXES_WITHOUT_EFFECT: &str = "an extent box ([[box]]) has no volume within
 const BODY_CUT: &str = "facets lie wholly or partly beyond the root, which cuts the body at its boundary: enlarge or move the root unless the body is meant to \
     extend beyond it";
 
-/// A sentence for each warning: what was found, and what to try.
+/// A sentence for each warning: what was found, and what to try. T0 has those of leaks only: nothing is deleted from it yet.
 pub fn of(mesh: &Mesh, case_name: &str) -> Vec<String> {
+    let leaks = of_leaks(mesh, case_name);
     if mesh.is_base {
-        return Vec::new();
+        return leaks.into_iter().collect();
     }
     let summary = &mesh.sides.summary;
     let empty = empty_region(mesh.rules.keep, summary);
     // These two already advise to enlarge the root.
     let explains_cut = empty.is_some() || summary.inside_reaches_boundary;
     let has_effect = |b: &ExtentBox| b.meets([0; 3], ROOT_EDGE);
-    let leaks = of_leaks(mesh, case_name);
     let empty = empty.filter(|warning| leaks.as_ref() != Some(warning));
     let others = [
         (summary.inside_reaches_boundary, FLOW_AT_BOUNDARY),

@@ -10,7 +10,7 @@
 
 use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::spacing::Crossed;
-use super::{Check, CheckResult, Subject, contact, several_levels, some_leaves};
+use super::{Check, CheckResult, Subject, UNKNOWN_INPUTS, contact, several_levels, some_leaves};
 use contract::manifest::{Keep, Manifest, Tree as MeshKind};
 use contract::octant::{CELLS_PER_EDGE, Octant};
 use contract::tree::{DELETED, Handle, Kind, Kinds, Tree};
@@ -35,6 +35,9 @@ pub(super) const CHECK: Check = Check {
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     let terms = &subject.terms;
+    if terms.lacks_inputs {
+        return result.lacks(UNKNOWN_INPUTS);
+    }
     match Crossed::of(subject).filter(|_| !subject.promises.definition) {
         // Such a promise says nothing about the sides of leaves.
         Some(crossed) => check_tree(&crossed.labelled(subject.tree()), terms, result),

@@ -16,7 +16,7 @@ pub const NAME: &str = "manifest";
 
 pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothing, run };
 
-/// The inputs, by their keys.
+/// The inputs, by their keys. A mesh in the format of another program may lack all but the first two.
 const INPUTS: [&str; 9] = [
     "tree",
     "root",
@@ -66,6 +66,10 @@ fn stated(manifest: &Manifest) -> Value {
     let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
     stated["boxes"] = manifest.boxes.iter().map(extent).collect();
     stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
+    if manifest.lacks_inputs {
+        let entries = stated.as_object_mut().expect("a manifest is an object");
+        entries.retain(|key, _| !INPUTS[2..].contains(&&key[..]));
+    }
     stated
 }
 
@@ -77,7 +81,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
         keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
         keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
-        let mut inputs = Manifest { tree: manifest.tree, ..subject.inputs.clone() };
+        let lacks_inputs = manifest.lacks_inputs;
+        let mut inputs = Manifest { tree: manifest.tree, lacks_inputs, ..subject.inputs.clone() };
         if subject.base.is_some() {
             // A mesh with an engine's T0 beside it is a final one.
             inputs.tree = if prefix.is_empty() { Tree::Final } else { Tree::Base };

@@ -35,6 +35,8 @@ pub(crate) use splits::{NAME as SPLITS, kilobytes};
 
 /// Why what needs sides is not checked.
 const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";
+/// Why what needs inputs is not checked.
+const UNKNOWN_INPUTS: &str = "the inputs of the mesh are unknown without a case";
 /// Why what needs facets is not checked.
 const NO_GEOMETRY: &str = "the geometry is unknown without a case";
 /// Why nothing can be wrong.

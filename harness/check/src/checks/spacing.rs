@@ -11,7 +11,9 @@
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::facets::Facets;
-use super::{Check, CheckResult, NO_GEOMETRY, Subject, for_definition, nothing, some_leaves};
+use super::{
+    Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, for_definition, nothing, some_leaves,
+};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
@@ -35,12 +37,18 @@ pub(super) const CHECK: Check = Check {
 pub(super) const BOXES: Check = Check {
     name: "boxes",
     wanted: |subject| !subject.promises.definition && subject.promises.boxes,
-    needs: |subject| subject.terms.boxes.is_empty().then(|| "the case has no boxes".to_owned()),
+    needs: |subject| {
+        let why = if subject.terms.lacks_inputs { UNKNOWN_INPUTS } else { "the case has no boxes" };
+        subject.terms.boxes.is_empty().then(|| why.to_owned())
+    },
     run: |subject, result| boxes_met(subject.tree(), &subject.terms, result),
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     let (tree, terms) = (subject.tree(), &subject.terms);
+    if terms.lacks_inputs {
+        return result.lacks(UNKNOWN_INPUTS);
+    }
     boxes_met(tree, terms, result);
     crossing_fine(tree, terms, result);
     let (Some(base), Some(truth)) = (subject.tree_base(), subject.truth()) else { return };

@@ -65,7 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     let engine = promises.as_deref().map(promising).transpose()?;
     let case = source.read_case()?;
-    if let (Some(engine), Some(case)) = (&engine, &case)
+    // Promises without a name are no engine's, which could decline a case.
+    if let (Some(engine), Some(case)) = (engine.as_ref().filter(|e| !e.name.is_empty()), &case)
         && let Some(why) = engine.declines(case)
     {
         return Err(Failure::missing(format!("left out: {why}")));

@@ -23,7 +23,7 @@ const SCRIPT_LIMIT: Duration = Duration::from_secs(24 * 3600);
 pub struct Arguments {
     /// The mesh: a leaf-set directory of any size
     mesh: Input,
-    /// The file to write; its name decides the format. An existing file is replaced, an existing polyMesh is not
+    /// The file to write; its name decides the format. An existing file is replaced, but no .stl, which may be a body, and no polyMesh
     file: PathBuf,
     /// The case that was meshed: its named solids become patches (polyMesh, .cgns), and .vtp has the gap to the wall; name in geometries/catalogue.toml or path of a case file
     #[arg(long, value_name = "CASE")]

@@ -129,9 +129,13 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
     let is_flow_inside = case.keep == Keep::Inside && !case.seeds.is_empty();
     let closed = if is_flow_inside { sides.outside } else { sides.inside };
     if leaks.is_empty() && closed == 0 {
-        return Err(format!(
-            "the facets enclose no leaf at this spacing, so there is nothing to examine: {START}"
-        ));
+        let fact = match case.seeds.is_empty() {
+            true => {
+                "no leaf is inside by its rays at this spacing, as where every facet appears twice"
+            }
+            false => "the flow of the seeds reaches all leaves at this spacing",
+        };
+        return Err(format!("{fact}, so there is nothing to examine: {START}"));
     }
     Ok(leaks)
 }

@@ -1,8 +1,7 @@
 //! `harness report`: draws figures and a page from records.
 
 use crate::options::Input;
-use bench::experiments::entry;
-use bench::experiments::entry::Line;
+use bench::experiments::entry::{self, Line};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::benchmark::numbers::{Checked, Number, check, included};

@@ -27,6 +27,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
+    if case.is_none() && disk.manifest.lacks_inputs {
+        let why = "states no inputs, from which all leaves follow: give --case";
+        return Err(Failure::input(format!("{} {why}", made.dir.display())));
+    }
     let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();
     let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());

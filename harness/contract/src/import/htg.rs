@@ -50,17 +50,13 @@ impl ImportedTree {
             Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
             Err(error) => return Err(content(error)),
         };
-        let mut manifest = leaf_set::manifest(tree.root, 0, case, program);
+        let mut manifest = leaf_set::manifest(tree.root, case, program);
         tree.words(&mut |run| {
             run.iter().for_each(|&word| manifest.add(word));
             true
         })
         .map_err(content)?;
         manifest.finish();
-        if case.is_none() {
-            let finest = manifest.leaves_by_level.iter().rposition(|&leaves| leaves > 0);
-            manifest.level_surface = finest.unwrap_or(0) as u8;
-        }
         let imported = Self { tree, manifest };
         imported.check_invariants();
         Ok(Some(imported))

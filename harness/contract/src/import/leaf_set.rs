@@ -12,8 +12,7 @@ use crate::word::{self, Order};
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
 ///
-/// The manifest states the requirements of the case. Without one it requires nothing beyond 2:1 balance: n is 1, no box
-/// exists, and the surface has the level of the finest cell. All of the root is then expected to be filled.
+/// The manifest has the inputs of the case. Without one they are unknown, and all of the root is expected to be filled.
 ///
 /// # Errors
 /// If the cells are not leaves of an oct-tree with this root, or if these do not have the digest that the file states.
@@ -33,22 +32,20 @@ pub fn leaf_set(
     if !cells.digest.is_none_or(is_of_digest) {
         return Err(Failure::input("has other leaves than its digest states: it is damaged"));
     }
-    let finest = words.iter().map(|&w| word::level(w)).max().unwrap_or(0);
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };
-    let manifest = Manifest { sides, ..manifest(root, finest, case, program) };
+    let manifest = Manifest { sides, ..manifest(root, case, program) };
     let set = LeafSet::new(manifest, Vec::new()).with_parts(vec![words]);
     check_invariants(cells, &set);
     Ok(set)
 }
 
-/// The manifest of a mesh in a root, without leaves, whose finest leaf has this level.
-pub(super) fn manifest(root: Root, finest: u8, case: Option<&Case>, program: String) -> Manifest {
+/// The manifest of a mesh in a root, without leaves.
+pub(super) fn manifest(root: Root, case: Option<&Case>, program: String) -> Manifest {
     match case {
         Some(case) => Manifest { root, ..case.manifest(Tree::Final, program) },
-        None => Manifest {
-            level_surface: finest,
-            ..Manifest::without_leaves(Tree::Final, root, program)
-        },
+        None => {
+            Manifest { lacks_inputs: true, ..Manifest::without_leaves(Tree::Final, root, program) }
+        }
     }
 }
 
@@ -164,8 +161,8 @@ mod tests {
         let set = leaf_set(&cells, Some(ROOT), None, "test".to_owned()).unwrap();
         assert_eq!(set.manifest.digest, Digest::of(&words));
         assert_eq!(
-            (set.manifest.leaves, set.manifest.level_surface, set.manifest.sides),
-            (22, 3, Sides::Known)
+            (set.manifest.leaves, set.manifest.lacks_inputs, set.manifest.sides),
+            (22, true, Sides::Known)
         );
         cells.sides = None;
         let set = leaf_set(&cells, None, None, "test".to_owned()).unwrap();

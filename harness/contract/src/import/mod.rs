@@ -107,7 +107,7 @@ pub fn guess(path: &Path) -> Result<Format, Failure> {
 
 /// Refuses a directory that is a leaf set already.
 fn refuse_leaf_set(path: &Path) -> Result<(), Failure> {
-    let why = "is a complete leaf set, with its manifest mesh.json: use it as it is";
+    let why = "has a manifest mesh.json, so it is a leaf set without an import, or a broken one: `harness audit` finds out";
     match path.join(manifest::FILE).exists() {
         true => Err(Failure::input(why)),
         false => Ok(()),

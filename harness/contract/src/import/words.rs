@@ -40,12 +40,8 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
             if let Some(why) = word::fault(if with_sides { word } else { word & !3 }) {
                 let cell = cells.count();
                 let part = if part.is_empty() { part } else { part + ": " };
-                let swapped = match word::fault(word.swap_bytes()) {
-                    None => "; with its bytes swapped it would be a leaf",
-                    Some(_) => "",
-                };
                 return Err(Failure::input(format!(
-                    "{part}cell {cell} is the word {word:#018x}, in which {why}{swapped}"
+                    "{part}cell {cell} is the word {word:#018x}, in which {why}"
                 )));
             }
             let octant = word::octant(word);
@@ -86,7 +82,7 @@ mod tests {
         }
         fs::write(place.path().join(manifest::FILE), "{}").unwrap();
         let why = read(place.path(), &request(true)).unwrap_err().to_string();
-        assert!(why.starts_with("is a complete leaf set"), "{why}");
+        assert!(why.starts_with("has a manifest"), "{why}");
     }
 
     #[test]

@@ -26,7 +26,7 @@ use contract::sets::Sets;
 use contract::word::{self, Side};
 
 use crate::leaves::Leaves;
-use crate::options::{Export, Options, Regions, Summary};
+use crate::options::{Export, Options, Regions, Summary, require_new};
 use crate::points::{Point, Points};
 use faces::Faces;
 use patches::{Patches, SIDES};
@@ -52,11 +52,7 @@ pub struct Mesh {
 /// If an invariant of the answer is violated: see [`Faces::check_invariants`].
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let of_mesh = read(export)?;
-    let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
-    if has_content {
-        let why = format!("{} exists: remove it, or choose another case", path.display());
-        return Err(Failure::input(why));
-    }
+    require_new(path)?;
     let named = |error| Failure::at(path, error);
     let staging = Staging::inside(nearest_directory(path)).map_err(named)?;
     let dir = staging.path().join("polyMesh");

@@ -29,37 +29,26 @@ pub struct Patches {
 impl Patches {
     /// The patches of a mesh. Without a case, its body is one patch.
     pub fn new(case: Option<&Case>, has_cut: bool) -> Self {
-        let mut patches = Self {
-            names: SIDES.map(str::to_owned).to_vec(),
-            has_cut,
-            of_facet: Vec::new(),
-            facets: None,
-        };
-        if let Some(case) = case {
-            patches.add_solids(case);
-        }
-        if patches.names.len() == SIDES.len() {
-            patches.names.push(BODY.to_owned());
-        }
-        patches.names.extend(has_cut.then(|| CUT.to_owned()));
-        patches
-    }
-
-    fn add_solids(&mut self, case: &Case) {
-        let mut patch_of = HashMap::new();
-        for solid in case.solids.iter().filter(|solid| solid.facets > 0) {
+        let mut names = SIDES.map(str::to_owned).to_vec();
+        let (mut of_facet, mut patch_of) = (Vec::new(), HashMap::new());
+        let solids = case.iter().flat_map(|case| &case.solids);
+        for solid in solids.filter(|solid| solid.facets > 0) {
             let patch = *patch_of.entry(&solid.name).or_insert_with(|| {
                 let name = patch_name(solid.name.as_deref().unwrap_or_default());
                 let numbered = (2..).map(|number| format!("{name}_{number}"));
-                let mut names = std::iter::once(name.clone()).chain(numbered);
-                self.names.extend(names.find(|name| !self.names.contains(name)));
-                self.names.len() - 1
+                let mut choices = std::iter::once(name.clone()).chain(numbered);
+                names.extend(choices.find(|name| !names.contains(name)));
+                names.len() - 1
             });
-            self.of_facet.extend(std::iter::repeat_n(patch, solid.facets));
+            of_facet.extend(std::iter::repeat_n(patch, solid.facets));
         }
-        if self.names.len() > SIDES.len() + 1 {
-            self.facets = Some(FacetTree::new(&case.facets_lattice));
+        let several = case.filter(|_| names.len() > SIDES.len() + 1);
+        let facets = several.map(|case| FacetTree::new(&case.facets_lattice));
+        if names.len() == SIDES.len() {
+            names.push(BODY.to_owned());
         }
+        names.extend(has_cut.then(|| CUT.to_owned()));
+        Self { names, has_cut, of_facet, facets }
     }
 
     /// The type of a patch.

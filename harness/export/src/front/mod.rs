@@ -33,7 +33,7 @@ use geometry::tree::{FacetTree, Point};
 use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
 use crate::leaves::{Content, Leaves, Square};
-use crate::options::{Export, Options, Summary};
+use crate::options::{Export, Options, Summary, require_new};
 use crate::polydata::{self, array};
 use polygons::Polygons;
 
@@ -111,8 +111,10 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
 /// Writes the polygons as triangles. Coordinates have single precision.
 ///
 /// # Errors
-/// As [`vtp`], and if there are more than 2^32 triangles, or if single precision does not resolve one.
+/// As [`vtp`], and if the file exists, if there are more than 2^32 triangles, or if single precision does not resolve one.
 pub fn stl(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
+    // Nothing in a surface shows whether it is an export or the body that was meshed.
+    require_new(path)?;
     write(export, path, &|front, out| Ok(write_stl_binary(&triangles(front)?, out)?))
 }
 

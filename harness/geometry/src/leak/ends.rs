@@ -40,7 +40,10 @@ pub fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<Point, String
 /// A point of the lattice in the user's units.
 pub fn to_user(root: &Root, at: Point) -> [f64; 3] {
     let unit = root.edge / UNITS_PER_EDGE as f64;
-    root.rounded((Point::from(root.origin) + at * unit).to_array())
+    let [at, low] = [(Point::from(root.origin) + at * unit).to_array(), root.origin];
+    let rounded = root.rounded(at);
+    // Rounding may lead out of the root.
+    std::array::from_fn(|a| rounded[a].clamp(low[a], low[a] + root.edge))
 }
 
 /// The leaf that contains a point of the root, among the sorted words of a tree that fills it.
@@ -49,6 +52,12 @@ pub fn leaf_at(words: &[u64], at: Point) -> u64 {
     let cell = at.to_array().map(|c| (c as i64 / UNITS_PER_CELL).clamp(0, last) as u32);
     let after = words.partition_point(|&w| word::key(w) <= word::key_of(cell));
     words[after - 1]
+}
+
+/// Whether a leaf has a face on the root's boundary.
+pub fn is_at_boundary(leaf: u64) -> bool {
+    let (low, high) = word::octant(leaf).bounds();
+    low.contains(&0) || high.contains(&UNITS_PER_EDGE)
 }
 
 /// Whether no facet touches a leaf.
@@ -119,10 +128,25 @@ impl<F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'_, F> {
         for &place in places {
             let Ok(at) = on_lattice("--from", place, &root) else { continue };
             let ends = (end, Some(at));
-            if self.crossed(level, ends).is_none() && self.search(level, ends)? {
+            if self.crossed(level, ends).is_none() && self.search(level, ends, None)? {
                 return Ok(Some(place));
             }
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_of_the_root_is_printed_within_the_root() {
+        let (low, edge) = (-1.4997306168079376, 2.9994612336158752);
+        let root = Root { origin: [low; 3], edge };
+        for at in [0, UNITS_PER_EDGE] {
+            let printed = to_user(&root, Point::splat(at as f64));
+            assert!(printed.iter().all(|x| (low..=low + edge).contains(x)), "{printed:?}");
+        }
     }
 }

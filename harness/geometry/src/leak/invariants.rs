@@ -1,7 +1,8 @@
 //! What an answer satisfies before it is printed. No tree of boxes and no cell of the search is used: facets are compared with the
 //! path one by one, and leaves are found by their words.
 //!
-//! - The path lies in the root, starts and ends where it says.
+//! - The path lies in the root, as its printed numbers say, starts and ends where it says; at the far field, what is outside if the body is
+//!   closed.
 //! - Every leg lies in a free leaf; or, in a leaf that facets cross, a ball of the least width passes along it.
 //! - No facet is nearer to a leg that counts than half of the least width, and none meets any leg.
 //! - The narrowest place is a point of the path; its width lies between its bounds, is no more than that of any point that counts, and is
@@ -9,10 +10,11 @@
 //! - A path exists iff there is a leak; only a leak closes, at a level coarser than that of the path, which is no finer than the case's.
 
 use super::ends::{Target, is_free, leaf_at};
-use super::report::{Passage, Report};
+use super::report::{Passage, Point as Stop, Report};
 use crate::tree::{Point, from_edges, from_point, met, triangle};
 use contract::case::Case;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::word::{self, Side};
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::query::Ray;
 use parry3d_f64::shape::Segment;
@@ -23,9 +25,10 @@ const ROUNDING: f64 = 2.0;
 const GROUP: usize = 32;
 
 impl Report {
-    /// Asserts the invariants, with the sorted words of the base tree that the path leads through.
-    pub fn check_invariants(&self, case: &Case, words: &[u64]) {
-        let Self { is_leak, closes, .. } = *self;
+    /// Asserts the invariants, with the sorted words of the base tree that the path leads through, and of that whose outside has the far field.
+    pub fn check_invariants(&self, case: &Case, words: &[u64], outside: Option<&[u64]>) {
+        let Self { is_leak, is_enclosed, closes, .. } = *self;
+        assert!(!(is_leak && is_enclosed), "what a path joins to the far field is not enclosed");
         assert_eq!(self.passage.is_some(), is_leak, "a path exists iff the ends are joined");
         assert!(is_leak || closes.is_none(), "{closes:?} closes no leak");
         if let Some(passage) = &self.passage {
@@ -35,7 +38,7 @@ impl Report {
                 (coarsest..=self.spacing.level).contains(&level),
                 "a path through level {level} with {closes:?}"
             );
-            passage.check_invariants(case, words, self.from, self.to);
+            passage.check_invariants(case, (words, outside), self.from, self.to);
         }
     }
 }
@@ -46,17 +49,28 @@ fn is_near(a: f64, b: f64) -> bool {
 }
 
 impl Passage {
-    fn check_invariants(&self, case: &Case, words: &[u64], from: [f64; 3], to: Target) {
+    fn check_invariants(
+        &self,
+        case: &Case,
+        (words, outside): (&[u64], Option<&[u64]>),
+        from: [f64; 3],
+        to: Target,
+    ) {
         let (edge, scale) = (UNITS_PER_EDGE as f64, UNITS_PER_EDGE as f64 / case.root.edge);
         let lattice = |at: [f64; 3]| (Point::from(at) - Point::from(case.root.origin)) * scale;
         let points: Vec<Point> = self.points.iter().map(|point| lattice(point.at)).collect();
         let margin = |at: &Point| at.min_element().min(edge - at.max_element());
-        let outside = points.iter().find(|at| margin(at) < -ROUNDING);
-        assert_eq!(outside, None, "a point of the path is outside the root");
+        let ends = case.root.origin.map(|low| low..=low + case.root.edge);
+        let is_beyond = |p: &&Stop| (0..3).any(|a| !ends[a].contains(&p.at[a]));
+        let beyond = self.points.iter().find(is_beyond);
+        assert_eq!(beyond, None, "a point of the path is outside the root");
         let end = points[points.len() - 1];
         let is_end = match to {
             Target::Point(to) => end.distance(lattice(to)) <= ROUNDING,
-            Target::Far => margin(&end) <= ROUNDING,
+            Target::Far => {
+                let is_outside = |words| word::side(leaf_at(words, end)) == Side::Outside;
+                margin(&end) <= ROUNDING && outside.is_none_or(is_outside)
+            }
         };
         let is_start = points[0].distance(lattice(from)) <= ROUNDING;
         assert!(is_start && is_end, "the path leads from {} to {end}", points[0]);
@@ -133,7 +147,6 @@ mod tests {
     use contract::failure::Failure;
     use contract::testing::base_tree;
     use contract::watch::Watch;
-    use contract::word::Side;
     use geometries::{Generator, Shape};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -163,7 +176,7 @@ mod tests {
     #[test]
     fn wrong_answers_are_noticed() {
         let (case, right, words) = torn();
-        right.check_invariants(&case, &words);
+        right.check_invariants(&case, &words, None);
         type Plant<'a> = (&'a str, &'a dyn Fn(&mut Report, &mut Passage));
         let through_a_facet = |_: &mut Report, p: &mut Passage| {
             // From the start straight to the boundary on the side without an opening.
@@ -200,11 +213,13 @@ mod tests {
             let mut passage = wrong.passage.take().unwrap();
             plant(&mut wrong, &mut passage);
             wrong.passage = Some(passage);
-            let noticed = catch_unwind(AssertUnwindSafe(|| wrong.check_invariants(&case, &words)));
+            let noticed =
+                catch_unwind(AssertUnwindSafe(|| wrong.check_invariants(&case, &words, None)));
             assert!(noticed.is_err(), "{what} is not noticed");
         }
         let crossing: Vec<u64> = words.iter().map(|w| w & !3 | Side::Crossing as u64).collect();
-        let noticed = catch_unwind(AssertUnwindSafe(|| right.check_invariants(&case, &crossing)));
+        let noticed =
+            catch_unwind(AssertUnwindSafe(|| right.check_invariants(&case, &crossing, None)));
         assert!(noticed.is_err(), "an approach through leaves that facets cross is not noticed");
     }
 }

@@ -21,6 +21,7 @@ use crate::tree::{FacetTree, Point};
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::watch::Watch;
+use contract::word::{self, Side};
 use ends::Target;
 use report::{Answers, Closes, Report, SCHEMA, Spacing};
 use space::Space;
@@ -76,21 +77,28 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         if let Some((what, at)) = self.crossed(level, ends) {
             return Err(Failure::input(ends::crossed(what, at, &self.trees[&level], root)));
         }
-        let is_leak = self.search(level, ends)?;
         let spacing = Spacing::of(level, root);
-        let mut report = Report { from, to, spacing, is_leak, closes: None, passage: None };
+        let is_joined = self.search(level, ends, None)?;
+        let is_outside = word::side(ends::leaf_at(&self.trees[&level], start)) == Side::Outside;
+        let by_rays = self.case.seeds.is_empty();
+        let is_enclosed = !is_joined && end.is_none() && is_outside && by_rays;
+        let outside = if is_joined && end.is_none() { self.closed(start)? } else { None };
+        let is_leak = is_joined && (outside.is_none() || self.search(level, ends, outside)?);
+        let (closes, passage) = (None, None);
+        let mut report = Report { from, to, spacing, is_leak, is_enclosed, closes, passage };
         if is_leak {
             // A leaf of the level that joins the ends is free, so the opening is at least as wide, or 4 times the leaves two levels
             // below. There the widest ball's centre lies in free leaves: no finer tree has a wider path.
             const DEEPER: u8 = 2;
-            report.closes = self.coarsen(ends)?;
+            report.closes = self.coarsen(ends, outside)?;
             let open = report.closes.map_or(0, |closes| closes.spacing.level + 1);
             let measured = level.min(open + DEEPER);
             self.watch.step("measuring the width");
-            let tree = (measured, &self.trees[&measured][..]);
-            report.passage =
-                Some(passage::widest((self.case, &self.facets), tree, ends, self.watch)?);
-            report.check_invariants(self.case, &self.trees[&measured]);
+            let outside = outside.map(|level| &self.trees[&level][..]);
+            let words = &self.trees[&measured];
+            let space = Space::new(words, &self.facets, outside)?;
+            report.passage = Some(passage::widest((self.case, measured), space, ends, self.watch)?);
+            report.check_invariants(self.case, words, outside);
         }
         Ok(report)
     }
@@ -112,20 +120,36 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         ends.into_iter().flatten().find(is_crossed)
     }
 
-    /// Whether free leaves of a base tree join the ends, which lie in some. The coarsest leaves are searched first: few of them lead far.
-    fn search(&self, level: u8, ends: Ends) -> Result<bool, Failure> {
+    /// The finest coarser level at which the start is inside, if part of the root's boundary is outside there. The root may cut the body, so
+    /// only that part is the far field.
+    fn closed(&mut self, start: Point) -> Result<Option<u8>, Failure> {
+        for level in (0..self.case.level_surface).rev() {
+            self.make_tree(level)?;
+            let words = &self.trees[&level];
+            if word::side(ends::leaf_at(words, start)) == Side::Inside {
+                let is_far = |w: u64| word::side(w) == Side::Outside && ends::is_at_boundary(w);
+                return Ok(words.iter().any(|&w| is_far(w)).then_some(level));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether free leaves of a base tree join the ends, which lie in some. The far field is what is `outside` at that level, if there is one.
+    /// The coarsest leaves are searched first: few of them lead far.
+    fn search(&self, level: u8, ends: Ends, outside: Option<u8>) -> Result<bool, Failure> {
         self.watch.step(&format!("searching the base tree of level {level}"));
-        let mut space = Space::new(&self.trees[&level], &self.facets)?;
+        let outside = outside.map(|level| &self.trees[&level][..]);
+        let mut space = Space::new(&self.trees[&level], &self.facets, outside)?;
         let edge = |space: &mut Space, cell: u32| space.cells[cell as usize].edge();
         Ok(space.widest(ends, f32::INFINITY, edge, self.watch)?.is_some())
     }
 
     /// Coarsens the surface until the ends are not joined.
-    fn coarsen(&mut self, ends: Ends) -> Result<Option<Closes>, Failure> {
+    fn coarsen(&mut self, ends: Ends, outside: Option<u8>) -> Result<Option<Closes>, Failure> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let is_end_crossed = self.crossed(level, ends).is_some();
-            if is_end_crossed || !self.search(level, ends)? {
+            if is_end_crossed || !self.search(level, ends, outside)? {
                 let spacing = Spacing::of(level, &self.case.root);
                 return Ok(Some(Closes { spacing, is_end_crossed }));
             }

@@ -76,17 +76,17 @@ struct Search<'a> {
     watch: &'a dyn Watch,
 }
 
-/// The widest path between two points, or to the far field, which free leaves of the base tree of this level join.
+/// The widest path between two points, or to the far field, which free leaves of the base tree of this level join: the cells of `space`.
 ///
 /// # Errors
 /// If `watch` is interrupted.
 pub fn widest(
-    (case, facets): (&Case, &FacetTree),
-    (level, words): (u8, &[u64]),
+    (case, level): (&Case, u8),
+    space: Space,
     (from, to): Ends,
     watch: &dyn Watch,
 ) -> Result<Passage, Failure> {
-    let space = Space::new(words, facets).expect("the tree was searched before");
+    let facets = space.facets;
     let before = approach(&space, from);
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
     let ends = (before[before.len() - 1], after.last().copied());

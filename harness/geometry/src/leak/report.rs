@@ -93,6 +93,8 @@ pub struct Report {
     pub spacing: Spacing,
     /// Whether free leaves of the case's base tree join the ends.
     pub is_leak: bool,
+    /// Whether the start is outside by its rays, although no path joins it to the far field.
+    pub is_enclosed: bool,
     /// The coarser level, the nearest to the case's, whose base tree does not join the ends.
     pub closes: Option<Closes>,
     /// The widest path if there is a leak, at the case's level or a coarser one that joins the ends.
@@ -120,6 +122,9 @@ const FACETS_MAX: usize = 24;
 const CLOSE: &str =
     "close it wherever the lattice lies; a finer one may close it on this lattice only.";
 const END: &str = "          This is an end of the path: no place on the way is narrower, so there is no opening between the ends.\n";
+/// What follows where no path explains that the start is outside.
+const ENCLOSED: &str = ", but the start is outside by its rays: the facets enclose it, and the majority of the rays calls it outside, as where bodies \
+    overlap or facets appear twice. If the mesher reports a leak there, this has changed its side; `harness geometry` finds such facets";
 const ENDS_CROSSED: &str = ", where facets cross the leaf of the start or the end";
 
 impl fmt::Display for Answers {
@@ -138,7 +143,8 @@ impl fmt::Display for Report {
         let (from, at) = (point(&self.from), spacing(&self.spacing));
         writeln!(f, "from      {from}\nto        {to}\nspacing   {at}\n")?;
         let Some(passage) = &self.passage else {
-            return writeln!(f, "no leak at this spacing");
+            let enclosed = if self.is_enclosed { ENCLOSED } else { "" };
+            return writeln!(f, "no leak at this spacing{enclosed}");
         };
         let verdict = match passage.narrowest.is_end {
             true => "JOINED: start and end lie in one space, or one of them within the opening",
@@ -227,6 +233,7 @@ mod tests {
             to: Target::Far,
             spacing,
             is_leak: true,
+            is_enclosed: false,
             closes: Some(Closes { spacing: Spacing::of(2, &root), is_end_crossed: true }),
             passage: Some(Passage { spacing, narrowest, inner: (0, points.len() - 1), points }),
         }
@@ -271,6 +278,8 @@ mod tests {
         let mut report = leak(1, narrowest(3..4, 0, false));
         (report.is_leak, report.closes, report.passage) = (false, None, None);
         assert_eq!(report.to_string(), format!("{HEAD}no leak at this spacing\n"));
+        report.is_enclosed = true;
+        assert!(report.to_string().contains("no leak at this spacing, but the start is outside"));
     }
 
     #[test]

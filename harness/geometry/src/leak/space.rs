@@ -7,13 +7,13 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::Ends;
-use super::ends::is_free;
+use super::ends::{is_free, leaf_at};
 use crate::tree::{FacetTree, Point};
 use contract::failure::Failure;
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
 use contract::watch::Watch;
-use contract::word::{self, KEY_END, Order};
+use contract::word::{self, KEY_END, Order, Side};
 
 /// A cell; lengths are in lattice units.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,7 @@ impl Cell {
         3f64.sqrt() / 2.0 * self.edge()
     }
 
-    fn is_far(&self) -> bool {
+    fn is_at_boundary(&self) -> bool {
         self.low.iter().any(|&c| c == 0 || i64::from(c + self.edge) == UNITS_PER_EDGE)
     }
 }
@@ -55,14 +55,21 @@ pub struct Space<'a> {
     order: BTreeMap<u128, u32>,
     /// The facets of the case.
     pub facets: &'a FacetTree,
+    /// The far field is the part of the root's boundary that is outside in the base tree of these words, and all of it without them.
+    outside: Option<&'a [u64]>,
 }
 
 impl<'a> Space<'a> {
-    /// The leaves of a base tree, given by its sorted words.
+    /// The leaves of a base tree, given by its sorted words, and the base tree whose outside has the far field, if not all of the root's
+    /// boundary is that.
     ///
     /// # Errors
     /// One sentence, if the words are not leaves that tile the root.
-    pub fn new(words: &[u64], facets: &'a FacetTree) -> Result<Self, String> {
+    pub fn new(
+        words: &[u64],
+        facets: &'a FacetTree,
+        outside: Option<&'a [u64]>,
+    ) -> Result<Self, String> {
         let mut linear = Order::default();
         let added = words.iter().try_for_each(|&word| linear.add(word));
         added.map_err(|why| format!("the base tree is not a tree: {why}"))?;
@@ -76,7 +83,13 @@ impl<'a> Space<'a> {
         };
         let cells: Vec<Cell> = words.iter().map(cell).collect();
         let order = cells.iter().zip(0..).map(|(cell, i)| (key(cell.low), i)).collect();
-        Ok(Self { cells, order, facets })
+        Ok(Self { cells, order, facets, outside })
+    }
+
+    fn is_far(&self, cell: u32) -> bool {
+        let cell = &self.cells[cell as usize];
+        let is_outside = |words| word::side(leaf_at(words, cell.centre())) == Side::Outside;
+        cell.is_at_boundary() && self.outside.is_none_or(is_outside)
     }
 
     /// The cell that contains a point of the root.
@@ -188,7 +201,7 @@ impl<'a> Space<'a> {
             if label != labels[cell as usize] {
                 continue;
             }
-            if end.map_or_else(|| self.cells[cell as usize].is_far(), |end| cell == end) {
+            if end.map_or_else(|| self.is_far(cell), |end| cell == end) {
                 let mut path = vec![cell];
                 while path[path.len() - 1] != start {
                     path.push(via[path[path.len() - 1] as usize]);

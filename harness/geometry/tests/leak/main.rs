@@ -189,6 +189,8 @@ fn a_closed_body_does_not_leak() {
     for level in [4, 8] {
         let report = from_centre(&closed, level);
         assert!(!report.is_leak && report.passage.is_none() && report.closes.is_none());
+        // These base trees have no inside.
+        assert!(report.is_enclosed && report.to_string().contains("the facets enclose it"));
     }
 }
 

@@ -72,26 +72,21 @@ pub fn tex(figure: &Figure) -> String {
         axis_options("x", &figure.x, &x),
         axis_options("y", &figure.y, &y)
     );
-    for (plot, s) in figure.series.iter().enumerate() {
-        if s.kind == Kind::Line {
-            let (style, x) = (s.style % COLOURS.len(), s.points[0].x);
-            let _ = writeln!(
-                out,
+    let plot = |(plot, s): (usize, &Series)| {
+        let (style, id, name) = (s.style % COLOURS.len(), &figure.id, escape(&s.name));
+        match (s.kind, &s.points[..]) {
+            (Kind::Line, [Point { x, .. }, ..]) => format!(
                 "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
-                 \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{}}}",
-                escape(&s.name)
-            );
-            continue;
+                 \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{name}}}\n"
+            ),
+            _ => format!(
+                "\\addplot[{}] table[col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, \
+                 x=x, y=y{errors}] {{\\figures/{id}.csv}};\n\\addlegendentry{{{name}}}\n",
+                plot_options(s)
+            ),
         }
-        let _ = writeln!(
-            out,
-            "\\addplot[{}] table[col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, \
-             x=x, y=y{errors}] {{\\figures/{}.csv}};\n\\addlegendentry{{{}}}",
-            plot_options(s),
-            figure.id,
-            escape(&s.name)
-        );
-    }
+    };
+    out.extend(figure.series.iter().enumerate().map(plot));
     out + "\\end{axis}\n\\end{tikzpicture}\n"
 }
 

@@ -83,7 +83,6 @@ impl Squares {
         })?;
         while found.squares.len() > squares_max && found.level_drawn > 0 {
             found.level_drawn -= 1;
-            found.level_outlined = found.level_outlined.min(found.level_drawn);
             found.leaves = 0;
             std::mem::take(&mut found.squares).into_iter().for_each(|square| found.add(square));
         }

@@ -19,6 +19,13 @@ fn meshed(case: &Small, comm: &str) -> (Vec<String>, Value) {
         (workspace.json("run.json"), read_json(&workspace.path().join("mesh/mesh.json")));
     assert_eq!((&report["warnings"], &report["leaks"]), (&json!(warnings), &manifest["leaks"]));
 
+    let base = run(workspace.mesher(&["case.toml", "--ungraded", comm]));
+    let of_leaks = |line: &&str| line.contains("leak");
+    assert!(
+        ended.stderr.lines().filter(of_leaks).eq(base.stderr.lines().filter(of_leaks)),
+        "{base:?}"
+    );
+
     let strict = run(workspace.mesher(&["case.toml", "--out", "strict", "--strict", comm]));
     let message = warnings.first().map_or(String::new(), |warning| format!("mesher: {warning}\n"));
     let code = i32::from(!warnings.is_empty());
