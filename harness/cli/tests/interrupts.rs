@@ -123,9 +123,11 @@ fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
     let fixture = Fixture::new();
     fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
     fixture.program("pingpong", "");
+    // It is asked for its version first.
+    fixture.program("launcher", "#!/bin/sh\ntest $1 = --version || exec ./mesher\n");
     let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [2]\n";
     fs::write(fixture.path().join("study.toml"), series).unwrap();
-    let launcher = ["--launcher", "./mesher {ranks}", "--mesher", "./mesher"];
+    let launcher = ["--launcher", "./launcher {ranks}", "--mesher", "./mesher"];
     let bench = ["bench", "study.toml", "--record", "record.jsonl"];
     let mut run = fixture.start(&[&bench[..], &launcher].concat());
     while fixture.ids().len() < 2 {

@@ -240,6 +240,23 @@ mod tests {
     }
 
     #[test]
+    fn sessions_with_another_given_network_are_left_out() {
+        let of = |name: &str, entry: Entry| Line { session: name.into(), ..line(entry) };
+        let opening = || Entry::Session(Box::default());
+        let network = |measured: bool| {
+            Entry::Network(Network { latency_s: 1.0, bandwidth_bytes_per_s: 1e9, measured })
+        };
+        let lines = [
+            of("a", opening()),
+            of("a", network(true)),
+            of("b", opening()),
+            of("b", network(false)),
+            of("c", opening()),
+        ];
+        assert_eq!(of_last_origin(&lines), lines[2..]);
+    }
+
+    #[test]
     fn runs_of_another_machine_do_not_move_a_median() {
         let targets = read(FILE).unwrap();
         let session = |name: &str, cpu: &str| {

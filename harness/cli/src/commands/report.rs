@@ -51,23 +51,25 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(code)
 }
 
-/// Reads a text and those that it includes, without the files that the report in `directory` has just written.
+/// Reads a text and those that it includes, without figures of reports, and without the numbers that the report in `directory` has just
+/// written.
 fn texts(main: &Path, directory: &Path) -> Result<Vec<(PathBuf, String)>, Failure> {
-    let own = ["numbers.tex", "figures.tex", "figures"].map(|name| directory.join(name));
-    let own = own.map(|path| path.canonicalize().unwrap_or(path));
-    let is_own = |path: &PathBuf| {
-        path.canonicalize().is_ok_and(|path| own.iter().any(|own| path.starts_with(own)))
-    };
-    let mut paths = vec![main.to_owned()];
-    let mut all: Vec<(PathBuf, String)> = Vec::new();
-    while let Some(path) = paths.get(all.len()).cloned() {
+    let own = directory.join("numbers.tex").canonicalize().ok();
+    let (mut paths, mut all) = (vec![main.to_owned()], Vec::new());
+    let mut next = 0;
+    while let Some(path) = paths.get(next).cloned() {
+        next += 1;
         let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
+        let is_figure = |line| line == r"\providecommand{\figures}{figures}";
+        if text.lines().take(3).any(is_figure) || path.canonicalize().ok() == own {
+            continue;
+        }
         for name in included(&text) {
             // As LaTeX does: relative to the main text, whichever includes it.
             let [named, with_end] =
                 ["", ".tex"].map(|end| main.with_file_name(format!("{name}{end}")));
             let file = if named.is_file() || name.ends_with(".tex") { named } else { with_end };
-            if !paths.contains(&file) && !is_own(&file) {
+            if !paths.contains(&file) {
                 paths.push(file);
             }
         }

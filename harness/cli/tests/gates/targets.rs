@@ -86,10 +86,13 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     // A text that it includes is a part of it; what the report has just written need not be compared.
     fixture
         .write("parts/one.tex", &format!("\\result{{{key}}}, or 98.76543 s\\input{{parts/one}}"));
-    let whole = check("\\input{out/numbers}\\include{parts/one} % \\input{absent}");
+    fixture.write("copy.tex", "%\n\\providecommand{\\figures}{figures}\n98.76543");
+    let whole = check("\\input{out/numbers}\\input{copy}\\include{parts/one} % \\input{absent}");
     let part = "one.tex, line 1: 98.76543 is written by hand";
     assert!(whole.code == 1 && whole.printed.contains(part), "{}", whole.printed);
-    assert!(!whole.printed.contains("numbers.tex"), "{}", whole.printed);
+    for made in ["numbers.tex", "copy.tex"] {
+        assert!(!whole.printed.contains(made), "{}", whole.printed);
+    }
     let absent = check(&format!("\\result{{{key}}}\\input{{absent}}"));
     assert!(absent.code == 2 && absent.printed.contains("absent.tex"), "{}", absent.printed);
 }
