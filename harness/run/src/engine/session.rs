@@ -5,6 +5,7 @@
 
 use super::failure::End;
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, setsid, waitpid};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -214,18 +215,37 @@ impl MemorySampler {
             return;
         }
         self.last = Instant::now();
-        let peaks = members(leader).into_iter().filter_map(|id| {
-            let path = format!("/proc/{}/status", id.as_raw_nonzero());
-            peak_bytes(&fs::read_to_string(path).ok()?)
+        let statuses = members(leader).into_iter().filter_map(|id| {
+            let status =
+                fs::read_to_string(format!("/proc/{}/status", id.as_raw_nonzero())).ok()?;
+            Some((id.as_raw_nonzero().get().cast_unsigned().into(), Status::parse(&status)?))
         });
-        self.peak_bytes = self.peak_bytes.max(peaks.sum());
+        self.peak_bytes = self.peak_bytes.max(total_bytes(&statuses.collect()));
     }
 }
 
-/// The peak resident memory in the text of `/proc/ID/status`.
-fn peak_bytes(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    Some(line.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
+/// A process, of which `/proc/ID/status` has the parent and the peak resident memory.
+struct Status {
+    parent: u64,
+    peak_bytes: u64,
+}
+
+impl Status {
+    fn parse(text: &str) -> Option<Self> {
+        let number = |name| {
+            let value = text.lines().find_map(|line| line.strip_prefix(name))?;
+            value.split_whitespace().next()?.parse::<u64>().ok()
+        };
+        Some(Self { parent: number("PPid:")?, peak_bytes: number("VmHWM:")? * 1024 })
+    }
+}
+
+/// The sum of the peaks. Between its start and that of its program, a process has its parent's memory, which counts once.
+fn total_bytes(processes: &BTreeMap<u64, Status>) -> u64 {
+    let is_of_parent = |of: &&Status| {
+        processes.get(&of.parent).is_some_and(|parent| parent.peak_bytes == of.peak_bytes)
+    };
+    processes.values().filter(|of| !is_of_parent(of)).map(|of| of.peak_bytes).sum()
 }
 
 #[cfg(test)]
@@ -274,8 +294,17 @@ mod tests {
     }
 
     #[test]
-    fn the_peak_is_parsed() {
-        assert_eq!(peak_bytes("Name:\ta\nVmHWM:\t    12 kB\nVmRSS:\t 3 kB\n"), Some(12 * 1024));
-        assert_eq!(peak_bytes("Name:\ta\n"), None);
+    fn peaks_add_up_and_memory_that_parent_and_child_share_counts_once() {
+        let total = |all: &[(u64, u64, u64)]| {
+            let parsed = all.iter().map(|(id, parent, peak)| {
+                let text =
+                    format!("Name:\ta\nPPid:\t{parent}\nVmHWM:\t  {peak} kB\nVmRSS:\t 3 kB\n");
+                (*id, Status::parse(&text).unwrap())
+            });
+            total_bytes(&parsed.collect()) / 1024
+        };
+        assert_eq!(total(&[(7, 1, 9000), (8, 7, 9000)]), 9000, "a child without its program yet");
+        assert_eq!(total(&[(7, 1, 9000), (8, 7, 10_000), (9, 7, 10_000)]), 29_000, "siblings");
+        assert!(Status::parse("Name:\ta\nPPid:\t1\n").is_none());
     }
 }
