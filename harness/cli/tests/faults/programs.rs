@@ -138,7 +138,9 @@ impl Program {
     /// The input, with old output in place of the files that it replaces.
     pub fn before(&self, inputs: &Files) -> Files {
         let mut files = inputs.clone();
-        for name in self.outputs.iter().filter(|name| name.contains('.')) {
+        // An export replaces no surface.
+        let is_replaced = |name: &&&str| name.contains('.') && !name.ends_with(".stl");
+        for name in self.outputs.iter().filter(is_replaced) {
             files.entry(name.into()).or_insert_with(|| Some(b"old\n".to_vec()));
         }
         files
