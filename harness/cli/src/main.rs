@@ -79,11 +79,12 @@ fn report_a_panic_once() {
     }));
 }
 
-/// Prints why a command has no result; returns its exit code.
+/// Prints why a command has no result; returns its exit code. After an interrupt, what else fails does so because of it: files that were
+/// being made are gone.
 fn print_failure(Failure { code, why }: Failure) -> u8 {
-    match code {
-        EXIT_INTERRUPTED => interrupt::announce(),
-        _ => eprintln!("harness: {why}"),
+    match code == EXIT_INTERRUPTED || interrupt::requested() {
+        true => interrupt::announce(),
+        false => eprintln!("harness: {why}"),
     }
     code
 }
