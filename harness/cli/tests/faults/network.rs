@@ -1,7 +1,7 @@
 //! Ranks on two hosts with a network between them, which is cut while a rank has stopped itself at a point (`STOP_AT`). The hosts are network namespaces, joined by a pair of virtual
 //! interfaces; a script in place of a remote shell starts OpenMPI's daemon in the second one.
 
-use crate::place::{HANGS, Place};
+use crate::place::{HANGS, Place, in_time};
 use crate::table::{Row, Table};
 use crate::tools::{is_full, mpi, mpirun, skip};
 use std::fs;
@@ -51,20 +51,23 @@ pub fn family() {
     let phases = if is_full() { &["refine", "sides", "grade", "leaves"][..] } else { &["grade"] };
     for phase in phases {
         for host in if is_full() { &[0, 1][..] } else { &[1] } {
-            place.reset(&before);
-            (0..2).for_each(|host| hosts.link(host, "up"));
-            let job = hosts.job(&place, &mesher, &format!("{phase}:{host}"));
-            let (is_cut, ended) = std::thread::scope(|scope| {
-                let cut = scope.spawn(|| hosts.cut(&place, *host));
-                let mut ended = place.run(job, LIMIT);
-                // The daemon of the other host is not reached by the launcher, and ends when the test removes the host.
-                ended.wrong = ended.wrong.filter(|why| !why.starts_with("processes"));
-                (cut.join().unwrap(), ended)
+            let (is_cut, ended, left) = in_time(|| {
+                place.reset(&before);
+                (0..2).for_each(|host| hosts.link(host, "up"));
+                let job = hosts.job(&place, &mesher, &format!("{phase}:{host}"));
+                let (is_cut, ended) = std::thread::scope(|scope| {
+                    let cut = scope.spawn(|| hosts.cut(&place, *host));
+                    let mut ended = place.run(job, LIMIT);
+                    // The daemon of the other host is not reached by the launcher, and ends when the test removes the host.
+                    ended.wrong = ended.wrong.filter(|why| !why.starts_with("processes"));
+                    (cut.join().unwrap(), ended)
+                });
+                let files = place.files().into_keys().filter(|path| path.starts_with("out"));
+                let left: Vec<_> = files.collect();
+                let is_early = !left.is_empty() && ended.may_be_killed_early();
+                ((is_cut, ended, left), is_early)
             });
-            let after = place.files();
             let named = ended.err.lines().filter(|line| line.starts_with("mesher: ")).count();
-            let left =
-                if after.keys().any(|path| path.starts_with("out")) { "files" } else { "nothing" };
             let wrong = match () {
                 () if ended.wrong.is_some() => ended.wrong.clone(),
                 () if !is_cut => Some("no rank stopped, so the network was not cut".to_owned()),
@@ -76,11 +79,12 @@ pub fn family() {
                 {
                     Some("no sentence names the host".to_owned())
                 }
-                () if left != "nothing" => Some("files were left".to_owned()),
+                () if !left.is_empty() => Some(format!("files were left: {left:?}")),
                 () => None,
             };
             let what = format!("host {host} is cut off before {phase}");
             let mut row = Row::new("mesher on 2 hosts, --stall-limit 5", what);
+            let left = if left.is_empty() { "nothing" } else { "files" };
             row.add(ended.code, ended.seconds, left, wrong.map(|why| format!("{why}: {ended:?}")));
             table.push(row);
         }

@@ -1,7 +1,7 @@
 //! Ranks that are killed, crash or stop at the beginning of each phase. A rank names its phase in its status file: that write is the
 //! call that the fault is injected into.
 
-use crate::place::{Ended, Files, HANGS, Place};
+use crate::place::{Ended, Files, HANGS, Place, in_time};
 use crate::table::{Row, Table};
 use crate::tools::{injector, is_full, mpi, mpirun, skip};
 use std::fs;
@@ -52,9 +52,13 @@ pub fn family() {
                 if !(is_full() || is_sampled) {
                     continue;
                 }
-                place.reset(&before);
-                let (ended, _) = job.run(action, i + 1);
-                let left = left(&place.files(), &complete);
+                let (ended, left) = in_time(|| {
+                    place.reset(&before);
+                    let (ended, _) = job.run(action, i + 1);
+                    let left = left(&place.files(), &complete);
+                    let is_early = left != "nothing" && ended.may_be_killed_early();
+                    ((ended, left), is_early)
+                });
                 let mut row =
                     Row::new(format!("phase {phase}"), format!("rank {rank} of {RANKS} {what}"));
                 let wrong = judge(&ended, codes, left, phase, rank);

@@ -35,6 +35,22 @@ pub struct Ended {
     pub wrong: Option<String>,
 }
 
+/// Runs a job until it returns `false` beside its result, at most five times: whether ranks may have been killed before they had removed
+/// their files. A launcher does that a second after it has asked them to end, which a busy machine may not notice by then.
+pub fn in_time<T>(mut job: impl FnMut() -> (T, bool)) -> T {
+    let mut attempts = (1..5).map(|_| job());
+    let done = attempts.find(|(_, is_early)| !is_early);
+    drop(attempts);
+    done.unwrap_or_else(job).0
+}
+
+impl Ended {
+    /// Whether the first rank has not said that it was interrupted, which it does when its files are removed.
+    pub fn may_be_killed_early(&self) -> bool {
+        !self.err.contains("mesher: ")
+    }
+}
+
 /// A directory with files, and a directory beside it for what the programs do not see.
 pub struct Place {
     root: PathBuf,

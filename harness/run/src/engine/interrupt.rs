@@ -103,12 +103,12 @@ fn end() -> ! {
 
 /// Ends the child processes, and removes unfinished files and temporary directories. Then the process must end.
 pub fn clean() {
-    let _ended = end_all();
-    // Until the process ends, nothing else is staged or published.
+    let ended = end_all();
     let staged = publications();
     interrupt::abandon(false);
     staged.iter().chain(TEMPORARY.get()).for_each(|path| remove(path));
-    std::mem::forget(staged);
+    // Until the process ends, other threads start, stage and publish nothing else.
+    std::mem::forget((ended, staged));
 }
 
 fn remove(directory: &Path) {

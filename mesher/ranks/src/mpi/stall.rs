@@ -1,7 +1,8 @@
 //! A limit for calls: the rank that the others wait for is named, and the job ends.
 //!
 //! A rank that has waited for longer than the limit asks all others for a sign, on a communicator of its own. Ranks that wait themselves
-//! answer at once, as they look for questions while they wait. Those that do not answer compute, hang, or have been stopped.
+//! answer at once, as they look for questions while they wait. Those that do not answer compute, hang, or have been stopped. The rank that
+//! names them tells the others so before, which then say nothing, however long the end of the job takes.
 
 use crate::STALLED;
 use files::interrupt;
@@ -16,6 +17,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(1);
 const QUESTION: i32 = 1;
 const ANSWER: i32 = 2;
+const END: i32 = 3;
 
 /// Watches the calls of a rank.
 pub struct Watch {
@@ -67,6 +69,10 @@ impl Watch {
             let from = status.source_rank();
             match status.tag() {
                 QUESTION => self.side.process_at_rank(from).send_with_tag(&0u64, ANSWER),
+                END => {
+                    self.since.set(Instant::now());
+                    *answered = None;
+                }
                 _ => answered.iter_mut().for_each(|ranks| _ = ranks.insert(from)),
             }
         }
@@ -75,11 +81,8 @@ impl Watch {
         let patience = PATIENCE.max(self.limit / 2);
         match &*answered {
             None if waited > self.limit => {
-                let me = self.side.rank();
-                for rank in (0..self.side.size()).filter(|&rank| rank != me) {
-                    self.side.process_at_rank(rank).send_with_tag(&0u64, QUESTION);
-                }
-                *answered = Some(BTreeSet::from([me]));
+                self.tell_others(QUESTION);
+                *answered = Some(BTreeSet::from([self.side.rank()]));
                 self.since.set(Instant::now());
             }
             Some(ranks) if waited > patience => {
@@ -87,7 +90,7 @@ impl Watch {
                     // All ranks wait: the call takes long by itself.
                     drop(answered);
                     self.start();
-                } else if ranks.first() == Some(&self.side.rank()) || waited > 2 * patience {
+                } else if ranks.first() == Some(&self.side.rank()) || waited > 3 * patience {
                     self.end(ranks);
                 }
             }
@@ -95,7 +98,15 @@ impl Watch {
         }
     }
 
+    fn tell_others(&self, tag: i32) {
+        let me = self.side.rank();
+        for rank in (0..self.side.size()).filter(|&rank| rank != me) {
+            self.side.process_at_rank(rank).send_with_tag(&0u64, tag);
+        }
+    }
+
     fn end(&self, answered: &BTreeSet<i32>) -> ! {
+        self.tell_others(END);
         let silent: Vec<String> = (0..self.side.size())
             .filter(|r| !answered.contains(r))
             .map(|r| r.to_string())
