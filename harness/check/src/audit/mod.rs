@@ -155,7 +155,7 @@ fn audit_within(
             let mut files = CheckResult::new(checks::FILES);
             let tree = manifest.hyper_tree_grid.is_some();
             files.examined = manifest.parts.len() as u64 + u64::from(tree);
-            let subject = Subject::of(manifest, pass, case).promising(promises);
+            let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
             if tree && mesh.tree_file.is_none() {
                 report.checks.push(tree_file(dir, manifest));

@@ -14,10 +14,8 @@ pub(super) const CHECK: Check = Check {
     name: "balance",
     wanted: |subject| {
         subject.promises.balance.is_some()
-            || subject.promises.definition
-                && subject.manifest.tree == contract::manifest::Tree::Final
+            || subject.promises.definition && subject.inputs.tree == contract::manifest::Tree::Final
     },
-    needs: several_levels,
     run,
 };
 
@@ -31,6 +29,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
             touching_leaves(subject.tree_with_deleted(), root, Touching::Corner, 1, result);
         }
     }
+    result.requires(several_levels(subject));
 }
 
 /// Leaves that touch in this way differ by at most `levels` levels.

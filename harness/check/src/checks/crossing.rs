@@ -16,7 +16,6 @@ pub(super) const CHECK: Check = Check {
     wanted: |subject| {
         subject.promises.crossing || subject.promises.definition && subject.case.is_some()
     },
-    needs: super::nothing,
     run,
 };
 
@@ -27,22 +26,19 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         return super::unknown_sides(subject, subject.promises.crossing, result);
     }
     let Some(truth) = subject.truth() else { return result.lacks(super::NO_GEOMETRY) };
-    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: Octant| {
+    let mut report = |is_crossed: bool, kinds: Kinds, octant: Octant| {
         let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
         let (given, leaf) = (contact::name(kinds), subject.terms.root.place(octant));
-        result.report(format_args!("{prefix}{what} the {given} leaf {leaf}"));
+        result.report(format_args!("{what} the {given} leaf {leaf}"));
     };
     if subject.promises.definition {
         // Leaves are crossing iff those of T0 are that contain them.
-        for (prefix, _, pass) in subject.meshes() {
-            truth.mislabelled(pass.tree(), &mut |found, side| {
-                let is_crossed = side == Side::Crossing;
-                if is_crossed || found.kinds == 1 << CROSSING {
-                    report(prefix, is_crossed, found.kinds, found.octant);
-                }
-            });
-        }
-        return;
+        return truth.mislabelled(subject.tree(), &mut |found, side| {
+            let is_crossed = side == Side::Crossing;
+            if is_crossed || found.kinds == 1 << CROSSING {
+                report(is_crossed, found.kinds, found.octant);
+            }
+        });
     }
     // Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
     let surface = subject.terms.level_surface;
@@ -50,7 +46,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         let is_crossed = !near.is_empty();
         let inherits = || octant.level > surface && truth.is_crossed(&octant.ancestor(surface));
         if kind == CROSSING && !is_crossed && !inherits() || kind != CROSSING && is_crossed {
-            report("", is_crossed, 1 << kind, octant);
+            report(is_crossed, 1 << kind, octant);
         }
     });
 }
@@ -59,6 +55,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::manifest::Tree;
     use contract::testing::{leaf_set, words_with_sides};
 
     /// The facet lies in octant 0 of level 1, the surface's level, and there in its child 0. Leaves have level 2.
@@ -76,7 +73,7 @@ mod tests {
             let side = |path: &str| if crossing(path) { Side::Crossing } else { Side::Outside };
             let words = words_with_sides(|o| o.level < 2, |o| Some(side(&o.path())));
             let mesh = leaf_set(vec![words]);
-            let result = check(Subject::new(&case, &mesh));
+            let result = check(Subject::new(&case, Tree::Final, &mesh));
             assert_eq!(result.examined, 64);
             result.findings
         };
@@ -97,7 +94,7 @@ mod tests {
         let side =
             |o: &Octant| Some(if is_crossing(o.path()) { Side::Crossing } else { Side::Outside });
         let mesh = leaf_set(vec![words_with_sides(|o| ["root", "0"].contains(&&*o.path()), side)]);
-        let result = check(Subject::new(&case, &mesh));
+        let result = check(Subject::new(&case, Tree::Final, &mesh));
         let text = &result.findings[0];
         assert!(result.findings_total == 1 && text.contains("octant 1 "), "{result}");
     }

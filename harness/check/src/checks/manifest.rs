@@ -4,17 +4,17 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
 //! leaks and the ambiguous components, and `kept` the numbers of components.
 
-use super::{Check, CheckResult, Subject, always, json, nothing};
+use super::{Check, CheckResult, Subject, always, json};
 use contract::lattice::Root;
 use contract::manifest::{
-    BySide, Components, EnclosedComponents, ExtentBox, Leak, Manifest, OCTANTS, Sides, Tree,
+    BySide, Components, EnclosedComponents, ExtentBox, Leak, Manifest, OCTANTS, Sides,
 };
 use serde_json::{Value, json};
 
 /// Name of the check.
 pub const NAME: &str = "manifest";
 
-pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothing, run };
+pub(super) const CHECK: Check = Check { name: NAME, wanted: always, run };
 
 /// The inputs, by their keys. A mesh in the format of another program may lack all but the first two.
 const INPUTS: [&str; 9] = [
@@ -74,40 +74,32 @@ fn stated(manifest: &Manifest) -> Value {
 }
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    for (prefix, manifest, pass) in subject.meshes() {
-        let (claimed, tally) = (("the manifest", manifest), &pass.tally);
-        result.examined += tally.leaves;
-        let mut keys =
-            ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
-        keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
-        keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
-        let lacks_inputs = manifest.lacks_inputs;
-        let mut inputs = Manifest { tree: manifest.tree, lacks_inputs, ..subject.inputs.clone() };
-        if subject.base.is_some() {
-            // A mesh with an engine's T0 beside it is a final one.
-            inputs.tree = if prefix.is_empty() { Tree::Final } else { Tree::Base };
-        }
-        let of_leaves = differing(&keys, claimed, ("fact", tally));
-        for line in of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs))) {
-            result.report(format_args!("{prefix}{line}"));
-        }
-        let BySide { outside, inside, crossing } = tally.leaves_by_side;
-        if manifest.sides == Sides::Unknown && outside < tally.leaves {
-            result.report(format_args!(
-                "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
-                tally.leaves
-            ));
-        }
+    let (manifest, tally) = (subject.manifest, &subject.pass.tally);
+    let claimed = ("the manifest", manifest);
+    let mut keys =
+        ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
+    keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
+    keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
+    let inputs = Manifest { lacks_inputs: manifest.lacks_inputs, ..subject.inputs.clone() };
+    let of_leaves = differing(&keys, claimed, ("fact", tally));
+    let lines = of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs)));
+    lines.for_each(|line| result.report(line));
+    let BySide { outside, inside, crossing } = tally.leaves_by_side;
+    if manifest.sides == Sides::Unknown && outside < tally.leaves {
+        result.report(format_args!(
+            "sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
+            tally.leaves
+        ));
     }
-    possible_leaks(subject.manifest, result);
+    possible_leaks(manifest, result);
     // Of different leaves, `identical` reports the cause. This is the only check of the counts in a mesh whose T0 is not known, such as one
     // made on several ranks.
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
         && mesh.words == reference.words
     {
-        let (claimed, expected) = (("", subject.manifest), ("the reference", &reference.manifest));
-        components(claimed, expected, &["components_ambiguous", "leaks"], result);
-        components(claimed, expected, &COMPONENTS, result);
+        let expected = ("the reference", &reference.manifest);
+        components(manifest, expected, &["components_ambiguous", "leaks"], result);
+        components(manifest, expected, &COMPONENTS, result);
     }
 }
 
@@ -117,7 +109,7 @@ pub(super) const COMPONENTS: [&str; 3] =
 
 /// The manifest has these entries about components as another one, if both have them. Places may be rounded.
 pub(super) fn components(
-    (prefix, manifest): Owned,
+    manifest: &Manifest,
     (owner, other): Owned,
     keys: &[&str],
     result: &mut CheckResult,
@@ -135,9 +127,8 @@ pub(super) fn components(
         let example = aligned(claimed.enclosed.example, found.enclosed.example);
         Components { enclosed: EnclosedComponents { example, ..found.enclosed }, ..found }
     });
-    for line in differing(keys, ("the manifest", manifest), (owner, &expected)) {
-        result.report(format_args!("{prefix}{line}"));
-    }
+    let lines = differing(keys, ("the manifest", manifest), (owner, &expected));
+    lines.into_iter().for_each(|line| result.report(line));
 }
 
 /// A leak opens between a coarser spacing and a finer one, and has a volume and a point in the root.

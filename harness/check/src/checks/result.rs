@@ -58,21 +58,20 @@ impl CheckResult {
     /// States that a premise is missing.
     pub fn lacks(&mut self, why: impl fmt::Display) {
         self.nothing_to_check = Some(why.to_string());
+        self.examined = 0;
     }
 
-    /// States that there was nothing to check, if nothing was examined and found.
-    pub fn needs_objects(&mut self, why: &str) {
-        if self.holds() && self.was_run() && self.examined == 0 {
+    /// States which premise is missing, if one is and nothing was found: a check without its premise cannot fail, so it must not count as
+    /// one that holds.
+    pub(crate) fn requires(&mut self, missing: Option<impl fmt::Display>) {
+        if let Some(why) = missing.filter(|_| self.holds() && self.was_run()) {
             self.lacks(why);
         }
     }
 
-    /// Adds the findings of another result.
-    pub fn append(&mut self, other: &Self) {
-        let room = FINDINGS_LISTED - self.findings.len();
-        self.findings.extend(other.findings.iter().take(room).cloned());
-        self.findings_total += other.findings_total;
-        self.examined += other.examined;
+    /// States that there was nothing to check, if nothing was examined and found.
+    pub fn needs_objects(&mut self, why: &str) {
+        self.requires((self.examined == 0).then_some(why));
     }
 
     /// Panics if an invariant of the answer does not hold.

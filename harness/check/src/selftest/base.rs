@@ -1,5 +1,4 @@
-//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to. The check `spacing`
-//! must detect most of them.
+//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to.
 
 use super::SelftestCase;
 use super::mutant::{
@@ -9,21 +8,21 @@ use contract::octant::LEVEL_MAX;
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
-    base("T0 too coarse at the surface", "spacing", INFORMED, coarse_at_surface),
-    base("T0 too coarse in a box", "spacing", INFORMED, |s| merged_in_box(s, &s.base.words)),
-    base("T0 needlessly fine away from the surface", "spacing", INFORMED, fine_away),
-    base("T0 needlessly fine at the surface", "spacing", INFORMED, fine_at_surface),
-    base("T0 with a hole", "complete", INFORMED, |s| {
+    base("T0 too coarse at the surface", "spacing", AUDITED, coarse_at_surface),
+    base("T0 too coarse in a box", "spacing", AUDITED, |s| merged_in_box(s, &s.base.words)),
+    base("T0 needlessly fine away from the surface", "identical", INFORMED, fine_away),
+    base("T0 needlessly fine at the surface", "identical", INFORMED, fine_at_surface),
+    base("T0 with a hole", "complete", AUDITED, |s| {
         let mut words = s.base.words.clone();
         // The self test at scale does not know T0 of a mesh that it did not make.
         (!words.is_empty()).then(|| words.remove(words.len() / 3))?;
         Some(words)
     }),
-    base("T0 with a duplicate leaf", "linear", INFORMED, |s| {
+    base("T0 with a duplicate leaf", "linear", AUDITED, |s| {
         let words = &s.base.words;
         Some([&words[..], &[*words.get(words.len() / 3)?]].concat())
     }),
-    base("T0 one level too coarse along the whole surface", "spacing", INFORMED, |s| {
+    base("T0 one level too coarse along the whole surface", "spacing", AUDITED, |s| {
         let groups = siblings_of_surface(s);
         (!groups.is_empty()).then(|| merged_crossing(&s.base.words, &groups))
     }),

@@ -62,8 +62,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
         m.enclosed = if is_deleted { Enclosed::Keep } else { Enclosed::Delete };
     }),
     manifest("manifest: final mesh labelled T0", INFORMED, |m| m.tree = Tree::Base),
-    sets("manifest: T0 labelled final mesh", "manifest", INFORMED, |_, mutation| {
-        mutation.base.manifest.tree = Tree::Final;
+    sets("manifest: T0 labelled final mesh", "manifest", INFORMED, |s, mutation| {
+        *mutation = Mutation::of(s, Tree::Base);
+        mutation.mesh.manifest.tree = Tree::Final;
         Some(())
     }),
     sets("leaf's side flipped, manifest unchanged", "manifest", AUDITED, |_, mutation| {

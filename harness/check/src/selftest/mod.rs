@@ -18,6 +18,7 @@ use crate::checks::{self, CheckResult, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::{self, LeafSet};
+use contract::manifest::Tree;
 
 mod base;
 mod files;
@@ -52,6 +53,16 @@ pub struct SelftestCase {
     pub mesh: LeafSet,
     /// The base tree T0.
     pub base: LeafSet,
+}
+
+impl SelftestCase {
+    /// The final mesh or T0.
+    pub fn set(&self, tree: Tree) -> &LeafSet {
+        match tree {
+            Tree::Final => &self.mesh,
+            Tree::Base => &self.base,
+        }
+    }
 }
 
 /// The result of one trial: a corruption of one mesh.
@@ -145,10 +156,12 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
     let mut report = SelftestReport::default();
     let cases: Vec<SelftestCase> = cases.iter().map(mutant::in_parts).collect();
     for correct in &cases {
-        let unchanged = Mutation::of(correct);
-        let examined = examine(correct, &unchanged, &scratch.join("unchanged"))?;
-        let alarms = examined.iter().flatten().filter(|result| !result.holds());
-        report.alarms.extend(alarms.map(|r| format!("{}: {r}", correct.case.name)));
+        for tree in [Tree::Final, Tree::Base] {
+            let unchanged = Mutation::of(correct, tree);
+            let examined = examine(correct, &unchanged, &scratch.join("unchanged"))?;
+            let alarms = examined.iter().flatten().filter(|result| !result.holds());
+            report.alarms.extend(alarms.map(|r| format!("{}: {r}", correct.case.name)));
+        }
     }
     for mutant in catalogue() {
         for correct in &cases {
@@ -174,8 +187,8 @@ fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::
     let checks = match leafset::read(dir) {
         Err(e) => vec![CheckResult::unreadable(&e)],
         Ok(mesh) => {
-            let subject = Subject::new(&correct.case, &mesh).with_base(&mutation.base);
-            checks::all(&subject.with_reference(&correct.mesh))
+            let subject = Subject::new(&correct.case, mutation.tree, &mesh);
+            checks::all(&subject.with_reference(correct.set(mutation.tree)))
         }
     };
     let audit = audit::audit(dir).checks;
@@ -195,15 +208,15 @@ fn kill(
         results.iter().filter(|r| !r.holds()).map(|r| r.name).collect()
     };
     let expected = checks.iter().find(|r| r.name == mutant.expected);
-    let (before, after) = (&correct.mesh, &mutation.mesh);
-    let is_of_mesh = mutation.tamper.is_some()
+    let (before, after) = (correct.set(mutation.tree), &mutation.mesh);
+    let is_changed = mutation.tamper.is_some()
         || (&before.manifest, &before.parts) != (&after.manifest, &after.parts);
     Kill {
         mutant,
         case: correct.case.name.clone(),
         caught_by: failed(checks),
         audit_caught_by: failed(audit),
-        whole_audit_missed: is_of_mesh && failed(whole).is_empty(),
+        whole_audit_missed: is_changed && failed(whole).is_empty(),
         finding: expected.and_then(|r| r.findings.first()).cloned(),
     }
 }
