@@ -20,15 +20,11 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let root = &subject.terms.root;
-    match subject.promises.balance {
-        Some(touching) => {
-            touching_leaves(subject.tree(), root, touching, subject.promises.levels(), result);
-        }
-        None => {
-            touching_leaves(subject.tree_with_deleted(), root, Touching::Corner, 1, result);
-        }
-    }
+    let (tree, touching, levels) = match subject.promises.balance {
+        Some(touching) => (subject.tree(), touching, subject.promises.levels()),
+        None => (subject.tree_with_deleted(), Touching::Corner, 1),
+    };
+    touching_leaves(tree, &subject.terms.root, touching, levels, result);
     result.requires(several_levels(subject));
 }
 

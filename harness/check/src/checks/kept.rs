@@ -10,12 +10,13 @@ mod alone;
 use super::components::Component;
 use super::manifest::{COMPONENTS, components};
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, for_definition, some_leaves};
+use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
 use contract::tree::Handle;
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check = Check { name: "kept", wanted: for_definition, run };
+pub(super) const CHECK: Check =
+    Check { name: "kept", wanted: |subject| subject.promises.definition, run };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     match subject.truth() {

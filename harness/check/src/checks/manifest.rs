@@ -4,17 +4,15 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
 //! leaks and the ambiguous components, and `kept` the numbers of components.
 
-use super::{Check, CheckResult, Subject, always, json};
+use super::{Check, CheckResult, Subject, json};
 use contract::lattice::Root;
-use contract::manifest::{
-    BySide, Components, EnclosedComponents, ExtentBox, Leak, Manifest, OCTANTS, Sides,
-};
+use contract::manifest::{BySide, ExtentBox, Leak, Manifest, OCTANTS, Sides};
 use serde_json::{Value, json};
 
 /// Name of the check.
 pub const NAME: &str = "manifest";
 
-pub(super) const CHECK: Check = Check { name: NAME, wanted: always, run };
+pub(super) const CHECK: Check = Check { name: NAME, wanted: |_| true, run };
 
 /// The inputs, by their keys. A mesh in the format of another program may lack all but the first two.
 const INPUTS: [&str; 9] = [
@@ -58,11 +56,16 @@ pub(crate) fn differing_inputs(a: Owned, b: Owned) -> Vec<String> {
     differing(&keys, a, b)
 }
 
-/// The manifest as JSON, with boxes and seeds in the user's units.
+/// The manifest as JSON, with boxes and seeds in the user's units, and places rounded to the lattice.
 fn stated(manifest: &Manifest) -> Value {
     let root = &manifest.root;
     let user = |at: [i64; 3]| root.rounded(root.to_user(at));
-    let mut stated = serde_json::to_value(manifest).expect("a manifest is representable in JSON");
+    let mut rounded = manifest.clone();
+    let enclosed = rounded.components.iter_mut().map(|components| &mut components.enclosed.example);
+    for place in enclosed.chain([&mut rounded.components_ambiguous.example]).flatten() {
+        *place = root.quantise(*place).map_or(*place, user);
+    }
+    let mut stated = serde_json::to_value(rounded).expect("a manifest is representable in JSON");
     let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
     stated["boxes"] = manifest.boxes.iter().map(extent).collect();
     stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
@@ -107,26 +110,16 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 pub(super) const COMPONENTS: [&str; 3] =
     ["components/outside", "components/inside", "components/enclosed"];
 
-/// The manifest has these entries about components as another one, if both have them. Places may be rounded.
+/// The manifest has these entries about components as another one, if both have them.
 pub(super) fn components(
     manifest: &Manifest,
     (owner, other): Owned,
     keys: &[&str],
     result: &mut CheckResult,
 ) {
-    let aligned = |claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| match (claimed, found) {
-        (Some(a), Some(b)) if other.same_place(a, b) => claimed,
-        _ => found,
-    };
     let mut expected = other.clone();
-    let ambiguous = &mut expected.components_ambiguous;
-    ambiguous.example = aligned(manifest.components_ambiguous.example, ambiguous.example);
     expected.leaks = manifest.leaks.clone().map(|leaks| other.leaks.clone().unwrap_or(leaks));
-    expected.components = manifest.components.map(|claimed| {
-        let Some(found) = other.components else { return claimed };
-        let example = aligned(claimed.enclosed.example, found.enclosed.example);
-        Components { enclosed: EnclosedComponents { example, ..found.enclosed }, ..found }
-    });
+    expected.components = manifest.components.map(|claimed| other.components.unwrap_or(claimed));
     let lines = differing(keys, ("the manifest", manifest), (owner, &expected));
     lines.into_iter().for_each(|line| result.report(line));
 }

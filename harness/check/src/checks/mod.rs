@@ -116,14 +116,6 @@ fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     }
 }
 
-fn always(_: &Subject) -> bool {
-    true
-}
-
-fn for_definition(subject: &Subject) -> bool {
-    subject.promises.definition
-}
-
 /// Why a check that compares leaves of several levels can find nothing.
 fn several_levels(subject: &Subject) -> Option<String> {
     let tree = subject.tree_with_deleted();

@@ -1,10 +1,10 @@
 //! One pass over the leaves, from a directory or from memory: it counts them, checks their order and builds the tree.
 //!
 //! The check `linear`: every word is a leaf, each part is sorted, and no two leaves overlap. Sections 7 and 8 of
-//! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` and `crossing` do).
+//! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` does).
 
 use super::identical::Named;
-use super::{Check, CheckResult, always};
+use super::{Check, CheckResult};
 use contract::digest::Digest;
 use contract::failure::Failure;
 use contract::lattice::Root;
@@ -135,7 +135,7 @@ impl State {
 /// The pass over the leaves has found what there is to report.
 pub(super) const CHECK: Check = Check {
     name: "linear",
-    wanted: always,
+    wanted: |_| true,
     run: |subject, result| result.clone_from(&subject.pass.linear),
 };
 
@@ -148,8 +148,9 @@ mod tests {
     #[test]
     fn every_leaf_is_examined_and_one_that_is_not_sorted_is_found() {
         let mut mesh = leaf_set(vec![words_of(|o| o.level < 1)]);
-        let check =
-            |mesh: &LeafSet| super::super::only(&Subject::alone(mesh), &["linear"]).remove(0);
+        let check = |mesh: &LeafSet| {
+            super::super::only(&Subject::new(None, mesh.manifest.tree, mesh), &["linear"]).remove(0)
+        };
         let result = check(&mesh);
         assert_eq!((result.examined, result.findings_total), (8, 0));
         mesh.parts[0].swap(2, 3);

@@ -15,7 +15,7 @@ pub const FINDINGS_LISTED: usize = 4;
 pub const FILES: &str = "files";
 
 /// The result of a check on one mesh.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CheckResult {
     /// Name of the check.
     pub name: &'static str,
@@ -38,14 +38,7 @@ pub struct CheckResult {
 impl CheckResult {
     /// A result without findings.
     pub fn new(name: &'static str) -> Self {
-        Self {
-            name,
-            examined: 0,
-            findings: Vec::new(),
-            findings_total: 0,
-            note: String::new(),
-            nothing_to_check: None,
-        }
+        Self { name, ..Self::default() }
     }
 
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.

@@ -10,16 +10,15 @@
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::facets::Facets;
-use super::{
-    Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, for_definition, some_leaves,
-};
+use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, Kind, Tree};
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check = Check { name: "spacing", wanted: for_definition, run };
+pub(super) const CHECK: Check =
+    Check { name: "spacing", wanted: |subject| subject.promises.definition, run };
 
 /// The promise of boxes alone.
 pub(super) const BOXES: Check = Check {

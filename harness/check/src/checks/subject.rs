@@ -37,15 +37,9 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// A mesh in memory that must be this tree of a case.
-    pub fn new(case: &'a Case, tree: Kind, mesh: &'a LeafSet) -> Self {
-        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, tree, Pass::of(mesh), Some(case)) }
-    }
-
-    /// A mesh in memory, of an unknown case.
-    pub fn alone(mesh: &'a LeafSet) -> Self {
-        let manifest = &mesh.manifest;
-        Self { mesh: Some(mesh), ..Self::of(manifest, manifest.tree, Pass::of(mesh), None) }
+    /// A mesh in memory that must be this tree, of a case if it is known.
+    pub fn new(case: impl Into<Option<&'a Case>>, tree: Kind, mesh: &'a LeafSet) -> Self {
+        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, tree, Pass::of(mesh), case.into()) }
     }
 
     /// A mesh by the pass over its leaves.

@@ -111,16 +111,6 @@ impl Truth {
         self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
     }
 
-    /// Visits the parts of a mesh whose leaves do not have the side of the leaf of T0 that contains them, with that side.
-    pub fn mislabelled(&self, mesh: &Tree, visit: &mut dyn FnMut(&Found, Side)) {
-        self.compare(mesh, &mut |found| {
-            let side = found.base.filter(|_| found.kinds != HOLES).map(Self::side);
-            if let Some(side) = side.filter(|&side| found.kinds != 1 << side as u8) {
-                visit(&found, side);
-            }
-        });
-    }
-
     /// Visits every leaf and every hole of a mesh with the kind of T0, in Morton order. A leaf that T0 splits has none.
     pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Octant, Option<Kind>, Option<Kind>)) {
         let single = |kinds: Kinds| (kinds != HOLES).then(|| kinds.trailing_zeros() as Kind);

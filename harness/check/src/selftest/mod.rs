@@ -4,9 +4,6 @@
 //! A corruption that the responsible check misses is a gap in that check, even if another check reports it,
 //! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
 //! false alarm and fails the self test, too. The audit of the mesh with its case must report every corruption of the mesh.
-//!
-//! Invariants of a report: only corruptions of the catalogue were tried, each once on a case; the expected check has a finding iff it
-//! reported the corruption.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -113,19 +110,6 @@ impl SelftestReport {
         let names = catalogue().into_iter().map(|mutant| mutant.name);
         names.filter(|name| !tried.contains(name)).collect()
     }
-
-    /// Panics if an invariant of the answer does not hold.
-    pub fn check_invariants(&self) {
-        let known = catalogue();
-        let mut trials = HashSet::new();
-        for Kill { mutant, case, caught_by, finding, .. } in &self.kills {
-            let Mutant { name, expected, .. } = *mutant;
-            assert!(known.iter().any(|mutant| mutant.name == name), "{name} is in no catalogue");
-            assert!(trials.insert((name, case)), "{name} was tried twice on {case}");
-            let by_expected = caught_by.contains(&expected);
-            assert_eq!(finding.is_some(), by_expected, "the finding for {name}");
-        }
-    }
 }
 
 /// What survived, false alarms, what applies nowhere, and a summary.
@@ -171,7 +155,6 @@ pub fn run(cases: &[SelftestCase], scratch: &Path) -> std::io::Result<SelftestRe
             }
         }
     }
-    report.check_invariants();
     Ok(report)
 }
 
@@ -240,22 +223,9 @@ mod tests {
     }
 
     #[test]
-    fn a_report_that_contradicts_itself_is_a_bug() {
-        correct().check_invariants();
-        assert!(correct().holds());
-        let faults: [fn(&mut SelftestReport); 5] = [
-            |r| r.kills.push(r.kills[0].clone()),
-            |r| r.kills[0].mutant.name = "another",
-            |r| r.kills[0].mutant.expected = "files",
-            |r| r.kills[0].caught_by.clear(),
-            |r| r.kills[0].finding = None,
-        ];
-        for (i, fault) in faults.iter().enumerate() {
-            let mut wrong = correct();
-            fault(&mut wrong);
-            let seen = std::panic::catch_unwind(|| wrong.check_invariants());
-            assert!(seen.is_err(), "fault {i}");
-        }
+    fn every_corruption_has_a_name_of_its_own() {
+        let names: HashSet<&str> = catalogue().iter().map(|mutant| mutant.name).collect();
+        assert_eq!(names.len(), catalogue().len());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Wrong sides, wrong components and wrong counts of them, which the checks `sides`, `crossing` and `kept` must detect.
+//! Wrong sides, wrong components and wrong counts of them, which the checks `sides` and `kept` must detect.
 //!
 //! The leaves to corrupt are found from the correct mesh and T0 alone, so that the corruptions apply to a window of a
 //! larger mesh, too.
@@ -39,16 +39,16 @@ pub(super) const MUTANTS: &[Mutant] = &[
         flipped(s, |w| has_side(w, Side::Inside))
     }),
     words("inside and outside swapped everywhere", "sides", INFORMED, |s| flipped(s, |_| true)),
-    words("crossing leaf labelled outside", "crossing", INFORMED, |s| {
+    words("crossing leaf labelled outside", "sides", INFORMED, |s| {
         relabelled(s, Side::Crossing, Side::Outside)
     }),
-    words("crossing leaf labelled inside", "crossing", INFORMED, |s| {
+    words("crossing leaf labelled inside", "sides", INFORMED, |s| {
         relabelled(s, Side::Crossing, Side::Inside)
     }),
-    words("leaf labelled crossing", "crossing", INFORMED, |s| {
+    words("leaf labelled crossing", "sides", INFORMED, |s| {
         labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing))
     }),
-    words("leaf of the surface's level labelled crossing", "crossing", INFORMED, |s| {
+    words("leaf of the surface's level labelled crossing", "sides", INFORMED, |s| {
         let of_surface = |w| word::level(w) == s.case.level_surface;
         labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing) && of_surface(w))
     }),

@@ -43,7 +43,7 @@ proptest! {
                 words.extend(component.leaves.iter().map(|&i| base[i as usize]));
             }
             let mesh = counted(words);
-            let alone = Subject::alone(&mesh);
+            let alone = Subject::new(None, Tree::Final, &mesh);
             // Without the case, `sides` reports leaves of the side that is not kept.
             prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without the case: {text}");
             prop_assert!(reported(&Subject::new(&correct.case, Tree::Final, &mesh)), "{text}");
