@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::finding::{Finding, Kind, Place};
+use super::leak::report::point;
 use super::report::Diagnosis;
 use contract::number::number;
 use contract::stl::Solid;
@@ -33,9 +34,10 @@ impl Diagnosis {
             rows.extend(name.as_ref().map(row));
         }
         rows.push(("shells", format!("{}, {} closed", shells.count, shells.closed)));
-        rows.push(("extent", format!("{} to {}", point(&extent.low), point(&extent.high))));
+        let [low, high] = [extent.low, extent.high].map(|at| point(root.rounded(at)));
+        rows.push(("extent", format!("{low} to {high}")));
         let (edge, margin) = (self.with_cells("", root.edge), self.with_cells("", extent.margin));
-        let origin = point(&root.origin);
+        let origin = point(root.origin);
         let root = format!("{origin} with edge {edge}; least distance to a face {margin}");
         rows.push(("root", root));
         let unknown = "not known; --spacing-min reports sizes in cells and thin sheets";
@@ -56,7 +58,8 @@ impl Diagnosis {
             let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
             let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
             let facets: Vec<String> = facets.iter().map(ToString::to_string).collect();
-            let (at, width, facets) = (point(at), width.unwrap_or_default(), facets.join(", "));
+            let at = point(self.root.rounded(*at));
+            let (width, facets) = (width.unwrap_or_default(), facets.join(", "));
             writeln!(f, "  at {at}{width}; facets {facets}{dots}")?;
         }
         let more = count - places.len() as u64;
@@ -73,14 +76,6 @@ impl Diagnosis {
         let cells = self.cell.map(|cell| format!(" ({} cells)", number(length / cell)));
         format!("{}{word}{}", number(length), cells.unwrap_or_default())
     }
-}
-
-fn point(at: &[f64; 3]) -> String {
-    let [x, y, z] = at.map(|c| match c as f32 {
-        short if short.is_finite() => format!("{short:?}"),
-        _ => number(c),
-    });
-    format!("({x}, {y}, {z})")
 }
 
 #[cfg(test)]
@@ -135,16 +130,16 @@ mod tests {
         let expected = "facets    30, with 17 distinct vertices\n\
             solids    2\n          \"wing\": 20 facets from number 3\n\
             shells    3, 2 closed\n\
-            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
-            root      (-8.0, -8.0, -8.0) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
+            extent    (-1, -1, -1) to (1, 1, 2.5)\n\
+            root      (-8, -8, -8) with edge 16.0 (64.0 cells); least distance to a face 5.50 (22.0 cells)\n\
             cell      0.250 at the surface\n\n\
             openings: 2; 1 can change the mesh's region\n  Meaning of Openings.\n  \
-            at (0.1, 2.0, -3.5): 0.500 wide (2.00 cells); facets 1, 2\n  and 1 more (--limit)\n\n\
+            at (0.1, 2, -3.5): 0.500 wide (2.00 cells); facets 1, 2\n  and 1 more (--limit)\n\n\
             intersecting pairs of facets: at least 2; 2 can change the mesh's region\n  Meaning of Intersections.\n  \
-            at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n  and 1 more (--limit)\n\n\
+            at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n  and 1 more (--limit)\n\n\
             facets of thin walls: 4; 4 can change the mesh's region\n  Meaning of ThinWalls.\n  \
-            at (0.1, 2.0, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
-            closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2.0, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
+            at (0.1, 2, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
+            closed shells inside out: 1\n  Meaning of InsideOut.\n  at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6\n\n\
             at least one finding can change the mesh's region";
         assert_eq!(diagnosis().to_string(), expected);
     }
@@ -156,8 +151,8 @@ mod tests {
         (plain.solids, plain.findings) = (Vec::new(), Vec::new());
         plain.shells = Shells { count: 1, closed: 1, facets: 16 };
         let expected = "facets    30, with 17 distinct vertices\nshells    1, 1 closed\n\
-            extent    (-1.0, -1.0, -1.0) to (1.0, 1.0, 2.5)\n\
-            root      (-8.0, -8.0, -8.0) with edge 16.0; least distance to a face 5.50\n\
+            extent    (-1, -1, -1) to (1, 1, 2.5)\n\
+            root      (-8, -8, -8) with edge 16.0; least distance to a face 5.50\n\
             cell      not known; --spacing-min reports sizes in cells and thin sheets\n\n\
             no finding that changes the mesh's region";
         assert_eq!(plain.to_string(), expected);

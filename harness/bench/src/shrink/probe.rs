@@ -7,6 +7,7 @@ use check::promises::Independence;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::leafset::LeafSet;
+use contract::manifest::Tree;
 use contract::plain::PlainCase;
 use run::engine::description::Description;
 use run::engine::failure::{End, Failure as Ended};
@@ -109,23 +110,19 @@ impl Probe {
         };
         let truth = truth.map(|(engine, name)| {
             let none = |why| format!("no mesh to compare with, because {name} failed: {why}");
-            self.run(engine, &path, Ranks::Serial, false).map_err(none)
+            self.run(engine, &path, Ranks::Serial).map_err(none)
         });
         let truth = truth.transpose()?;
-        let mesh = match self.run(engine, &path, ranks, false) {
+        let mesh = match self.run(engine, &path, ranks) {
             Ok(mesh) => mesh,
             Err(failure) => return Ok(vec![(RUNS, Some(failed_run(failure, ranks)?))]),
         };
-        let subject = Subject::new(&case, &mesh);
+        let subject = Subject::new(&case, Tree::Final, &mesh);
         let results = match truth {
             Some(truth) if ranks != Ranks::Serial => {
                 vec![identical::compare(&mesh.words, &truth.words, &case.root)]
             }
-            Some(truth) => {
-                let base = self.run(&self.reference, &path, Ranks::Serial, true);
-                let base = base.map_err(Failure::input)?;
-                checks::all(&subject.with_base(&base).with_reference(&truth))
-            }
+            Some(truth) => checks::all(&subject.with_reference(&truth)),
             None => self.promised(&path, ranks, subject)?,
         };
         let judged = |result: &CheckResult| match result.outcome() {
@@ -154,7 +151,7 @@ impl Probe {
         let subject = subject.promising(promises);
         let mut results = checks::all(&subject);
         if promises.deterministic && ranks == Ranks::Serial {
-            let again = self.run(&self.engine, path, ranks, false);
+            let again = self.run(&self.engine, path, ranks);
             let again = again.map_err(Failure::input)?;
             let words = subject.mesh.map_or(&[][..], |mesh| &mesh.words);
             let compared = identical::compare(&again.words, words, &subject.terms.root);
@@ -164,17 +161,10 @@ impl Probe {
     }
 
     /// Runs an engine and reads its mesh.
-    fn run(
-        &self,
-        engine: &Engine,
-        case: &Path,
-        ranks: Ranks,
-        ungraded: bool,
-    ) -> Result<LeafSet, Ended> {
+    fn run(&self, engine: &Engine, case: &Path, ranks: Ranks) -> Result<LeafSet, Ended> {
         let place = emptied(self.place.path().join("run"), engine)?;
         let mesh = place.join("mesh");
-        let options =
-            RunOptions { mesh: Some(&mesh), ungraded, ..RunOptions::new(&place, self.limit) };
+        let options = RunOptions { mesh: Some(&mesh), ..RunOptions::new(&place, self.limit) };
         engine.run(case, &Layout::on(ranks), &options)?;
         engine.read_mesh(&mesh)
     }

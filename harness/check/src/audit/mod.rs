@@ -6,8 +6,8 @@
 //! manifest, and the head of each names what it cannot detect. With a case, they are a whole check: a mesh that passes is the
 //! mesh of the definition. With promises of less than the definition, exactly those are checked.
 //!
-//! Invariants of a report: no two checks have one name, and each result has its own invariants; the tree of a mesh has no more
-//! distinct octants than leaves and their ancestors; reading takes no longer than the audit.
+//! Invariants of a report: each result has its own invariants; the tree of a mesh has no more distinct octants than leaves and their
+//! ancestors.
 
 #[cfg(test)]
 mod tests;
@@ -29,7 +29,7 @@ use cpu_time::ProcessTime;
 use serde::Serialize;
 
 /// The result of an audit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct AuditReport {
     /// One result per check.
     pub checks: Vec<CheckResult>,
@@ -85,20 +85,9 @@ impl AuditReport {
     /// Panics if an invariant of the answer does not hold.
     pub fn check_invariants(&self) {
         self.checks.iter().for_each(CheckResult::check_invariants);
-        let mut names: Vec<&str> = self.checks.iter().map(|check| check.name).collect();
-        names.sort_unstable();
-        assert!(
-            names.windows(2).all(|pair| pair[0] != pair[1]),
-            "a check appears twice: {names:?}"
-        );
-        assert!(!names.is_empty(), "an audit without checks");
-        let Self { leaves, nodes, time_read_s, time_wall_s, .. } = *self;
+        let Self { leaves, nodes, .. } = *self;
         let nodes_max = leaves.saturating_mul(u64::from(LEVEL_MAX));
         assert!(nodes <= nodes_max, "{leaves} leaves have {nodes} distinct octants above them");
-        assert!(
-            0.0 <= time_read_s && time_read_s <= time_wall_s,
-            "an audit of {time_wall_s} s read for {time_read_s} s"
-        );
     }
 }
 
@@ -142,8 +131,7 @@ fn audit_within(
     promises: &Promises,
 ) -> AuditReport {
     let start = Instant::now();
-    let mut report =
-        AuditReport { checks: Vec::new(), leaves: 0, nodes: 0, time_read_s: 0.0, time_wall_s: 0.0 };
+    let mut report = AuditReport::default();
     let read =
         Mesh::open(dir).and_then(|mesh| Pass::over(&mesh, nodes_max).map(|pass| (mesh, pass)));
     report.time_read_s = start.elapsed().as_secs_f64();
@@ -155,7 +143,7 @@ fn audit_within(
             let mut files = CheckResult::new(checks::FILES);
             let tree = manifest.hyper_tree_grid.is_some();
             files.examined = manifest.parts.len() as u64 + u64::from(tree);
-            let subject = Subject::of(manifest, pass, case).promising(promises);
+            let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
             if tree && mesh.tree_file.is_none() {
                 report.checks.push(tree_file(dir, manifest));

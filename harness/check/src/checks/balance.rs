@@ -14,23 +14,18 @@ pub(super) const CHECK: Check = Check {
     name: "balance",
     wanted: |subject| {
         subject.promises.balance.is_some()
-            || subject.promises.definition
-                && subject.manifest.tree == contract::manifest::Tree::Final
+            || subject.promises.definition && subject.inputs.tree == contract::manifest::Tree::Final
     },
-    needs: several_levels,
     run,
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let root = &subject.terms.root;
-    match subject.promises.balance {
-        Some(touching) => {
-            touching_leaves(subject.tree(), root, touching, subject.promises.levels(), result);
-        }
-        None => {
-            touching_leaves(subject.tree_with_deleted(), root, Touching::Corner, 1, result);
-        }
-    }
+    let (tree, touching, levels) = match subject.promises.balance {
+        Some(touching) => (subject.tree(), touching, subject.promises.levels()),
+        None => (subject.tree_with_deleted(), Touching::Corner, 1),
+    };
+    touching_leaves(tree, &subject.terms.root, touching, levels, result);
+    result.requires(several_levels(subject));
 }
 
 /// Leaves that touch in this way differ by at most `levels` levels.

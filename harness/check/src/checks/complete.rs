@@ -7,8 +7,6 @@
 //! lack neighbours, for example a crossing leaf among crossing leaves. A promise of less than the definition is judged beyond a
 //! band around the geometry ([`super::region`]).
 
-use std::fmt::Write;
-
 use super::contact;
 use super::region::Survey;
 use super::truth::{Found, Truth};
@@ -16,12 +14,11 @@ use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Keep, Manifest, Sides};
 use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Handle, Kind, Tree};
-use contract::word::{self, Side};
+use contract::word::Side;
 
 pub(super) const CHECK: Check = Check {
     name: "complete",
     wanted: |subject| subject.promises.definition || subject.promises.complete,
-    needs: |subject| if subject.case.is_some() { None } else { some_leaves(subject) },
     run,
 };
 
@@ -36,27 +33,15 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         Some(truth) => {
             result.examined = subject.examined_with(truth);
             truth.compare(tree, &mut |found| compare(&found, terms, result));
-            if let Some(base) = subject.tree_base() {
-                truth.compare(base, &mut |Found { octant, kinds, .. }| {
-                    if kinds == HOLES {
-                        let place = terms.root.place(octant);
-                        let what = "T0 does not tile the root; it has no leaf in";
-                        result.report(format_args!("{what} {place}"));
-                    }
-                });
-            }
         }
         None if terms.sides == Sides::Unknown && deletes => {
             return result.lacks(super::UNKNOWN_SIDES);
         }
         None => check_holes(tree, terms, result),
     }
-    let volume: u128 = (0..)
-        .zip(subject.pass.tally.leaves_by_level)
-        .map(|(level, leaves)| u128::from(leaves) * u128::from(word::span(level)))
-        .sum();
-    let fraction = volume as f64 / word::KEY_END as f64;
-    let _ = write!(result.note, "the mesh fills {:.6} % of the root", 100.0 * fraction);
+    if subject.case.is_none() {
+        result.requires(some_leaves(subject));
+    }
 }
 
 fn compare(found: &Found, terms: &Manifest, result: &mut CheckResult) {
@@ -104,27 +89,7 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::case::Case;
-    use contract::octant::Octant;
-    use contract::testing::{leaf_set, words_with_sides};
-
-    #[test]
-    fn the_note_states_which_part_of_the_root_is_filled() {
-        let text =
-            "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
-        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
-        let case = Case::from_parts(text, vec![facet]).unwrap();
-        for (lacks, percent) in [("", "100.000000"), ("7", "87.500000"), ("3.7", "98.437500")] {
-            let side = |o: &Octant| (o.path() != lacks).then_some(Side::Outside);
-            let words = words_with_sides(|o| o.level == 0 || o.path() == "3", side);
-            let mesh = leaf_set(vec![words]);
-            let [result] = &super::super::only(&Subject::new(&case, &mesh), &["complete"])[..]
-            else {
-                panic!()
-            };
-            assert_eq!(result.note, format!("the mesh fills {percent} % of the root"));
-        }
-    }
+    use contract::testing::leaf_set;
 
     #[test]
     fn a_mesh_without_leaves_is_a_finding_if_nothing_is_ever_deleted() {

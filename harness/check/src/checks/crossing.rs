@@ -1,56 +1,32 @@
-//! Crossing leaves are exactly those that facets cross.
+//! The promise `crossing`: crossing leaves are exactly those that facets cross. Of the definition, `sides` checks it.
 //!
-//! Sections 2 and 7 of reference/DEFINITION.md: a leaf is crossing iff a facet crosses the leaf of T0 that contains it. As a
-//! promise of its own, without a T0: a leaf that a facet crosses is crossing, and a crossing leaf is crossed or, if it is
-//! finer than the surface, lies in a crossed octant of the surface's level. There is no band: one facet in one point decides.
+//! A leaf that a facet crosses is crossing, and a crossing leaf is crossed or, if it is finer than the surface, lies in a crossed octant
+//! of the surface's level. There is no band: one facet in one point decides.
 //! The check ignores facets outside the root, and does not detect a missing crossing leaf (`complete` does, if both are promised).
 
 use super::{Check, CheckResult, Subject, contact};
 use contract::manifest::Sides;
-use contract::octant::Octant;
-use contract::tree::{Kind, Kinds};
+use contract::tree::Kind;
 use contract::word::Side;
 
-pub(super) const CHECK: Check = Check {
-    name: "crossing",
-    wanted: |subject| {
-        subject.promises.crossing || subject.promises.definition && subject.case.is_some()
-    },
-    needs: super::nothing,
-    run,
-};
+pub(super) const CHECK: Check =
+    Check { name: "crossing", wanted: |subject| subject.promises.crossing, run };
 
 const CROSSING: Kind = Side::Crossing as Kind;
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     if subject.terms.sides == Sides::Unknown {
-        return super::unknown_sides(subject, subject.promises.crossing, result);
+        return super::unknown_sides(subject, true, result);
     }
     let Some(truth) = subject.truth() else { return result.lacks(super::NO_GEOMETRY) };
-    let mut report = |prefix: &str, is_crossed: bool, kinds: Kinds, octant: Octant| {
-        let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
-        let (given, leaf) = (contact::name(kinds), subject.terms.root.place(octant));
-        result.report(format_args!("{prefix}{what} the {given} leaf {leaf}"));
-    };
-    if subject.promises.definition {
-        // Leaves are crossing iff those of T0 are that contain them.
-        for (prefix, _, pass) in subject.meshes() {
-            truth.mislabelled(pass.tree(), &mut |found, side| {
-                let is_crossed = side == Side::Crossing;
-                if is_crossed || found.kinds == 1 << CROSSING {
-                    report(prefix, is_crossed, found.kinds, found.octant);
-                }
-            });
-        }
-        return;
-    }
-    // Leaves are crossing iff facets cross them, or the octant of the surface's level around them.
     let surface = subject.terms.level_surface;
     truth.facets.leaves(subject.tree(), &mut |octant, kind, near| {
         let is_crossed = !near.is_empty();
         let inherits = || octant.level > surface && truth.is_crossed(&octant.ancestor(surface));
         if kind == CROSSING && !is_crossed && !inherits() || kind != CROSSING && is_crossed {
-            report("", is_crossed, 1 << kind, octant);
+            let what = if is_crossed { "a facet crosses" } else { "no facet crosses" };
+            let (given, leaf) = (contact::name(1 << kind), subject.terms.root.place(octant));
+            result.report(format_args!("{what} the {given} leaf {leaf}"));
         }
     });
 }
@@ -59,6 +35,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::manifest::Tree;
+    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     /// The facet lies in octant 0 of level 1, the surface's level, and there in its child 0. Leaves have level 2.
@@ -76,7 +54,7 @@ mod tests {
             let side = |path: &str| if crossing(path) { Side::Crossing } else { Side::Outside };
             let words = words_with_sides(|o| o.level < 2, |o| Some(side(&o.path())));
             let mesh = leaf_set(vec![words]);
-            let result = check(Subject::new(&case, &mesh));
+            let result = check(Subject::new(&case, Tree::Final, &mesh));
             assert_eq!(result.examined, 64);
             result.findings
         };
@@ -97,7 +75,7 @@ mod tests {
         let side =
             |o: &Octant| Some(if is_crossing(o.path()) { Side::Crossing } else { Side::Outside });
         let mesh = leaf_set(vec![words_with_sides(|o| ["root", "0"].contains(&&*o.path()), side)]);
-        let result = check(Subject::new(&case, &mesh));
+        let result = check(Subject::new(&case, Tree::Final, &mesh));
         let text = &result.findings[0];
         assert!(result.findings_total == 1 && text.contains("octant 1 "), "{result}");
     }

@@ -4,7 +4,7 @@
 //! reference is the only correct one. The check cannot detect an error that both programs make; the other
 //! checks do.
 
-use super::{Check, CheckResult, nothing};
+use super::{Check, CheckResult};
 use contract::lattice::Root;
 use contract::word::{self, Leaf};
 use std::fmt;
@@ -15,7 +15,6 @@ pub const NAME: &str = "identical";
 pub(super) const CHECK: Check = Check {
     name: NAME,
     wanted: |subject| subject.reference.is_some(),
-    needs: nothing,
     run: |subject, result| {
         if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference) {
             *result = compare(&mesh.words, &reference.words, &subject.terms.root);

@@ -10,23 +10,22 @@ mod alone;
 use super::components::Component;
 use super::manifest::{COMPONENTS, components};
 use super::truth::Truth;
-use super::{Check, CheckResult, Subject, for_definition, some_leaves};
+use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
 use contract::tree::Handle;
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check = Check {
-    name: "kept",
-    wanted: for_definition,
-    needs: |subject| if subject.truth().is_some() { None } else { some_leaves(subject) },
-    run,
-};
+pub(super) const CHECK: Check =
+    Check { name: "kept", wanted: |subject| subject.promises.definition, run };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
     match subject.truth() {
         Some(truth) => with_truth(subject, truth, result),
         None if subject.terms.sides == Sides::Unknown => result.lacks(super::UNKNOWN_SIDES),
-        None => alone::check(subject.tree(), &subject.inputs, subject.manifest, result),
+        None => {
+            alone::check(subject.tree(), &subject.inputs, subject.manifest, result);
+            result.requires(some_leaves(subject));
+        }
     }
 }
 
@@ -51,9 +50,7 @@ fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
     }
     let counts = Some(count(&truth.components, &subject.inputs));
     let expected = Manifest { components: counts, ..subject.inputs.clone() };
-    for (prefix, manifest, _) in subject.meshes() {
-        components((prefix, manifest), ("T0", &expected), &COMPONENTS, result);
-    }
+    components(subject.manifest, ("T0", &expected), &COMPONENTS, result);
 }
 
 /// The components by side, as a manifest states them.

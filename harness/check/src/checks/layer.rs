@@ -20,15 +20,7 @@ pub(super) const CHECK: Check = Check {
     name: "layer",
     wanted: |subject| {
         subject.promises.layers
-            || subject.promises.definition && subject.manifest.tree == MeshKind::Final
-    },
-    needs: |subject| {
-        let tree = subject.tree_with_deleted();
-        let is_crossed = tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
-        let has_extra_layer = !subject.terms.keep_crossing && is_crossed;
-        let none = subject.terms.layer_cells_min == 1 && !has_extra_layer;
-        let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
-        some_leaves(subject).or_else(|| none.then(why)).or_else(|| several_levels(subject))
+            || subject.promises.definition && subject.inputs.tree == MeshKind::Final
     },
     run,
 };
@@ -38,11 +30,18 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if terms.lacks_inputs {
         return result.lacks(UNKNOWN_INPUTS);
     }
+    let tree = subject.tree_with_deleted();
     match Crossed::of(subject).filter(|_| !subject.promises.definition) {
         // Such a promise says nothing about the sides of leaves.
         Some(crossed) => check_tree(&crossed.labelled(subject.tree()), terms, result),
-        None => check_tree(subject.tree_with_deleted(), terms, result),
+        None => check_tree(tree, terms, result),
     }
+    let has_extra_layer =
+        !terms.keep_crossing && tree.kinds(tree.root()) & CROSSING_OR_DELETED != 0;
+    let none = terms.layer_cells_min == 1 && !has_extra_layer;
+    let why = || "with n = 1 the layers are the 2:1 balance, which `balance` checks".to_owned();
+    let missing = some_leaves(subject).or_else(|| none.then(why));
+    result.requires(missing.or_else(|| several_levels(subject)));
 }
 
 fn check_tree(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {

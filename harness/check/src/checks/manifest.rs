@@ -4,17 +4,15 @@
 //! components and leaks. The check cannot detect wrong leaves, or two sets of leaves with equal digests. With a case, `sides` checks the
 //! leaks and the ambiguous components, and `kept` the numbers of components.
 
-use super::{Check, CheckResult, Subject, always, json, nothing};
+use super::{Check, CheckResult, Subject, json};
 use contract::lattice::Root;
-use contract::manifest::{
-    BySide, Components, EnclosedComponents, ExtentBox, Leak, Manifest, OCTANTS, Sides, Tree,
-};
+use contract::manifest::{BySide, ExtentBox, Leak, Manifest, OCTANTS, Sides};
 use serde_json::{Value, json};
 
 /// Name of the check.
 pub const NAME: &str = "manifest";
 
-pub(super) const CHECK: Check = Check { name: NAME, wanted: always, needs: nothing, run };
+pub(super) const CHECK: Check = Check { name: NAME, wanted: |_| true, run };
 
 /// The inputs, by their keys. A mesh in the format of another program may lack all but the first two.
 const INPUTS: [&str; 9] = [
@@ -58,11 +56,16 @@ pub(crate) fn differing_inputs(a: Owned, b: Owned) -> Vec<String> {
     differing(&keys, a, b)
 }
 
-/// The manifest as JSON, with boxes and seeds in the user's units.
+/// The manifest as JSON, with boxes and seeds in the user's units, and places rounded to the lattice.
 fn stated(manifest: &Manifest) -> Value {
     let root = &manifest.root;
     let user = |at: [i64; 3]| root.rounded(root.to_user(at));
-    let mut stated = serde_json::to_value(manifest).expect("a manifest is representable in JSON");
+    let mut rounded = manifest.clone();
+    let enclosed = rounded.components.iter_mut().map(|components| &mut components.enclosed.example);
+    for place in enclosed.chain([&mut rounded.components_ambiguous.example]).flatten() {
+        *place = root.quantise(*place).map_or(*place, user);
+    }
+    let mut stated = serde_json::to_value(rounded).expect("a manifest is representable in JSON");
     let extent = |b: &ExtentBox| json!({"min": user(b.min), "max": user(b.max), "level": b.level});
     stated["boxes"] = manifest.boxes.iter().map(extent).collect();
     stated["seeds"] = manifest.seeds.iter().map(|&seed| json!(user(seed))).collect();
@@ -74,40 +77,32 @@ fn stated(manifest: &Manifest) -> Value {
 }
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    for (prefix, manifest, pass) in subject.meshes() {
-        let (claimed, tally) = (("the manifest", manifest), &pass.tally);
-        result.examined += tally.leaves;
-        let mut keys =
-            ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
-        keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
-        keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
-        let lacks_inputs = manifest.lacks_inputs;
-        let mut inputs = Manifest { tree: manifest.tree, lacks_inputs, ..subject.inputs.clone() };
-        if subject.base.is_some() {
-            // A mesh with an engine's T0 beside it is a final one.
-            inputs.tree = if prefix.is_empty() { Tree::Final } else { Tree::Base };
-        }
-        let of_leaves = differing(&keys, claimed, ("fact", tally));
-        for line in of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs))) {
-            result.report(format_args!("{prefix}{line}"));
-        }
-        let BySide { outside, inside, crossing } = tally.leaves_by_side;
-        if manifest.sides == Sides::Unknown && outside < tally.leaves {
-            result.report(format_args!(
-                "{prefix}sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
-                tally.leaves
-            ));
-        }
+    let (manifest, tally) = (subject.manifest, &subject.pass.tally);
+    let claimed = ("the manifest", manifest);
+    let mut keys =
+        ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
+    keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
+    keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
+    let inputs = Manifest { lacks_inputs: manifest.lacks_inputs, ..subject.inputs.clone() };
+    let of_leaves = differing(&keys, claimed, ("fact", tally));
+    let lines = of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs)));
+    lines.for_each(|line| result.report(line));
+    let BySide { outside, inside, crossing } = tally.leaves_by_side;
+    if manifest.sides == Sides::Unknown && outside < tally.leaves {
+        result.report(format_args!(
+            "sides: unknown in the manifest, but of {} leaves {inside} are inside and {crossing} crossing by their words",
+            tally.leaves
+        ));
     }
-    possible_leaks(subject.manifest, result);
+    possible_leaks(manifest, result);
     // Of different leaves, `identical` reports the cause. This is the only check of the counts in a mesh whose T0 is not known, such as one
     // made on several ranks.
     if let (Some(mesh), Some(reference)) = (subject.mesh, subject.reference)
         && mesh.words == reference.words
     {
-        let (claimed, expected) = (("", subject.manifest), ("the reference", &reference.manifest));
-        components(claimed, expected, &["components_ambiguous", "leaks"], result);
-        components(claimed, expected, &COMPONENTS, result);
+        let expected = ("the reference", &reference.manifest);
+        components(manifest, expected, &["components_ambiguous", "leaks"], result);
+        components(manifest, expected, &COMPONENTS, result);
     }
 }
 
@@ -115,29 +110,18 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 pub(super) const COMPONENTS: [&str; 3] =
     ["components/outside", "components/inside", "components/enclosed"];
 
-/// The manifest has these entries about components as another one, if both have them. Places may be rounded.
+/// The manifest has these entries about components as another one, if both have them.
 pub(super) fn components(
-    (prefix, manifest): Owned,
+    manifest: &Manifest,
     (owner, other): Owned,
     keys: &[&str],
     result: &mut CheckResult,
 ) {
-    let aligned = |claimed: Option<[f64; 3]>, found: Option<[f64; 3]>| match (claimed, found) {
-        (Some(a), Some(b)) if other.same_place(a, b) => claimed,
-        _ => found,
-    };
     let mut expected = other.clone();
-    let ambiguous = &mut expected.components_ambiguous;
-    ambiguous.example = aligned(manifest.components_ambiguous.example, ambiguous.example);
     expected.leaks = manifest.leaks.clone().map(|leaks| other.leaks.clone().unwrap_or(leaks));
-    expected.components = manifest.components.map(|claimed| {
-        let Some(found) = other.components else { return claimed };
-        let example = aligned(claimed.enclosed.example, found.enclosed.example);
-        Components { enclosed: EnclosedComponents { example, ..found.enclosed }, ..found }
-    });
-    for line in differing(keys, ("the manifest", manifest), (owner, &expected)) {
-        result.report(format_args!("{prefix}{line}"));
-    }
+    expected.components = manifest.components.map(|claimed| other.components.unwrap_or(claimed));
+    let lines = differing(keys, ("the manifest", manifest), (owner, &expected));
+    lines.into_iter().for_each(|line| result.report(line));
 }
 
 /// A leak opens between a coarser spacing and a finer one, and has a volume and a point in the root.

@@ -2,8 +2,8 @@
 //! checks, and the errors that it cannot detect.
 //!
 //! A check never trusts the program under test. It derives what it needs from the leaves and, if the case is known, from its
-//! facets: the harness makes T0 itself, with the sides of its leaves ([`truth`]). A T0 of the program under test is compared
-//! with that one.
+//! facets: the harness makes T0 itself, with the sides of its leaves ([`truth`]). A T0 of the program under test is a mesh of its own,
+//! from which nothing is deleted.
 
 pub mod balance;
 pub(crate) mod clearance;
@@ -49,9 +49,6 @@ pub struct Check {
     pub name: &'static str,
     /// Whether the mesh must have it.
     wanted: fn(&Subject) -> bool,
-    /// What the mesh lacks, so that the check could find nothing. A check without its premise cannot fail, so it must not count
-    /// as one that holds.
-    needs: fn(&Subject) -> Option<String>,
     run: fn(&Subject, &mut CheckResult),
 }
 
@@ -95,13 +92,8 @@ impl Check {
     fn result(&self, subject: &Subject) -> CheckResult {
         let mut result = CheckResult::new(self.name);
         (self.run)(subject, &mut result);
-        if result.holds() && result.was_run() {
-            result.nothing_to_check = (self.needs)(subject);
-        }
-        match result.was_run() {
-            true if result.examined == 0 => result.examined = subject.pass.tally.leaves,
-            true => {}
-            false => result.examined = 0,
+        if result.was_run() && result.examined == 0 {
+            result.examined = subject.pass.tally.leaves;
         }
         result.needs_objects(NO_LEAVES);
         result.check_invariants();
@@ -124,20 +116,7 @@ fn unknown_sides(subject: &Subject, promised: bool, result: &mut CheckResult) {
     }
 }
 
-/// For checks that need nothing in particular.
-fn nothing(_: &Subject) -> Option<String> {
-    None
-}
-
-fn always(_: &Subject) -> bool {
-    true
-}
-
-fn for_definition(subject: &Subject) -> bool {
-    subject.promises.definition
-}
-
-/// For checks that need leaves of more than one level.
+/// Why a check that compares leaves of several levels can find nothing.
 fn several_levels(subject: &Subject) -> Option<String> {
     let tree = subject.tree_with_deleted();
     let level = tree.finest_level(tree.root(), 0);

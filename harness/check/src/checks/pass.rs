@@ -1,10 +1,10 @@
 //! One pass over the leaves, from a directory or from memory: it counts them, checks their order and builds the tree.
 //!
 //! The check `linear`: every word is a leaf, each part is sorted, and no two leaves overlap. Sections 7 and 8 of
-//! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` and `crossing` do).
+//! reference/DEFINITION.md. It does not detect holes (`complete` does), nor wrong sides (`sides` does).
 
 use super::identical::Named;
-use super::{Check, CheckResult, always, nothing};
+use super::{Check, CheckResult};
 use contract::digest::Digest;
 use contract::failure::Failure;
 use contract::lattice::Root;
@@ -35,7 +35,7 @@ impl Pass {
     /// # Errors
     /// If a part or the tree cannot be read.
     pub(crate) fn over(mesh: &Mesh, nodes_max: usize) -> Result<Self, Failure> {
-        let mut state = State::new(&mesh.manifest, "", nodes_max);
+        let mut state = State::new(&mesh.manifest, nodes_max);
         mesh.stream(&mut |part, run| {
             state.count(part, run);
             state.build(run);
@@ -44,9 +44,9 @@ impl Pass {
         Ok(state.finish())
     }
 
-    /// Takes the leaves of a mesh in memory. `prefix` begins every finding.
-    pub(crate) fn of(set: &LeafSet, prefix: &'static str) -> Self {
-        let mut state = State::new(&set.manifest, prefix, NODES_MAX);
+    /// Takes the leaves of a mesh in memory.
+    pub(crate) fn of(set: &LeafSet) -> Self {
+        let mut state = State::new(&set.manifest, NODES_MAX);
         (0..).zip(&set.parts).for_each(|(part, words)| state.count(part, words));
         state.build(&set.words);
         state.finish()
@@ -54,7 +54,6 @@ impl Pass {
 }
 
 struct State {
-    prefix: &'static str,
     root: Root,
     nodes_max: usize,
     tally: Manifest,
@@ -69,7 +68,7 @@ struct State {
 }
 
 impl State {
-    fn new(manifest: &Manifest, prefix: &'static str, nodes_max: usize) -> Self {
+    fn new(manifest: &Manifest, nodes_max: usize) -> Self {
         // Of a mesh without parts, the tree is the only one.
         let files = manifest.parts.iter().map(|part| &part.file).chain(&manifest.hyper_tree_grid);
         let part =
@@ -80,13 +79,13 @@ impl State {
         tally.clear_leaves();
         let (linear, builder) = (CheckResult::new(CHECK.name), Builder::default());
         let (root, by_code, last) = (manifest.root, [0; 128], 0);
-        Self { prefix, root, nodes_max, tally, linear, by_code, last_of_part, last, builder }
+        Self { root, nodes_max, tally, linear, by_code, last_of_part, last, builder }
     }
 
     /// Adds to counts and digests, and checks the order. Digests are summed per octant first, because this loop dominates the
     /// time of the pass.
     fn count(&mut self, part: usize, run: &[u64]) {
-        let Self { tally: Manifest { parts, octant_digests, .. }, prefix, .. } = self;
+        let Self { tally: Manifest { parts, octant_digests, .. }, .. } = self;
         let (last, Part { file, leaves, digest }) =
             (&mut self.last_of_part[part], &mut parts[part]);
         *leaves += run.len() as u64;
@@ -99,7 +98,7 @@ impl State {
             self.by_code[(word & 127) as usize] += 1;
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
                 let [before, word] = [before, word].map(|word| Named(word, self.root));
-                let finding = format_args!("{prefix}{file} is not sorted: {word} follows {before}");
+                let finding = format_args!("{file} is not sorted: {word} follows {before}");
                 self.linear.report(finding);
             }
         }
@@ -116,12 +115,9 @@ impl State {
                 continue;
             }
             let [leaf, last] = [word, self.last].map(|word| Named(word, self.root));
-            let (prefix, linear) = (self.prefix, &mut self.linear);
             match word::fault(word) {
-                Some(_) => linear.report(format_args!("{prefix}not a leaf: {leaf}")),
-                None => {
-                    linear.report(format_args!("{prefix}two leaves overlap: {leaf} and {last}"))
-                }
+                Some(_) => self.linear.report(format_args!("not a leaf: {leaf}")),
+                None => self.linear.report(format_args!("two leaves overlap: {leaf} and {last}")),
             }
         }
     }
@@ -139,36 +135,28 @@ impl State {
 /// The pass over the leaves has found what there is to report.
 pub(super) const CHECK: Check = Check {
     name: "linear",
-    wanted: always,
-    needs: nothing,
-    run: |subject, result| subject.meshes().for_each(|(.., pass)| result.append(&pass.linear)),
+    wanted: |_| true,
+    run: |subject, result| result.clone_from(&subject.pass.linear),
 };
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::checks::Subject;
-    use contract::case::Case;
     use contract::testing::{leaf_set, words_of};
 
     #[test]
-    fn the_leaves_of_the_mesh_and_of_the_base_tree_are_examined() {
-        let text =
-            "spacing_min = 4.0\nkeep = 'all'\nroot = { origin = [0.0, 0.0, 0.0], edge = 8.0 }\n";
-        let facet = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]];
-        let case = Case::from_parts(text, vec![facet]).unwrap();
-        let (fine, coarse) = (words_of(|o| o.level < 2), words_of(|o| o.level < 1));
-        let (mesh, mut base) = (leaf_set(vec![fine]), leaf_set(vec![coarse]));
-        let check = |base: &LeafSet| {
-            super::super::only(&Subject::new(&case, &mesh).with_base(base), &["linear"]).remove(0)
+    fn every_leaf_is_examined_and_one_that_is_not_sorted_is_found() {
+        let mut mesh = leaf_set(vec![words_of(|o| o.level < 1)]);
+        let check = |mesh: &LeafSet| {
+            super::super::only(&Subject::new(None, mesh.manifest.tree, mesh), &["linear"]).remove(0)
         };
-        let result = check(&base);
-        assert_eq!((result.examined, result.findings_total), (64 + 8, 0));
-        base.parts[0].swap(2, 3);
-        let result = check(&base);
+        let result = check(&mesh);
+        assert_eq!((result.examined, result.findings_total), (8, 0));
+        mesh.parts[0].swap(2, 3);
+        let result = check(&mesh);
         let [finding] = &result.findings[..] else { panic!("{result}") };
-        let text =
-            finding.strip_prefix("T0: leaves-00000.npy is not sorted: outside leaf: octant 2 ");
+        let text = finding.strip_prefix("leaves-00000.npy is not sorted: outside leaf: octant 2 ");
         assert!(
             text.is_some_and(|rest| rest.contains("follows outside leaf: octant 3 ")),
             "{result}"

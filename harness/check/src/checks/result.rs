@@ -15,7 +15,7 @@ pub const FINDINGS_LISTED: usize = 4;
 pub const FILES: &str = "files";
 
 /// The result of a check on one mesh.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CheckResult {
     /// Name of the check.
     pub name: &'static str,
@@ -38,14 +38,7 @@ pub struct CheckResult {
 impl CheckResult {
     /// A result without findings.
     pub fn new(name: &'static str) -> Self {
-        Self {
-            name,
-            examined: 0,
-            findings: Vec::new(),
-            findings_total: 0,
-            note: String::new(),
-            nothing_to_check: None,
-        }
+        Self { name, ..Self::default() }
     }
 
     /// The result of [`FILES`] for a directory that cannot be read as a leaf set.
@@ -58,21 +51,20 @@ impl CheckResult {
     /// States that a premise is missing.
     pub fn lacks(&mut self, why: impl fmt::Display) {
         self.nothing_to_check = Some(why.to_string());
+        self.examined = 0;
     }
 
-    /// States that there was nothing to check, if nothing was examined and found.
-    pub fn needs_objects(&mut self, why: &str) {
-        if self.holds() && self.was_run() && self.examined == 0 {
+    /// States which premise is missing, if one is and nothing was found: a check without its premise cannot fail, so it must not count as
+    /// one that holds.
+    pub(crate) fn requires(&mut self, missing: Option<impl fmt::Display>) {
+        if let Some(why) = missing.filter(|_| self.holds() && self.was_run()) {
             self.lacks(why);
         }
     }
 
-    /// Adds the findings of another result.
-    pub fn append(&mut self, other: &Self) {
-        let room = FINDINGS_LISTED - self.findings.len();
-        self.findings.extend(other.findings.iter().take(room).cloned());
-        self.findings_total += other.findings_total;
-        self.examined += other.examined;
+    /// States that there was nothing to check, if nothing was examined and found.
+    pub fn needs_objects(&mut self, why: &str) {
+        self.requires((self.examined == 0).then_some(why));
     }
 
     /// Panics if an invariant of the answer does not hold.

@@ -2,8 +2,8 @@
 //! seeds or, without seeds, rays determine.
 //!
 //! Section 4 of reference/DEFINITION.md. With the case: the components of T0's leaves (connected through faces) are
-//! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf of the mesh and of
-//! an engine's T0 must have the side of T0's leaf. The manifest must state the number of ambiguous components, and the leaks. Without the case:
+//! found by union-find, the seeds or the harness's own exact rays determine the side of each, and every leaf of the mesh must have
+//! the side of T0's leaf. The manifest must state the number of ambiguous components, and the leaks. Without the case:
 //! no outside leaf shares part of a face with an inside leaf, and no leaf has a side that is deleted. The check cannot detect that
 //! all rays are wrong, which is possible on a body that is not watertight; the oracles can. A promise of less than the
 //! definition is judged beyond a band around the geometry ([`super::region`]).
@@ -23,15 +23,6 @@ use contract::word::{self, Side};
 pub(super) const CHECK: Check = Check {
     name: "sides",
     wanted: |subject| subject.promises.definition || subject.promises.sides.is_some(),
-    needs: |subject| match subject.truth() {
-        Some(truth) => {
-            truth.components.is_empty().then(|| "all leaves of T0 are crossing".to_owned())
-        }
-        None => some_leaves(subject).or_else(|| {
-            let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
-            (kinds.count_ones() == 1).then(|| "all leaves have the same side".to_owned())
-        }),
-    },
     run,
 };
 
@@ -45,24 +36,33 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     let terms = &subject.terms;
     not_kept(subject.tree(), terms, result);
     of_neighbours(subject.tree(), terms, result);
-    let Some(truth) = subject.truth() else { return };
+    let Some(truth) = subject.truth() else {
+        let kinds = subject.tree().kinds(subject.tree().root()) & !HOLES;
+        let alike =
+            || (kinds.count_ones() == 1).then(|| "all leaves have the same side".to_owned());
+        return result.requires(some_leaves(subject).or_else(alike));
+    };
     let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
-    let states_leaks = subject.meshes().any(|(_, manifest, _)| manifest.leaks.is_some());
-    let leaks = states_leaks.then(|| leaks(subject, truth));
-    for (prefix, manifest, pass) in subject.meshes() {
-        truth.mislabelled(pass.tree(), &mut |found, side| {
-            let (given, leaf) = (contact::name(found.kinds), terms.root.place(found.octant));
-            let why = match side {
-                Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
-                _ => format!("{judges} show that its component is {side}"),
-            };
-            result.report(format_args!("{prefix}the leaf is {given}, but {why}: {leaf}"));
-        });
-        let components_ambiguous = ambiguous(manifest.components_ambiguous.example, truth, terms);
-        let expected = Manifest { components_ambiguous, leaks: leaks.clone(), ..terms.clone() };
-        let keys = ["components_ambiguous", "leaks"];
-        super::manifest::components((prefix, manifest), ("T0", &expected), &keys, result);
-    }
+    truth.compare(subject.tree(), &mut |found| {
+        let Some(side) = found.base.filter(|_| found.kinds != HOLES).map(Truth::side) else {
+            return;
+        };
+        if found.kinds == 1 << side as u8 {
+            return;
+        }
+        let (given, leaf) = (contact::name(found.kinds), terms.root.place(found.octant));
+        let why = match side {
+            Side::Crossing => "a facet crosses its leaf of T0".to_owned(),
+            _ => format!("{judges} show that its component is {side}"),
+        };
+        result.report(format_args!("the leaf is {given}, but {why}: {leaf}"));
+    });
+    let manifest = subject.manifest;
+    let components_ambiguous = ambiguous(manifest.components_ambiguous.example, truth, terms);
+    let leaks = manifest.leaks.as_ref().map(|_| leaks(subject, truth));
+    let expected = Manifest { components_ambiguous, leaks, ..terms.clone() };
+    let keys = ["components_ambiguous", "leaks"];
+    super::manifest::components(manifest, ("T0", &expected), &keys, result);
 }
 
 /// Inside and outside leaves share no face.

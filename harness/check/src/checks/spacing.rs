@@ -1,47 +1,34 @@
-//! Leaves are as fine as the surface and the boxes require, and T0 is no finer than that.
+//! Leaves are as fine as the surface and the boxes require.
 //!
 //! Section 3 of reference/DEFINITION.md: every leaf that a facet crosses has at least the level of the surface,
-//! and every leaf whose interior meets the interior of a box has at least the level of the box. T0 is the
-//! smallest such tree: an engine's T0 splits what the harness's own splits, and nothing else. Of the mesh the check
+//! and every leaf whose interior meets the interior of a box has at least the level of the box. The check
 //! establishes only that leaves labelled crossing are fine enough; `complete` compares all of them with T0, and `splits`
-//! detects needless refinement.
+//! detects needless refinement, also of a T0.
 //!
 //! The promise `surface`: crossed leaves are found from the facets, never from the mesh's own sides. A leaf that is coarser than the
 //! surface level is a finding if a facet reaches deeper into it than a tolerance. The check cannot detect a crossed leaf that is
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
 use super::facets::Facets;
-use super::{
-    Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, for_definition, nothing, some_leaves,
-};
+use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
 use contract::tree::{Builder, Kind, Tree};
 use contract::word::{self, Side};
 
-pub(super) const CHECK: Check = Check {
-    name: "spacing",
-    wanted: for_definition,
-    needs: |subject| {
-        let kinds = subject.tree().kinds(subject.tree().root());
-        let without = kinds & 1 << Side::Crossing as u8 == 0 && subject.terms.boxes.is_empty();
-        let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
-        let missing = some_leaves(subject).or_else(|| without.then(uncrossed));
-        missing.filter(|_| subject.base.is_none())
-    },
-    run,
-};
+pub(super) const CHECK: Check =
+    Check { name: "spacing", wanted: |subject| subject.promises.definition, run };
 
 /// The promise of boxes alone.
 pub(super) const BOXES: Check = Check {
     name: "boxes",
     wanted: |subject| !subject.promises.definition && subject.promises.boxes,
-    needs: |subject| {
+    run: |subject, result| {
+        boxes_met(subject.tree(), &subject.terms, result);
         let why = if subject.terms.lacks_inputs { UNKNOWN_INPUTS } else { "the case has no boxes" };
-        subject.terms.boxes.is_empty().then(|| why.to_owned())
+        result.requires(subject.terms.boxes.is_empty().then_some(why));
     },
-    run: |subject, result| boxes_met(subject.tree(), &subject.terms, result),
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
@@ -51,15 +38,10 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     }
     boxes_met(tree, terms, result);
     crossing_fine(tree, terms, result);
-    let (Some(base), Some(truth)) = (subject.tree_base(), subject.truth()) else { return };
-    truth.compare(base, &mut |found| {
-        let what = match found.base {
-            None => "a facet or a box requires T0 to split the leaf",
-            Some(_) if found.is_finer => "T0 needlessly splits a leaf; it has",
-            Some(_) => return,
-        };
-        result.report(format_args!("{what} {}", terms.root.place(found.octant)));
-    });
+    let kinds = tree.kinds(tree.root());
+    let without = kinds & 1 << Side::Crossing as u8 == 0 && terms.boxes.is_empty();
+    let uncrossed = || "no leaf is crossing, and there are no boxes".to_owned();
+    result.requires(some_leaves(subject).or_else(|| without.then(uncrossed)));
 }
 
 /// Every leaf that meets a box has at least the level of the box.
@@ -96,7 +78,6 @@ fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 pub(super) const SURFACE: Check = Check {
     name: "surface",
     wanted: |subject| !subject.promises.definition && subject.promises.surface.is_some(),
-    needs: nothing,
     run: |subject, result| match Crossed::of(subject) {
         Some(crossed) => crossed.check(subject.tree(), result),
         None => result.lacks(NO_GEOMETRY),

@@ -7,9 +7,8 @@
 
 use std::fs;
 
-use super::{Check, CheckResult, NO_GEOMETRY, Subject, nothing};
+use super::{Check, CheckResult, NO_GEOMETRY, Subject};
 use crate::why::Mesh;
-use contract::manifest::Manifest;
 
 pub(crate) const NAME: &str = "splits";
 
@@ -22,7 +21,6 @@ pub(super) const CHECK: Check = Check {
     wanted: |subject| {
         subject.promises.definition && subject.case.is_some() && subject.reference.is_none()
     },
-    needs: nothing,
     run,
 };
 
@@ -32,8 +30,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
         return result.lacks(why);
     }
-    let inputs = Manifest { tree: subject.manifest.tree, ..subject.inputs.clone() };
-    Mesh::of(&inputs, subject.tree(), Some(truth)).audit(&mut |octant, fault| {
+    Mesh::of(&subject.inputs, subject.tree(), Some(truth)).audit(&mut |octant, fault| {
         result.examined += 1;
         if let Some(what) = fault {
             result.report(format_args!("{what} {}", subject.terms.root.place(octant)));

@@ -1,6 +1,7 @@
-//! The mesh that the checks examine, with everything that they may use.
+//! The mesh that the checks examine, final or T0, with everything that they may use.
 
 use std::cell::OnceCell;
+use std::rc::Rc;
 
 use super::truth::Truth;
 use super::{CheckResult, Pass};
@@ -14,14 +15,13 @@ use contract::word::{self, Side};
 /// Name of the check that the tree of the mesh and T0 fit their limits.
 pub const CAPACITY: &str = "capacity";
 
-/// A mesh, with its case, the engine's T0 and a reference if they are known. What needs much time is found when a check first
-/// needs it.
+/// A mesh, with its case and a reference if they are known. What needs much time is found when a check first needs it.
 pub struct Subject<'a> {
     /// The manifest of the mesh.
     pub manifest: &'a Manifest,
     /// The case, if it is known.
     pub case: Option<&'a Case>,
-    /// The inputs of the case or, without one, of the manifest.
+    /// The inputs of the case or, without one, of the manifest; and the tree that the mesh must be.
     pub inputs: Manifest,
     /// The inputs as far as they concern the leaves: T0 precedes deletion.
     pub terms: Manifest,
@@ -31,30 +31,27 @@ pub struct Subject<'a> {
     pub mesh: Option<&'a LeafSet>,
     /// The mesh that `mesh` must equal.
     pub reference: Option<&'a LeafSet>,
-    /// The manifest of the engine's T0, and what a pass over its leaves found.
-    pub(super) base: Option<(&'a Manifest, Pass)>,
     pub(crate) pass: Pass,
-    truth: OnceCell<Option<Truth>>,
+    truth: Rc<OnceCell<Option<Truth>>>,
     with_deleted: OnceCell<Tree>,
 }
 
 impl<'a> Subject<'a> {
-    /// The mesh of a case, in memory.
-    pub fn new(case: &'a Case, mesh: &'a LeafSet) -> Self {
-        let pass = Pass::of(mesh, "");
-        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, pass, Some(case)) }
-    }
-
-    /// A mesh in memory, of an unknown case.
-    pub fn alone(mesh: &'a LeafSet) -> Self {
-        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, Pass::of(mesh, ""), None) }
+    /// A mesh in memory that must be this tree, of a case if it is known.
+    pub fn new(case: impl Into<Option<&'a Case>>, tree: Kind, mesh: &'a LeafSet) -> Self {
+        Self { mesh: Some(mesh), ..Self::of(&mesh.manifest, tree, Pass::of(mesh), case.into()) }
     }
 
     /// A mesh by the pass over its leaves.
-    pub(crate) fn of(manifest: &'a Manifest, pass: Pass, case: Option<&'a Case>) -> Self {
+    pub(crate) fn of(
+        manifest: &'a Manifest,
+        tree: Kind,
+        pass: Pass,
+        case: Option<&'a Case>,
+    ) -> Self {
         let inputs = case.map_or_else(|| manifest.clone(), Case::inputs);
-        let inputs = Manifest { sides: manifest.sides, ..inputs };
-        let terms = match manifest.tree {
+        let inputs = Manifest { tree, sides: manifest.sides, ..inputs };
+        let terms = match tree {
             Kind::Final => inputs.clone(),
             Kind::Base => Manifest { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
         };
@@ -66,16 +63,15 @@ impl<'a> Subject<'a> {
             promises: Promises::of_definition(),
             mesh: None,
             reference: None,
-            base: None,
             pass,
-            truth: OnceCell::new(),
+            truth: Rc::default(),
             with_deleted: OnceCell::new(),
         }
     }
 
-    /// The subject with the base tree that the engine made.
-    pub fn with_base(self, base: &'a LeafSet) -> Self {
-        Self { base: Some((&base.manifest, Pass::of(base, "T0: "))), ..self }
+    /// The subject with the T0 that the harness makes for another mesh of the same case.
+    pub fn sharing_truth(self, other: &Self) -> Self {
+        Self { truth: other.truth.clone(), ..self }
     }
 
     /// The subject with the mesh that it must equal.
@@ -93,21 +89,10 @@ impl<'a> Subject<'a> {
         self.pass.tree()
     }
 
-    /// The mesh, and the engine's T0 with a prefix for findings: manifests, and what a pass found.
-    pub(super) fn meshes(&self) -> impl Iterator<Item = (&'static str, &Manifest, &Pass)> {
-        let base = self.base.iter().map(|(manifest, pass)| ("T0: ", *manifest, pass));
-        std::iter::once(("", self.manifest, &self.pass)).chain(base)
-    }
-
-    /// The engine's T0 as a tree.
-    pub(super) fn tree_base(&self) -> Option<&Tree> {
-        self.base.as_ref().map(|(_, pass)| pass.tree())
-    }
-
     /// A finding if the tree of the mesh or T0 exceeds its limit, so that the checks that need it cannot run.
     pub(super) fn capacity(&self) -> Option<CheckResult> {
         let mut result = CheckResult::new(CAPACITY);
-        if self.meshes().any(|(.., pass)| pass.tree.is_none()) {
+        if self.pass.tree.is_none() {
             let why = "and was not checked; increase the limit";
             result.report(format_args!("a tree has more distinct octants than the limit {why}"));
         } else if self.case.is_some() && self.truth().is_none() {

@@ -41,8 +41,6 @@ pub struct Found {
     pub kinds: Kinds,
     /// The kind of the leaf of T0 that contains it; `None` if T0 splits it.
     pub base: Option<Kind>,
-    /// Whether the mesh splits that leaf of T0.
-    pub is_finer: bool,
 }
 
 impl Truth {
@@ -113,16 +111,6 @@ impl Truth {
         self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
     }
 
-    /// Visits the parts of a mesh whose leaves do not have the side of the leaf of T0 that contains them, with that side.
-    pub fn mislabelled(&self, mesh: &Tree, visit: &mut dyn FnMut(&Found, Side)) {
-        self.compare(mesh, &mut |found| {
-            let side = found.base.filter(|_| found.kinds != HOLES).map(Self::side);
-            if let Some(side) = side.filter(|&side| found.kinds != 1 << side as u8) {
-                visit(&found, side);
-            }
-        });
-    }
-
     /// Visits every leaf and every hole of a mesh with the kind of T0, in Morton order. A leaf that T0 splits has none.
     pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Octant, Option<Kind>, Option<Kind>)) {
         let single = |kinds: Kinds| (kinds != HOLES).then(|| kinds.trailing_zeros() as Kind);
@@ -140,17 +128,13 @@ impl Truth {
         visit: &mut dyn FnMut(Found),
     ) {
         let kinds = mesh.kinds(handle);
-        let (kind, level) = match base.as_coarser_leaf() {
-            Some((kind, level)) => (Some(kind), level),
-            None => (base.as_leaf(), octant.level),
-        };
+        let kind = base.as_leaf().or(base.as_coarser_leaf().map(|(kind, _)| kind));
         let is_whole = match kind {
             Some(_) => !handle.is_node() || kinds.is_power_of_two() && !every_leaf,
             None => handle.as_leaf().is_some(),
         };
         if is_whole {
-            let is_finer = handle != Handle::HOLE && (octant.level > level || handle.is_node());
-            return visit(Found { octant, kinds, base: kind, is_finer });
+            return visit(Found { octant, kinds, base: kind });
         }
         for digit in 0..8 {
             let below = [(mesh, handle), (&self.tree, base)];

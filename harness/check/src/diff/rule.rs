@@ -12,7 +12,7 @@ use contract::word::{self, Leaf};
 /// A mesh with its name.
 type Named<'a> = (&'static str, &'a Mesh<'a>);
 
-/// The rule at the first difference of two meshes of the same inputs, in which needless splits justify nothing.
+/// The rule at the first difference of two meshes of the same inputs.
 pub(super) fn at(a: &Mesh, b: &Mesh, x: Option<u64>, y: Option<u64>) -> String {
     let leaf = |word: u64| word::decode(word).expect("the words that are compared are leaves");
     let (a, b) = (("A", a), ("B", b));
@@ -110,8 +110,7 @@ mod tests {
         let manifest = case.manifest(manifest::Tree::Final, "test".to_owned());
         let body = is_given.then(|| why::body(case, &manifest).unwrap());
         let trees = [a, b].map(Tree::of_words);
-        let [of_a, of_b] =
-            trees.each_ref().map(|tree| Mesh::of(&manifest, tree, body.as_ref()).distrusting());
+        let [of_a, of_b] = trees.each_ref().map(|tree| Mesh::of(&manifest, tree, body.as_ref()));
         let first = a.iter().zip(b).take_while(|(x, y)| x == y).count();
         at(&of_a, &of_b, a.get(first).copied(), b.get(first).copied())
     }

@@ -28,49 +28,43 @@ impl Isometry {
         image
     }
 
-    /// The isometry from the tree with the face `low` to the tree with the face `high`, which is not lower: the first corner of `low` becomes
-    /// this corner of `high`.
-    pub fn gluing(dimension: usize, low: usize, high: usize, orientation: usize) -> Self {
-        let (from, onto) = (across(dimension, low / 2), across(dimension, high / 2));
-        let candidate = |swapped: bool| {
-            let mut glued = Self { to: [0, 1, 2], is_reversed: [false; 3], shift: [0; 3] };
-            // The outward normal becomes the inward one.
-            glued.to[low / 2] = high / 2;
-            glued.is_reversed[low / 2] = low % 2 == high % 2;
-            for (i, &axis) in from.iter().enumerate() {
-                let j = if swapped { 1 - i } else { i };
-                glued.to[axis] = onto[j];
-                glued.is_reversed[axis] = orientation >> j & 1 == 1;
-            }
-            let first = glued.of_cube(face_corner(dimension, low, 0), 0);
-            let wanted = face_corner(dimension, high, orientation);
-            glued.shift = [0, 1, 2].map(|axis| wanted[axis] - first[axis]);
-            glued
-        };
-        let straight = candidate(false);
-        if dimension == 2 || straight.is_rotation() { straight } else { candidate(true) }
+    /// The isometry to the tree across a face, from the corner of the face with one number to that of its face `its` with another: the only
+    /// one that lays the cube beyond the face onto that tree. In three dimensions it is a rotation.
+    pub fn gluing(
+        dimension: usize,
+        [face, its]: [usize; 2],
+        [corner, its_corner]: [usize; 2],
+    ) -> Option<Self> {
+        let mut beyond = [0; 3];
+        beyond[face / 2] = if face % 2 == 0 { -LENGTH } else { LENGTH };
+        let (from, onto) =
+            (face_corner(dimension, face, corner), face_corner(dimension, its, its_corner));
+        let all = ORDERS.into_iter().flat_map(|to| {
+            let reversed = |bits: usize| [0, 1, 2].map(|axis| bits >> axis & 1 == 1);
+            (0..8).map(move |bits| Self { to, is_reversed: reversed(bits), shift: [0; 3] })
+        });
+        let mut glued =
+            all.map(|map| Self { shift: map.of_cube(beyond, LENGTH).map(|c| -c), ..map });
+        glued.find(|map| {
+            map.is_possible(dimension)
+                && map.to[face / 2] == its / 2
+                && map.of_cube(from, 0) == onto
+        })
     }
 
-    fn is_rotation(&self) -> bool {
+    fn is_possible(&self, dimension: usize) -> bool {
+        if dimension == 2 {
+            return self.to[2] == 2 && !self.is_reversed[2];
+        }
         let exchanged = (0..3).filter(|&axis| self.to[axis] != axis).count();
         let reversed = self.is_reversed.iter().filter(|&&r| r).count();
         // Two exchanged axes are a reflection; three are a rotation.
-        (usize::from(exchanged == 2) + reversed) % 2 == 0
-    }
-
-    /// The isometry back.
-    pub fn inverse(&self) -> Self {
-        let mut inverse = Self { to: [0; 3], is_reversed: [false; 3], shift: [0; 3] };
-        for axis in 0..3 {
-            let image = self.to[axis];
-            inverse.to[image] = axis;
-            inverse.is_reversed[image] = self.is_reversed[axis];
-            let shift = self.shift[image];
-            inverse.shift[axis] = if self.is_reversed[axis] { shift } else { -shift };
-        }
-        inverse
+        (usize::from(exchanged == 2) + reversed).is_multiple_of(2)
     }
 }
+
+/// All orders of the axes.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 /// The axes other than this one.
 fn across(dimension: usize, axis: usize) -> Vec<usize> {

@@ -248,11 +248,10 @@ fn glued_faces(
                          face is not glued to it in the same way"
                     ));
                 }
-                let isometry = match face <= its {
-                    true => Isometry::gluing(dimension, face, its, orientation),
-                    false => Isometry::gluing(dimension, its, face, orientation).inverse(),
-                };
-                *found = Some((other, isometry));
+                // The first corner of the lower face is the corner of the higher one that the orientation names.
+                let corners = if face <= its { [0, orientation] } else { [orientation, 0] };
+                let isometry = Isometry::gluing(dimension, [face, its], corners);
+                *found = isometry.map(|isometry| (other, isometry));
             }
             Some(_) => {}
         }

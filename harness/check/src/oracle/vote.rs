@@ -101,14 +101,10 @@ impl Ballot<'_> {
             };
             let (points, right, wrong) = (differing.len(), rays(false), rays(true));
             let undecided = points - right - wrong;
-            let judged = match self.seeds {
-                true => format!("exact rays agree with it at {right}"),
-                false => format!(
-                    "by exact rays it is right at {right}, wrong at {wrong}, undecided at {undecided}"
-                ),
-            };
-            let note =
-                format!("{name} differs from the mesh at {points} of {all} points; {judged}");
+            let note = format!(
+                "{name} differs from the mesh at {points} of {all} points: exact rays confirm it at {right}, refute it at {wrong}, and \
+                 disagree at {undecided}"
+            );
             (points > 0).then_some(note)
         };
         let mut notes: Vec<String> = self.oracles.iter().filter_map(sentence).collect();
@@ -190,16 +186,16 @@ mod tests {
     #[test]
     fn one_wrong_oracle_is_noted_and_does_not_fail() {
         let (_, failure, notes) = vote(TRUE, [YES, &[1, 1, 0], YES], true);
-        let expected = "oracle 1 differs from the mesh at 2 of 3 points; by exact rays it is right at 0, wrong at 2, \
-            undecided at 0";
+        let expected = "oracle 1 differs from the mesh at 2 of 3 points: exact rays confirm it at 0, refute it at 2, \
+            and disagree at 0";
         assert_eq!((failure, notes), (None, vec![expected.to_owned()]));
     }
 
     #[test]
     fn a_note_counts_where_the_exact_rays_support_an_oracle() {
         let (_, _, notes) = vote([Some(true), Some(true), None], [YES, &[1, 0, 0], YES], true);
-        let expected = "oracle 1 differs from the mesh at 3 of 3 points; by exact rays it is right at 1, wrong at 1, \
-            undecided at 1";
+        let expected = "oracle 1 differs from the mesh at 3 of 3 points: exact rays confirm it at 1, refute it at 1, \
+            and disagree at 1";
         assert_eq!(notes, [expected]);
     }
 
@@ -207,7 +203,10 @@ mod tests {
     fn exact_rays_that_contradict_the_mesh_are_a_failure() {
         let exact = [Some(false), Some(false), Some(true)];
         let (against, failure, notes) = vote(exact, [YES, &[0, 0, 1], YES], true);
-        assert!(against == [1] && notes[0].contains("right at 1, wrong at 0"), "{notes:?}");
+        assert!(
+            against == [1] && notes[0].contains("confirm it at 1, refute it at 0"),
+            "{notes:?}"
+        );
         assert_eq!(
             failure.unwrap(),
             "all six exact rays contradict the mesh at 1 points, first at [1.0, 1.0, 1.0], which is inside in the mesh"
@@ -229,7 +228,11 @@ mod tests {
         let no: &[u8] = &[1, 1, 0];
         let (_, failure, notes) = vote(exact, [no, no, no], false);
         assert_eq!((failure, notes.len()), (None, 4));
-        assert!(notes[0].ends_with("right at 1, wrong at 0, undecided at 1"), "{}", notes[0]);
+        assert!(
+            notes[0].ends_with("confirm it at 1, refute it at 0, and disagree at 1"),
+            "{}",
+            notes[0]
+        );
     }
 
     #[test]
@@ -239,7 +242,7 @@ mod tests {
         let (against, failure, notes) = vote_with_seeds(exact, [no, no, no], true, true);
         assert_eq!((against.len(), failure, notes.len()), (2, None, 4));
         assert!(
-            notes[0].ends_with("at 2 of 3 points; exact rays agree with it at 2"),
+            notes[0].ends_with("confirm it at 2, refute it at 0, and disagree at 0"),
             "{}",
             notes[0]
         );

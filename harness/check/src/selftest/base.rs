@@ -1,5 +1,4 @@
-//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to. The check `spacing`
-//! must detect most of them.
+//! Base trees that are too coarse or too fine, and meshes that such a base tree leads to.
 
 use super::SelftestCase;
 use super::mutant::{
@@ -9,23 +8,19 @@ use contract::octant::LEVEL_MAX;
 use contract::word::{self, Side};
 
 pub(super) const MUTANTS: &[Mutant] = &[
-    base("T0 too coarse at the surface", "spacing", INFORMED, coarse_at_surface),
-    base("T0 too coarse in a box", "spacing", INFORMED, |s| merged_in_box(s, &s.base.words)),
-    base("T0 needlessly fine away from the surface", "spacing", INFORMED, fine_away),
-    base("T0 needlessly fine at the surface", "spacing", INFORMED, fine_at_surface),
-    base("T0 with a hole", "complete", INFORMED, |s| {
+    base("T0 too coarse at the surface", "spacing", AUDITED, coarse_at_surface),
+    base("T0 too coarse in a box", "spacing", AUDITED, |s| merged_in_box(s, &s.base.words)),
+    base("T0 needlessly fine away from the surface", "identical", INFORMED, fine_away),
+    base("T0 needlessly fine at the surface", "identical", INFORMED, fine_at_surface),
+    base("T0 with a hole", "complete", AUDITED, |s| {
         let mut words = s.base.words.clone();
         // The self test at scale does not know T0 of a mesh that it did not make.
         (!words.is_empty()).then(|| words.remove(words.len() / 3))?;
         Some(words)
     }),
-    base("T0 with a duplicate leaf", "linear", INFORMED, |s| {
+    base("T0 with a duplicate leaf", "linear", AUDITED, |s| {
         let words = &s.base.words;
         Some([&words[..], &[*words.get(words.len() / 3)?]].concat())
-    }),
-    base("T0 one level too coarse along the whole surface", "spacing", INFORMED, |s| {
-        let groups = siblings_of_surface(s);
-        (!groups.is_empty()).then(|| merged_crossing(&s.base.words, &groups))
     }),
     words("crossing leaves of the mesh merged", "spacing", AUDITED, |s| {
         let words = &s.mesh.words;
@@ -38,27 +33,17 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
 ];
 
-/// Indices of eight sibling leaves of T0 on the surface's level, whatever their sides.
-fn siblings_of_surface(s: &SelftestCase) -> Vec<usize> {
-    let sideless: Vec<u64> = s.base.words.iter().map(|w| w & !3).collect();
-    let of_surface = |&i: &usize| word::level(sideless[i]) == s.case.level_surface;
-    sibling_groups(&sideless).into_iter().filter(of_surface).collect()
-}
-
-/// The words with groups of siblings merged into crossing leaves.
-fn merged_crossing(words: &[u64], groups: &[usize]) -> Vec<u64> {
-    let mut merged = merge(words, groups);
-    for at in groups.iter().enumerate().map(|(before, i)| i - 7 * before) {
-        merged[at] = mutant::with_side(merged[at], Side::Crossing);
-    }
-    merged
-}
-
-/// Merges siblings of which at least one is crossing. (All eight rarely are.)
+/// Merges siblings on the surface's level of which at least one is crossing (all eight rarely are) into a crossing leaf.
 fn coarse_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
-    let words = &s.base.words;
-    let crosses = |&i: &usize| words[i..i + 8].iter().any(|&w| has_side(w, Side::Crossing));
-    Some(merged_crossing(words, &[siblings_of_surface(s).into_iter().find(crosses)?]))
+    let sideless: Vec<u64> = s.base.words.iter().map(|w| w & !3).collect();
+    let fit = |&i: &usize| {
+        word::level(sideless[i]) == s.case.level_surface
+            && s.base.words[i..i + 8].iter().any(|&w| has_side(w, Side::Crossing))
+    };
+    let i = sibling_groups(&sideless).into_iter().find(fit)?;
+    let mut merged = merge(&s.base.words, &[i]);
+    merged[i] = mutant::with_side(merged[i], Side::Crossing);
+    Some(merged)
 }
 
 /// The words with eight siblings merged whose level a box requires.

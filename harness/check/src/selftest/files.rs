@@ -28,14 +28,16 @@ pub(super) const MUTANTS: &[Mutant] = &[
         *to += 1;
     }),
     manifest("manifest: wrong digest", AUDITED, |m| m.digest.0 ^= 1),
-    manifest("manifest: wrong digest of one octant", AUDITED, octant_digest),
+    manifest("manifest: wrong digest of one octant", AUDITED, |m| {
+        m.octant_digests[100].0 ^= 1 << 90;
+    }),
     manifest("manifest: digests of two octants swapped", AUDITED, |m| {
         let empty = Digest::default();
         let full = m.octant_digests.iter().position(|&d| d != empty).expect("there are leaves");
         let other = m.octant_digests.iter().rposition(|d| *d != m.octant_digests[full]);
         m.octant_digests.swap(full, other.expect("not all digests are equal"));
     }),
-    manifest("manifest: wrong digest of one part", AUDITED, part_digest),
+    manifest("manifest: wrong digest of one part", AUDITED, |m| last_part(m).digest.0 ^= 1),
     manifest("manifest: one leaf too many in one part", AUDITED, |m| last_part(m).leaves += 1),
     manifest("manifest: wrong root corner", INFORMED, |m| m.root.origin[1] += m.root.edge),
     manifest("manifest: wrong root edge", INFORMED, |m| m.root.edge *= 2.0),
@@ -62,8 +64,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
         m.enclosed = if is_deleted { Enclosed::Keep } else { Enclosed::Delete };
     }),
     manifest("manifest: final mesh labelled T0", INFORMED, |m| m.tree = Tree::Base),
-    sets("manifest: T0 labelled final mesh", "manifest", INFORMED, |_, mutation| {
-        mutation.base.manifest.tree = Tree::Final;
+    sets("manifest: T0 labelled final mesh", "manifest", INFORMED, |s, mutation| {
+        *mutation = Mutation::of(s, Tree::Base);
+        mutation.mesh.manifest.tree = Tree::Final;
         Some(())
     }),
     sets("leaf's side flipped, manifest unchanged", "manifest", AUDITED, |_, mutation| {
@@ -165,14 +168,6 @@ const fn manifest(name: &'static str, audit: bool, edit: fn(&mut Manifest)) -> M
     Mutant { name, expected: "manifest", audit, change: Change::Manifest(edit) }
 }
 
-fn octant_digest(m: &mut Manifest) {
-    m.octant_digests[100].0 ^= 1 << 90;
-}
-
-fn part_digest(m: &mut Manifest) {
-    last_part(m).digest.0 ^= 1;
-}
-
 fn last_part(m: &mut Manifest) -> &mut Part {
     m.parts.last_mut().expect("there is a part")
 }
@@ -191,7 +186,11 @@ mod tests {
             before.digest = digest;
             before.octant_digests.fill(digest);
             before.parts.iter_mut().for_each(|part| part.digest = digest);
-            for change in [octant_digest, part_digest] {
+            let changes =
+                MUTANTS.iter().filter(|mutant| mutant.name.contains("wrong digest of one"));
+            assert_eq!(changes.clone().count(), 2);
+            for mutant in changes {
+                let Change::Manifest(change) = mutant.change else { panic!("{}", mutant.name) };
                 let mut after = before.clone();
                 change(&mut after);
                 assert_ne!(after, before);

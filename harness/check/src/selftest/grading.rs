@@ -10,7 +10,7 @@ use super::mutant::{
 };
 use contract::manifest::Keep;
 use contract::neighbourhood::{Neighbourhood, OFFSETS};
-use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use contract::tree::Tree;
 use contract::word::{self, Side};
 
@@ -23,16 +23,15 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("two levels apart over a corner only", "balance", AUDITED, |s| {
         split_where(s, |coarser| coarser[1] == 0 && coarser[2] == 0 && coarser[3] > 0)
-            .or_else(|| merge_where(s, |l, near| near.touching > l && near.in_edge <= l))
     }),
-    words("leaf split twice", "balance", AUDITED, split_twice),
     words("octant that balance requires merged", "balance", AUDITED, |s| {
         merge_where(s, |level, near| near.touching > level)
     }),
     words("layer too thin at one place of one level", "layer", AUDITED, |s| {
-        merge_where(s, |level, near| thins_layer(s, level, near))
+        merge_where(s, |level, near| {
+            has_layer(s, level) && near.touching <= level && near.within_layer > level
+        })
     }),
-    words("layer too thin along one whole level", "layer", AUDITED, layer_missing),
     words("layer around the surface too thin", "layer", AUDITED, |s| {
         merge_where(s, |level, near| level == s.case.level_surface && near.in_surface_layer)
     }),
@@ -72,25 +71,6 @@ fn merged_where(s: &SelftestCase, fit: impl Fn(usize) -> bool) -> Option<Vec<u64
     Some(merge(&s.mesh.words, &[i]))
 }
 
-/// Whether two octants have exactly one common point.
-fn meet_in_corner(a: &Octant, b: &Octant) -> bool {
-    let adjacent =
-        |i: usize| a.corner[i] + a.edge() == b.corner[i] || b.corner[i] + b.edge() == a.corner[i];
-    (0..3).all(adjacent)
-}
-
-fn split_twice(s: &SelftestCase) -> Option<Vec<u64>> {
-    // A neighbour of the leaf's level is two levels coarser than the leaf's grandchildren. The first child is
-    // split, so the neighbour must be across a low face.
-    let tree = Tree::of_words(&s.mesh.words);
-    let fit = |&w: &u64| {
-        let neighbourhood = mutant::neighbourhood(&tree, w);
-        word::level(w) + 1 < LEVEL_MAX && neighbourhood.at_offset([-1, 0, 0]).as_leaf().is_some()
-    };
-    let i = s.mesh.words.iter().position(fit)?;
-    Some(split(&split(&s.mesh.words, i), i))
-}
-
 /// Groups of siblings that gradation made, because T0 is coarser there.
 fn graded_siblings(s: &SelftestCase) -> Vec<usize> {
     let base = Tree::of_words(&s.base.words);
@@ -102,11 +82,10 @@ fn graded_siblings(s: &SelftestCase) -> Vec<usize> {
 }
 
 /// The surroundings of siblings that are to be merged.
+#[derive(Default)]
 struct Surroundings {
     /// Level of the finest leaf that touches them.
     touching: u8,
-    /// Level of the finest leaf that shares part of an edge or a face with them.
-    in_edge: u8,
     /// Level of the finest leaf within n cells of the siblings' level.
     within_layer: u8,
     /// Whether the siblings are in the layer around a crossing leaf, and their parent is coarser than the surface.
@@ -122,8 +101,7 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
     let n = i64::from(s.case.layer_cells_min);
     let surface = s.case.level_surface;
     let cell_surface = i64::from(CELLS_PER_EDGE >> surface);
-    let mut found =
-        Surroundings { touching: 0, in_edge: 0, within_layer: 0, in_surface_layer: false };
+    let mut found = Surroundings::default();
     for &w in words {
         let leaf = word::octant(w);
         if merged.contains(&leaf) {
@@ -132,9 +110,6 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
         let distance = merged.distance(&leaf);
         if distance == 0 {
             found.touching = found.touching.max(leaf.level);
-            if !meet_in_corner(&merged, &leaf) {
-                found.in_edge = found.in_edge.max(leaf.level);
-            }
         }
         if distance < n * cell {
             found.within_layer = found.within_layer.max(leaf.level);
@@ -157,23 +132,6 @@ fn merge_where(
 /// Whether the definition requires a layer of cells of this level that is not implied by the balance.
 fn has_layer(s: &SelftestCase, level: u8) -> bool {
     s.case.layer_cells_min > 1 && (s.case.keep == Keep::All || level < s.case.level_surface)
-}
-
-/// Whether merging siblings of this level makes a layer too thin, but keeps the mesh balanced.
-fn thins_layer(s: &SelftestCase, level: u8, near: &Surroundings) -> bool {
-    has_layer(s, level) && near.touching <= level && near.within_layer > level
-}
-
-/// Merges all graded siblings of one level that touch nothing finer. The level is the first on which that makes
-/// a layer too thin.
-fn layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
-    let words = &s.mesh.words;
-    let graded = graded_siblings(s);
-    let thins = |&&i: &&usize| thins_layer(s, word::level(words[i]), &surroundings(s, i));
-    let level = word::level(words[*graded.iter().find(thins)?]);
-    let of_level =
-        |&i: &usize| word::level(words[i]) == level && surroundings(s, i).touching <= level;
-    Some(merge(words, &graded.into_iter().filter(of_level).collect::<Vec<_>>()))
 }
 
 /// Merges all graded siblings above the middle plane across z, as if a rank had not received its neighbour's layer.
@@ -204,6 +162,7 @@ fn extra_layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
 mod tests {
     use super::*;
     use contract::case::Case;
+    use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
 
     #[test]

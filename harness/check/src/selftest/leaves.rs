@@ -51,7 +51,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         mutation.mesh = s.mesh.with_parts(parts);
         Some(())
     }),
-    words("all leaves shifted by half the root", "crossing", INFORMED, |s| {
+    words("all leaves shifted by half the root", "sides", INFORMED, |s| {
         let words = mutant::shifted(&s.mesh.words, CELLS_PER_EDGE / 2);
         let crossing = s.mesh.words.iter().any(|&w| has_side(w, Side::Crossing));
         let moved = words.iter().any(|w| s.mesh.words.binary_search(w).is_err());

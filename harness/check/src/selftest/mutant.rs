@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::SelftestCase;
 use contract::leafset::LeafSet;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Tree as Kind};
 use contract::neighbourhood::Neighbourhood;
 use contract::octant::CELLS_PER_EDGE;
 use contract::tree::Tree;
@@ -32,12 +32,8 @@ pub(super) const INFORMED: bool = false;
 /// What a corruption changes. `None` if it does not apply.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
-    /// The leaves of the mesh, with a manifest that agrees with them: no check shall detect the change by a digest.
-    Words(fn(&SelftestCase) -> Option<Vec<u64>>),
-    /// The leaves of T0, likewise.
-    Base(fn(&SelftestCase) -> Option<Vec<u64>>),
-    /// Both, likewise.
-    Both(fn(&SelftestCase) -> Option<[Vec<u64>; 2]>),
+    /// The leaves of the final mesh or of T0, with a manifest that agrees with them: no check shall detect the change by a digest.
+    Words(Kind, fn(&SelftestCase) -> Option<Vec<u64>>),
     /// The manifest of the mesh.
     Manifest(fn(&mut Manifest)),
     /// The files of the mesh.
@@ -49,32 +45,29 @@ pub(super) enum Change {
 /// A corrupted mesh.
 #[derive(Clone, Debug)]
 pub struct Mutation {
+    /// The tree that was corrupted.
+    pub tree: Kind,
     /// The mesh to write.
     pub mesh: LeafSet,
-    /// Its T0.
-    pub base: LeafSet,
     /// A change of the files after they were written.
     pub tamper: Option<fn(&Path) -> io::Result<()>>,
 }
 
 impl Mutation {
-    /// The mesh without a change.
-    pub fn of(correct: &SelftestCase) -> Self {
-        Self { mesh: correct.mesh.clone(), base: correct.base.clone(), tamper: None }
+    /// The final mesh or T0 without a change.
+    pub fn of(correct: &SelftestCase, tree: Kind) -> Self {
+        Self { tree, mesh: correct.set(tree).clone(), tamper: None }
     }
 }
 
 impl Mutant {
     /// The corrupted mesh; `None` if the corruption does not apply.
     pub fn make(&self, correct: &SelftestCase) -> Option<Mutation> {
-        let mut made = Mutation::of(correct);
+        let mut made = Mutation::of(correct, Kind::Final);
         match self.change {
-            Change::Words(words) => made.mesh = with_words(&correct.mesh, words(correct)?),
-            Change::Base(words) => made.base = with_words(&correct.base, words(correct)?),
-            Change::Both(words) => {
-                let [mesh, base] = words(correct)?;
-                (made.mesh, made.base) =
-                    (with_words(&correct.mesh, mesh), with_words(&correct.base, base));
+            Change::Words(tree, words) => {
+                let mesh = with_words(correct.set(tree), words(correct)?);
+                made = Mutation { tree, mesh, ..made };
             }
             Change::Manifest(edit) => edit(&mut made.mesh.manifest),
             Change::Files(tamper) => {
@@ -90,20 +83,19 @@ impl Mutant {
 }
 
 macro_rules! rows {
-    ($($function:ident: $change:ident($type:ty);)*) => {$(
+    ($($function:ident: $change:ident $([$tree:ident])? ($type:ty);)*) => {$(
         /// A row of the tables.
         pub(super) const fn $function(
             name: &'static str, expected: &'static str, audit: bool, change: $type,
         ) -> Mutant {
-            Mutant { name, expected, audit, change: Change::$change(change) }
+            Mutant { name, expected, audit, change: Change::$change($(Kind::$tree,)? change) }
         }
     )*};
 }
 
 rows! {
-    words: Words(fn(&SelftestCase) -> Option<Vec<u64>>);
-    base: Base(fn(&SelftestCase) -> Option<Vec<u64>>);
-    both: Both(fn(&SelftestCase) -> Option<[Vec<u64>; 2]>);
+    words: Words[Final](fn(&SelftestCase) -> Option<Vec<u64>>);
+    base: Words[Base](fn(&SelftestCase) -> Option<Vec<u64>>);
     sets: Sets(fn(&SelftestCase, &mut Mutation) -> Option<()>);
 }
 

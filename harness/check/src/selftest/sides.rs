@@ -1,12 +1,11 @@
-//! Wrong sides, wrong components and wrong counts of them, which the checks `sides`, `crossing` and `kept` must detect.
+//! Wrong sides, wrong components and wrong counts of them, which the checks `sides` and `kept` must detect.
 //!
 //! The leaves to corrupt are found from the correct mesh and T0 alone, so that the corruptions apply to a window of a
 //! larger mesh, too.
 
 use super::SelftestCase;
 use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, Mutation, both, changed, has_side, middle, sets, with_side,
-    words,
+    self, AUDITED, INFORMED, Mutant, Mutation, changed, has_side, sets, with_side, words,
 };
 use crate::checks::components;
 use contract::manifest::{Components, Keep};
@@ -36,29 +35,22 @@ pub(super) const MUTANTS: &[Mutant] = &[
         };
         labelled(s, Side::Inside, deep).filter(|_| s.case.keep == Keep::All)
     }),
-    both("one leaf flipped in mesh and T0", "sides", INFORMED, |s| {
-        in_both(s, Side::Inside, |w| has_side(w, Side::Outside))
+    words("all inside leaves labelled outside", "sides", INFORMED, |s| {
+        flipped(s, |w| has_side(w, Side::Inside))
     }),
-    both("a whole component flipped in mesh and T0", "sides", INFORMED, |s| {
-        let inside = |w: u64| has_side(w, Side::Inside);
-        flipped(s, inside).filter(|_| s.base.words.iter().any(|&w| inside(w)))
-    }),
-    both("inside and outside swapped everywhere", "sides", INFORMED, |s| flipped(s, |_| true)),
-    words("crossing leaf of the mesh labelled outside", "crossing", INFORMED, |s| {
+    words("inside and outside swapped everywhere", "sides", INFORMED, |s| flipped(s, |_| true)),
+    words("crossing leaf labelled outside", "sides", INFORMED, |s| {
         relabelled(s, Side::Crossing, Side::Outside)
     }),
-    both("crossing leaf labelled outside in mesh and T0", "crossing", INFORMED, |s| {
-        in_both(s, Side::Outside, |w| has_side(w, Side::Crossing))
+    words("crossing leaf labelled inside", "sides", INFORMED, |s| {
+        relabelled(s, Side::Crossing, Side::Inside)
     }),
-    both("crossing leaf labelled inside in mesh and T0", "crossing", INFORMED, |s| {
-        in_both(s, Side::Inside, |w| has_side(w, Side::Crossing))
-    }),
-    words("leaf of the mesh labelled crossing", "crossing", INFORMED, |s| {
+    words("leaf labelled crossing", "sides", INFORMED, |s| {
         labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing))
     }),
-    both("leaf labelled crossing in mesh and T0", "crossing", INFORMED, |s| {
+    words("leaf of the surface's level labelled crossing", "sides", INFORMED, |s| {
         let of_surface = |w| word::level(w) == s.case.level_surface;
-        in_both(s, Side::Crossing, |w| !has_side(w, Side::Crossing) && of_surface(w))
+        labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing) && of_surface(w))
     }),
     sets("one ambiguous component too many in the manifest", "sides", INFORMED, |_, mutation| {
         mutation.mesh.manifest.components_ambiguous.count += 1;
@@ -80,11 +72,10 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let applies = s.case.keep != Keep::All && !s.case.seeds.is_empty();
         applies.then(|| removed(s, |_| true)).flatten()
     }),
-    both("side flipped against the seeds in mesh and T0", "sides", INFORMED, |s| {
+    words("side flipped against the seeds", "sides", INFORMED, |s| {
         let flow = s.case.inputs().side_of_flow();
-        let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
-        let flipped = mapped(s, |w| if has_side(w, flow) { with_side(w, other) } else { w });
-        (!s.case.seeds.is_empty() && flipped[0] != s.mesh.words).then_some(flipped)
+        let flipped = swapped(s, |w| has_side(w, flow));
+        flipped.filter(|_| !s.case.seeds.is_empty())
     }),
     sets("manifest: one outside component too many", "kept", INFORMED, |_, mutation| {
         counted(mutation, |c| c.outside += 1)
@@ -119,22 +110,15 @@ fn relabelled(s: &SelftestCase, from: Side, to: Side) -> Option<Vec<u64>> {
     labelled(s, to, |w| has_side(w, from))
 }
 
-/// Mesh and T0 with other words for all leaves.
-fn mapped(s: &SelftestCase, map: impl Fn(u64) -> u64) -> [Vec<u64>; 2] {
-    [&s.mesh, &s.base].map(|set| set.words.iter().map(|&w| map(w)).collect())
+/// The mesh with inside and outside swapped where a predicate holds, if there is such a leaf.
+fn swapped(s: &SelftestCase, predicate: impl Fn(u64) -> bool) -> Option<Vec<u64>> {
+    let swap = |&w: &u64| if w & 3 < 2 && predicate(w) { w ^ 1 } else { w };
+    Some(s.mesh.words.iter().map(swap).collect()).filter(|words| *words != s.mesh.words)
 }
 
-/// Mesh and T0 with another side for one leaf that they have in common.
-fn in_both(s: &SelftestCase, to: Side, predicate: impl Fn(u64) -> bool) -> Option<[Vec<u64>; 2]> {
-    let in_base = |w: u64| s.base.words.binary_search(&w).is_ok();
-    let leaf = s.mesh.words[middle(&s.mesh.words, |w| predicate(w) && in_base(w))?];
-    Some(mapped(s, |w| if w == leaf { with_side(w, to) } else { w }))
-}
-
-/// Mesh and T0 with inside and outside swapped where a predicate holds, if nothing is deleted and not all leaves are crossing.
-fn flipped(s: &SelftestCase, predicate: impl Fn(u64) -> bool) -> Option<[Vec<u64>; 2]> {
-    let swapped = mapped(s, |w| if w & 3 < 2 && predicate(w) { w ^ 1 } else { w });
-    (s.case.keep == Keep::All && swapped[0] != s.mesh.words).then_some(swapped)
+/// The same if nothing is deleted.
+fn flipped(s: &SelftestCase, predicate: impl Fn(u64) -> bool) -> Option<Vec<u64>> {
+    swapped(s, predicate).filter(|_| s.case.keep == Keep::All)
 }
 
 /// The mesh with leaves of T0 in enclosed components, at most `most`: leaves of the wanted side that the mesh does not have.

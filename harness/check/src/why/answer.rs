@@ -35,8 +35,6 @@ pub struct Answer {
     pub deleted_by: Option<String>,
     /// The split of the leaf's parent; none for the root.
     pub split: Option<Split>,
-    /// Whether the facets are known.
-    pub knows_facets: bool,
     root: Root,
     layer_cells_min: u32,
 }
@@ -195,7 +193,7 @@ impl fmt::Display for Answer {
         if let Some(SideReason { side, decision }) = side_decided_by {
             writeln!(f, "side\n  {side} by section 4: {decision}")?;
         }
-        if !self.knows_facets {
+        if side_decided_by.is_none() {
             let why = "which the mesh does not contain: give the case with --case";
             writeln!(f, "left out: what depends on facets, {why}")?;
         }
@@ -228,7 +226,6 @@ impl Mesh<'_> {
             side_decided_by,
             deleted_by: deletion.filter(|_| leaf.is_none()),
             split: octant.map(|octant| self.split(&parent(&octant))),
-            knows_facets: self.body.is_some(),
             root,
             layer_cells_min: self.inputs.layer_cells_min,
         };

@@ -160,7 +160,7 @@ impl Search<'_, '_> {
             self.leaf(at)
         } else if !content.is_node() {
             self.mesh.has_deleted_crossing() && self.hole(at, content, in_deleted)
-        } else if !self.mesh.distrusts || self.counts_as_split(&at) {
+        } else if self.counts_as_split(&at) {
             self.descend(&at, content, false)
         } else {
             self.leaf(at)

@@ -22,10 +22,9 @@ type Visit<'v> = &'v mut dyn FnMut(Octant, Option<&'static str>);
 impl Mesh<'_> {
     /// Visits all octants of the mesh with their faults. What is found out about split octants is kept in memory. Panics if the surface is
     /// not known.
-    pub fn audit(self, visit: Visit) {
+    pub fn audit(&self, visit: Visit) {
         assert!(self.knows_surface(), "splits are audited where the surface is known");
-        let mesh = self.distrusting();
-        mesh.audit_below(&mut Trail::new(mesh.tree), visit);
+        self.audit_below(&mut Trail::new(self.tree), visit);
     }
 
     fn audit_below(&self, trail: &mut Trail, visit: Visit) {

@@ -5,7 +5,8 @@
 //!
 //! **Invariant of the search.** The sources of level l are the leaves of level l at the start of its step of the sweep,
 //! so their parents are split by T0, by the extra layer, or by a step of a deeper level. A chain therefore goes to ever
-//! finer levels, and every question about an octant is answered from finer octants in its neighbourhood.
+//! finer levels, and every question about an octant is answered from finer octants in its neighbourhood. A split in the mesh counts
+//! only if it is required itself, so needless splits require nothing.
 
 use std::cell::RefCell;
 
@@ -52,9 +53,7 @@ pub struct Mesh<'a> {
     body: Option<&'a Truth>,
     /// Whether the leaves are those of T0, which precedes gradation.
     is_base: bool,
-    /// Whether a split in the mesh counts only if it is justified itself, so that needless splits justify nothing.
-    distrusts: bool,
-    /// Deepest level of a leaf that can force an octant to split; no search goes deeper.
+    /// Deepest level of a leaf that can force an octant to split; no search goes deeper, because only needless splits do.
     level_deepest: u8,
     /// Answers to questions that were asked before.
     known: RefCell<FxHashMap<u64, bool>>,
@@ -68,15 +67,8 @@ impl<'a> Mesh<'a> {
         if is_base {
             (inputs.keep, inputs.keep_crossing) = (manifest::Keep::All, true);
         }
-        let level_deepest = tree.finest_level(tree.root(), 0).max(inputs.level_deepest());
-        let known = RefCell::default();
-        Self { tree, inputs, body, is_base, distrusts: false, level_deepest, known }
-    }
-
-    /// The same mesh, in which needless splits justify nothing.
-    pub(crate) fn distrusting(self) -> Self {
-        let level_deepest = self.inputs.level_deepest();
-        Self { distrusts: true, level_deepest, ..self }
+        let level_deepest = inputs.level_deepest();
+        Self { tree, inputs, body, is_base, level_deepest, known: RefCell::default() }
     }
 
     /// Whether it is known where the surface is: from the facets, or from the crossing leaves of the mesh.

@@ -7,7 +7,7 @@ use check::checks::{self, CheckResult, Subject, components};
 use check::promises::Promises;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
-use contract::manifest::{Leak, Manifest};
+use contract::manifest::{Leak, Manifest, Tree};
 use contract::word;
 use proptest::prelude::*;
 use std::collections::HashSet;
@@ -43,10 +43,10 @@ proptest! {
                 words.extend(component.leaves.iter().map(|&i| base[i as usize]));
             }
             let mesh = counted(words);
-            let alone = Subject::alone(&mesh);
+            let alone = Subject::new(None, Tree::Final, &mesh);
             // Without the case, `sides` reports leaves of the side that is not kept.
             prop_assert!(reported(&alone) || !is_kept && !component.enclosed, "without the case: {text}");
-            prop_assert!(reported(&Subject::new(&correct.case, &mesh)), "{text}");
+            prop_assert!(reported(&Subject::new(&correct.case, Tree::Final, &mesh)), "{text}");
         }
     }
 }
@@ -64,7 +64,7 @@ fn leaks_that_are_impossible_or_differ_from_those_of_the_reference_are_reported(
     };
     let found = |leaks, reference| {
         let (mesh, reference) = (with(leaks), with(reference));
-        let subject = Subject::new(&correct.case, &mesh).with_reference(&reference);
+        let subject = Subject::new(&correct.case, Tree::Final, &mesh).with_reference(&reference);
         check(&subject, "manifest").findings_total
     };
     assert_eq!(found(Some(vec![leak]), Some(vec![leak])), 0);
@@ -90,7 +90,7 @@ fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
     let found = |change: fn(&mut Manifest)| {
         let mut mesh = correct.mesh.clone();
         change(&mut mesh.manifest);
-        let subject = Subject::new(&correct.case, &mesh).with_reference(&correct.mesh);
+        let subject = Subject::new(&correct.case, Tree::Final, &mesh).with_reference(&correct.mesh);
         check(&subject, "manifest").findings_total
     };
     assert_eq!(found(|_| ()), 0);
@@ -119,7 +119,7 @@ fn enclosed_space_must_be_deleted_or_kept_as_the_case_requires() {
         (&kept, &deleted, Some("a leaf must be deleted")),
         (&deleted, &kept, Some("the mesh has a hole")),
     ] {
-        let subject = Subject::new(&of.case, &mesh.mesh).promising(&complete);
+        let subject = Subject::new(&of.case, Tree::Final, &mesh.mesh).promising(&complete);
         let [.., result] = &checks::all(&subject)[..] else { panic!("one promise is one check") };
         assert!(result.was_run(), "{result}");
         let first = result.findings.first().map(|finding| finding.as_str());

@@ -4,6 +4,7 @@ use crate::support;
 use check::audit;
 use check::checks::{self, Subject};
 use check::promises::{Promises, Sides, Surface, Touching};
+use contract::manifest::Tree;
 use geometries::Facet;
 use proptest::prelude::*;
 
@@ -80,13 +81,14 @@ proptest! {
                 return Ok(());
             }
         };
-        let subject = Subject::new(&correct.case, &correct.mesh);
-        let informed = subject.with_base(&correct.base).with_reference(&correct.mesh);
-        for result in checks::all(&informed) {
-            prop_assert!(result.holds(), "{text}{result}");
-        }
-        for result in checks::all(&Subject::new(&correct.case, &correct.mesh)) {
-            prop_assert!(result.holds(), "without T0 and reference: {text}{result}");
+        for tree in [Tree::Final, Tree::Base] {
+            let subject = Subject::new(&correct.case, tree, correct.set(tree));
+            for result in checks::all(&subject) {
+                prop_assert!(result.holds(), "without a reference: {text}{result}");
+            }
+            for result in checks::all(&subject.with_reference(correct.set(tree))) {
+                prop_assert!(result.holds(), "{text}{result}");
+            }
         }
         let definition = Promises::of_definition();
         for set in [&correct.mesh, &correct.base] {
@@ -114,7 +116,7 @@ proptest! {
             ..Promises::default()
         };
         let Ok(correct) = support::meshes_of_facets(&text, &facets) else { return Ok(()) };
-        let results = checks::all(&Subject::new(&correct.case, &correct.mesh).promising(&promises));
+        let results = checks::all(&Subject::new(&correct.case, Tree::Final, &correct.mesh).promising(&promises));
         prop_assert_eq!(results.len(), 2 + 7);
         for result in results {
             prop_assert!(result.holds(), "{text}{result}");

@@ -188,7 +188,7 @@ fn a_directory_alone_explains_the_same_sizes() {
             answer.split.iter().map(|split| split.cause.as_ref().unwrap().is_crossed).collect()
         };
         assert_eq!(crossed(with), crossed(without));
-        assert!(with.knows_facets && !without.knows_facets);
+        assert!(with.side_decided_by.is_some() && without.side_decided_by.is_none());
         assert!(without.to_string().contains("--case"), "{without}");
     }
 }

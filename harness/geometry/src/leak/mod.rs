@@ -97,8 +97,9 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
             let outside = outside.map(|level| &self.trees[&level][..]);
             let words = &self.trees[&measured];
             let space = Space::new(words, &self.facets, outside)?;
-            report.passage = Some(passage::widest((self.case, measured), space, ends, self.watch)?);
-            report.check_invariants(self.case, words, outside);
+            let passage = passage::widest((self.case, measured), space, ends, self.watch)?;
+            passage.check_invariants(self.case, (words, outside), (from, to));
+            report.passage = Some(passage);
         }
         Ok(report)
     }

@@ -49,7 +49,12 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
         }
     }
     let Some(counted) = &manifest.components else { return };
-    for (side, expected) in counts_of_tree(counted, terms, manifest.tree) {
+    let is_base = manifest.tree == Kind::Base;
+    let deleted = if is_base { 0 } else { counted.enclosed.count };
+    let outside = counted.outside.saturating_sub(deleted);
+    let counts = [(Side::Outside, outside), (Side::Inside, counted.inside)];
+    let is_of_tree = |(side, _): &(Side, u64)| is_base || terms.keeps(*side as u8);
+    for (side, expected) in counts.into_iter().filter(is_of_tree) {
         let found = found.iter().filter(|component| component.side == side).count() as u64;
         if found != expected {
             result.report(format_args!(
@@ -58,7 +63,7 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
         }
     }
     let (found, count) = (enclosed().count() as u64, counted.enclosed.count);
-    if manifest.tree == Kind::Base && found != count {
+    if is_base && found != count {
         result.report(format_args!(
             "the manifest counts {count} enclosed components, and T0 has {found}"
         ));
@@ -79,15 +84,6 @@ fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
         one.is_none() && words.len() <= OCTANTS_MAX
     });
     (words.len() <= OCTANTS_MAX).then_some(words)
-}
-
-/// The sides of a tree's leaves, with the numbers of components that a manifest leaves of them.
-fn counts_of_tree(counted: &Components, terms: &Manifest, kind: Kind) -> Vec<(Side, u64)> {
-    let (outside, deleted) = (counted.outside, counted.enclosed.count);
-    let left = if kind == Kind::Base { outside } else { outside.saturating_sub(deleted) };
-    let counts = [(Side::Outside, left), (Side::Inside, counted.inside)];
-    let is_of_tree = |(side, _): &(Side, u64)| kind == Kind::Base || terms.keeps(*side as u8);
-    counts.into_iter().filter(is_of_tree).collect()
 }
 
 /// Every seed lies in a leaf of flow.
@@ -131,15 +127,6 @@ fn possible(
         result.report(format_args!(
             "{count} of {outside} outside components cannot be enclosed with {leaves} leaves of T0 and one at {at}"
         ));
-    }
-    let kinds = tree.kinds(tree.root());
-    for (side, expected) in counts_of_tree(counted, terms, kind) {
-        if (expected > 0) != (kinds & 1 << side as u8 != 0) {
-            let leaves = if expected > 0 { "no leaf is" } else { "leaves are" };
-            result.report(format_args!(
-                "the manifest leaves {expected} {side} components, but {leaves} {side}"
-            ));
-        }
     }
 }
 
