@@ -81,7 +81,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         applies.then(|| removed(s, |_| true)).flatten()
     }),
     both("side flipped against the seeds in mesh and T0", "sides", INFORMED, |s| {
-        let flow = s.case.inputs().side_of_flow();
+        let flow = s.case.side_of_flow();
         let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
         let flipped = mapped(s, |w| if has_side(w, flow) { with_side(w, other) } else { w });
         (!s.case.seeds.is_empty() && flipped[0] != s.mesh.words).then_some(flipped)
