@@ -52,8 +52,8 @@ impl<'a> Subject<'a> {
 
     /// A mesh by the pass over its leaves.
     pub(crate) fn of(manifest: &'a Manifest, pass: Pass, case: Option<&'a Case>) -> Self {
-        let inputs = case.map_or_else(|| manifest.clone(), Case::inputs);
-        let inputs = Manifest { sides: manifest.sides, ..inputs };
+        let inputs = case.map_or(manifest, |case| &case.rules);
+        let inputs = Manifest { sides: manifest.sides, ..inputs.clone() };
         let terms = match manifest.tree {
             Kind::Final => inputs.clone(),
             Kind::Base => Manifest { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
