@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use ::files::Draft;
 use std::fs::{self, File, Permissions};
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
@@ -25,29 +25,6 @@ pub fn fill_atomically(
     let bytes = draft.file_mut().metadata().map_err(named)?.len();
     draft.publish().map_err(named)?;
     Ok(bytes)
-}
-
-/// What [`write_together`] writes into a file.
-pub type Content<'a> = &'a dyn Fn(&mut dyn Write) -> io::Result<()>;
-
-/// Like [`write_atomically`], for several files that are complete or absent together.
-///
-/// # Errors
-/// If a file cannot be written.
-pub fn write_together(files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
-    let draft = |(path, fill): &(&Path, Content<'_>)| {
-        let mut out = BufWriter::new(Draft::create(path)?);
-        fill(&mut out)?;
-        let draft = out.into_inner()?;
-        draft.synchronise()?;
-        Ok(draft)
-    };
-    let failed = |path: &Path, error| Failure::at(path, error);
-    let drafts = files.iter().map(|file| draft(file).map_err(|error| failed(file.0, error)));
-    let drafts = drafts.collect::<Result<Vec<Draft>, Failure>>()?;
-    let _publication = publications();
-    let mut drafts = files.iter().zip(drafts);
-    drafts.try_for_each(|((path, _), draft)| draft.publish().map_err(|error| failed(path, error)))
 }
 
 /// Directories that an interrupt removes.
@@ -119,30 +96,6 @@ pub fn nearest_directory(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn files_written_together_replace_older_ones_only_if_all_can_be_written() {
-        let place = tempfile::tempdir().unwrap();
-        let [first, second] = ["first", "second"].map(|name| place.path().join(name));
-        let fail = std::cell::Cell::new(true);
-        let write = || {
-            let content: [(&Path, Content<'_>); 2] = [
-                (&first, &|out| out.write_all(b"new")),
-                (&second, &|out| match fail.get() {
-                    true => Err(io::Error::other("full")),
-                    false => out.write_all(b"new"),
-                }),
-            ];
-            write_together(&content).map_err(|failure| failure.why)
-        };
-        fs::write(&first, "old").unwrap();
-        assert_eq!(write(), Err(format!("{}: full", second.display())));
-        assert_eq!(fs::read(&first).unwrap(), b"old");
-        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
-        fail.set(false);
-        assert_eq!(write(), Ok(()));
-        assert!([&first, &second].iter().all(|path| fs::read(path).unwrap() == b"new"));
-    }
 
     #[test]
     fn a_staged_directory_is_removed_unless_it_is_moved() {

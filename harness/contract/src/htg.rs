@@ -36,7 +36,6 @@ pub struct TreeFile {
     pub root: Root,
     /// Number of leaves.
     pub leaves: u64,
-    with_sides: bool,
     /// The nodes of each level.
     levels: Vec<Range<u64>>,
     split: Bits,
@@ -47,11 +46,11 @@ pub struct TreeFile {
 type Result<T> = std::result::Result<T, TreeError>;
 
 impl TreeFile {
-    /// Opens a file. With `sides`, its leaves have sides; otherwise all are outside.
+    /// Opens a file.
     ///
     /// # Errors
     /// If the file is not a hyper-tree grid as this repository writes it.
-    pub fn open(path: &Path, with_sides: bool) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         let file = TreeReader::open(path)?;
         let Shape { origin, edge, .. } = file.shape;
         let is_cube = edge > 0.0 && edge.is_finite() && origin.iter().all(|c| c.is_finite());
@@ -82,7 +81,7 @@ impl TreeFile {
             }
         }
         let (path, root) = (path.to_owned(), Root { origin, edge });
-        Ok(Self { path, file, root, leaves, with_sides, levels, split, masked })
+        Ok(Self { path, file, root, leaves, levels, split, masked })
     }
 
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
@@ -150,9 +149,6 @@ impl Walk<'_> {
 
     /// The side of a node.
     fn side(&mut self, level: usize, node: u64) -> Result<u8> {
-        if !self.tree.with_sides {
-            return Ok(0);
-        }
         let Level { sides, first, .. } = &mut self.levels[level];
         let mut at = node.wrapping_sub(*first) as usize;
         if at >= sides.len() {

@@ -10,7 +10,6 @@ use crate::case::Case;
 use crate::digest::Digest;
 use crate::failure::Failure;
 use crate::htg::{TreeError, TreeFile};
-use crate::lattice::Root;
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
 use crate::octant::Octant;
@@ -88,7 +87,7 @@ impl Mesh {
     pub fn of_tree(dir: &Path, manifest: &Manifest) -> Result<Option<Self>, Failure> {
         let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
         let path = dir.join(name);
-        let tree = TreeFile::open(&path, manifest.sides == Sides::Known);
+        let tree = TreeFile::open(&path);
         let tree = tree.map_err(|why| damaged_tree(&path, &why))?;
         if tree.root != manifest.root {
             let (found, stated) = (tree.root, manifest.root);
@@ -215,22 +214,18 @@ impl Mesh {
     /// # Errors
     /// If the mesh cannot be one of the case.
     pub fn require_case(&self, case: &Case) -> Result<(), Failure> {
-        let stated = |&Root { origin: [x, y, z], edge }, level: u8, geometry: Option<Geometry>| {
-            let facets = geometry.map_or(String::new(), |Geometry { facets, digest }| {
-                format!(", with {facets} facets of the digest {digest}")
-            });
-            format!("a root of edge {edge} at ({x}, {y}, {z}) and surface level {level}{facets}")
-        };
-        let &Manifest { ref root, lacks_inputs, level_surface, geometry, .. } = &self.manifest;
-        let level = if lacks_inputs { case.level_surface } else { level_surface };
-        let of_mesh = stated(root, level, geometry);
-        let geometry = geometry.map(|_| Geometry::of(&case.facets_lattice));
-        let of_case = stated(&case.root, case.level_surface, geometry);
-        if of_mesh == of_case {
+        let &Manifest { root, lacks_inputs, level_surface, geometry, .. } = &self.manifest;
+        let differs = if root != case.root {
+            format!("root ({root})")
+        } else if !lacks_inputs && level_surface != case.level_surface {
+            format!("surface level ({level_surface})")
+        } else if geometry.is_some_and(|facets| facets != Geometry::of(&case.facets_lattice)) {
+            "geometry".to_owned()
+        } else {
             return Ok(());
-        }
+        };
         Err(Failure::input(format!(
-            "the mesh is not of the case {}: the mesh has {of_mesh}, the case {of_case}; give the case that was meshed",
+            "the mesh is not of the case {}, but has another {differs}: give the case that was meshed",
             case.name
         )))
     }

@@ -2,9 +2,8 @@
  *
  *   p4est-load FOREST SAVED
  *
- * Run on as many ranks as the forest has saved parts, it keeps the partition; otherwise p4est makes a uniform one. It prints the
- * number of quadrants, how many of them fill holes (data 3), and what p8est_balance then splits. p4est aborts if the file
- * cannot be loaded or the forest is not valid.
+ * The partition is uniform. It prints the number of quadrants, how many of them fill holes (data 3), and what p8est_balance
+ * then splits. p4est aborts if the file cannot be loaded or the forest is not valid.
  *
  * Exit codes: 0 success, 2 invalid arguments.
  */
@@ -39,35 +38,21 @@ static void split(p8est_t *forest, p4est_topidx_t tree, int outgoing, p8est_quad
         *data_of(to[i]) = *data_of(from[0]);
 }
 
-/* The number of saved parts: the 6th number of the header, which follows the 384 bytes of a connectivity of one tree. */
-static int parts_saved(const char *path)
-{
-    uint64_t parts = 0;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL || fseek(file, 384 + 5 * 8, SEEK_SET) != 0 || fread(&parts, sizeof parts, 1, file) != 1) {
-        fprintf(stderr, "p4est-load: %s has no header of a forest of one tree\n", path);
-        exit(EXIT_ARGUMENTS);
-    }
-    fclose(file);
-    return (int) parts;
-}
-
 int main(int argc, char **argv)
 {
     if (argc != 3) {
         fprintf(stderr, "usage: p4est-load FOREST SAVED\n");
         return EXIT_ARGUMENTS;
     }
-    int rank, ranks, parts = parts_saved(argv[1]);
+    int rank;
     struct counts counts = {0, 0, 0}, sums;
     sc_MPI_Init(&argc, &argv);
     sc_MPI_Comm_rank(sc_MPI_COMM_WORLD, &rank);
-    sc_MPI_Comm_size(sc_MPI_COMM_WORLD, &ranks);
     sc_init(sc_MPI_COMM_WORLD, 0, 0, NULL, SC_LP_ERROR);
     p4est_init(NULL, SC_LP_ERROR);
 
     p8est_connectivity_t *connectivity;
-    p8est_t *forest = p8est_load_ext(argv[1], sc_MPI_COMM_WORLD, 1, 1, ranks != parts, 0, &counts, &connectivity);
+    p8est_t *forest = p8est_load_ext(argv[1], sc_MPI_COMM_WORLD, 1, 1, 1, 0, &counts, &connectivity);
     if (!p8est_is_valid(forest) || !p8est_connectivity_is_valid(connectivity))
         SC_ABORT("the forest is not valid");
     p8est_save(argv[2], forest, 1);

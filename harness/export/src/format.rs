@@ -102,7 +102,7 @@ fn made(
     let mut made = File::open(&file).map_err(failed)?;
     let copy = |draft: &mut File| io::copy(&mut made, draft).map(|_| ()).map_err(failed);
     let bytes = fill_atomically(path, copy)?;
-    Ok(Summary { files: 1, bytes, ..written })
+    Ok(Summary { bytes, ..written })
 }
 
 /// The format of a file with this name.

@@ -33,7 +33,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         families.push(&leaf);
         Ok(())
     })?;
-    written.check_invariants(export, leaves);
+    written.check_invariants(leaves);
     let Root { origin, edge } = mesh.manifest.root;
     let below_root = families.levels[1..].iter().map(|level| 8 * level.len() as u64);
     let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };
@@ -60,7 +60,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         }
         out.finish().map(drop).map_err(named)
     })?;
-    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
 /// Families of siblings, level by level; level 0 has the root in place of the first of its family.

@@ -5,8 +5,7 @@
 //!
 //! A tree of p4est has no holes. What the mesh or the selection leaves out is filled with the fewest possible quadrants, and the
 //! data of each quadrant, one byte, is its side, [`NO_SIDE`] or [`FILLER`]: a solver skips fillers, or gives them a material of their own.
-//! The saved partition gives each rank as many quadrants as its part of the mesh has, with the fillers before and among its leaves.
-//! Ranks of p4est own intervals of the Morton curve, and so do the parts of a mesh, except near their boundaries.
+//! The saved partition is that of one rank: p4est makes a uniform one, which is that of the mesher within its tolerance.
 
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -39,68 +38,56 @@ const VERSION: &[u8] = b"2.2";
 /// the user interrupts.
 pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let leaves = export.count()?;
-    let mut ends = vec![0; export.mesh.parts.len().max(1)];
-    let start = |ends: &[u64]| {
+    let start = |quadrants: u64| {
         let mut bytes = connectivity(&export.mesh.manifest.root);
-        // Format; bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; parts.
-        let header = [FORMAT, 4, QUADRANT_STRUCT_BYTES, 1, 1, ends.len() as u64];
-        // The end of the last part is that of the only tree.
-        let numbers = [&header[..], ends, &ends[ends.len() - 1..]].concat();
-        bytes.extend_from_slice(bytemuck::cast_slice(&numbers));
+        // Format; bytes of a coordinate, of a quadrant in memory, and of its data; whether data are saved; ranks; the ends of the only
+        // rank and of the only tree.
+        let header = [FORMAT, 4, QUADRANT_STRUCT_BYTES, 1, 1, 1, quadrants, quadrants];
+        bytes.extend_from_slice(bytemuck::bytes_of(&header));
         pad(&mut bytes);
         bytes
     };
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
-        out.write_all(&start(&ends)).map_err(named)?;
-        let mut written = Written::default();
-        quadrants(export, &mut |Quadrant { octant, data, part }| {
+        out.write_all(&start(0)).map_err(named)?;
+        let (mut written, mut count) = (Written::default(), 0);
+        quadrants(export, &mut |octant, data| {
             export.options.progress(written.cells, leaves);
-            ends[part as usize] += 1;
+            count += 1;
             written.add(&octant, data != FILLER);
             let Octant { corner: [x, y, z], level } = octant;
             let numbers = [x, y, z, level.into()];
             out.write_all(bytemuck::bytes_of(&numbers)).map_err(named)?;
             out.write_all(&[data]).map_err(named)
         })?;
-        written.check_invariants(export, leaves);
+        written.check_invariants(leaves);
         assert_eq!(written.volume, KEY_END, "quadrants tile the root");
-        for part in 1..ends.len() {
-            ends[part] += ends[part - 1];
-        }
-        let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(&ends)));
+        let begun = out.seek(SeekFrom::Start(0)).and_then(|_| out.write_all(&start(count)));
         begun.and_then(|()| out.flush()).map_err(named)
     })?;
-    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
-/// An octant of the forest, its data, and the part of the mesh in which it, or the next leaf, is.
-struct Quadrant {
-    octant: Octant,
-    data: u8,
-    part: u32,
-}
-
-/// Visits the quadrants of the forest in Morton order.
+/// Visits the quadrants of the forest in Morton order, with their data.
 fn quadrants(
     export: &Export<'_>,
-    visit: &mut impl FnMut(Quadrant) -> Result<(), Failure>,
+    visit: &mut impl FnMut(Octant, u8) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let has_sides = export.mesh.manifest.sides == Sides::Known;
-    let (mut next, mut part_last) = (0, 0);
-    export.visit(&mut |Leaf { octant, side, rank: part, .. }| {
+    let mut next = 0;
+    export.visit(&mut |Leaf { octant, side, .. }| {
         if octant.level > QUADRANT_LEVEL_MAX {
             return Err(Failure::input(format!(
                 "{octant} is too deep: p4est has levels 0 to {QUADRANT_LEVEL_MAX} (--level-max omits deeper leaves)"
             )));
         }
         let key = word::key_of(octant.corner);
-        fill(next, key, &mut |octant| visit(Quadrant { octant, data: FILLER, part }))?;
-        (next, part_last) = (key + word::span(octant.level), part);
-        visit(Quadrant { octant, data: if has_sides { side as u8 } else { NO_SIDE }, part })
+        fill(next, key, &mut |octant| visit(octant, FILLER))?;
+        next = key + word::span(octant.level);
+        visit(octant, if has_sides { side as u8 } else { NO_SIDE })
     })?;
-    fill(next, KEY_END, &mut |octant| visit(Quadrant { octant, data: FILLER, part: part_last }))
+    fill(next, KEY_END, &mut |octant| visit(octant, FILLER))
 }
 
 /// Visits the fewest octants that cover the Morton codes from `key` to `end`, in order.
@@ -188,11 +175,12 @@ mod tests {
         (dir, summary)
     }
 
-    /// The saved partition: quadrants up to the end of each part.
-    fn partition(path: &Path) -> Vec<u64> {
+    /// The saved number of quadrants.
+    fn quadrants_saved(path: &Path) -> u64 {
         let bytes = fs::read(path).unwrap();
         let number = |i: usize| u64::from_le_bytes(bytes[384 + 8 * i..][..8].try_into().unwrap());
-        (0..number(5) as usize).map(|part| number(6 + part)).collect()
+        assert_eq!((number(5), number(6)), (1, number(7)));
+        number(7)
     }
 
     proptest! {
@@ -216,10 +204,7 @@ mod tests {
             let complete = import(&path, false);
             let filled: u64 = complete.words.iter().map(|&w| word::span(word::level(w))).sum();
             prop_assert_eq!(filled, KEY_END);
-            let ends = partition(&path);
-            prop_assert_eq!(*ends.last().unwrap(), complete.manifest.leaves);
-            prop_assert!(ends.windows(2).all(|e| e[0] <= e[1]));
-            prop_assert_eq!(ends.len(), parts);
+            prop_assert_eq!(quadrants_saved(&path), complete.manifest.leaves);
         }
 
         #[test]
@@ -241,7 +226,7 @@ mod tests {
             let (dir, _) = exported(&mesh, &Selection::default());
             let path = dir.path().join("forest.p8est");
             let mut bytes = fs::read(&path).unwrap();
-            let quadrants = 17 * *partition(&path).last().unwrap() as usize;
+            let quadrants = 17 * quadrants_saved(&path) as usize;
             let at = bytes.len() - 1 - at.index(quadrants);
             bytes[at] ^= 1 << bit;
             fs::write(&path, bytes).unwrap();
@@ -316,6 +301,6 @@ mod tests {
         // The eight leaves of level 19 become one quadrant of level 18.
         let coarse = Selection { level_max: Some(18), ..Selection::default() };
         let leaves = refusal(&coarse).unwrap().leaves;
-        assert_eq!(partition(&path), [leaves + 1]);
+        assert_eq!(quadrants_saved(&path), leaves + 1);
     }
 }

@@ -31,12 +31,6 @@ impl Points {
         self.numbers.clear();
     }
 
-    /// Renumbers the points, in the order of a key.
-    pub fn sort_by<K: Ord>(&mut self, key: impl Fn(&Point) -> K) {
-        self.all.sort_by_cached_key(key);
-        self.numbers.extend(self.all.iter().copied().zip(0..));
-    }
-
     /// Appends the numbers of the points on the edges of a square with these corners, the first corner first.
     pub fn polygon(&self, corners: [Point; 4], polygon: &mut Vec<u32>) {
         for (i, corner) in corners.iter().enumerate() {

@@ -105,7 +105,7 @@ proptest! {
             };
             // A file of part of a mesh counts only that part.
             let expected: Vec<u64> = expected.into_iter().map(|(word, ..)| word).collect();
-            let file = TreeFile::open(&dir.path().join("mesh.vtkhdf"), true).unwrap();
+            let file = TreeFile::open(&dir.path().join("mesh.vtkhdf")).unwrap();
             prop_assert_eq!(file.root, ROOT);
             prop_assert_eq!(&words(&file).unwrap(), &expected);
             prop_assert_eq!(tree.leaf_count(), expected.len() as u64);
@@ -127,7 +127,7 @@ proptest! {
         let path = dir.path().join("mesh.vtkhdf");
         let nodes = [1].into_iter().chain(levels.iter().map(|n| 8 * n)).collect();
         write(&path, Shape { origin: ROOT.origin, edge: ROOT.edge, nodes }, &groups, sparse);
-        let Ok(tree) = TreeFile::open(&path, true) else { return Ok(()) };
+        let Ok(tree) = TreeFile::open(&path) else { return Ok(()) };
         let streamed = words(&tree);
         for pair in streamed.unwrap_or_default().windows(2) {
             prop_assert!(word::fault(pair[0]).is_none());

@@ -49,8 +49,8 @@ impl<'a> Subject<'a> {
         pass: Pass,
         case: Option<&'a Case>,
     ) -> Self {
-        let inputs = case.map_or_else(|| manifest.clone(), Case::inputs);
-        let inputs = Manifest { tree, sides: manifest.sides, ..inputs };
+        let inputs = case.map_or(manifest, |case| &case.rules);
+        let inputs = Manifest { tree, sides: manifest.sides, ..inputs.clone() };
         let terms = match tree {
             Kind::Final => inputs.clone(),
             Kind::Base => Manifest { keep: Keep::All, keep_crossing: true, ..inputs.clone() },

@@ -117,7 +117,7 @@ mod tests {
 
     /// T0 with these leaves split.
     fn split(case: &Case, paths: &[&[u8]]) -> Vec<u64> {
-        let truth = Truth::of(case, &case.inputs()).unwrap();
+        let truth = Truth::of(case, &case.rules).unwrap();
         let mut words = truth.words;
         for path in paths {
             let i = words.iter().position(|&w| word::octant(w) == octant(path)).expect("a leaf");

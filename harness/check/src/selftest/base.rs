@@ -63,7 +63,7 @@ fn fine_away(s: &SelftestCase) -> Option<Vec<u64>> {
 
 fn fine_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
     // On the deepest level, no box requires the split.
-    let deepest = s.case.inputs().level_deepest();
+    let deepest = s.case.level_deepest();
     let fit = |&w: &u64| has_side(w, Side::Crossing) && word::level(w) == deepest;
     let i = s.base.words.iter().position(fit).filter(|_| deepest < LEVEL_MAX)?;
     Some(split(&s.base.words, i))

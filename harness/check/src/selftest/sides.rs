@@ -73,7 +73,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         applies.then(|| removed(s, |_| true)).flatten()
     }),
     words("side flipped against the seeds", "sides", INFORMED, |s| {
-        let flow = s.case.inputs().side_of_flow();
+        let flow = s.case.side_of_flow();
         let flipped = swapped(s, |w| has_side(w, flow));
         flipped.filter(|_| !s.case.seeds.is_empty())
     }),

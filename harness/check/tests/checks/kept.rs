@@ -33,7 +33,7 @@ proptest! {
     #[test]
     fn a_component_that_is_added_or_removed_is_reported(facets in prop_oneof![1 => soup(), 3 => hulls()], text in settings()) {
         let Ok(correct) = support::meshes_of_facets(&text, &facets) else { return Ok(()) };
-        let (terms, base) = (correct.case.inputs(), &correct.base.words);
+        let (terms, base) = (correct.case.rules.clone(), &correct.base.words);
         let counted = |words| -> LeafSet { correct.mesh.with_parts(vec![words]) };
         for component in components::find(base, &terms, &correct.case.facets_lattice) {
             let (removed, mut words) = within(&correct.mesh.words, base, &component.leaves);

@@ -37,7 +37,7 @@ impl Brute<'_> {
 
 /// Checks one answer link by link, with the numbers of the definition.
 fn check(answer: &Answer, correct: &SelftestCase) -> Result<(), TestCaseError> {
-    let terms = correct.case.inputs();
+    let terms = correct.case.rules.clone();
     let words = &correct.mesh.words;
     let brute = Brute { case: &correct.case, terms: terms.clone() };
     let crossing = |octant: &Octant| {

@@ -17,7 +17,7 @@ fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
     let quantised = seeds.iter().map(|&seed| correct.case.root.quantise_seed(seed).unwrap());
     correct.case.rules.seeds = quantised.collect();
     correct.base.manifest.seeds = correct.case.rules.seeds.clone();
-    let terms = correct.case.inputs();
+    let terms = correct.case.rules.clone();
     let mut words = correct.base.words.clone();
     for component in components::find(&words.clone(), &terms, &correct.case.facets_lattice) {
         for &i in &component.leaves {
@@ -31,7 +31,7 @@ fn with_seeds(seeds: &[[f64; 3]]) -> SelftestCase {
 /// The answers for the first leaf of every component, for its last, and for a crossing leaf.
 fn explain(correct: &SelftestCase) -> Vec<Answer> {
     let words = &correct.base.words;
-    let terms = correct.case.inputs();
+    let terms = correct.case.rules.clone();
     let found = components::find(words, &terms, &correct.case.facets_lattice);
     let ends = found.iter().flat_map(|component| {
         [component.leaves[0], *component.leaves.last().unwrap()].map(|i| words[i as usize])
@@ -64,7 +64,7 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
 #[test]
 fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
     let correct = with_seeds(&[]);
-    let terms = correct.case.inputs();
+    let terms = correct.case.rules.clone();
     let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
     let mut sides = Vec::new();
     for answer in explain(&correct) {
@@ -142,7 +142,7 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
         let expected = if twice < 3 { Side::Inside } else { Side::Outside };
         assert_eq!((side, answer.leaf.unwrap().side), (expected, expected), "{twice}: {decision}");
         if (1..6).contains(&twice) {
-            let terms = correct.case.inputs();
+            let terms = correct.case.rules.clone();
             let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
             let leaves = |side| found.iter().find(|c| c.side == side && c.is_ambiguous());
             let candidates = leaves(side).unwrap().leaves.len().min(32);

@@ -54,12 +54,11 @@ fn after_help() -> String {
 /// If the mesh cannot be read, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let format = format::of(&arguments.file)?;
-    let Summary { leaves, files, bytes, notes } = write(format, arguments)?;
+    let Summary { leaves, bytes, notes } = write(format, arguments)?;
     let file = arguments.file.display();
     let what = if format.is_surface() { "face" } else { "cell" };
     let per_cell = bytes as f64 / leaves as f64;
-    let files = if files == 1 { String::new() } else { format!(" in {files} files") };
-    println!("{file}: {leaves} {what}s, {bytes} bytes{files} ({per_cell:.2} per {what})");
+    println!("{file}: {leaves} {what}s, {bytes} bytes ({per_cell:.2} per {what})");
     notes.iter().for_each(|note| println!("  {note}"));
     Ok(EXIT_HOLDS)
 }

@@ -1,10 +1,11 @@
 //! `harness leak`: the widest path through an opening of the geometry, and the spacing that closes it.
 
 use crate::options::{Output, examples, point, whole_seconds};
+use crate::output::put;
 use clap::Args;
 use contract::case::Case;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
-use contract::files::{Content, write_together};
+use contract::files::write_atomically;
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::{PlainCase, StlForm};
@@ -144,20 +145,22 @@ fn leaked(case: &Case, tree: &LeafSet) -> Result<Vec<Leak>, String> {
 fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     let passages: Vec<&Passage> =
         answers.examined.iter().filter_map(|r| r.passage.as_ref()).collect();
-    let json: Content<'_> = &|out| out.write_all(pretty(answers).as_bytes());
-    let vtk: Content<'_> = &|out| polydata::paths(&passages, out);
     if passages.is_empty() && arguments.vtk.is_some() {
         eprintln!(
             "harness: there is no path, so --vtk writes nothing: a file of this name is from an earlier run"
         );
     }
-    let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
-    let all = [(arguments.json.as_deref(), json), (of_path, vtk)];
-    let files: Vec<_> = all.into_iter().filter_map(|(file, fill)| Some((file?, fill))).collect();
     if interrupt::requested() {
         return Err(Failure::interrupted());
     }
-    write_together(&files)
+    if let Some(file) = &arguments.json {
+        put(file, &pretty(answers))?;
+    }
+    let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
+    of_path.map_or(Ok(()), |file| {
+        let written = write_atomically(file, |out| polydata::paths(&passages, out));
+        written.map_err(|error| Failure::at(file, error))
+    })
 }
 
 fn target(text: &str) -> Result<Target, String> {

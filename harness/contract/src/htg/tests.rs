@@ -94,13 +94,10 @@ fn a_tree_in_several_chunks_is_read_as_a_whole() {
     let nodes = nodes_of(&words);
     assert!(nodes.split.len() as u64 > 2 * WINDOW && nodes.by_level.len() == 8);
     let file = file_of(&nodes);
-    let tree = TreeFile::open(file.path(), true).unwrap();
+    let tree = TreeFile::open(file.path()).unwrap();
     assert_eq!((tree.root, &*tree.path), (ROOT, file.path()));
     assert_eq!(words_in(&tree).unwrap(), words);
     assert_eq!(tree.leaves, words.len() as u64);
-    let without_sides = TreeFile::open(file.path(), false).unwrap();
-    let expected: Vec<u64> = words.iter().map(|w| w & !word::SIDE_BITS).collect();
-    assert_eq!(words_in(&without_sides).unwrap(), expected);
     let (mut runs, mut read) = (0, 0);
     tree.words(&mut |run| {
         assert!(run.len() < RUN + 8);
@@ -115,7 +112,7 @@ fn a_tree_in_several_chunks_is_read_as_a_whole() {
 fn trees_of_one_leaf_and_without_leaves_are_read() {
     for (words, leaves) in [(vec![2], 1), (vec![], 0)] {
         let file = file_of(&nodes_of(&words));
-        let tree = TreeFile::open(file.path(), true).unwrap();
+        let tree = TreeFile::open(file.path()).unwrap();
         assert_eq!((words_in(&tree).unwrap(), tree.leaves), (words, leaves));
     }
 }
@@ -127,7 +124,7 @@ fn a_root_that_is_no_cube_is_another_layout() {
         let file = NamedTempFile::new().unwrap();
         let out = fs::File::create(file.path()).unwrap();
         TreeWriter::new(out, shape).unwrap().finish().unwrap();
-        let error = TreeFile::open(file.path(), true).unwrap_err();
+        let error = TreeFile::open(file.path()).unwrap_err();
         assert!(matches!(&error, TreeError::Unknown(why) if why.contains("no cube")), "{error}");
     }
 }
@@ -138,7 +135,7 @@ fn nodes_that_are_no_tree_are_damage() {
         let mut nodes = nodes_of(&words(5));
         edit(&mut nodes);
         let file = file_of(&nodes);
-        let read = TreeFile::open(file.path(), true).and_then(|tree| words_in(&tree));
+        let read = TreeFile::open(file.path()).and_then(|tree| words_in(&tree));
         let error = read.unwrap_err();
         assert!(matches!(error, TreeError::Damaged(_)), "{error}");
         error.to_string()

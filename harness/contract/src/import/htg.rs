@@ -10,7 +10,6 @@ use crate::lattice::Root;
 use crate::leafset;
 use crate::manifest::{self, Manifest, Part};
 use crate::npy;
-use crate::word;
 use std::fs;
 use std::io;
 use std::os::unix::fs::symlink;
@@ -45,7 +44,7 @@ impl ImportedTree {
         if sides.is_some_and(|sides| sides != SIDE) {
             return Ok(None);
         }
-        let tree = match TreeFile::open(path, true) {
+        let tree = match TreeFile::open(path) {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
             Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
             Err(error) => return Err(content(error)),
@@ -57,24 +56,8 @@ impl ImportedTree {
         })
         .map_err(content)?;
         manifest.finish();
-        let imported = Self { tree, manifest };
-        imported.check_invariants();
-        Ok(Some(imported))
-    }
-
-    /// Panics if an invariant of the answer does not hold: every leaf has a level and a side, and the leaves fit the root.
-    pub fn check_invariants(&self) {
-        let Manifest { leaves, leaves_by_level, leaves_by_side: sides, .. } = &self.manifest;
-        let of_levels: u64 = leaves_by_level.iter().sum();
-        let of_sides = sides.outside + sides.inside + sides.crossing;
-        assert!(
-            *leaves == of_levels && *leaves == of_sides,
-            "{leaves} leaves, {of_levels} by level and {of_sides} by side"
-        );
-        let spans =
-            (0..).zip(leaves_by_level).map(|(l, &n)| u128::from(n) * u128::from(word::span(l)));
-        let filled: u128 = spans.sum();
-        assert!(filled <= u128::from(word::KEY_END), "leaves fill {filled} of {}", word::KEY_END);
+        assert_eq!(manifest.leaves, tree.leaves, "leaves of the walk, and of the bits of nodes");
+        Ok(Some(Self { tree, manifest }))
     }
 
     /// Writes the leaf words as a new directory, or into one that is empty, in one part.

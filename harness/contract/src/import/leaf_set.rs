@@ -50,7 +50,7 @@ pub(super) fn manifest(root: Root, case: Option<&Case>, program: String) -> Mani
 }
 
 /// Panics if an invariant of the answer does not hold: the leaves are a linear oct-tree, as many as there are cells, and fill
-/// the same part of the root; the manifest has their counts and digest.
+/// the same part of the root.
 pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let LeafSet { manifest, words, .. } = set;
     assert_eq!(cells.count(), words.len(), "cells and leaves");
@@ -63,13 +63,6 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
         (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells,
         "cells fill {of_cells} of the root, and their leaves {of_leaves}"
     );
-    let mut expected = manifest.clone();
-    expected.set_leaves(words);
-    assert!(*manifest == expected, "counts or digests of {}", expected.digest);
-    let known = manifest.sides == Sides::Known;
-    assert!(known == cells.sides.is_some(), "sides are known: {known}");
-    let by_side = manifest.leaves_by_side;
-    assert!(known || by_side.outside == manifest.leaves, "unknown sides are {by_side:?}");
 }
 
 #[cfg(test)]
@@ -102,7 +95,7 @@ mod tests {
         let cells = cells_of(&words, &ROOT);
         let correct = leaf_set(&cells, Some(ROOT), None, "test".to_owned()).unwrap();
         type Fault = fn(&mut LeafSet);
-        let faults: [Fault; 7] = [
+        let faults: [Fault; 4] = [
             |set| *set = set.with_parts(vec![set.words[1..].to_vec()]),
             |set| set.words.swap(0, 1),
             |set| *set = set.with_parts(vec![[&set.words[..1], &set.words[..21]].concat()]),
@@ -110,9 +103,6 @@ mod tests {
                 let moved = set.words.iter().map(|w| if word::level(*w) == 1 { w + 4 } else { *w });
                 *set = set.with_parts(vec![moved.collect()]);
             },
-            |set| set.manifest.digest.0 ^= 1,
-            |set| set.manifest.leaves_by_level[1] += 1,
-            |set| set.manifest.sides = Sides::Unknown,
         ];
         for (i, fault) in faults.iter().enumerate() {
             let mut wrong = correct.clone();

@@ -21,13 +21,12 @@ use std::path::Path;
 
 use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
-use contract::octant::CELLS_PER_EDGE;
 use contract::sets::Sets;
 use contract::word::{self, Side};
 
 use crate::leaves::Leaves;
 use crate::options::{Export, Options, Regions, Summary, require_new};
-use crate::points::{Point, Points};
+use crate::points::Points;
 use faces::Faces;
 use patches::{Patches, SIDES};
 
@@ -58,9 +57,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let dir = staging.path().join("polyMesh");
     fs::create_dir(&dir).map_err(named)?;
     of_mesh.write(export, &dir).map_err(|failure| failure.of_file(path))?;
-    let (mut files, mut bytes) = (0, 0);
+    let mut bytes = 0;
     for file in fs::read_dir(&dir).map_err(named)? {
-        files += 1;
         bytes += file.and_then(|file| file.metadata()).map_err(named)?.len();
     }
     export.options.check()?;
@@ -73,7 +71,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     if is_selected && export.mesh.manifest.leaves_by_side.crossing > 0 {
         notes.push(CROSSED.to_owned());
     }
-    Ok(Summary { leaves: of_mesh.leaves.count().into(), files, bytes, notes })
+    Ok(Summary { leaves: of_mesh.leaves.count().into(), bytes, notes })
 }
 
 /// A warning about exported cells that the geometry crosses.
@@ -96,7 +94,7 @@ fn read(export: &Export<'_>) -> Result<Mesh, Failure> {
     Mesh::new(leaves, ranks, patches, options)
 }
 
-/// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then by cells.
+/// The first cell of the region of each cell, the number of regions, and which is the largest by volume, then the first.
 fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32), Failure> {
     // Sets of cells, which are represented by their first cells.
     let mut sets = Sets::new(leaves.count() as usize);
@@ -108,18 +106,17 @@ fn regions(leaves: &Leaves, options: &Options) -> Result<(Vec<u32>, usize, u32),
         Ok(())
     })?;
     let of_cell: Vec<u32> = (0..leaves.count()).map(|cell| sets.root(cell)).collect();
-    let mut sizes = vec![(0, 0); of_cell.len()];
+    let mut volumes = vec![0; of_cell.len()];
     for (&set, word) in of_cell.iter().zip(leaves.cells()) {
-        let (volume, cells) = &mut sizes[set as usize];
-        (*volume, *cells) = (*volume + word::span(word::level(word)), *cells + 1);
+        volumes[set as usize] += word::span(word::level(word));
     }
-    let count = sizes.iter().filter(|size| size.1 > 0).count();
-    let largest = (0..).zip(sizes).min_by_key(|&(_, size)| Reverse(size));
+    let count = volumes.iter().filter(|&&volume| volume > 0).count();
+    let largest = (0..).zip(volumes).min_by_key(|&(_, volume)| Reverse(volume));
     Ok((of_cell, count, largest.map_or(0, |(cell, _)| cell)))
 }
 
-/// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They ascend in Morton
-/// order.
+/// The points of cells: their corners, and those of the squares into which their faces are split where cells are missing. They are
+/// numbered as the cells need them, so those of a cell are close together.
 fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
     let mut points = Points::default();
     leaves.walk(options, &mut |_, octant, squares| {
@@ -133,14 +130,7 @@ fn points(leaves: &Leaves, options: &Options) -> Result<Points, Failure> {
         }
         Ok(())
     })?;
-    points.sort_by(key);
     Ok(points)
-}
-
-/// The Morton code of a point. One on the root's maximum faces has a 20th bit along an axis.
-fn key(point: &Point) -> (u32, u64) {
-    let beyond = (0..3).map(|a| (point[a] / CELLS_PER_EDGE) << a).sum();
-    (beyond, word::key_of(point.map(|c| c % CELLS_PER_EDGE)))
 }
 
 impl Mesh {

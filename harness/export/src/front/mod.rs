@@ -149,7 +149,7 @@ fn write(
         ),
     };
     let notes = vec![format!("a surface of area {}, {closed}", number(area))];
-    Ok(Summary { leaves: front.1.len() as u64, files: 1, bytes, notes })
+    Ok(Summary { leaves: front.1.len() as u64, bytes, notes })
 }
 
 /// The polygons as triangles.

@@ -81,7 +81,7 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
         export.options.check()
     })?;
-    Ok(Summary { leaves, files: 1, bytes, notes: Vec::new() })
+    Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
 /// Encodes the selected leaves, of which the number is known, and hands their pieces to `take` in order. As many pieces as there are threads are
@@ -123,7 +123,7 @@ fn encode(
         Ok(())
     })?;
     flush(&mut encoders)?;
-    written.check_invariants(export, leaves);
+    written.check_invariants(leaves);
     Ok(())
 }
 

@@ -114,7 +114,7 @@ pub(super) fn tree_file(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     repair_checksums(&mut bytes);
     let path = scratch.file("mesh.vtkhdf", &bytes);
     let imported = ImportedTree::open(path, None, None, None, "fuzz".to_owned());
-    let tree = TreeFile::open(path, true);
+    let tree = TreeFile::open(path);
     let Ok(tree) = tree else {
         assert!(!matches!(imported, Ok(Some(_))));
         return false;

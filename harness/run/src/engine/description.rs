@@ -25,21 +25,6 @@ pub fn is_own(name: &str) -> bool {
     OWN.iter().any(|(own, _)| *own == name)
 }
 
-/// Examples of keys that are often wrong.
-const EXAMPLES: [(&str, &str); 11] = [
-    ("program", "program = \"{here}/my-mesher\""),
-    ("serial", "serial = [\"my-mesher\", \"{case}\", \"{out}\"]"),
-    ("parallel", "parallel = [\"{launcher}\", \"my-mesher\", \"{case}\", \"{out}\"]"),
-    ("out", "out = [\"--out\", \"{out}\"]"),
-    ("json", "json = [\"--json\", \"{json}\"]"),
-    ("format", "format = \"vtk\""),
-    ("sides", "sides = \"side\" in [run], sides = { band_cells = 1.0 } in [promises]"),
-    ("keep", "keep = [\"all\"]"),
-    ("surface", "surface = { tolerance_cells = 0.5 }"),
-    ("balance", "balance = \"face\""),
-    ("independent_of", "independent_of = [\"ranks\"]"),
-];
-
 /// An engine file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -166,8 +151,7 @@ impl Description {
     /// # Errors
     /// One sentence, if it is wrong.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let mut description: Self =
-            toml::from_str(text).map_err(|error| explain(text, &error, &EXAMPLES))?;
+        let mut description: Self = toml::from_str(text).map_err(|error| explain(text, &error))?;
         description.promises.fault().map_or(Ok(()), Err)?;
         let templates = &mut description.run;
         if let Some(first) = templates.serial.first().cloned() {
@@ -203,7 +187,7 @@ impl Description {
     /// Why the engine is not run on a case; `None` if it is.
     pub fn declines(&self, case: &Case) -> Option<String> {
         let (takes, limits) = (&self.takes, &self.limits);
-        let (level, facets) = (case.inputs().level_deepest(), case.facets.len() as u64);
+        let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
         let keep = format!("{:?}", case.keep).to_lowercase();
         let is_enclosed_kept = case.enclosed == Enclosed::Keep;
         let beyond = [

@@ -59,7 +59,9 @@ fn the_papers_partition_is_swept_over_depths_and_its_bound_is_that_of_its_speedu
     let paper = study.run.values().filter(|run| run.partitioner == "paper" && run.ranks == 32);
     let swept: BTreeSet<_> = paper.map(|run| (&run.mesh, run.level_base)).collect();
     assert_eq!(swept.len(), 16);
-    let bound = (contract::paper::imbalance_max()[0] * 100.0).round() / 100.0;
+    let bound = (contract::paper::number("parallel_ranks") / contract::paper::speedup() * 100.0)
+        .round()
+        / 100.0;
     let kept = study.row.iter().filter(|row| row.at_most.is_some());
     let bounds: Vec<_> = kept.map(|row| (row.measure.name, row.at_most)).collect();
     assert_eq!(bounds, vec![("lambda_cells", Some(bound)); 16]);

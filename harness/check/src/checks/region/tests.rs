@@ -11,7 +11,7 @@ struct Geometry {
 
 impl Geometry {
     fn of(case: &Case) -> Self {
-        let terms = case.inputs();
+        let terms = case.rules.clone();
         let truth = Truth::of(case, &terms).unwrap();
         Self { terms, truth, lattice: case.facets_lattice.clone() }
     }

@@ -9,13 +9,14 @@ use std::path::Path;
 
 use contract::case::Case;
 use contract::leafset::LeafSet;
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::testing::{leaf_set, random_words, words_with_sides};
 use proptest::prelude::*;
 
 use super::*;
 use crate::leaves::{CUT, Square};
 use crate::options::Label;
+use crate::points::Point;
 use crate::selection::Selection;
 pub use crate::testing::{options, whole};
 use contract::mesh::Mesh as OnDisk;
