@@ -1,8 +1,7 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
-//! in which their commits were made, so that a commit may be measured later than its successors; one without a time follows the line
-//! before it.
+//! in which their commits were made, so that a commit may be measured later than its successors.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
@@ -42,9 +41,8 @@ pub struct Record {
     pub schema: String,
     /// Full hash of the commit.
     pub commit: String,
-    /// When it was committed, ISO 8601.
-    #[serde(default)]
-    pub time: String,
+    /// When it was committed.
+    pub time: Timestamp,
     /// First line of its message.
     #[serde(default)]
     pub subject: String,
@@ -79,6 +77,7 @@ impl Record {
         let mut lines = text.lines().map(str::to_owned);
         let mut next = || lines.next().unwrap_or_default();
         let (commit, time, subject) = (next(), next(), next());
+        let time = time.parse().map_err(|why| format!("the time of {named}: {why}"))?;
         Ok(Self { time, subject, ..Self::new(commit) })
     }
 
@@ -161,7 +160,6 @@ fn is_of_machine(name: &str) -> bool {
 fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let (mut machines, mut geometries) = (Origins::default(), Origins::default());
-    let mut records: Vec<(Timestamp, Record)> = Vec::new();
     for Line { number, is_finished, content } in lines {
         let wrong = |why: String| format!("line {number}: {why}");
         let mut record = match content {
@@ -190,22 +188,15 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             (name, value)
         };
         record.metrics = record.metrics.into_iter().map(named).collect();
-        match records.iter_mut().find(|(_, same)| same.commit == record.commit) {
-            Some((_, same)) => {
+        match history.records.iter_mut().find(|same| same.commit == record.commit) {
+            Some(same) => {
                 same.metrics.extend(record.metrics);
                 same.accepted |= record.accepted;
             }
-            None => {
-                let time = match &*record.time {
-                    "" => records.last().map_or(Timestamp::MIN, |(time, _)| *time),
-                    time => time.parse().map_err(|why| wrong(format!("time: {why}")))?,
-                };
-                records.push((time, record));
-            }
+            None => history.records.push(record),
         }
     }
-    records.sort_by_key(|(time, _)| *time);
-    history.records = records.into_iter().map(|(_, record)| record).collect();
+    history.records.sort_by_key(|record| record.time);
     history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
     Ok(history)
 }
@@ -260,19 +251,20 @@ mod tests {
         let path = place.path().join("history.jsonl");
         for (commit, time) in [
             ("c", "2026-03-01T12:00:00+02:00"),
-            ("d", ""),
             ("a", "2026-01-01T00:00:00Z"),
             ("b", "2026-03-01T11:30:00+02:00"),
             ("e", "2026-03-01T12:00:00+01:00"),
         ] {
-            append(&path, &Record { time: time.into(), ..record(commit, &[("x", 1.0)]) }).unwrap();
+            let time = time.parse().unwrap();
+            append(&path, &Record { time, ..record(commit, &[("x", 1.0)]) }).unwrap();
         }
         let records = read(&path).unwrap().records;
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
-        assert_eq!(commits, ["a", "b", "c", "d", "e"]);
-        append(&path, &Record { time: "noon".into(), ..record("f", &[]) }).unwrap();
+        assert_eq!(commits, ["a", "b", "c", "e"]);
+        let line = serde_json::to_string(&record("f", &[])).unwrap();
+        fs::write(&path, line.replace("1970-01-01T00:00:00Z", "noon") + "\n").unwrap();
         let error = read(&path).unwrap_err();
-        assert!(error.contains("line 6: time: "), "{error}");
+        assert!(error.contains("line 1: "), "{error}");
         fs::write(&path, "").unwrap();
         append(&path, &record("g", &[("x", 1e308)])).unwrap();
         let error = read(&path).unwrap_err();
