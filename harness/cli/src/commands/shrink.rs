@@ -2,16 +2,13 @@
 
 use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{Budget, fault, replaced, shrink, write};
+use bench::shrink::{fault, replaced, shrink, write};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// Maximum number of trials.
-const TRIALS: usize = 5000;
 
 /// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail; 3 the engine does not support it.
 #[derive(Args, Debug)]
@@ -83,8 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return Ok(EXIT_FAILED);
     }
     eprintln!("harness shrink: the case fails {first}");
-    let budget = Budget { trials: TRIALS, time: Duration::from_secs(arguments.budget) };
-    let shrunk = shrink(trial, &first, &budget, |trial| probe.judge(trial))?;
+    let limit = Duration::from_secs(arguments.budget);
+    let shrunk = shrink(trial, &first, limit, |trial| probe.judge(trial))?;
     let mut options = vec!["--engine", engine];
     let mesher = given.mesher.as_deref().map(Path::to_string_lossy);
     options.extend(mesher.iter().flat_map(|mesher| ["--mesher", mesher]));
