@@ -333,17 +333,10 @@ pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Opt
 /// session.
 fn pooled_nodes(lines: &[Line]) -> Vec<String> {
     let sessions = lines.iter().filter_map(Line::session).filter(|of| !of.nodes.is_empty());
-    let by_machine = by_key(sessions, |session| session.machine.label());
-    let nodes =
-        by_machine.into_iter().map(|(_, of)| distinct(of.into_iter().map(|s| s.nodes.as_str())));
-    let several = nodes.filter(|nodes| nodes.len() > 1);
-    let sentence = |nodes: Vec<&str>| {
-        let names: Vec<String> = nodes.iter().map(|name| name.chars().take(24).collect()).collect();
-        let shown = names[..names.len().min(3)].join(", ");
-        let more = if names.len() > 3 { ", ..." } else { "" };
-        format!("runs of {} nodes are taken for those of one machine: {shown}{more}", names.len())
-    };
-    several.map(sentence).collect()
+    let by_machine = by_key(sessions, |session| session.machine.label()).into_iter();
+    let counts = by_machine.map(|(_, of)| distinct(of.into_iter().map(|s| &s.nodes)).len());
+    let several = counts.filter(|count| *count > 1);
+    several.map(|n| format!("runs of {n} nodes are taken for those of one machine")).collect()
 }
 
 /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network or geometry
