@@ -35,7 +35,7 @@ pub struct Group {
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
-    /// The network of projected times: that of the session; of several measured ones, the one of median latency.
+    /// The network of projected times: that of the typical run's session.
     pub network: Network,
 }
 
@@ -45,10 +45,8 @@ impl Group {
         let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &of.1);
         let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
         let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
-        let mut typical = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.0.clone();
-        let mut networks: Vec<Network> = repetitions.iter().map(|of| of.1).collect();
-        networks.sort_by(|a, b| a.latency_s.total_cmp(&b.latency_s));
-        let network = networks[networks.len() / 2];
+        let nearest = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let (mut typical, network) = (*nearest).clone();
         let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
