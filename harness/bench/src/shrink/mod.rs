@@ -17,7 +17,7 @@ use run::engine::interrupt;
 use run::engine::layout::Ranks;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The result of a reduction.
@@ -97,14 +97,6 @@ pub fn shrink(
     let shrunk = Shrunk { trial, fault, facets_before, trials, minimal };
     shrunk.check_invariants(&given, first);
     Ok(shrunk)
-}
-
-/// The files of the directory.
-const FILES: [&str; 3] = ["case.toml", "body.stl", "README.md"];
-
-/// The first file that writing into a directory would replace: of the case itself, perhaps.
-pub fn replaced(directory: &Path) -> Option<PathBuf> {
-    FILES.iter().map(|name| directory.join(name)).find(|path| path.exists())
 }
 
 /// Writes `case.toml`, `body.stl` and `README.md` into a directory; returns the text of the README. `options` choose the program in the

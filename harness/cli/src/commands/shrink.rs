@@ -2,7 +2,7 @@
 
 use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{fault, replaced, shrink, write};
+use bench::shrink::{fault, shrink, write};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::plain::PlainCase;
@@ -59,11 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    if let Some(exists) = replaced(&out).filter(|_| !arguments.test_only) {
-        let exists = exists.display();
-        let why =
-            format!("{exists} would be replaced: remove it, or give another directory with --out");
-        return Err(Failure::input(why));
+    if out.exists() && !arguments.test_only {
+        let why = "is there already: remove it, or give another directory with --out";
+        return Err(Failure::about(&out, why));
     }
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::read(&path)?, ranks };
