@@ -94,38 +94,28 @@ impl Record {
         }
     }
 
-    /// Adds the metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
+    /// Returns the record with the machine, geometries and metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
     /// dedicated machine only.
     ///
     /// # Errors
     /// One sentence, if it is neither.
-    pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
-        let measures = Measures::parse(text)?;
-        let apart = |has: String| {
-            Err(format!("it {has} than the values before it: append it by a command of its own"))
-        };
-        if !self.machine.is_empty() && self.machine != measures.machine {
-            return apart(format!("is of another machine ({})", measures.machine));
-        }
-        self.machine = measures.machine;
-        for (case, measures) in measures.cases {
+    pub fn with(mut self, text: &[u8]) -> Result<Self, String> {
+        let Measures { machine, cases, .. } = Measures::parse(text)?;
+        self.machine = machine;
+        for (case, measures) in cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
-            if let Some(digest) = geometry
-                && *self.geometries.entry(case.clone()).or_insert_with(|| digest.clone()) != digest
-            {
-                return apart(format!("has other facets of {case}"));
-            }
+            self.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
             let numbers = exact.into_iter().chain(memory).chain(counted);
             let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
             self.metrics.extend(numbers.map(named));
         }
-        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(()) };
+        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(self) };
         let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
         for GateFinding { case, metric, candidate, .. } in times.flat_map(|layer| &layer.findings) {
             let metric = metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
             self.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
         }
-        Ok(())
+        Ok(self)
     }
 }
 
@@ -392,15 +382,8 @@ mod tests {
         let mut measures = Measures::of_program(Measured::default());
         measures.case("cube").exact.insert("rays".into(), 6);
         measures.case("cube").counted.insert("instructions".into(), 7);
-        let mut one = record("a", &[]);
-        one.add(&serde_json::to_vec(&measures).unwrap()).unwrap();
+        let one = record("a", &[]).with(&serde_json::to_vec(&measures).unwrap()).unwrap();
         assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
-        let elsewhere = Measures { machine: "other".into(), ..measures };
-        assert!(
-            Record { machine: "this".into(), ..one.clone() }
-                .add(&serde_json::to_vec(&elsewhere).unwrap())
-                .is_err()
-        );
-        assert!(one.add(b"{}").is_err());
+        assert!(one.with(b"{}").is_err());
     }
 }
