@@ -285,12 +285,16 @@ impl Setup {
     }
 }
 
-/// A run by all that was given.
+/// A run by all that was given, so that two setups differ.
 impl fmt::Display for Setup {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { engine, case, experiment, spacing_min, layer_cells_min: n, ranks, .. } = self;
         let (comm, division) = (crate::name_of(&self.comm), self.division());
-        write!(f, "{engine} {case} {experiment} {spacing_min:e} n={n} {comm}:{ranks} {division}")
+        let of_series = self.series_cells.map_or(String::new(), |cells| format!(" of {cells:e}"));
+        write!(
+            f,
+            "{engine} {case} {experiment}{of_series} {spacing_min:e} n={n} {comm}:{ranks} {division}"
+        )
     }
 }
 
