@@ -143,12 +143,8 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             (Some(false), false) => ("better", 2),
         };
         // Between the last commit with the old value and the first with the new one.
-        Plotted::vertical(
-            name,
-            style,
-            x(change.step.at - 1).midpoint(x(change.step.at)),
-            (low, high),
-        )
+        let at = change.step.at;
+        Plotted::vertical(name, style, x(at - 1).midpoint(x(at)), (low, high))
     };
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);

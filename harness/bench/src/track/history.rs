@@ -1,7 +1,7 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
-//! in which their commits were made, so that a commit may be measured later than its successors.
+//! in which their commits were made, so that a commit may be measured later than its successors; those without a time come first.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
@@ -42,6 +42,7 @@ pub struct Record {
     /// Full hash of the commit.
     pub commit: String,
     /// When it was committed.
+    #[serde(default)]
     pub time: Timestamp,
     /// First line of its message.
     #[serde(default)]
@@ -248,9 +249,12 @@ mod tests {
             let time = time.parse().unwrap();
             append(&path, &Record { time, ..record(commit, &[("x", 1.0)]) }).unwrap();
         }
+        // By hand, without a time.
+        let line = serde_json::json!({"schema": SCHEMA, "commit": "f", "metrics": {}});
+        append(&path, &line).unwrap();
         let records = read(&path).unwrap().records;
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
-        assert_eq!(commits, ["a", "b", "c", "e"]);
+        assert_eq!(commits, ["f", "a", "b", "c", "e"]);
         let line = serde_json::to_string(&record("f", &[])).unwrap();
         fs::write(&path, line.replace("1970-01-01T00:00:00Z", "noon") + "\n").unwrap();
         let error = read(&path).unwrap_err();
