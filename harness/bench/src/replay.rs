@@ -284,6 +284,16 @@ mod tests {
         assert!(Expected::of(&[]).is_err());
     }
 
+    /// Series of two sizes may come to the same mesh.
+    #[test]
+    fn runs_of_two_series_are_apart() {
+        let mut lines = edited(|run| run.setup.series_cells = Some(1e4));
+        lines.extend(edited(|run| run.setup.series_cells = Some(2e4)));
+        let expected = Expected::of(&lines).unwrap();
+        assert!(expected.values[0].run.contains(" of 1e4 "), "{}", expected.values[0].run);
+        assert!(expected.compare(&lines).holds());
+    }
+
     #[test]
     fn other_meshes_and_counts_fail_and_slower_machines_do_not() {
         let expected = expected();

@@ -22,7 +22,7 @@ pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
     sorted.sort_by_key(|series| series.changes.is_empty());
     let ends = [("from", records.first()), ("to", records.last())];
     let dated = |record: &Record| {
-        let date = record.time.get(..10).unwrap_or("no date");
+        let date = record.time.strftime("%Y-%m-%d");
         html! { (linked(&record.commit, link)) " (" (date) ")" }
     };
     let content = html! {
@@ -54,7 +54,7 @@ fn changes(records: &[Record], all: &[Series], link: Option<&str>) -> Markup {
     if found.is_empty() {
         return html! { p { "No change points." } };
     }
-    let first_new = |(series, change): &(&Series, &Change)| series.points[change.at].0;
+    let first_new = |(series, change): &(&Series, &Change)| series.points[change.step.at].0;
     found.sort_by_key(|change| Reverse(first_new(change)));
     let row = |both: &(&Series, &Change)| {
         let (series, change) = *both;
@@ -83,7 +83,7 @@ fn values(series: &Series, change: &Change) -> [String; 3] {
         unit => format!("{} {unit}", tick_label(value)),
     };
     let by = change.percent.map_or("from 0".to_owned(), |by| format!("{by:+.2} %"));
-    [value(change.before), value(change.after), by]
+    [value(change.step.before), value(change.step.after), by]
 }
 
 /// All steps with their series.
@@ -103,7 +103,7 @@ pub fn summary(all: &[Series]) -> String {
             "{}: {before} -> {after} ({by}) in {}, p = {:.2e}{accepted}\n",
             series.name,
             commits.join(".."),
-            change.p
+            change.step.p
         )
     };
     let text: String =
@@ -143,7 +143,8 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
             (Some(false), false) => ("better", 2),
         };
         // Between the last commit with the old value and the first with the new one.
-        Plotted::vertical(name, style, x(change.at - 1).midpoint(x(change.at)), (low, high))
+        let at = change.step.at;
+        Plotted::vertical(name, style, x(at - 1).midpoint(x(at)), (low, high))
     };
     let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
     let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
@@ -188,7 +189,7 @@ fn range(series: &Series) -> (f64, f64) {
     let cut = (sorted.len() as f64 * OUTLIERS).ceil() as usize;
     let kept = sorted.get(cut..sorted.len().saturating_sub(cut)).filter(|kept| !kept.is_empty());
     let kept = kept.unwrap_or(&sorted);
-    let levels = series.changes.iter().flat_map(|change| [change.before, change.after]);
+    let levels = series.changes.iter().flat_map(|change| [change.step.before, change.step.after]);
     let shown = || kept.iter().copied().chain(levels.clone());
     let low = shown().fold(f64::INFINITY, f64::min);
     let high = shown().fold(f64::NEG_INFINITY, f64::max);

@@ -14,9 +14,10 @@
 
 use super::median::median_of;
 use super::segments::{Fit, Mean, Series};
+use serde::Serialize;
 
 /// A step.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Index of the first value after it.
     pub at: usize,

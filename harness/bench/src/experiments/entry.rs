@@ -40,35 +40,16 @@ impl Line {
         Self { schema, session, time_utc: now_utc(), entry }
     }
 
-    /// What cannot be true of any run, in one sentence.
-    pub fn fault(&self) -> Option<String> {
-        let times: Vec<f64> = match &self.entry {
-            _ if self.schema != SCHEMA => return Some(format!("its schema is {}", self.schema)),
+    /// Whether the numbers are those that a run can have. All tables and figures take them as such.
+    pub fn is_possible(&self) -> bool {
+        match &self.entry {
             // Of an empty message, and of one more byte.
-            Entry::Network(network) => vec![network.latency_s, 1.0 / network.bandwidth_bytes_per_s],
-            Entry::Run(run) if run.time_wall_s == 0.0 || run.setup.ranks == 0 => {
-                return Some("it has no wall time, or no ranks".to_owned());
+            Entry::Network(network) => {
+                are_times([network.latency_s, 1.0 / network.bandwidth_bytes_per_s])
             }
-            Entry::Run(run) => {
-                if let Some(Spread { sum, max, .. }) =
-                    run.spreads().into_iter().find(|of| !of.is_possible())
-                {
-                    return Some(format!(
-                        "a sum of {sum:e} over the ranks, with {max:e} on one, is not possible"
-                    ));
-                }
-                if !run.has_times_of_phases() {
-                    return Some("the times of its phases are not those of the run".to_owned());
-                }
-                let times = run.phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
-                times
-                    .chain([run.useful_s.sum, run.time_wall_s, run.time_launch_s, run.time_cpu_s])
-                    .collect()
-            }
-            _ => return None,
-        };
-        let wrong = times.into_iter().find(|time| !(0.0..=SECONDS_MAX).contains(time))?;
-        Some(format!("a time of {wrong:e} s is not possible"))
+            Entry::Run(run) => run.is_possible(),
+            _ => true,
+        }
     }
 
     /// Returns the session that the line begins, if it begins one.
@@ -176,6 +157,11 @@ pub enum Comm {
     Mpi,
     /// Ranks in one process, of which one runs at a time: CPU times are undisturbed, wall times are meaningless.
     Sim,
+}
+
+/// Whether a clock can show all of these times.
+fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
+    times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 
 /// How far a sum may be from that of so many stored values.
@@ -299,12 +285,16 @@ impl Setup {
     }
 }
 
-/// A run by all that was given.
+/// A run by all that was given, so that two setups differ.
 impl fmt::Display for Setup {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { engine, case, experiment, spacing_min, layer_cells_min: n, ranks, .. } = self;
         let (comm, division) = (crate::name_of(&self.comm), self.division());
-        write!(f, "{engine} {case} {experiment} {spacing_min:e} n={n} {comm}:{ranks} {division}")
+        let of_series = self.series_cells.map_or(String::new(), |cells| format!(" of {cells:e}"));
+        write!(
+            f,
+            "{engine} {case} {experiment}{of_series} {spacing_min:e} n={n} {comm}:{ranks} {division}"
+        )
     }
 }
 
@@ -351,22 +341,23 @@ pub struct Run {
 }
 
 impl Run {
-    /// All quantities over the ranks.
-    fn spreads(&self) -> Vec<&Spread> {
-        let phases = self.phases.iter();
+    /// Whether it has ranks and a wall time, times that a clock can show, and sums that are those of the ranks and of the phases.
+    fn is_possible(&self) -> bool {
+        let Self { setup, time_wall_s, useful_s, phases, .. } = self;
+        let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
+        let of_run = [useful_s.sum, *time_wall_s, self.time_launch_s, self.time_cpu_s];
         let of_phases =
-            phases.flat_map(|p| [&p.useful_s, &p.wall_s, &p.messages, &p.message_bytes]);
-        let counters = self.counters.values();
-        of_phases.chain(counters).chain([&self.useful_s, &self.peak_rss_bytes]).collect()
-    }
-
-    /// Whether the useful time is that of the phases, if these state that of every rank.
-    fn has_times_of_phases(&self) -> bool {
-        let Self { phases, useful_s, setup, .. } = self;
-        let is_stated = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
+            phases.iter().flat_map(|p| [&p.useful_s, &p.wall_s, &p.messages, &p.message_bytes]);
+        let mut spreads =
+            of_phases.chain(self.counters.values()).chain([useful_s, &self.peak_rss_bytes]);
+        let is_by_rank = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
         let off = rounding(setup.ranks * phases.len(), total);
-        phases.is_empty() || !is_stated || (useful_s.sum - total).abs() <= off
+        setup.ranks > 0
+            && *time_wall_s > 0.0
+            && are_times(times.chain(of_run))
+            && spreads.all(Spread::is_possible)
+            && (phases.is_empty() || !is_by_rank || (useful_s.sum - total).abs() <= off)
     }
 }
 
@@ -391,10 +382,11 @@ pub fn read(path: &Path) -> io::Result<Content> {
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
             Ok(Line { entry: Entry::Former, .. }) => {}
-            Ok(line) => match line.fault() {
-                None => lines.push(line),
-                Some(why) => broken.push((number, why)),
-            },
+            Ok(line) if line.schema != SCHEMA => {
+                broken.push((number, format!("its schema is {}", line.schema)));
+            }
+            Ok(line) if line.is_possible() => lines.push(line),
+            Ok(_) => broken.push((number, "it has numbers that no run can have".to_owned())),
             Err(why) => broken.push((number, why)),
         }
     }

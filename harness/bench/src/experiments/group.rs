@@ -35,7 +35,7 @@ pub struct Group {
     pub typical: Run,
     /// Whether the typical run consists of such medians.
     pub by_rank: bool,
-    /// The network of projected times: that of the session; of several measured ones, the one of median latency.
+    /// The network of projected times: that of the typical run's session.
     pub network: Network,
 }
 
@@ -45,10 +45,8 @@ impl Group {
         let time_of = |of: &&(Run, Network)| pop::time_s(&of.0, &of.1);
         let mut time_s = median(&repetitions.iter().map(time_of).collect::<Vec<f64>>())?;
         let off = |of: &&&(Run, Network)| (time_of(of) - time_s.value).abs();
-        let mut typical = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?.0.clone();
-        let mut networks: Vec<Network> = repetitions.iter().map(|of| of.1).collect();
-        networks.sort_by(|a, b| a.latency_s.total_cmp(&b.latency_s));
-        let network = networks[networks.len() / 2];
+        let nearest = repetitions.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let (mut typical, network) = (*nearest).clone();
         let runs: Vec<Run> = repetitions.iter().map(|of| of.0.clone()).collect();
         let by_rank = quieten(&mut typical, &runs);
         if setup.comm != Comm::Sim {
@@ -333,17 +331,10 @@ pub(crate) fn another_mesh(run: &Run, lacks: &Lacks, meshes: &mut Meshes) -> Opt
 /// session.
 fn pooled_nodes(lines: &[Line]) -> Vec<String> {
     let sessions = lines.iter().filter_map(Line::session).filter(|of| !of.nodes.is_empty());
-    let by_machine = by_key(sessions, |session| session.machine.label());
-    let nodes =
-        by_machine.into_iter().map(|(_, of)| distinct(of.into_iter().map(|s| s.nodes.as_str())));
-    let several = nodes.filter(|nodes| nodes.len() > 1);
-    let sentence = |nodes: Vec<&str>| {
-        let names: Vec<String> = nodes.iter().map(|name| name.chars().take(24).collect()).collect();
-        let shown = names[..names.len().min(3)].join(", ");
-        let more = if names.len() > 3 { ", ..." } else { "" };
-        format!("runs of {} nodes are taken for those of one machine: {shown}{more}", names.len())
-    };
-    several.map(sentence).collect()
+    let by_machine = by_key(sessions, |session| session.machine.label()).into_iter();
+    let counts = by_machine.map(|(_, of)| distinct(of.into_iter().map(|s| &s.nodes)).len());
+    let several = counts.filter(|count| *count > 1);
+    several.map(|n| format!("runs of {n} nodes are taken for those of one machine")).collect()
 }
 
 /// Returns the setup of a run as that of another program or case, if there were runs of another machine, build, given network or geometry

@@ -3,6 +3,7 @@
 use super::entry::Machine;
 use crate::{git, printed};
 use contract::digest::mix;
+use rustix::system::{sysinfo, uname};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +14,8 @@ pub fn describe(mpirun: &Path, place: &Path) -> Machine {
     Machine {
         cpu: cpu(&fs::read_to_string("/proc/cpuinfo").unwrap_or_default()),
         cores: cores(),
-        memory_bytes: memory_bytes(&fs::read_to_string("/proc/meminfo").unwrap_or_default()),
-        kernel: fs::read_to_string("/proc/sys/kernel/osrelease")
-            .map_or_else(|_| std::env::consts::OS.to_owned(), |r| format!("Linux {}", r.trim())),
+        memory_bytes: sysinfo().totalram * u64::from(sysinfo().mem_unit),
+        kernel: format!("Linux {}", uname().release().to_string_lossy()),
         mpi: first_line(Command::new(mpirun).arg("--version")),
         compiler: first_line(Command::new("rustc").arg("--version")),
         commit: git(place, &["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
@@ -57,14 +57,14 @@ pub fn cores() -> usize {
 
 /// Returns the names of the machines on which ranks run: those of Slurm's job, else of this one.
 pub fn nodes() -> String {
-    let own = || fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    std::env::var("SLURM_JOB_NODELIST").unwrap_or_else(|_| own().trim().to_owned())
+    let own = |_| uname().nodename().to_string_lossy().into_owned();
+    std::env::var("SLURM_JOB_NODELIST").unwrap_or_else(own)
 }
 
-/// Returns the number of runnable processes, averaged over the last minute; 0 if the system does not report it.
+/// Returns the number of runnable processes, averaged over the last minute, as /proc/loadavg has it.
 pub fn load_average() -> f64 {
-    let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    text.split(' ').next().and_then(|w| w.parse().ok()).unwrap_or(0.0)
+    // The kernel counts in units of 2^-16.
+    (sysinfo().loads[0] as f64 / 65_536.0 * 100.0).round() / 100.0
 }
 
 fn cpu(cpuinfo: &str) -> String {
@@ -76,12 +76,6 @@ fn cpu(cpuinfo: &str) -> String {
     let name = value("model name").filter(|name| !name.eq_ignore_ascii_case("unknown"));
     let [family, model] = ["cpu family", "model"].map(|key| value(key).unwrap_or("?"));
     format!("{} (family {family}, model {model})", name.unwrap_or("unnamed"))
-}
-
-fn memory_bytes(meminfo: &str) -> u64 {
-    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemTotal:"));
-    let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
-    kib.unwrap_or(0) * 1024
 }
 
 /// Returns the first line that a command prints; empty if it fails.
@@ -99,7 +93,6 @@ mod tests {
         let text = "processor\t: 0\ncpu family\t: 6\nmodel\t\t: 85\nmodel name\t: A Chip @ 2 GHz\n";
         assert_eq!(cpu(text), "A Chip @ 2 GHz (family 6, model 85)");
         assert_eq!(cpu(&text.replace("A Chip @ 2 GHz", "unknown")), "unnamed (family 6, model 85)");
-        assert_eq!(memory_bytes("MemTotal:       16 kB\nMemFree: 1 kB\n"), 16_384);
     }
 
     #[test]
@@ -121,6 +114,9 @@ mod tests {
     #[test]
     fn this_machine_is_described_even_without_a_launcher() {
         let machine = describe(Path::new("no-such-launcher"), Path::new("."));
-        assert!(machine.cores > 0 && machine.mpi.is_empty() && !machine.kernel.is_empty());
+        assert!(machine.cores > 0 && machine.mpi.is_empty() && machine.memory_bytes > 1 << 20);
+        let release = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
+        assert_eq!(machine.kernel, format!("Linux {}", release.trim()));
+        assert!((0.0..1e4).contains(&load_average()));
     }
 }

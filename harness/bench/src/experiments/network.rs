@@ -4,7 +4,7 @@ use super::entry::Network;
 use super::execute::Runner;
 use contract::number::number;
 use run::engine::process::{self, Watch};
-use serde::Deserialize;
+use serde_json::Value;
 use std::fmt;
 use std::fs;
 use std::time::Duration;
@@ -51,27 +51,19 @@ pub fn measured(runner: &Runner) -> Result<Network, String> {
     Ok(three[1])
 }
 
-/// Parses the output of `pingpong`: latency from the smallest message, bandwidth from the largest.
+/// Parses the output of `pingpong`, one-way times of messages of ascending sizes: latency from the first, bandwidth from the last.
 fn parse(text: &str) -> Result<Network, String> {
-    /// Message sizes with their median one-way times.
-    #[derive(Deserialize)]
-    struct PingPong {
-        points: Vec<Ping>,
-    }
-    #[derive(Deserialize)]
-    struct Ping {
-        bytes: f64,
-        time_s: f64,
-    }
-    let PingPong { mut points } = serde_json::from_str(text)
+    let printed: Value = serde_json::from_str(text)
         .map_err(|error| format!("the ping-pong printed no result: {error}"))?;
-    points.sort_by(|a, b| a.bytes.total_cmp(&b.bytes));
-    match &points[..] {
-        [s, .., l] if s.time_s > 0.0 && l.bytes > s.bytes && l.time_s > s.time_s => Ok(Network {
-            latency_s: s.time_s,
-            bandwidth_bytes_per_s: (l.bytes - s.bytes) / (l.time_s - s.time_s),
-            measured: true,
-        }),
+    let point = |of: &Value| Some([of["bytes"].as_f64()?, of["time_s"].as_f64()?]);
+    let points = printed["points"].as_array().into_iter().flatten().filter_map(point);
+    match points.collect::<Vec<_>>()[..] {
+        [[small, latency_s], .., [large, time_s]]
+            if latency_s > 0.0 && large > small && time_s > latency_s =>
+        {
+            let bandwidth_bytes_per_s = (large - small) / (time_s - latency_s);
+            Ok(Network { latency_s, bandwidth_bytes_per_s, measured: true })
+        }
         _ => Err("the ping-pong's times do not grow with the messages".to_owned()),
     }
 }

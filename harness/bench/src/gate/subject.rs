@@ -78,12 +78,10 @@ impl Subject {
     pub fn find(named: &str, options: &GateOptions, engine: &Engine) -> Result<Self, Failure> {
         let description = &engine.description;
         if Path::new(named).is_file() {
-            let is_data =
-                Path::new(named).extension().is_some_and(|of| of == "json" || of == "toml");
             let mode = fs::metadata(named)?.permissions().mode();
             // One that another program interprets need not be executable.
             let is_started = description.run.serial.first().is_some_and(|word| word == "{program}");
-            if is_data || is_started && mode & 0o111 == 0 {
+            if is_started && mode & 0o111 == 0 {
                 let why = "is neither a program that can be executed nor a revision";
                 return Err(Failure::input(format!("{named} {why}")));
             }

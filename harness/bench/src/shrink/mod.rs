@@ -17,17 +17,8 @@ use run::engine::interrupt;
 use run::engine::layout::Ranks;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
-
-/// Limits of a reduction.
-#[derive(Clone, Copy, Debug)]
-pub struct Budget {
-    /// Maximum number of trials.
-    pub trials: usize,
-    /// Maximum time.
-    pub time: Duration,
-}
 
 /// The result of a reduction.
 #[derive(Clone, Debug)]
@@ -40,7 +31,7 @@ pub struct Shrunk {
     pub facets_before: usize,
     /// Number of trials.
     pub trials: usize,
-    /// Whether nothing more can be removed; otherwise the budget is exhausted.
+    /// Whether nothing more can be removed; otherwise the time is over.
     pub minimal: bool,
 }
 
@@ -49,9 +40,8 @@ impl Shrunk {
     ///
     /// # Panics
     /// If it fails otherwise, or is larger in any respect, which is a bug.
-    fn check_invariants(&self, given: &Trial, first: &Fault, budget: &Budget) {
+    fn check_invariants(&self, given: &Trial, first: &Fault) {
         assert!(self.fault.is_same_as(first), "{} in place of {first}", self.fault);
-        assert!(self.trials <= budget.trials.max(1), "{} of {} trials", self.trials, budget.trials);
         let (reduced, before) = (self.trial.counts(), given.counts());
         let smaller = reduced.iter().zip(before).all(|(reduced, before)| *reduced <= before);
         assert!(smaller, "facets, boxes, seeds, ranks: {reduced:?} reduced from {before:?}");
@@ -80,20 +70,18 @@ pub fn fault(judged: &[Judged], check: Option<&str>) -> Result<Option<Fault>, Fa
 pub fn shrink(
     given: Trial,
     first: &Fault,
-    budget: &Budget,
+    limit: Duration,
     judge: impl Fn(&Trial) -> Result<Vec<Judged>, Failure>,
 ) -> Result<Shrunk, Failure> {
     let start = Instant::now();
     let mut trials = 1;
-    let spent = |trials| {
-        trials >= budget.trials || start.elapsed() >= budget.time || interrupt::requested()
-    };
+    let is_over = || start.elapsed() >= limit || interrupt::requested();
     let same = |trial: &Trial| -> Result<Option<Fault>, Failure> {
         let mut faults = judge(trial)?.into_iter().filter_map(|one| one.1);
         Ok(faults.find(|fault| fault.is_same_as(first)))
     };
     let mut fails = |trial: &Trial| {
-        if spent(trials) {
+        if is_over() {
             return false;
         }
         trials += 1;
@@ -101,22 +89,14 @@ pub fn shrink(
         same(trial).is_ok_and(|fault| fault.is_some())
     };
     let trial = reduce::reduce(given.clone(), &mut fails);
-    let minimal = !spent(trials);
+    let minimal = !is_over();
     let fault = same(&trial)?.ok_or_else(|| {
         Failure::input("the failure does not repeat: it depends on more than the case")
     })?;
     let facets_before = given.case.facets.len();
     let shrunk = Shrunk { trial, fault, facets_before, trials, minimal };
-    shrunk.check_invariants(&given, first, budget);
+    shrunk.check_invariants(&given, first);
     Ok(shrunk)
-}
-
-/// The files of the directory.
-const FILES: [&str; 3] = ["case.toml", "body.stl", "README.md"];
-
-/// The first file that writing into a directory would replace: of the case itself, perhaps.
-pub fn replaced(directory: &Path) -> Option<PathBuf> {
-    FILES.iter().map(|name| directory.join(name)).find(|path| path.exists())
 }
 
 /// Writes `case.toml`, `body.stl` and `README.md` into a directory; returns the text of the README. `options` choose the program in the
@@ -127,8 +107,7 @@ pub fn replaced(directory: &Path) -> Option<PathBuf> {
 pub fn write(shrunk: &Shrunk, options: &[&str], directory: &Path) -> io::Result<String> {
     fs::create_dir_all(directory)?;
     let case = shrunk.trial.case.write(directory, StlForm::Any)?;
-    let minimal =
-        if shrunk.minimal { "nothing more can be removed" } else { "the budget is exhausted" };
+    let minimal = if shrunk.minimal { "nothing more can be removed" } else { "the time is over" };
     let text = format!(
         "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {}\n",
         shrunk.fault,
@@ -182,7 +161,6 @@ mod tests {
         let facets = vec![[[0.0; 3]; 3]; 2];
         let given = Trial { case: PlainCase { table, facets }, ranks: Ranks::Mpi(3) };
         let first = Fault::of("balance", "7 findings");
-        let budget = Budget { trials: 5, time: Duration::ZERO };
         let right = Shrunk {
             trial: given.clone(),
             fault: Fault::of("balance", "2 findings"),
@@ -190,14 +168,14 @@ mod tests {
             trials: 5,
             minimal: true,
         };
-        right.check_invariants(&given, &first, &budget);
+        right.check_invariants(&given, &first);
         let refused = |change: fn(&mut Shrunk)| {
             let mut wrong = right.clone();
             change(&mut wrong);
-            let check = || wrong.check_invariants(&given, &first, &budget);
+            let check = || wrong.check_invariants(&given, &first);
             std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err()
         };
-        assert!(refused(|s| s.fault.check = "sides".into()) && refused(|s| s.trials = 6));
+        assert!(refused(|s| s.fault.check = "sides".into()));
         assert!(refused(|s| s.facets_before = 3) && refused(|s| s.trial.ranks = Ranks::Mpi(4)));
         assert!(refused(|s| s.trial.case.facets.push([[1.0; 3]; 3])));
     }
@@ -219,12 +197,12 @@ mod tests {
         #![proptest_config(ProptestConfig { failure_persistence: None, cases: 64, ..ProptestConfig::default() })]
 
         /// A check fails where some facets and so many ranks are, and another one where they are not. The answer satisfies its
-        /// invariants, has what the failure needs, and, unless the budget is exhausted, nothing else. A larger or another answer is refused.
+        /// invariants, has what the failure needs, and, unless the time is over, nothing else. A larger or another answer is refused.
         #[test]
         fn answers_for_drawn_failures_satisfy_the_invariants(
             (facets, needed) in (1u16..60).prop_flat_map(|n| (Just(n), prop::collection::btree_set(0..n, 0..4))),
-            (seeds, ranks, least, budget) in (0u8..4, 2usize..17, 2usize..17, 1usize..400),
-            wrong in 0usize..6,
+            (seeds, ranks, least, wrong) in (0u8..4, 2usize..17, 2usize..17, 0usize..5),
+            limit in prop_oneof![Just(Duration::MAX), (0u64..400).prop_map(Duration::from_micros)],
         ) {
             let given = trial(facets, seeds, ranks);
             let least = least.min(ranks);
@@ -236,8 +214,7 @@ mod tests {
                 Ok(vec![(name, failure)])
             };
             let first = Fault::of("balance", "7 findings");
-            let budget = Budget { trials: budget, time: Duration::MAX };
-            let mut shrunk = shrink(given.clone(), &first, &budget, judge).map_err(|_| TestCaseError::fail("an error"))?;
+            let mut shrunk = shrink(given.clone(), &first, limit, judge).map_err(|_| TestCaseError::fail("an error"))?;
             let left: BTreeSet<_> = shrunk.trial.case.facets.iter().map(|f| f[0][0] as u16).collect();
             prop_assert!(needed.is_subset(&left) && shrunk.trial.ranks.count() >= least);
             if shrunk.minimal {
@@ -245,13 +222,12 @@ mod tests {
             }
             match wrong {
                 0 => shrunk.fault = Fault::of("sides", "1 finding"),
-                1 => shrunk.trials = budget.trials + 1,
-                2 => shrunk.facets_before += 1,
-                3 => shrunk.trial.ranks = Ranks::Mpi(ranks + 1),
-                4 => shrunk.trial.case.facets = (0..=facets).map(facet).collect(),
+                1 => shrunk.facets_before += 1,
+                2 => shrunk.trial.ranks = Ranks::Mpi(ranks + 1),
+                3 => shrunk.trial.case.facets = (0..=facets).map(facet).collect(),
                 _ => shrunk.trial = trial(0, seeds + 1, 2),
             }
-            let check = || shrunk.check_invariants(&given, &first, &budget);
+            let check = || shrunk.check_invariants(&given, &first);
             prop_assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(check)).is_err());
         }
     }

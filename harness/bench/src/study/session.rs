@@ -176,12 +176,10 @@ impl Session<'_> {
     /// Records the circumstances.
     fn open(&mut self) -> Result<(), Failure> {
         let programs = self.runner.programs;
-        let catalogue = programs.paths.catalogue.path();
-        let repository = catalogue.parent().and_then(Path::parent).unwrap_or(Path::new("."));
         let lacks = |name: String| (name.clone(), programs.named(&name).description.lacks());
         let opening = Opening {
             command: std::env::args().collect(),
-            machine: machine::describe(&self.runner.launcher.program(), repository),
+            machine: machine::describe(&self.runner.launcher.program(), &programs.paths.root),
             nodes: machine::nodes(),
             load_average: machine::load_average(),
             lacks: self.study.engines().into_iter().map(lacks).collect(),

@@ -1,8 +1,7 @@
 //! The history: a file of JSON lines, one record per commit, kept in the repository or on a separate branch.
 //!
 //! Invariant: lines are only ever appended. If a commit has several records, the last value of each metric counts. Records are in the order
-//! in which their commits were made, so that a commit may be measured later than its successors; one without a time follows the line
-//! before it.
+//! in which their commits were made, so that a commit may be measured later than its successors; those without a time come first.
 //!
 //! Times, memory and instructions of different machines are different series: those of the second machine have the suffix ` [2]`. So are
 //! numbers of different geometries under one case name: the second is the case `CASE [2]`.
@@ -42,9 +41,9 @@ pub struct Record {
     pub schema: String,
     /// Full hash of the commit.
     pub commit: String,
-    /// When it was committed, ISO 8601.
+    /// When it was committed.
     #[serde(default)]
-    pub time: String,
+    pub time: Timestamp,
     /// First line of its message.
     #[serde(default)]
     pub subject: String,
@@ -79,6 +78,7 @@ impl Record {
         let mut lines = text.lines().map(str::to_owned);
         let mut next = || lines.next().unwrap_or_default();
         let (commit, time, subject) = (next(), next(), next());
+        let time = time.parse().map_err(|why| format!("the time of {named}: {why}"))?;
         Ok(Self { time, subject, ..Self::new(commit) })
     }
 
@@ -95,38 +95,28 @@ impl Record {
         }
     }
 
-    /// Adds the metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
+    /// Returns the record with the machine, geometries and metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
     /// dedicated machine only.
     ///
     /// # Errors
     /// One sentence, if it is neither.
-    pub fn add(&mut self, text: &[u8]) -> Result<(), String> {
-        let measures = Measures::parse(text)?;
-        let apart = |has: String| {
-            Err(format!("it {has} than the values before it: append it by a command of its own"))
-        };
-        if !self.machine.is_empty() && self.machine != measures.machine {
-            return apart(format!("is of another machine ({})", measures.machine));
-        }
-        self.machine = measures.machine;
-        for (case, measures) in measures.cases {
+    pub fn with(mut self, text: &[u8]) -> Result<Self, String> {
+        let Measures { machine, cases, .. } = Measures::parse(text)?;
+        self.machine = machine;
+        for (case, measures) in cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
-            if let Some(digest) = geometry
-                && *self.geometries.entry(case.clone()).or_insert_with(|| digest.clone()) != digest
-            {
-                return apart(format!("has other facets of {case}"));
-            }
+            self.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
             let numbers = exact.into_iter().chain(memory).chain(counted);
             let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
             self.metrics.extend(numbers.map(named));
         }
-        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(()) };
+        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(self) };
         let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
         for GateFinding { case, metric, candidate, .. } in times.flat_map(|layer| &layer.findings) {
             let metric = metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
             self.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
         }
-        Ok(())
+        Ok(self)
     }
 }
 
@@ -161,7 +151,6 @@ fn is_of_machine(name: &str) -> bool {
 fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
     let (mut machines, mut geometries) = (Origins::default(), Origins::default());
-    let mut records: Vec<(Timestamp, Record)> = Vec::new();
     for Line { number, is_finished, content } in lines {
         let wrong = |why: String| format!("line {number}: {why}");
         let mut record = match content {
@@ -190,22 +179,15 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
             (name, value)
         };
         record.metrics = record.metrics.into_iter().map(named).collect();
-        match records.iter_mut().find(|(_, same)| same.commit == record.commit) {
-            Some((_, same)) => {
+        match history.records.iter_mut().find(|same| same.commit == record.commit) {
+            Some(same) => {
                 same.metrics.extend(record.metrics);
                 same.accepted |= record.accepted;
             }
-            None => {
-                let time = match &*record.time {
-                    "" => records.last().map_or(Timestamp::MIN, |(time, _)| *time),
-                    time => time.parse().map_err(|why| wrong(format!("time: {why}")))?,
-                };
-                records.push((time, record));
-            }
+            None => history.records.push(record),
         }
     }
-    records.sort_by_key(|(time, _)| *time);
-    history.records = records.into_iter().map(|(_, record)| record).collect();
+    history.records.sort_by_key(|record| record.time);
     history.warnings.extend(machines.described().into_iter().chain(geometries.described()));
     Ok(history)
 }
@@ -260,19 +242,23 @@ mod tests {
         let path = place.path().join("history.jsonl");
         for (commit, time) in [
             ("c", "2026-03-01T12:00:00+02:00"),
-            ("d", ""),
             ("a", "2026-01-01T00:00:00Z"),
             ("b", "2026-03-01T11:30:00+02:00"),
             ("e", "2026-03-01T12:00:00+01:00"),
         ] {
-            append(&path, &Record { time: time.into(), ..record(commit, &[("x", 1.0)]) }).unwrap();
+            let time = time.parse().unwrap();
+            append(&path, &Record { time, ..record(commit, &[("x", 1.0)]) }).unwrap();
         }
+        // By hand, without a time.
+        let line = serde_json::json!({"schema": SCHEMA, "commit": "f", "metrics": {}});
+        append(&path, &line).unwrap();
         let records = read(&path).unwrap().records;
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
-        assert_eq!(commits, ["a", "b", "c", "d", "e"]);
-        append(&path, &Record { time: "noon".into(), ..record("f", &[]) }).unwrap();
+        assert_eq!(commits, ["f", "a", "b", "c", "e"]);
+        let line = serde_json::to_string(&record("f", &[])).unwrap();
+        fs::write(&path, line.replace("1970-01-01T00:00:00Z", "noon") + "\n").unwrap();
         let error = read(&path).unwrap_err();
-        assert!(error.contains("line 6: time: "), "{error}");
+        assert!(error.contains("line 1: "), "{error}");
         fs::write(&path, "").unwrap();
         append(&path, &record("g", &[("x", 1e308)])).unwrap();
         let error = read(&path).unwrap_err();
@@ -400,15 +386,8 @@ mod tests {
         let mut measures = Measures::of_program(Measured::default());
         measures.case("cube").exact.insert("rays".into(), 6);
         measures.case("cube").counted.insert("instructions".into(), 7);
-        let mut one = record("a", &[]);
-        one.add(&serde_json::to_vec(&measures).unwrap()).unwrap();
+        let one = record("a", &[]).with(&serde_json::to_vec(&measures).unwrap()).unwrap();
         assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
-        let elsewhere = Measures { machine: "other".into(), ..measures };
-        assert!(
-            Record { machine: "this".into(), ..one.clone() }
-                .add(&serde_json::to_vec(&elsewhere).unwrap())
-                .is_err()
-        );
-        assert!(one.add(b"{}").is_err());
+        assert!(one.with(b"{}").is_err());
     }
 }

@@ -14,7 +14,7 @@ pub mod history;
 use crate::gate::report::change_percent;
 use history::Record;
 use serde::Serialize;
-use statistics::change_points::{Change as Found, change_points};
+use statistics::change_points::{Change as Step, change_points};
 use statistics::comparison::adjusted;
 use std::collections::BTreeSet;
 
@@ -50,20 +50,15 @@ pub struct Series {
 /// A step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Index in `points` of the first new value.
-    pub at: usize,
-    /// The commit of the value before `at`.
+    /// The step of the values in `points`.
+    #[serde(flatten)]
+    pub step: Step,
+    /// The commit of the value before it.
     pub last_old: String,
-    /// The commit of the value `at`.
+    /// The commit of the first new value.
     pub first_new: String,
-    /// Median of the values since the previous step.
-    pub before: f64,
-    /// Median of the values up to the next step.
-    pub after: f64,
     /// Relative change in percent; `None` if it was 0.
     pub percent: Option<f64>,
-    /// The p-value of the permutation test.
-    pub p: f64,
     /// Whether the user has accepted the new values.
     pub accepted: bool,
 }
@@ -76,18 +71,18 @@ impl Series {
             part.iter().any(|p| p.1 <= value) && part.iter().any(|p| p.1 >= value)
         };
         let mut from = 0;
-        let ends = changes.iter().map(|step| step.at).skip(1).chain([points.len()]);
-        for (step, until) in changes.iter().zip(ends) {
+        let ends = changes.iter().map(|change| change.step.at).skip(1).chain([points.len()]);
+        for (Change { step, last_old, first_new, percent, .. }, until) in changes.iter().zip(ends) {
             let at = step.at;
             assert!(from < at && at < until, "{name}: in order: {step:?}");
             let (old, new) = (&points[from..at], &points[at..until]);
             let beside = is_within(step.before, old) && is_within(step.after, new);
             assert!(beside, "{name}: values beside a step are of their segments: {step:?}");
-            let Change { last_old, first_new, before, after, p, .. } = step;
+            let Step { before, after, p, .. } = step;
             let commits = [at - 1, at].map(|at| &records[points[at].0].commit);
             assert_eq!([last_old, first_new], commits, "{name}: commits of a step");
             let by = change_percent(*before, *after);
-            assert_eq!(step.percent, by, "{name}: the percentage is that of {before} and {after}");
+            assert_eq!(*percent, by, "{name}: the percentage is that of {before} and {after}");
             assert!(*p > 0.0 && *p <= 1.0, "{name}: {p} is a probability");
             from = at;
         }
@@ -95,14 +90,14 @@ impl Series {
 
     /// Whether a change is for the worse; `None` if it is neither better nor worse.
     pub fn is_worse(&self, change: &Change) -> Option<bool> {
-        Some(is_gain(&self.name)? != (change.after > change.before))
+        Some(is_gain(&self.name)? != (change.step.after > change.step.before))
     }
 
     /// Returns the last change if it is for the worse, was not accepted, and its first new value is among the last
     /// `recent`.
     pub fn worse_recently(&self, recent: usize) -> Option<&Change> {
         let last = self.changes.last()?;
-        let new = self.points.len() - last.at <= recent;
+        let new = self.points.len() - last.step.at <= recent;
         (new && !last.accepted && self.is_worse(last) == Some(true)).then_some(last)
     }
 }
@@ -137,21 +132,18 @@ pub fn analyse(records: &[Record], alpha: f64) -> Vec<Series> {
     };
     let all: Vec<_> = names.into_iter().map(of_metric).collect();
     // A metric is one test: its smallest p-value counts, and 1 if nothing was found.
-    let least = |found: &[Found]| found.iter().map(|change| change.p).fold(1.0, f64::min);
+    let least = |found: &[Step]| found.iter().map(|change| change.p).fold(1.0, f64::min);
     let p_values: Vec<f64> = all.iter().map(|(.., found)| least(found)).collect();
     let mut p_values = adjusted(&p_values).into_iter();
-    let of_discovery = |(name, points, found): (String, Vec<(usize, f64)>, Vec<Found>)| {
+    let of_discovery = |(name, points, found): (String, Vec<(usize, f64)>, Vec<Step>)| {
         let is_discovery = p_values.next() <= Some(alpha);
         let commit = |at: usize| records[points[at].0].commit.clone();
-        let change = |Found { at, before, after, p }| Change {
-            at,
-            last_old: commit(at - 1),
-            first_new: commit(at),
-            before,
-            after,
-            percent: change_percent(before, after),
-            p,
-            accepted: is_accepted(at, &points, records),
+        let change = |step: Step| Change {
+            last_old: commit(step.at - 1),
+            first_new: commit(step.at),
+            percent: change_percent(step.before, step.after),
+            accepted: is_accepted(step.at, &points, records),
+            step,
         };
         let found = found.into_iter().filter(|_| is_discovery);
         let changes = found.map(change).collect();
@@ -180,7 +172,7 @@ mod tests {
         let all = analyse(&sample(), 0.01);
         assert!(all[0].changes.is_empty());
         let [change] = &all[1].changes[..] else { panic!("{:?}", all[1].changes) };
-        assert_eq!((change.at, &change.first_new), (20, &format!("{:040x}", 20)));
+        assert_eq!((change.step.at, &change.first_new), (20, &format!("{:040x}", 20)));
         assert!((9.0..11.0).contains(&change.percent.unwrap()), "{change:?}");
     }
 
@@ -189,7 +181,7 @@ mod tests {
         let all = analyse(&sample(), 0.01);
         assert!(all[1].worse_recently(10).is_some() && all[1].worse_recently(9).is_none());
         let mut better = all[1].clone();
-        better.changes[0].after = 1.0;
+        better.changes[0].step.after = 1.0;
         assert!(better.worse_recently(10).is_none());
         let neutral = Series { name: "uav/cells".into(), ..all[1].clone() };
         assert!(neutral.worse_recently(10).is_none());
@@ -244,7 +236,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "values beside a step are of their segments")]
     fn a_value_of_the_other_segment_is_noticed() {
-        planted(|change| change.before = change.after);
+        planted(|change| change.step.before = change.step.after);
     }
 
     #[test]

@@ -2,16 +2,13 @@
 
 use crate::options::{EngineArguments, whole_seconds};
 use bench::shrink::probe::{Probe, Trial};
-use bench::shrink::{Budget, fault, replaced, shrink, write};
+use bench::shrink::{fault, shrink, write};
 use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use contract::plain::PlainCase;
 use run::engine::layout::Ranks;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// Maximum number of trials.
-const TRIALS: usize = 5000;
 
 /// `harness shrink`. Exit codes: 1 the case fails (and was shrunk); 0 it does not fail; 3 the engine does not support it.
 #[derive(Args, Debug)]
@@ -62,11 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let path = catalogue.case_file(&arguments.case, Path::new(""))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("shrunk-{name}")));
-    if let Some(exists) = replaced(&out).filter(|_| !arguments.test_only) {
-        let exists = exists.display();
-        let why =
-            format!("{exists} would be replaced: remove it, or give another directory with --out");
-        return Err(Failure::input(why));
+    if out.exists() && !arguments.test_only {
+        let why = "is there already: remove it, or give another directory with --out";
+        return Err(Failure::about(&out, why));
     }
     let probe = Probe::new(programs.engine, programs.reference, arguments.timeout)?;
     let trial = Trial { case: PlainCase::read(&path)?, ranks };
@@ -83,8 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         return Ok(EXIT_FAILED);
     }
     eprintln!("harness shrink: the case fails {first}");
-    let budget = Budget { trials: TRIALS, time: Duration::from_secs(arguments.budget) };
-    let shrunk = shrink(trial, &first, &budget, |trial| probe.judge(trial))?;
+    let limit = Duration::from_secs(arguments.budget);
+    let shrunk = shrink(trial, &first, limit, |trial| probe.judge(trial))?;
     let mut options = vec!["--engine", engine];
     let mesher = given.mesher.as_deref().map(Path::to_string_lossy);
     options.extend(mesher.iter().flat_map(|mesher| ["--mesher", mesher]));

@@ -115,18 +115,25 @@ fn append(arguments: &Arguments) -> Result<(), Failure> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
     let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
-    let mut record = Record::of_commit(&arguments.commit, repository)?;
-    for file in &arguments.add {
+    let base = Record::of_commit(&arguments.commit, repository)?;
+    // Each file has a machine and geometries of its own.
+    let of_file = |file: &Input| {
         let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
-        record.add(&text).map_err(|why| Failure::about(file, why))?;
-    }
-    record.metrics.extend(arguments.value.iter().cloned());
-    if record.metrics.is_empty() {
+        base.clone().with(&text).map_err(|why| Failure::about(file, why))
+    };
+    let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>, Failure>>()?;
+    let mut last = records.pop().unwrap_or(base);
+    last.metrics.extend(arguments.value.iter().cloned());
+    records.push(last);
+    records.retain(|record| !record.metrics.is_empty());
+    if records.is_empty() {
         let why = "nothing was measured, so nothing is appended: no file of --add has a metric";
         return Err(Failure::missing(why));
     }
     // It would make the history unreadable.
-    record.check().map_err(Failure::input)?;
-    jsonl::append(&arguments.history, &record)
+    records.iter().try_for_each(Record::check).map_err(Failure::input)?;
+    records
+        .iter()
+        .try_for_each(|record| jsonl::append(&arguments.history, record))
         .map_err(|error| Failure::at(&arguments.history, error))
 }

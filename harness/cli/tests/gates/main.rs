@@ -47,7 +47,7 @@ fn shrinking_replaces_no_file() {
     let before = fs::read(fixture.path("case.toml")).unwrap();
     let outcome = fixture.harness(&format!("{SHRINK} --out ."));
     assert_eq!(outcome.code, 2, "{}", outcome.printed);
-    assert!(outcome.printed.contains("case.toml would be replaced"), "{}", outcome.printed);
+    assert!(outcome.printed.contains("is there already"), "{}", outcome.printed);
     assert_eq!(fs::read(fixture.path("case.toml")).unwrap(), before);
 }
 

@@ -63,7 +63,7 @@ pub(super) fn reports(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         let _ = report.peak_rss_bytes_total();
     }
     let gate = Measures::parse(bytes);
-    let added = Record::new("commit".to_owned()).add(bytes);
+    let added = Record::new("commit".to_owned()).with(bytes);
     assert_eq!(gate.is_ok(), added.is_ok());
     run.is_ok() || gate.is_ok()
 }
