@@ -82,7 +82,8 @@ impl Case {
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let text = files::read_text(path).map_err(|error| Failure::about(path, error))?;
         let wrong = |why: String| Failure::about(path, why);
-        let file: CaseFile = toml::from_str(&text).map_err(|e| wrong(explain(&text, &e)))?;
+        let file: CaseFile =
+            toml::from_str(&text).map_err(|e| wrong(explain(&text, &e, &EXAMPLES)))?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let Body { facets, solids } = match (&file.geometry, &file.generator) {
             (Some(stl), None) => stl::read(&directory.join(stl))?,
@@ -101,7 +102,7 @@ impl Case {
     /// # Errors
     /// One sentence, if the case is invalid.
     pub fn from_parts(text: &str, facets: Vec<Facet>) -> Result<Self, String> {
-        let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e))?;
+        let file: CaseFile = toml::from_str(text).map_err(|e| explain(text, &e, &EXAMPLES))?;
         Self::build("in-memory".to_owned(), &file, facets)
     }
 
@@ -241,17 +242,33 @@ fn positive(what: &str, value: f64) -> Result<(), String> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(why()) }
 }
 
-/// A TOML error in one line, with the line of the file, counted from 1, and the key or table on it.
-pub fn explain(text: &str, error: &toml::de::Error) -> String {
+/// Examples of keys of a case file.
+const EXAMPLES: [(&str, &str); 8] = [
+    ("geometry", "geometry = 'DIRECTORY/FILE.stl', in single quotes"),
+    ("spacing_min", "spacing_min = 0.01"),
+    ("layer_cells_min", "layer_cells_min = 4"),
+    ("keep", "keep = \"outside\""),
+    ("keep_crossing", "keep_crossing = true"),
+    ("root_scale", "root_scale = 10.0"),
+    ("origin", "origin = [-1.0, -1.0, -1.0]"),
+    ("edge", "edge = 2.0"),
+];
+
+/// A TOML error in one line, with the line of the file, counted from 1, the key or table on it, and an example of the key if there is one.
+pub fn explain(text: &str, error: &toml::de::Error, examples: &[(&str, &str)]) -> String {
     let message = error.message().replace("expected f64", "expected a number").replace('\n', " ");
     let at = error.span().map_or(0, |span| span.start);
     let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
     let number = text[..begin].matches('\n').count() + 1;
     let line = text[begin..].lines().next().unwrap_or_default();
     let key = line.split('=').next().unwrap_or_default().trim();
-    match at == 0 && message.starts_with("missing") {
+    let is_missing = message.starts_with("missing");
+    let wrong = if is_missing { message.split('`').nth(1).unwrap_or_default() } else { key };
+    let example = examples.iter().find(|(name, _)| *name == wrong);
+    let example = example.map_or_else(String::new, |(_, of)| format!("; for example {of}"));
+    match at == 0 && is_missing {
         // Of the file as a whole.
-        true => message,
-        false => format!("line {number}, {key}: {message}"),
+        true => message + &example,
+        false => format!("line {number}, {key}: {message}{example}"),
     }
 }

@@ -105,11 +105,14 @@ fn a_box_has_positive_extent_and_spacing() {
 #[test]
 fn an_error_of_the_file_has_a_line_and_one_of_the_whole_has_none() {
     let why = |text: &str| Case::from_parts(text, vec![UNIT]).unwrap_err();
-    assert_eq!(why("layer_cells_min = 3"), "missing field `spacing_min`");
+    assert_eq!(
+        why("layer_cells_min = 3"),
+        "missing field `spacing_min`; for example spacing_min = 0.01"
+    );
     let text = "spacing_min = 1.0\n\n[root]\norigin = [0.0, 0.0, 0.0]\nedge = 'long'";
     assert!(why(text).starts_with("line 5, edge: invalid type: string"), "{}", why(text));
     let without_edge = why("spacing_min = 1.0\n[root]\norigin = [0.0, 0.0, 0.0]");
-    assert_eq!(without_edge, "line 2, [root]: missing field `edge`");
+    assert_eq!(without_edge, "line 2, [root]: missing field `edge`; for example edge = 2.0");
     let both = "spacing_min = 1.0\nroot_scale = inf";
     assert_eq!(why(both), "root_scale = inf must be finite and greater than zero");
     let root = "spacing_min = 1.0\n[root]\norigin = [0.0, nan, 0.0]\nedge = 8.0";
@@ -133,7 +136,7 @@ fn errors_name_the_cause() {
     assert!(table.contains("line 2, [layer_cells_min]: invalid type: map"), "{table}");
     for path in [r#""C:\Users\me\a.stl""#, "parts/a.stl", "12"] {
         let why = why(&format!("spacing_min = 1.0\ngeometry = {path}"));
-        assert!(why.starts_with("line 2, geometry: "), "{why}");
+        assert!(why.starts_with("line 2, geometry: ") && why.contains("single quotes"), "{why}");
     }
     assert!(why("spacing_min = -1.0").contains("spacing_min"));
     assert!(why("spacing_min = 1e-9").contains("deeper"));
