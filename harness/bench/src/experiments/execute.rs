@@ -50,7 +50,6 @@ impl Runner<'_> {
         let options = RunOptions {
             // Its digest need not be in the run report.
             mesh: written.then_some(&mesh),
-            sample_memory: true,
             ..RunOptions::new(self.place, self.limit)
         };
         let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);

@@ -185,8 +185,7 @@ pub(super) fn count(bench: &Bench, engine: &Engine, case: &GateCase) -> Counted 
     let mut measures = CaseMeasures::default();
     for ranks in case.layouts() {
         let place = emptied(bench.place.join("counters/run"), engine)?;
-        let options =
-            RunOptions { sample_memory: true, ..RunOptions::new(&place, bench.options.timeout) };
+        let options = RunOptions::new(&place, bench.options.timeout);
         let report = engine.run(&path, &Layout::on(ranks), &options)?.report;
         let independent = engine.description.promises.is_independent_of(Independence::Ranks);
         // Of a report without a digest, the layer of correctness compares the mesh.

@@ -126,8 +126,6 @@ pub struct RunOptions<'a> {
     pub status: bool,
     /// Stop at the base tree.
     pub ungraded: bool,
-    /// Sample the memory of an engine that does not report it.
-    pub sample_memory: bool,
     /// Where runs on MPI use the engine's service, if it has one.
     pub services: Option<&'a Services>,
 }
@@ -142,7 +140,6 @@ impl<'a> RunOptions<'a> {
             report: true,
             status: false,
             ungraded: false,
-            sample_memory: false,
             services: None,
         }
     }

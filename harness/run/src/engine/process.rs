@@ -7,7 +7,7 @@
 
 use super::failure::{End, Failure};
 use super::interrupt;
-use super::session::{MemorySampler, Session};
+use super::session::{Session, peak_bytes};
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -21,6 +21,11 @@ use std::time::{Duration, Instant};
 const OUTPUT_MAX: u64 = 64 << 20;
 /// Bytes at the end of a standard error in which the error is looked for.
 const ERROR_MAX: u64 = 1 << 20;
+
+/// Looks at a child of any age, at least: what a short run uses last is missed as seldom as in a long one.
+const LOOKS: u32 = 16;
+/// Shortest and longest time between them.
+const PAUSES: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(50)];
 
 /// A child that exited with code 0.
 #[derive(Debug)]
@@ -107,18 +112,13 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
     let started = start();
     let (start, mut session, outputs) =
         started.map_err(|error| cannot_be_started(command, &error))?;
-    let mut sampler = watch.sample_memory.then(MemorySampler::new);
-    let mut pause = Duration::from_millis(1);
-    // Samples of memory are taken between pauses, often enough in a run of any length.
-    let longest = Duration::from_millis(if sampler.is_some() { 5 } else { 20 });
+    let mut peak_rss_bytes = watch.sample_memory.then_some(0);
     let outputs = outputs.each_ref();
     let ended = watch.until(start, &outputs, || {
-        if let Some(sampler) = &mut sampler {
-            sampler.sample(session.leader);
+        if let Some(peak) = &mut peak_rss_bytes {
+            *peak = peak_bytes(session.leader).max(*peak);
         }
-        let ended = session.wait(pause);
-        pause = (pause * 2).min(longest);
-        ended
+        session.wait((start.elapsed() / LOOKS).clamp(PAUSES[0], PAUSES[1]))
     });
     let time_wall_s = start.elapsed().as_secs_f64();
     if ended.is_err() {
@@ -133,7 +133,6 @@ fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
         return Err(End::Interrupted);
     }
     judge(status, outputs[1])?;
-    let peak_rss_bytes = sampler.map(|sampler| sampler.peak_bytes);
     Ok(Finished { time_wall_s, time_cpu_s, stdout: watch.log("stdout"), peak_rss_bytes })
 }
 

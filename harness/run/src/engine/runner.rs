@@ -307,7 +307,7 @@ impl Engine {
         let label = self.label();
         let watch = Watch {
             status: options.status.then_some(&status),
-            sample_memory: options.sample_memory && !self.description.reports_memory,
+            sample_memory: !self.description.reports_memory,
             ..Watch::new(&label, options.limit, options.place)
         };
         let Ranks::Mpi(count) = ranks else { return process::run(command, &watch) };

@@ -188,40 +188,14 @@ fn is_alive(stat: &str) -> bool {
     stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }
 
-/// Samples the memory of all processes of a session, for programs that do not report it.
-#[derive(Debug)]
-pub(super) struct MemorySampler {
-    start: Instant,
-    last: Instant,
-    /// The greatest sum, over all samples, of the peaks of the processes alive at that time. 0 if the system does not report them.
-    pub peak_bytes: u64,
-}
-
-impl MemorySampler {
-    /// A sampler without samples.
-    pub(super) fn new() -> Self {
-        let now = Instant::now();
-        Self { start: now, last: now, peak_bytes: 0 }
-    }
-
-    /// Takes a sample of the session, unless one was taken a short time ago. The system keeps the peak of each
-    /// process, so only memory that is first used after the last sample is missed.
-    pub(super) fn sample(&mut self, leader: Pid) {
-        /// Longest time between samples.
-        const PERIOD: Duration = Duration::from_millis(100);
-        /// Samples of a program of any age, at least, up to that period: what a short run uses last is missed as seldom as in a long one.
-        const SAMPLES: u32 = 16;
-        if self.last.elapsed() < PERIOD.min(self.start.elapsed() / SAMPLES) {
-            return;
-        }
-        self.last = Instant::now();
-        let statuses = members(leader).into_iter().filter_map(|id| {
-            let status =
-                fs::read_to_string(format!("/proc/{}/status", id.as_raw_nonzero())).ok()?;
-            Some((id.as_raw_nonzero().get().cast_unsigned().into(), Status::parse(&status)?))
-        });
-        self.peak_bytes = self.peak_bytes.max(total_bytes(&statuses.collect()));
-    }
+/// The sum of the peaks of memory of all live processes of a session, for programs that do not report it; 0 if the system does not report
+/// them. The system keeps the peak of each process, so only memory that is first used after the last look is missed.
+pub(super) fn peak_bytes(leader: Pid) -> u64 {
+    let statuses = members(leader).into_iter().filter_map(|id| {
+        let status = fs::read_to_string(format!("/proc/{}/status", id.as_raw_nonzero())).ok()?;
+        Some((id.as_raw_nonzero().get().cast_unsigned().into(), Status::parse(&status)?))
+    });
+    total_bytes(&statuses.collect())
 }
 
 /// A process, of which `/proc/ID/status` has the parent and the peaks of the address space and of resident memory.
@@ -290,11 +264,8 @@ mod tests {
         let mut child = command.spawn().unwrap();
         let mut line = [0; 6];
         child.stderr.take().unwrap().read_exact(&mut line).unwrap();
-        let mut sampler = MemorySampler::new();
         // The last bytes may still be in the pipe.
-        while sampler.peak_bytes < 29_000_000 {
-            sampler.sample(Pid::from_child(&child));
-        }
+        while peak_bytes(Pid::from_child(&child)) < 29_000_000 {}
         drop(child.stdin.take());
         assert!(child.wait().unwrap().success());
     }

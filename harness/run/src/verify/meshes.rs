@@ -74,7 +74,6 @@ impl CaseRun<'_> {
             mesh: mesh.as_deref(),
             status: true,
             ungraded: tree == Some(Tree::Base),
-            sample_memory: true,
             services: Some(&self.all.needs.services),
             ..RunOptions::new(&place, self.all.options.timeout)
         };
