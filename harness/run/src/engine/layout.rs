@@ -16,9 +16,9 @@ use tempfile::TempDir;
 
 /// The number of ranks and their kind.
 ///
-/// The JSON form is the number alone: only runs on MPI are recorded with their layout.
+/// The JSON form of ranks on MPI is the number alone; no others are recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "usize", from = "usize")]
+#[serde(untagged)]
 pub enum Ranks {
     /// One rank, without messages.
     Serial,
@@ -40,18 +40,6 @@ impl Ranks {
             Self::Serial => 1,
             Self::Simulated { ranks, .. } | Self::Mpi(ranks) => ranks,
         }
-    }
-}
-
-impl From<Ranks> for usize {
-    fn from(ranks: Ranks) -> Self {
-        ranks.count()
-    }
-}
-
-impl From<usize> for Ranks {
-    fn from(ranks: usize) -> Self {
-        Self::Mpi(ranks)
     }
 }
 
