@@ -6,6 +6,11 @@ use crate::verify::report::{
     Asked, CaseReport, Check, Missing, Outcome, RUNS, Report, Run, SCHEMA,
 };
 
+/// A check of a run with this layout.
+pub(crate) fn of_layout(layout: &Layout, name: &str, outcome: Outcome) -> Check {
+    Check { ranks: layout.rank_count(), ..Check::new(layout.to_string(), name, outcome) }
+}
+
 /// A report with one entry of every kind, also for the tests of the output formats.
 pub fn report() -> Report {
     let layout = Layout {
@@ -34,8 +39,8 @@ pub fn report() -> Report {
         runs: vec![run, on_ranks],
         checks: vec![
             sides,
-            Check::of_layout(&layout, RUNS, Outcome::held(2)),
-            Check::of_layout(&layout, "same leaves", Outcome::fail("first difference <at> root")),
+            of_layout(&layout, RUNS, Outcome::held(2)),
+            of_layout(&layout, "same leaves", Outcome::fail("first difference <at> root")),
             Check::new("p4est", "balance", Outcome::left_out("the engine is not built")),
         ],
         kept: Some("out/cube_small".into()),

@@ -92,8 +92,9 @@ impl<'a> CaseRun<'a> {
         self.all.progress.step(&format!("{}: {what}", self.selected.name));
     }
 
-    /// Adds a check, and with the first failed check the command that repeats it.
-    pub fn add(&mut self, check: Check, layout: Option<&Layout>) {
+    /// Adds a check of a run with this layout or of serial ones, and with the first failed check the command that repeats it.
+    pub fn add(&mut self, mut check: Check, layout: Option<&Layout>) {
+        check.ranks = layout.and_then(Layout::rank_count);
         if check.failed() && self.report.repeat_with.is_none() {
             self.report.repeat_with = Some(self.command_for(layout));
         }
@@ -108,8 +109,7 @@ impl<'a> CaseRun<'a> {
         results: Vec<CheckResult>,
     ) {
         for result in results {
-            let ranks = layout.and_then(Layout::rank_count);
-            let mut check = Check { ranks, ..Check::of_result(subject, result) };
+            let mut check = Check::of_result(subject, result);
             check.figures.take_if(|_| layout.is_some());
             self.add(check, layout);
         }
@@ -125,8 +125,7 @@ impl<'a> CaseRun<'a> {
             }
             _ => failure.to_string(),
         };
-        let check = Check::new(subject, RUNS, Outcome::fail(why));
-        self.add(Check { ranks: layout.and_then(Layout::rank_count), ..check }, layout);
+        self.add(Check::new(subject, RUNS, Outcome::fail(why)), layout);
     }
 
     /// A shell command that repeats the run with this layout, or the serial one.
@@ -158,7 +157,7 @@ impl<'a> CaseRun<'a> {
             None => &["--no-mpi", "--keep"],
         };
         words.extend(left_out.iter().map(|&word| word.to_owned()));
-        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+        shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default()
     }
 }
 
@@ -175,13 +174,5 @@ pub(super) fn steps(engine: &Description) -> &'static [(Step, Need)] {
             (("p4est", "balance"), Need::P4est),
         ],
         false => &[],
-    }
-}
-
-/// A word, quoted for a shell.
-fn quoted(word: &str) -> String {
-    match word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,".contains(c)) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
     }
 }

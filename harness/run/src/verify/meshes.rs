@@ -247,7 +247,7 @@ impl CaseRun<'_> {
         for layout in self.all.options.layouts(self.engine()) {
             let subject = layout.to_string();
             if self.report.checks.iter().all(|check| check.subject != subject) {
-                let check = Check::of_layout(&layout, RUNS, Outcome::left_out(why));
+                let check = Check::new(subject, RUNS, Outcome::left_out(why));
                 self.add(check, Some(&layout));
             }
         }
@@ -283,7 +283,7 @@ impl CaseRun<'_> {
             .fold(format!("ranks-{}", layout.ranks.count()), |name, of| format!("{name}-{of}"));
         let meshed = self.mesh(&self.file, &name, MESHER, Tree::Final, layout)?;
         self.report.runs.push(meshed.run);
-        let mut check = Check::of_layout(layout, RUNS, Outcome::held(2));
+        let mut check = Check::new(&*subject, RUNS, Outcome::held(2));
         let is_first = self.report.checks.iter().all(|check| check.ranks.is_none());
         if is_first && meshed.ranks.is_none() {
             check.notes.push(DOUBT.to_owned());

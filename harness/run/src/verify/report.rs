@@ -105,11 +105,6 @@ impl Check {
         }
     }
 
-    /// A check of one run.
-    pub fn of_layout(layout: &Layout, name: impl Into<String>, outcome: Outcome) -> Self {
-        Self { ranks: layout.rank_count(), ..Self::new(layout.to_string(), name, outcome) }
-    }
-
     /// Whether it failed.
     pub fn failed(&self) -> bool {
         self.outcome.failed()
@@ -224,11 +219,6 @@ impl CaseReport {
         let held = on_ranks.filter(|check| check.outcome.holds()).count();
         let runs = self.runs.iter().filter(|run| run.layout.is_some()).count();
         assert_eq!(held, runs, "{name}: checks that a run ended well, and runs");
-    }
-
-    /// Numbers of its checks by outcome.
-    pub fn tally(&self) -> Tally {
-        Tally::of(self.checks.iter())
     }
 
     /// Whether any check failed.

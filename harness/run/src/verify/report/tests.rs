@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::report;
+use crate::testing::{of_layout, report};
 use proptest::prelude::*;
 
 #[test]
@@ -82,11 +82,9 @@ fn drawn() -> impl Strategy<Value = Report> {
                 ranks.iter().map(|&n| Layout::on(crate::engine::layout::Ranks::Mpi(n))).collect();
             let on_ranks = layouts.iter().map(|l| Run { layout: Some(l.clone()), ..of.clone() });
             let runs = std::iter::once(of.clone()).chain(on_ranks).collect();
-            let of_layout = |l| {
-                [RUNS, identical::NAME, manifest::NAME]
-                    .map(|name| Check::of_layout(l, name, Outcome::held(cells)))
-            };
-            let mut checks: Vec<_> = layouts.iter().flat_map(of_layout).collect();
+            let names = [RUNS, identical::NAME, manifest::NAME];
+            let checks_of = |l| names.map(|name| of_layout(l, name, Outcome::held(cells)));
+            let mut checks: Vec<_> = layouts.iter().flat_map(checks_of).collect();
             checks.push(Check::new("serial", DETERMINISTIC, Outcome::held(cells)));
             checks.extend(
                 (0..failures).map(|_| Check::new("serial", "balance", Outcome::fail("one"))),
