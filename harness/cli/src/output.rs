@@ -67,10 +67,10 @@ pub fn finish(code: u8) -> u8 {
 ///
 /// # Errors
 /// The file's name and the reason.
-pub fn put(path: &Path, text: &str) -> Result<(), Failure> {
+pub fn put(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     let make = || {
         path.parent().map_or(Ok(()), create_dir_all)?;
-        write_atomically(path, |out| out.write_all(text.as_bytes()))
+        write_atomically(path, |out| out.write_all(content.as_ref()))
     };
     make().map_err(|error| Failure::at(path, error))
 }
@@ -94,7 +94,7 @@ pub type Form<'a> = (Option<&'a Path>, &'a dyn Fn() -> String);
 pub fn put_forms(code: u8, forms: &[Form], summary: Option<&str>) -> Result<u8, Failure> {
     let write = || -> Result<(), Failure> {
         for (file, form) in forms {
-            file.map_or(Ok(()), |file| put(file, &form()))?;
+            file.map_or(Ok(()), |file| put(file, form()))?;
         }
         let page = env::var_os("GITHUB_STEP_SUMMARY").filter(|path| !path.is_empty());
         if let (Some(page), Some(text)) = (page, summary) {

@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let diagnosis = diagnose(&input, arguments.limit.get());
     println!("{}\n{diagnosis}", arguments.file.display());
     if let Some(path) = &arguments.json {
-        put(path, &pretty(&diagnosis))?;
+        put(path, pretty(&diagnosis))?;
     }
     Ok(if diagnosis.changes_region { EXIT_FAILED } else { EXIT_HOLDS })
 }

@@ -1,13 +1,13 @@
 //! `harness picture`: draws a slice of a mesh.
 
 use crate::options::{MeshArguments, Output, SelectionArguments, examples, number_in};
+use crate::output::put;
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
 use report::picture::colour::Colour;
-use report::picture::{Picture, Request, format_of, write};
+use report::picture::{Picture, Request, format_of};
 use run::engine::layout::{Layout, Ranks, SERIAL};
-use std::io;
 use std::path::Path;
 
 /// `harness picture`.
@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         zoom: arguments.zoom,
     };
     let picture = Picture::collect(&mesh, &request)?;
-    write(out, &format(&picture.svg()).map_err(io::Error::other)?)?;
+    put(out, format(&picture.svg())?)?;
     println!("{}\n{}", picture.title(), out.display());
     if case.is_none() {
         println!("the geometry is not drawn: name its case with --case");

@@ -10,18 +10,14 @@ mod tests;
 
 use colour::{Colour, Entry};
 use contract::case::Facet;
-use contract::failure::{Failure, named};
-use contract::files::write_atomically;
+use contract::failure::Failure;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Sides;
 use contract::mesh::Mesh;
 use contract::octant::UNITS_PER_CELL;
 use export::selection::{Selection, Slice};
 use geometry::tree::{Aabb, Point, bounds};
-use run::engine::interrupt;
 use squares::{SQUARES_MAX, Square, Squares};
-use std::io::{self, Write};
-use std::path::Path;
 
 pub use crate::figure::format::format_of;
 use crate::figure::map::{Fill, Map};
@@ -274,16 +270,4 @@ fn section(root: &Root, slice: Slice, window: &[Planar; 2], facets: &[Facet]) ->
         (ends[0] <= ends[1]).then(|| ends.map(|t| axes.map(|a| from[a] + (to - from)[a] * t)))
     };
     facets.iter().filter_map(cut).collect()
-}
-
-/// Writes a file, which is either complete or absent. It is absent if the user has interrupted the drawing.
-///
-/// # Errors
-/// If it cannot be written; the message names it.
-pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let fill = |out: &mut dyn Write| {
-        out.write_all(bytes)?;
-        if interrupt::requested() { Err(io::ErrorKind::Interrupted.into()) } else { Ok(()) }
-    };
-    write_atomically(path, fill).map_err(|error| named(path, &error))
 }

@@ -180,14 +180,10 @@ fn a_picture_without_cells_and_unknown_sides_are_errors() {
 }
 
 #[test]
-fn a_picture_is_written_in_the_format_of_its_name() {
-    let (place, mesh) = on_disk(vec![eight_and_seven()]);
+fn a_picture_has_the_format_of_its_name() {
+    let (_place, mesh) = on_disk(vec![eight_and_seven()]);
     let svg = Picture::collect(&mesh, &request(Colour::Level)).unwrap().svg();
-    let path = place.path().join("a.svg");
-    write(&path, &format_of(&path).unwrap()(&svg).unwrap()).unwrap();
-    assert_eq!(std::fs::read_to_string(path).unwrap(), svg);
-    let error = write(&place.path().join("no/a.svg"), b"").unwrap_err();
-    assert!(error.to_string().contains("no/a.svg"), "{error}");
+    assert_eq!(format_of("a.svg".as_ref()).unwrap()(&svg).unwrap(), svg.as_bytes());
     for name in ["a.vtk", "a", ".svg", "a.html"] {
         assert!(format_of(name.as_ref()).unwrap_err().contains(".svg"), "{name}");
     }
