@@ -71,39 +71,39 @@ pub type Broken = (usize, String);
 /// The rules that a record breaks, in the order of the rules.
 pub fn broken(groups: &Groups, lines: &[Line]) -> Vec<Broken> {
     let failures = failures(lines);
-    let why = || format!("{failures} runs failed and are missing in the figures");
-    let failed = (failures > 0).then(|| (2, why()));
+    let failed = || format!("{failures} runs failed and are missing in the figures");
     // Efficiencies are of medians per rank, and counts repeat exactly.
     let has_interval = |experiment: &str| ["strong", "spacing", "layers"].contains(&experiment);
     let shown = groups.all.iter().filter(|g| has_interval(&g.setup.experiment));
     let poor: Vec<usize> =
         shown.filter(|g| g.time_s.coverage < 0.95).map(|g| g.runs.len()).collect();
     let count = poor.len();
-    let vague = poor.iter().min().map(|least| (5, format!(
-        "{count} configurations have fewer than the six runs that an interval with 95 % coverage needs (minimum: {least})"
-    )));
-    let sessions = || lines.iter().filter_map(Line::session);
-    let is_documented = sessions().all(|session| {
-        let m = &session.machine;
-        let known = [&m.cpu, &m.kernel, &m.compiler, &m.commit].iter().all(|v| !v.is_empty());
-        known && m.memory_bytes > 0
-    });
-    let of_rule_9 = |is_broken: bool, why: &str| is_broken.then(|| (9, why.to_owned()));
-    let is_unknown = sessions().next().is_none() || !is_documented;
-    let unknown = of_rule_9(is_unknown, "machine, compiler or commit are missing in the record");
-    let is_unclean = sessions().any(|session| session.machine.commit.ends_with("-dirty"));
-    let unclean = of_rule_9(is_unclean, "a session ran with files that differ from its commit");
-    let disturbed = sessions().find(|s| s.load_average > 0.5 * s.machine.cores as f64);
-    let disturbed = disturbed.map(|s| {
-        (
-            9,
-            format!(
-                "other processes may have disturbed a session, whose load average was {:.1}",
-                s.load_average
-            ),
+    let vague = |least| {
+        format!(
+            "{count} configurations have fewer than the six runs that an interval with 95 % coverage needs (minimum: {least})"
         )
-    });
-    [failed, vague, unknown, unclean, disturbed].into_iter().flatten().collect()
+    };
+    let machines = machines(lines);
+    let is_known = |m: &Machine| {
+        let names = [&m.cpu, &m.kernel, &m.compiler, &m.commit];
+        names.iter().all(|name| !name.is_empty()) && m.memory_bytes > 0
+    };
+    let is_unknown = machines.is_empty() || !machines.iter().all(is_known);
+    let unknown = || "machine, compiler or commit are missing in the record".to_owned();
+    let is_unclean = machines.iter().any(|machine| machine.commit.ends_with("-dirty"));
+    let unclean = || "a session ran with files that differ from its commit".to_owned();
+    let mut loads = lines.iter().filter_map(Line::session).map(|s| (s.load_average, &s.machine));
+    let disturbed = |(load, _)| {
+        format!("other processes may have disturbed a session, whose load average was {load:.1}")
+    };
+    let rules = [
+        (2, (failures > 0).then(failed)),
+        (5, poor.iter().min().map(vague)),
+        (9, is_unknown.then(unknown)),
+        (9, is_unclean.then(unclean)),
+        (9, loads.find(|(load, machine)| *load > 0.5 * machine.cores as f64).map(disturbed)),
+    ];
+    rules.into_iter().filter_map(|(rule, why)| Some((rule, why?))).collect()
 }
 
 /// Number of runs that failed.
