@@ -146,28 +146,23 @@ fn of_metric(records: &[Record], series: &Series) -> Figure {
         let at = change.step.at;
         Plotted::vertical(name, style, x(at - 1).midpoint(x(at)), (low, high))
     };
-    let is_inside = |point: &&(usize, f64)| (low..=high).contains(&point.1);
-    let (inside, outside): (Vec<_>, Vec<_>) = series.points.iter().partition(is_inside);
-    let plotted = |name: &str, how: Provenance, style: usize, shown: &[&(usize, f64)]| {
-        let point =
-            |&&(commit, value): &&(usize, f64)| Point::exact(commit as f64, value.clamp(low, high));
-        let notes = shown.iter().map(|point| note(point)).collect();
-        let plotted = Plotted::new(name, how, style, shown.iter().map(point).collect());
-        Plotted { notes, ..plotted.drawn_as(Kind::Scattered) }
-    };
     let metric = series.name.rsplit('/').next().unwrap_or_default();
-    let mut lines = vec![plotted(metric, Provenance::Measured, 0, &inside)];
-    if !outside.is_empty() {
-        let name = "beyond the axis, drawn at its end";
-        lines.push(plotted(name, Provenance::Oversubscribed, 5, &outside));
-    }
-    lines.extend(series.changes.iter().map(mark));
+    let point = |&(commit, value): &(usize, f64)| Point::exact(commit as f64, value);
+    let points = series.points.iter().map(point).collect();
+    let values = Plotted::new(metric, Provenance::Measured, 0, points).drawn_as(Kind::Scattered);
+    let values = Plotted { notes: series.points.iter().map(note).collect(), ..values };
+    let beyond = series.points.iter().filter(|(_, value)| !(low..=high).contains(value)).count();
+    let caption = match beyond {
+        0 => String::new(),
+        _ => format!("{beyond} values are beyond the axis, and drawn at its ends."),
+    };
     Figure {
+        caption,
         id: file_name(&format!("metric-{}", series.name)),
         title: series.name.clone(),
         x: commits(records.len()),
         y: Axis { range: Some((low, high)), ..Axis::linear(series.unit) },
-        series: lines,
+        series: [values].into_iter().chain(series.changes.iter().map(mark)).collect(),
         is_flat: true,
         ..Figure::default()
     }
@@ -258,10 +253,12 @@ mod tests {
         let figure = of_metric(&records, words);
         let (low, high) = figure.y.range.unwrap();
         assert!((500.0..1000.0).contains(&low) && (1110.0..1500.0).contains(&high), "{low} {high}");
-        let series = figure.series;
-        assert_eq!((series[0].points.len(), series[1].points.len()), (29, 1));
-        assert_eq!(series[1].points[0].y, high);
-        assert!(series[1].notes[0].contains("1000000000"), "{:?}", series[1].notes);
+        assert!(figure.caption.starts_with("1 values are beyond"), "{}", figure.caption);
+        let notes = &figure.series[0].notes;
+        assert!(notes.iter().any(|note| note.contains("1000000000")), "{notes:?}");
+        // It is drawn all the same, at the upper end.
+        let svg = svg(&figure);
+        assert_eq!(svg.matches("<circle").count(), 2 * 30 + 1, "{svg}");
     }
 
     #[test]
