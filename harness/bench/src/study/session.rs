@@ -435,7 +435,7 @@ mod tests {
         let record = at("record.jsonl");
         let outcome = measure(&options, &record, &study, &programs, &|_| ()).unwrap();
         let is_left_out = |line: &Line| match &line.entry {
-            Entry::LeftOut(left) => left.why.contains("12 facets"),
+            Entry::LeftOut(left) => left.why.contains("facets_max"),
             _ => false,
         };
         let kinds: Vec<bool> = outcome.lines.iter().map(is_left_out).collect();

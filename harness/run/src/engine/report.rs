@@ -44,8 +44,6 @@ pub struct RunReport {
 /// The facets of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct Geometry {
-    /// Their number.
-    pub facets: u64,
     /// Their digest.
     pub digest: String,
 }

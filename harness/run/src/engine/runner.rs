@@ -115,14 +115,9 @@ impl Engine {
         }
         let (name, path) = (self.name(), self.program.display());
         let option = if name == "reference" { name } else { "mesher" };
-        let fix = match description::is_own(name) {
-            true => format!("build {path}, or give another path with --{option}"),
-            false => format!(
-                "{path} does not exist, which `program` (or else the first word of `serial`) names in the engine file {name}: correct it, \
-                 as in program = \"{{here}}/my-mesher\", or give --{option} PATH"
-            ),
-        };
-        let why = format!("the {option} is missing: {fix}");
+        let why = format!(
+            "the {option} is missing: build {path}, correct `program` in the engine file {name}, or give another path with --{option}"
+        );
         Err(contract::failure::Failure::missing(why))
     }
 

@@ -189,13 +189,12 @@ impl Needs {
         self.absent.get(&need).map(String::as_str)
     }
 
-    /// Why an oracle cannot be asked: it is missing, or has hung, which costs the whole time limit.
-    pub fn lacks_oracle(&self, oracle: &str) -> Option<Failure> {
-        let is_gone = |failure: &&Failure| {
+    /// Whether an oracle is missing, or has hung, which costs the whole time limit.
+    pub fn lacks_oracle(&self, oracle: &str) -> bool {
+        self.silent.borrow().iter().any(|failure| {
             failure.program == oracle
                 && matches!(failure.end, End::Missing(_) | End::TimedOut { .. })
-        };
-        self.silent.borrow().iter().find(is_gone).cloned()
+        })
     }
 
     /// Everything that is missing, once each. A check of a case that was named, or of any case at all, is always required.

@@ -89,8 +89,7 @@ impl CaseRun<'_> {
             _ => POINTS,
         };
         let sample = oracle::choose(case, &base.words, most, SEED);
-        let (gone, asked): (Vec<&str>, Vec<&str>) =
-            ORACLES.into_iter().partition(|of| needs.lacks_oracle(of).is_some());
+        let asked: Vec<&str> = ORACLES.into_iter().filter(|of| !needs.lacks_oracle(of)).collect();
         let (mut answers, mut failures) = (Vec::new(), Vec::new());
         let (paths, limit) = (&self.all.programs.paths, self.all.options.timeout);
         let (question, place) = ((&*sample.points, &*case.facets), self.place.join("oracles"));
@@ -107,8 +106,7 @@ impl CaseRun<'_> {
         let mut check = match answers.is_empty() {
             false => count(step, case, &sample, &answers),
             true => {
-                let first = gone.first().and_then(|of| needs.lacks_oracle(of));
-                let why = first.as_ref().or(failures.first()).map(Failure::to_string);
+                let why = needs.silent.borrow().first().map(Failure::to_string);
                 Check::new(step.0, step.1, Outcome::left_out(why.unwrap_or_default()))
             }
         };
