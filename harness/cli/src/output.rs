@@ -4,7 +4,6 @@
 use contract::failure::{EXIT_HOLDS, EXIT_OUTPUT, Failure, exit_first};
 use contract::files::write_atomically;
 use files::{message, plain};
-use run::engine::interrupt;
 use std::env;
 use std::fmt::Arguments;
 use std::fs::{OpenOptions, create_dir_all};
@@ -37,10 +36,7 @@ pub fn write(text: Arguments) {
 
 /// Writes a message to standard error, at most a screen. If that fails, there is no place left to report it.
 pub fn write_error(text: Arguments) {
-    match message(&text).to_string() {
-        text if text == "harness: interrupted" => interrupt::announce(),
-        text => _ = writeln!(stderr().lock(), "{text}"),
-    }
+    let _ = writeln!(stderr().lock(), "{}", message(&text));
 }
 
 fn note(written: io::Result<()>) {
