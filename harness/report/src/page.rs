@@ -45,22 +45,12 @@ pub(crate) fn figure(figure: &Figure, svg: &str) -> Markup {
     }
 }
 
-/// Text in which words between backquotes are set as code.
-pub fn with_code(text: &str) -> Markup {
-    html! {
-        @for (i, part) in text.split('`').enumerate() {
-            @if i % 2 == 1 { code { (part) } } @else { (part) }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn text_is_escaped_and_backquotes_become_code() {
-        assert_eq!(with_code("a `b<c` d").into_string(), "a <code>b&lt;c</code> d");
+    fn text_is_escaped() {
         let page = page("a & b", &table(&["<x>"], &[vec![html! { "<y>" }]]));
         for part in ["<title>a &amp; b</title>", "<th>&lt;x&gt;</th>", "<td>&lt;y&gt;</td>"] {
             assert!(page.contains(part), "{part} is missing in\n{page}");

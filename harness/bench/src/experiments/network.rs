@@ -42,7 +42,8 @@ pub fn measured(runner: &Runner) -> Result<Network, String> {
     }
     let one = |_| {
         let watch = Watch::new("pingpong", PING_PONG_LIMIT, runner.place);
-        let finished = process::run(&mut runner.launcher.command(2, &program), &watch);
+        let (mut command, _shared) = runner.launcher.command(2, &program);
+        let finished = process::run(&mut command, &watch);
         let printed = finished.map_err(|failure| failure.to_string())?.stdout;
         parse(&fs::read_to_string(printed).map_err(|error| error.to_string())?)
     };

@@ -195,7 +195,7 @@ pub fn cause(run: &Run, reference: &Run, network: &Network) -> String {
                 format!("; a single base leaf holds {:.1} % of the cells", 100.0 * leaf)
             });
             format!(
-                "{loss} ({percent:.0} %), mostly in `{name}`, where rank {rank} is slowest (lambda {lambda:.2}){leaf}"
+                "{loss} ({percent:.0} %), mostly in the phase {name}, where rank {rank} is slowest (lambda {lambda:.2}){leaf}"
             )
         }
     };
@@ -326,7 +326,7 @@ mod tests {
         let mut two = run(Comm::Sim, 100, &[("read", &[0.05, 0.05]), ("grade", &[3.0, 1.0])]);
         let text = cause(&two, &one, &FREE);
         assert!(
-            text.starts_with("67 % at 2 ranks: the work of the ranks is uneven (33 %), mostly in `grade`, where rank 0"),
+            text.starts_with("67 % at 2 ranks: the work of the ranks is uneven (33 %), mostly in the phase grade, where rank 0"),
             "{text}"
         );
         two.counters.insert("base_leaf_cells_max".into(), Spread::of(&[70.0, 10.0]));
@@ -339,7 +339,7 @@ mod tests {
         assert!(cause(&fine, &one, &slow).contains("messages take time"));
 
         let redundant = run(Comm::Sim, 100, &[("read", &[2.05, 2.05]), ("grade", &[2.0, 2.0])]);
-        assert!(cause(&redundant, &one, &FREE).contains("mostly in `read`"));
+        assert!(cause(&redundant, &one, &FREE).contains("mostly in the phase read"));
 
         let crossed = run(Comm::Sim, 100, &[("read", &[0.05, 2.0]), ("grade", &[2.0, 0.05])]);
         assert!(cause(&crossed, &one, &FREE).contains("not within phases"));

@@ -3,7 +3,7 @@
 
 use super::tables;
 use crate::figure::Figure;
-use crate::page::{figure, page as whole_page, with_code};
+use crate::page::{figure, page as whole_page};
 use bench::experiments::entry::{Entry, Line, Machine};
 use bench::experiments::group::Groups;
 use bench::order::distinct;
@@ -37,7 +37,7 @@ pub fn page(
         p { "Load imbalance λ = max/mean over ranks; efficiencies by the POP definitions." }
         @for table in tables::tables(groups) { (table.html()) }
         h2 id="causes" { "Causes of lost efficiency" }
-        ul { @for cause in tables::causes(groups) { li { (with_code(&cause)) } } }
+        ul { @for cause in tables::causes(groups) { li { (cause) } } }
         h2 id="rules" { "The twelve rules of Hoefler and Belli" }
         @if broken.is_empty() { p { "The record breaks none of them." } }
         ul { @for (rule, why) in broken { li { strong { "Rule " (rule) " is broken" } ": " (why) } } }

@@ -4,7 +4,7 @@
 //! killed run cannot affect another run.
 
 use super::paths::on_path;
-use super::service::Services;
+use super::service::{Services, Start};
 use contract::files::publications;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
@@ -185,13 +185,13 @@ impl Launcher {
         self.words.iter().map(move |word| word.replace(RANKS, &ranks.to_string()))
     }
 
-    /// The command that runs `program` on `ranks` ranks; the caller adds the arguments.
-    pub fn command(&self, ranks: usize, program: impl AsRef<OsStr>) -> Command {
+    /// The command that runs `program` on `ranks` ranks, prepared as by [`Self::prepare`]; the caller adds the arguments.
+    pub fn command(&self, ranks: usize, program: impl AsRef<OsStr>) -> Start {
         let mut words = self.words(ranks);
         let mut command = Command::new(words.next().expect("a template has a word with {ranks}"));
         command.args(words).arg(program);
-        set_environment(&mut command);
-        command
+        let shared = self.prepare(&mut command);
+        (command, shared)
     }
 
     /// Prepares the environment of a run, and makes a directory for its shared memory. `None` if the launcher may start ranks on other
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn a_template_is_filled_in() {
         let launcher = Launcher::parse("srun -n {ranks} --tasks={ranks}").unwrap();
-        let command = launcher.command(16, "mesher");
+        let (command, _) = launcher.command(16, "mesher");
         let words: Vec<_> = command.get_args().map(|w| w.to_string_lossy().into_owned()).collect();
         assert_eq!(words, ["-n", "16", "--tasks=16", "mesher"]);
         assert_eq!(command.get_program(), "srun");

@@ -7,7 +7,7 @@ use super::paths::{Input, Paths, on_path};
 use super::process::{self, Finished, Watch};
 use super::report::RunReport;
 use super::service::{self, Services};
-use super::templates::{LAUNCHER, Templates, Values, fill};
+use super::templates::{LAUNCHER, Values, fill};
 use crate::import;
 use clap::Args;
 use contract::failure::named;
@@ -89,8 +89,7 @@ impl Engine {
 
     /// The files that make the engine what it is: its program and what its commands name beside it, such as a script.
     pub fn files(&self) -> BTreeSet<PathBuf> {
-        let Templates { serial, parallel, simulated, .. } = &self.description.run;
-        let words = [serial, parallel, simulated].into_iter().flatten();
+        let words = self.description.run.commands().into_iter().flat_map(|(_, words)| words);
         let named = words.map(|word| PathBuf::from(fill(word, &self.places)));
         named.chain([self.program.clone()]).filter(|path| path.is_file()).collect()
     }
@@ -333,9 +332,8 @@ impl Engine {
     fn service(&self, count: usize) -> Option<(String, impl FnOnce() -> service::Start)> {
         let serve = Some(&self.description.run.serve).filter(|serve| !serve.is_empty())?;
         let start = move || {
-            let mut command = self.launcher.command(count, &self.program);
+            let (mut command, shared) = self.launcher.command(count, &self.program);
             command.args(serve);
-            let shared = self.launcher.prepare(&mut command);
             (command, shared)
         };
         Some((format!("{} on {count} ranks", self.program.display()), start))

@@ -56,7 +56,7 @@ pub struct Templates {
 
 impl Templates {
     /// The commands that start a run, by key.
-    fn commands(&self) -> [(&'static str, &[String]); 3] {
+    pub(super) fn commands(&self) -> [(&'static str, &[String]); 3] {
         [("serial", &self.serial), ("parallel", &self.parallel), ("simulated", &self.simulated)]
     }
 
