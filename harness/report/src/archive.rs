@@ -37,12 +37,8 @@ pub struct About {
     #[arg(long, value_name = "SPDX|URL")]
     pub licence: String,
     /// The day, such as `2026-01-31`
-    #[arg(skip = today())]
+    #[arg(skip = now_utc()[.."2026-01-31".len()].to_owned())]
     pub day: String,
-}
-
-fn today() -> String {
-    now_utc().chars().take("2026-01-31".len()).collect()
 }
 
 /// The metadata: files with their sizes, sessions with command, machine and time, programs with their digests.

@@ -42,7 +42,7 @@ fn script_command(name: &str, script: &str, paths: &Paths) -> Result<Command, Fa
         return Err(Failure::new(name, End::Missing(why)));
     }
     let mut command = Command::new(python);
-    command.arg("-B").arg(paths.oracles.join(script));
+    command.arg("-B").arg(paths.root.join("harness/oracles").join(script));
     Ok(command)
 }
 

@@ -87,7 +87,7 @@ struct Bench<'a> {
 /// If the gate cannot start; later failures are in the report.
 pub fn gate(options: &GateOptions, programs: &Programs) -> Result<GateReport, Failure> {
     let start = Instant::now();
-    let default = programs.paths.engines.join("gate.toml");
+    let default = programs.paths.root.join("harness/engines/gate.toml");
     let rules = Rules::read(options.rules.as_deref().unwrap_or(&default))?;
     let cases = rules.select(&options.case, programs)?;
     let engine = &programs.engine;

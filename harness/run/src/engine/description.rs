@@ -144,15 +144,16 @@ impl Description {
     /// # Errors
     /// One sentence, if the file is missing or wrong.
     pub fn find(name: &str, paths: &Paths) -> Result<Self, String> {
+        let engines = paths.root.join("harness/engines");
         let path = match name.ends_with(".toml") {
             true => PathBuf::from(name),
-            false => paths.engines.join(format!("{name}.toml")),
+            false => engines.join(format!("{name}.toml")),
         };
         let wrong = |why: String| format!("{}: {why}", path.display());
         let text = match OWN.iter().find(|(own, _)| *own == name) {
             Some((_, text)) => (*text).to_owned(),
             None => contract::files::read_text(&path).map_err(|error| {
-                let engines = paths.engines.display();
+                let engines = engines.display();
                 wrong(format!("{error}: give a name in {engines}, or a path that ends in .toml"))
             })?,
         };

@@ -54,8 +54,6 @@ pub struct Paths {
     pub mpirun: PathBuf,
     /// A Python with the oracles' packages: `HARNESS_PYTHON`, that of the repository's `.venv`, or one beside the harness.
     pub python: PathBuf,
-    /// Directory of the oracles' scripts.
-    pub oracles: PathBuf,
     /// The p4est program: `HARNESS_P4EST`, or `engines/p4est-balance` in the target directory of the harness or of the
     /// repository.
     pub p4est: PathBuf,
@@ -63,9 +61,7 @@ pub struct Paths {
     pub proven_checker: PathBuf,
     /// The catalogue of cases.
     pub catalogue: Catalogue,
-    /// Directory of the engine files.
-    pub engines: PathBuf,
-    /// The repository.
+    /// The repository, with the engine files and the oracles' scripts.
     pub root: PathBuf,
     /// The harness itself.
     pub harness: PathBuf,
@@ -91,11 +87,9 @@ impl Paths {
             python: from_env("HARNESS_PYTHON").unwrap_or_else(|| {
                 or_else(root.join(".venv/bin/python"), directory.join("python"))
             }),
-            oracles: root.join("harness/oracles"),
             p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| built("engines/p4est-balance")),
             proven_checker: from_env("HARNESS_PROVEN").unwrap_or_else(|| built("proof/check")),
             catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
-            engines: root.join("harness/engines"),
             root,
             harness,
         }

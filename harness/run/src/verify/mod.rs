@@ -108,8 +108,18 @@ impl Verification<'_> {
         let mut report = run.report;
         report.time_s = start.elapsed().as_secs_f64();
         let keep = self.options.keep || (report.failed() && !interrupt::requested());
-        report.kept = self.workplace.leave(&place, keep).map(|kept| kept.display().to_string());
+        leave(&place, keep);
+        report.kept = keep.then(|| place.display().to_string());
         Ok(report)
+    }
+}
+
+/// Removes the directory of a case, unless it is kept.
+fn leave(place: &Path, keep: bool) {
+    match keep {
+        true => publications().retain(|other| other != place),
+        // Failing to remove a directory is no reason to lose the report.
+        false => _ = fs::remove_dir_all(place),
     }
 }
 
@@ -158,17 +168,6 @@ impl Workplace {
         Ok(place)
     }
 
-    /// Removes the directory of a case, or keeps and returns it.
-    fn leave(&self, place: &Path, keep: bool) -> Option<PathBuf> {
-        if keep {
-            publications().retain(|other| other != place);
-            return Some(place.to_owned());
-        }
-        // Failing to remove a directory is no reason to lose the report.
-        let _ = fs::remove_dir_all(place);
-        None
-    }
-
     /// Closes it. A temporary directory is kept only for the cases that were kept in it.
     fn close(self, keep: bool) {
         self.temporary.filter(|_| keep).map(TempDir::keep);
@@ -186,7 +185,7 @@ mod tests {
             let workplace = Workplace::new(&options()).unwrap();
             let root = workplace.root.clone();
             let place = workplace.enter("cube").unwrap();
-            assert_eq!(workplace.leave(&place, keep).is_some(), keep);
+            leave(&place, keep);
             workplace.close(keep);
             assert_eq!((root.exists(), place.exists()), (keep, keep));
             let _ = fs::remove_dir_all(root);
@@ -203,7 +202,7 @@ mod tests {
             assert!(publications().contains(&place));
             place
         });
-        workplace.leave(&failed, true);
+        leave(&failed, true);
         assert!(!publications().contains(&failed) && publications().contains(&under_way));
     }
 
