@@ -65,7 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         false => measure(arguments, study, &record)?,
     };
     if let Some(directory) = report {
-        super::report::write(directory, &[]).map_err(|why| unwritten(code)(why.into()))?;
+        let written = super::report::write(directory, arguments.record.as_slice());
+        written.map_err(|why| unwritten(code)(why.into()))?;
     }
     Ok(code)
 }

@@ -63,6 +63,9 @@ fn met_targets_succeed_and_the_record_gives_the_same_table() {
     let shown = fixture.harness(&format!("{TARGETS_COMMAND} {only} --show"));
     assert_eq!(shown.code, 0, "{}", shown.printed);
     assert!(outcome.printed.contains(shown.printed.trim()), "{}", shown.printed);
+    // The record of a report may be elsewhere.
+    let apart = fixture.harness(&format!("{TARGETS_COMMAND} {only} --show --report apart"));
+    assert!(apart.code == 0 && fixture.path("apart/index.html").is_file(), "{}", apart.printed);
     // A text takes its numbers from the record.
     let check = |text: &str| {
         fixture.write("paper.tex", text);

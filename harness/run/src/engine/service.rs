@@ -42,7 +42,7 @@ struct Service {
     requests: Option<ChildStdin>,
     /// Its lines; disconnected at the end of its output.
     answers: Receiver<String>,
-    /// What it has written to the standard error since the last request.
+    /// What it has written to the standard error since its start or the last answer.
     errors: File,
     /// When it was sent.
     sent: Instant,
@@ -86,7 +86,6 @@ impl Services {
         self.start(name, start)?;
         let mut services = self.0.borrow_mut();
         let service = services.get_mut(name).expect("it has been started");
-        let _ = service.errors.set_len(0);
         service.sent = Instant::now();
         let line = serde_json::to_string(words).expect("words are text");
         // That the program has ended is found when it is waited for.
@@ -102,6 +101,7 @@ impl Services {
         let mut services = self.0.borrow_mut();
         let service = services.get_mut(name).expect("it was sent a request");
         let time_s = service.answer(watch);
+        let _ = service.errors.set_len(0);
         let is_usable = match &time_s {
             // After an interrupt all services are ended at the same time: one after the other, there is no time left for a report.
             Ok(_) | Err(End::Interrupted) => true,
@@ -236,6 +236,23 @@ mod tests {
                     Err(other) => panic!("{other:?}"),
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_a_program_prints_before_its_first_request_is_its_error() {
+        let place = tempfile::tempdir().unwrap();
+        let start = || {
+            let mut command = Command::new("sh");
+            command.args(["-c", "echo bang >&2; exit 7"]);
+            (command, None)
+        };
+        for _ in 0..50 {
+            let services = Services::default();
+            services.send("sh", start, &[]).unwrap();
+            let watch = Watch::new("sh", Duration::from_secs(60), place.path());
+            let failure = services.answer("sh", &watch).unwrap_err();
+            assert_eq!(failure.end, End::Exited { code: 7, error: "bang".to_owned() });
         }
     }
 }
