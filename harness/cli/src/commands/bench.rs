@@ -168,7 +168,7 @@ fn publish(
         let session = lines.iter().rev().find_map(Line::session);
         let unknown = || "a machine that the record does not describe".to_owned();
         let machine = session.map_or_else(unknown, |session| session.machine.to_string());
-        put(&path, &page::markdown(rows, &machine)).map_err(unwritten(code))?;
+        put(&path, page::markdown(rows, &machine)).map_err(unwritten(code))?;
         println!("table: {}", path.display());
     }
     Ok(code)

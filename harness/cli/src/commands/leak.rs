@@ -154,7 +154,7 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
         return Err(Failure::interrupted());
     }
     if let Some(file) = &arguments.json {
-        put(file, &pretty(answers))?;
+        put(file, pretty(answers))?;
     }
     let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
     of_path.map_or(Ok(()), |file| {
