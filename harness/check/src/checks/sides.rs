@@ -44,10 +44,8 @@ fn run(subject: &Subject, result: &mut CheckResult) {
     };
     let judges = if terms.seeds.is_empty() { "rays" } else { "seeds" };
     truth.compare(subject.tree(), &mut |found| {
-        let Some(side) = found.base.filter(|_| found.kinds != HOLES).map(Truth::side) else {
-            return;
-        };
-        if found.kinds == 1 << side as u8 {
+        let Some(side) = found.base.map(Truth::side) else { return };
+        if [HOLES, 1 << side as u8].contains(&found.kinds) {
             return;
         }
         let (given, leaf) = (contact::name(found.kinds), terms.root.place(found.octant));
