@@ -130,20 +130,15 @@ fn per_cell(useful_s: &Spread, run: &Run) -> f64 {
 /// # Panics
 /// If an efficiency exceeds 1 and no factor can be the reason: then a factor is wrong.
 pub fn above_one(all: &[Efficiency]) -> Option<String> {
-    let factors: [(Factor, &str); 2] = [
-        (
-            |e| e.computation_scaling,
-            "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: the cost of the \
-             same facets does not grow with the mesh, smaller parts of a mesh fit into caches better, or the base case was disturbed.",
-        ),
-        (
-            |e| e.transfer,
-            "Transfer is above 1 where ranks do not wait at the end of every phase, or where the clocks disagree.",
-        ),
-    ];
     let exceeds = |factor: Factor| all.iter().any(|e| factor(e) > SHOWN_AS_ONE);
-    let reasons = factors.iter().filter(|(factor, _)| exceeds(*factor)).map(|(_, why)| *why);
-    let reasons: Vec<&str> = reasons.collect();
+    let scaling = exceeds(|e| e.computation_scaling).then_some(
+        "Computation scaling is above 1 where all ranks together take less CPU time per cell than the base case: the cost of the \
+         same facets does not grow with the mesh, smaller parts of a mesh fit into caches better, or the base case was disturbed.",
+    );
+    let transfer = exceeds(|e| e.transfer).then_some(
+        "Transfer is above 1 where ranks do not wait at the end of every phase, or where the clocks disagree.",
+    );
+    let reasons: Vec<&str> = [scaling, transfer].into_iter().flatten().collect();
     let above = all.iter().find(|e| e.is_above_one());
     let has_reason = above.is_none() || !reasons.is_empty();
     assert!(has_reason, "an efficiency above 1 has a reason: {above:?}");
