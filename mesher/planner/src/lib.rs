@@ -22,7 +22,7 @@ mod pilot;
 #[cfg(test)]
 mod tests;
 
-pub use memory::{Tightest, address_space_left};
+pub use memory::Tightest;
 
 use bricks::octant::{Level, edge};
 use bricks::tree::Tree;

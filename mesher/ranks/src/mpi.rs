@@ -51,11 +51,6 @@ impl Mpi {
     }
 }
 
-/// Name and version of the MPI library, in the library's own words.
-pub fn library() -> String {
-    mpi::environment::library_version().unwrap_or_else(|_| "of unknown version".to_owned())
-}
-
 /// Ends all ranks of the job at once.
 pub fn abort(code: i32) -> ! {
     // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation; panics
