@@ -228,7 +228,6 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     interrupt::decided();
     record.report_status("done");
     if let Some(limit) = args.stall_limit {
-        comm.enter("done");
         interrupt::stop_at(format_args!("done:{}", comm.rank()));
         comm.barrier();
         end_within(limit);
@@ -301,7 +300,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
             }),
         )?;
     }
-    let options = options(args)?;
+    let options = options(args);
     let mut bytes = Vec::new();
     let done = if args.plan {
         let plan = planner::plan(&case, &options, comm, record)?;

@@ -178,19 +178,13 @@ impl Comm for Mpi {
     fn limit_calls(&self, limit: Duration) {
         self.watch.get_or_init(|| Watch::new(&self.world, limit));
     }
-
-    fn enter(&self, phase: &'static str) {
-        if let Some(watch) = self.watch.get() {
-            watch.enter(phase);
-        }
-    }
 }
 
 /// Waits for a collective call under a limit.
-fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, S>) {
-    let mut pending = Some(request);
-    watch.wait(|| {
-        pending = pending.take().and_then(|request| request.test().err());
-        pending.is_none()
-    });
+fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, mut request: Request<'a, D, S>) {
+    watch.start();
+    while let Err(pending) = request.test() {
+        watch.poll();
+        request = pending;
+    }
 }
