@@ -4,8 +4,8 @@
 mod support;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mesher::mesh;
 use mesher::record::Recorder;
+use mesher::{Job, mesh};
 use ranks::Solo;
 use std::time::Duration;
 
@@ -20,9 +20,9 @@ fn meshes(c: &mut Criterion) {
     ] {
         let case = support::case(shape, facets, finer, layer_cells_min);
         let run = || {
-            mesh(&case, &support::options(), &Solo, &mut Recorder::default())
-                .expect("a good case")
-                .cells
+            let (options, mut record) = (support::options(), Recorder::default());
+            let mut job = Job::new(&options, &Solo, &mut record);
+            mesh(&case, &mut job, |_, _| Ok(())).expect("a good case").cells
         };
         group.throughput(Throughput::Elements(run()));
         let name = format!("{shape}-{facets}-1/2^{finer}-n{layer_cells_min}").replace('/', "_");

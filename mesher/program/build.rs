@@ -11,14 +11,9 @@ fn main() {
 
 /// The commit, with the suffix `-dirty` if the work tree has changes. None if git is missing, or if the sources are no work tree.
 fn commit() -> Option<String> {
-    // A commit or a checkout changes one of these files. A file that does not exist would make every build run this again.
-    let branch = git(&["symbolic-ref", "-q", "HEAD"]);
-    for name in ["HEAD", "packed-refs"].into_iter().chain(branch.as_deref()) {
-        let path = git(&["rev-parse", "--path-format=absolute", "--git-path", name])?;
-        if Path::new(&path).exists() {
-            println!("cargo::rerun-if-changed={path}");
-        }
-    }
+    // A commit or a checkout appends to this file. Where git keeps none, every build runs this again.
+    let log = git(&["rev-parse", "--path-format=absolute", "--git-path", "logs/HEAD"])?;
+    println!("cargo::rerun-if-changed={log}");
     // Uncommitted changes of the mesher, or of the harness, make the work tree dirty.
     println!("cargo::rerun-if-changed=..");
     git(&["describe", "--always", "--dirty", "--abbrev=12"])

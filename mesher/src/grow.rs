@@ -22,14 +22,13 @@ use ranks::{Comm, Solo, agree, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
 
-/// Phases 3 to 8: from the facets and the rules on the lattice to the tree. `count` sees the base tree. Collective.
+/// Phases 3 to 8: from the facets and the rules on the lattice to the tree. Collective.
 ///
 /// # Errors
 /// The same on all ranks.
 pub fn grow<F: Borrow<[Facet]>>(
     Quantised { rules, facets, counts }: Quantised<F>,
     job: &mut Job,
-    count: impl FnOnce(&Tree, &Ownership),
 ) -> Result<Mesh, Error> {
     let (options, comm) = (job.options, job.comm);
     let division = &options.division;
@@ -80,8 +79,6 @@ pub fn grow<F: Borrow<[Facet]>>(
     });
     drop(all_facets);
     let is_whole = check::is_whole(options, &tree.split, comm);
-
-    count(&tree, &ownership);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
     let slice = facets.borrow();
@@ -179,7 +176,7 @@ fn of_base_mesh(
     let options = Options { ungraded: true, ..Options::default() };
     let mut record = Recorder::default();
     let quantised = Quantised { rules: base, facets, counts };
-    let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record), |_, _| {});
+    let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record));
     let gone = match rules.keep {
         Keep::Outside => Some(Side::Inside as u64),
         Keep::Inside => Some(Side::Outside as u64),

@@ -51,27 +51,13 @@ use input::{ingest, quantise};
 use output::report::Report;
 use output::write::OutDir;
 use output::{htg, leaves};
-use ranks::Comm;
-use record::Recorder;
 
-/// Meshes a case: all ten phases. The recorder keeps this rank's times; the report is the same on all ranks. Collective.
+/// Meshes a case: all ten phases, if `may_run` has no error after phase 2: it sees the facets and the rules on the lattice. The report is the
+/// same on all ranks. Collective.
 ///
 /// # Errors
 /// The same on all ranks. Then nothing is left in the output directory.
 pub fn mesh(
-    case: &Case,
-    options: &Options,
-    comm: &dyn Comm,
-    record: &mut Recorder,
-) -> Result<Report, Error> {
-    mesh_if(case, &mut Job::new(options, comm, record), |_, _| Ok(()))
-}
-
-/// The same if `may_run` has no error after phase 2: it sees the facets and the rules on the lattice. Collective.
-///
-/// # Errors
-/// The same on all ranks. Then nothing is left in the output directory.
-pub fn mesh_if(
     case: &Case,
     job: &mut Job,
     may_run: impl FnOnce(&Quantised, &Job) -> Result<(), Error>,
@@ -80,7 +66,7 @@ pub fn mesh_if(
     let out = job.options.out.as_ref().map(claim).transpose()?;
     let quantised = quantised(case, job)?;
     may_run(&quantised, job)?;
-    let mesh = grow(quantised, job, |_, _| {})?;
+    let mesh = grow(quantised, job)?;
     let report = finish(&mesh, out.as_ref(), job)?;
     stop_at(format_args!("complete:{}", job.comm.rank()));
     if let Some(out) = out {

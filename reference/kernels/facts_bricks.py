@@ -138,8 +138,8 @@ def rows_back(k):
     yield z3.And(k("from_rows", k("to_rows", w)).x == w.x, k("to_rows", k("from_rows", w)).x == w.x)
 
 
-@fact(BRICK, ("(w & low) << unit | (w & m[1]) << gap }", "(w & low) << unit | (w & m[2]) << gap }"),
-      ("let (low, unit, gap) = (m[0] | m[2], 1 << axis, 7 << axis)", "let (low, unit, gap) = (m[0] | m[1], 1 << axis, 7 << axis)"))
+@fact(BRICK, ("(w & low) << unit | (w & one) << gap }", "(w & low) << unit | (w & low) << gap }"),
+      ("(m[0][0] | m[2][2], m[1][1], 1 << axis, 7 << axis)", "(m[0][0] | m[1][1], m[1][1], 1 << axis, 7 << axis)"))
 def moved(k):
     """`moved` moves every octant by one position along an axis within the brick, and drops those that leave it, in all six directions."""
     for axis in AXES:
@@ -148,7 +148,7 @@ def moved(k):
             yield k("moved", w, usize(axis), up).x == union(w, lambda i: [j for j, beyond in [beside(i, axis, not up)] if not beyond])
 
 
-@fact(BRICK, ("(w & AXES[axis][3]) >> shift", "(w & AXES[axis][2]) >> shift"))
+@fact(BRICK, ("(w & SPANS[axis][3][3]) >> shift", "(w & SPANS[axis][2][2]) >> shift"))
 def across(k):
     """`across` moves the octants at a face of the brick to the opposite face, and drops all others, in all six directions."""
     for axis in AXES:

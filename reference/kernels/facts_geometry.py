@@ -47,7 +47,7 @@ def ranges(k):
         yield z3.And(*[z3.And(low.x <= x, x <= high.x) for x in c], z3.Or([low.x == x for x in c]), z3.Or([high.x == x for x in c]))
 
 
-@fact(FACET, ("u[k & 3] & w[2 * half + (k >> 2)]", "u[k & 3] & w[half + (k >> 2)]"))
+@fact(FACET, ("(k & 3, 2 * half + (k >> 2))", "(k & 3, half + (k >> 2))"))
 def columns(k):
     """`COLUMNS` of an axis, half and byte is the union of the columns of octants over the squares whose bits the byte has, for every byte."""
     table = k.sources.constant("COLUMNS", FACET)

@@ -31,7 +31,10 @@ class Sources:
     def find(self, kind, name, file, module=None):
         """The file that defines a function or constant, and where: this file if it does, else one of the module's name, else the only one."""
         pattern = re.compile(rf"\b{kind} {name}\b")
-        found = {f: m.start() for f, text in self.texts.items() if (m := pattern.search(text))}
+        places = {f: [m.start() for m in pattern.finditer(text)] for f, text in self.texts.items()}
+        # A function comes before a method of its name, which is indented.
+        indented = lambda f: lambda at: self.texts[f][self.texts[f].rfind("\n", 0, at) + 1] == " "
+        found = {f: min(of, key=indented(f)) for f, of in places.items() if of}
         named = [f for f in found if Path(f).stem == module]
         if file in found and not (named and module):
             return file, found[file]

@@ -28,45 +28,26 @@ impl Brick {
     }
 }
 
-/// Masks of the octants whose x position in the brick is 0, 1, 2, 3.
-pub const X: [u64; 4] = axis_masks(0);
-/// The same by y position.
-pub const Y: [u64; 4] = axis_masks(1);
-/// The same by z position.
-pub const Z: [u64; 4] = axis_masks(2);
-/// The masks by axis.
-pub const AXES: [[u64; 4]; 3] = [X, Y, Z];
+/// Masks of the octants whose position along an axis is in `first..=last`, by axis, `first` and `last`.
+pub const SPANS: [[[u64; 4]; 4]; 3] = [spans(0), spans(1), spans(2)];
 
-const fn axis_masks(axis: u32) -> [u64; 4] {
-    let mut masks = [0; 4];
+const fn spans(axis: u32) -> [[u64; 4]; 4] {
+    let mut table = [[0; 4]; 4];
     let mut bit = 0;
     while bit < 64u32 {
         let index = (bit >> axis & 1) | (bit >> (axis + 3) & 1) << 1;
-        masks[index as usize] |= 1 << bit;
-        bit += 1;
-    }
-    masks
-}
-
-/// Mask of the positions `first..=last` of one axis.
-const fn spans(m: [u64; 4]) -> [[u64; 4]; 4] {
-    let mut table = [[0; 4]; 4];
-    let mut a = 0;
-    while a < 4 {
-        let mut b = a;
-        let mut bits = 0;
-        while b < 4 {
-            bits |= m[b];
-            table[a][b] = bits;
-            b += 1;
+        let mut span = 0;
+        while span < 16u32 {
+            let (first, last) = (span >> 2, span & 3);
+            if first <= index && index <= last {
+                table[first as usize][last as usize] |= 1 << bit;
+            }
+            span += 1;
         }
-        a += 1;
+        bit += 1;
     }
     table
 }
-
-/// Masks of the octants whose position along an axis is in `first..=last`, by axis, `first` and `last`.
-pub const SPANS: [[[u64; 4]; 4]; 3] = [spans(X), spans(Y), spans(Z)];
 
 /// Mask of the bits that octants of level `l` can have: all but at levels 0 and 1.
 #[inline]
@@ -145,9 +126,9 @@ pub fn components(mut open: u64) -> impl Iterator<Item = u64> {
 /// The face neighbours of the octants `w` within the brick along `axis`, in the positive direction if `up`.
 #[inline]
 pub const fn moved(w: u64, axis: usize, up: bool) -> u64 {
-    let m = AXES[axis];
-    let (low, unit, gap) = (m[0] | m[2], 1 << axis, 7 << axis);
-    if up { (w & low) << unit | (w & m[1]) << gap } else { w >> unit & low | w >> gap & m[1] }
+    let m = SPANS[axis];
+    let (low, one, unit, gap) = (m[0][0] | m[2][2], m[1][1], 1 << axis, 7 << axis);
+    if up { (w & low) << unit | (w & one) << gap } else { w >> unit & low | w >> gap & one }
 }
 
 /// The face neighbours of the octants `w` in the neighbouring brick along `axis`, in the positive direction if
@@ -155,7 +136,7 @@ pub const fn moved(w: u64, axis: usize, up: bool) -> u64 {
 #[inline]
 pub const fn across(w: u64, axis: usize, up: bool) -> u64 {
     let shift = 9 << axis;
-    if up { (w & AXES[axis][3]) >> shift } else { (w & AXES[axis][0]) << shift }
+    if up { (w & SPANS[axis][3][3]) >> shift } else { (w & SPANS[axis][0][0]) << shift }
 }
 
 /// Reorders a brick's bits from Morton order to row order: x fastest, then y, then z.
@@ -246,10 +227,11 @@ mod tests {
 
     #[test]
     fn flood_fill_stops_at_walls() {
-        let wall = !X[1];
-        assert_eq!(flood(1, wall), X[0]);
-        assert_eq!(flood(1 << 63, wall), X[2] | X[3]);
-        assert_eq!(flood(X[1], wall), 0);
+        let x = SPANS[0];
+        let wall = !x[1][1];
+        assert_eq!(flood(1, wall), x[0][0]);
+        assert_eq!(flood(1 << 63, wall), x[2][3]);
+        assert_eq!(flood(x[1][1], wall), 0);
     }
 
     #[test]

@@ -109,6 +109,11 @@ impl BrickSet {
         self.low.len()
     }
 
+    /// Bytes that its bricks take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.low[..]) + size_of_val(&self.bits[..])
+    }
+
     /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
         self.low.is_empty()

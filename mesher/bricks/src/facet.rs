@@ -23,7 +23,7 @@
 //!   `m + floor(c / h) >= 0`. Since `h` is a power of two, the floor is an arithmetic shift. Constants are
 //!   therefore shifted first, and the lanes evaluate `m + floor(c / h)` in i64 for all octants.
 
-use crate::brick::{SPANS, X, Y, Z};
+use crate::brick::SPANS;
 use crate::octant::{Level, ROOT_BITS};
 use bytemuck::{Pod, Zeroable};
 
@@ -57,8 +57,7 @@ impl Facet {
 static COLUMNS: [[[u64; 256]; 2]; 3] = [columns(0), columns(1), columns(2)];
 
 const fn columns(a: usize) -> [[u64; 256]; 2] {
-    let families = [X, Y, Z];
-    let (u, w) = (families[(a + 1) % 3], families[(a + 2) % 3]);
+    let (u, w) = (SPANS[(a + 1) % 3], SPANS[(a + 2) % 3]);
     let mut table = [[0; 256]; 2];
     let mut half = 0;
     while half < 2 {
@@ -67,7 +66,8 @@ const fn columns(a: usize) -> [[u64; 256]; 2] {
             let mut k = 0;
             while k < 8 {
                 if m >> k & 1 == 1 {
-                    table[half][m] |= u[k & 3] & w[2 * half + (k >> 2)];
+                    let (i, j) = (k & 3, 2 * half + (k >> 2));
+                    table[half][m] |= u[i][i] & w[j][j];
                 }
                 k += 1;
             }

@@ -102,13 +102,9 @@ pub const fn word(l: Level, code: u64, side: Side) -> u64 {
     start57(l, code) << 7 | (l as u64) << 2 | side as u64
 }
 
-/// The path from the root in child digits, for messages: `3.1.4`; the root is `root`.
+/// The path from the root in child digits, for messages, such as `314`: the code in octal. That of the root is `0`.
 pub fn path(l: Level, code: u64) -> String {
-    if l == 0 {
-        return "root".into();
-    }
-    let digit = |i: Level| (code >> (3 * (l - 1 - i)) & 7).to_string();
-    (0..l).map(digit).collect::<Vec<_>>().join(".")
+    format!("{code:0width$o}", width = l as usize)
 }
 
 #[cfg(test)]
@@ -144,8 +140,8 @@ mod tests {
 
     #[test]
     fn paths_start_at_the_root() {
-        assert_eq!(path(0, 0), "root");
-        assert_eq!(path(3, 0o314), "3.1.4");
+        assert_eq!(path(0, 0), "0");
+        assert_eq!((path(3, 0o314), path(4, 0o314)), ("314".into(), "0314".into()));
     }
 
     #[test]

@@ -49,11 +49,6 @@ impl Tree {
         root.into_iter().chain(above.child_bricks())
     }
 
-    /// The deepest level at which an octant is split, plus one; 0 for a root that is a leaf.
-    pub fn depth(&self) -> Level {
-        (0..LEVELS).rev().find(|&l| !self.split[l].is_empty()).map_or(0, |l| l as Level + 1)
-    }
-
     /// Checks the first two invariants on the bricks that this rank holds.
     ///
     /// # Panics
@@ -132,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "octant 1.0 of level 2 is split, but its parent is not")]
+    #[should_panic(expected = "octant 10 of level 2 is split, but its parent is not")]
     fn a_split_octant_without_a_split_parent_is_found() {
         let mut tree = small();
         tree.split[2] = set(&[0, 0o10]);
@@ -140,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "octant 0.0 of level 2 is crossing, but no leaf")]
+    #[should_panic(expected = "octant 00 of level 2 is crossing, but no leaf")]
     fn a_crossing_octant_that_is_split_is_found() {
         let mut tree = small();
         tree.crossing[2] = set(&[0]);
@@ -148,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "octant 0.0.1 of level 3 is deleted")]
+    #[should_panic(expected = "octant 001 of level 3 is deleted")]
     fn a_deleted_leaf_that_crosses_is_found() {
         let mut deleted = per_level();
         deleted[3] = set(&[1, 2]);

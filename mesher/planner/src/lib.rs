@@ -8,9 +8,8 @@
 //! counted as communication of the mesher. The mesher knows nothing of its planner: [`mesh`] asks before it lets it run.
 //!
 //! Invariants of a plan, which [`Plan::check_invariants`] executes before it is returned:
-//! - it fits if and only if the tightest limit leaves what is needed; only otherwise does it name a factor, above 1;
 //! - pilots become finer; if the last one is the run itself, the cells are its cells;
-//! - each rank has an entry; times are finite; the leaf words take about 8 bytes for each cell.
+//! - times are finite; the leaf words take about 8 bytes for each cell.
 
 #![deny(missing_docs)]
 
@@ -22,10 +21,9 @@ mod pilot;
 #[cfg(test)]
 mod tests;
 
-pub use memory::{Tightest, address_space_left};
+pub use memory::Tightest;
 
 use bricks::octant::{Level, edge};
-use bricks::tree::Tree;
 use memory::Ranks;
 use mesher::error::Error;
 use mesher::input::case::Case;
@@ -34,11 +32,9 @@ use mesher::input::quantise::Quantised;
 use mesher::output::leaves;
 use mesher::output::report::{Report, grouped};
 use mesher::partition::area;
-use mesher::partition::cost::Counts;
-use mesher::partition::ownership::Ownership;
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
-use pilot::{Amounts, Boxes, Pilot};
+use pilot::{Amounts, Pilot, boxed_in};
 use ranks::{Comm, gather, uncounted};
 use serde::Serialize;
 use std::fmt;
@@ -122,13 +118,12 @@ pub fn mesh(
     comm: &dyn Comm,
     record: &mut Recorder,
 ) -> Result<Report, Error> {
-    mesher::mesh_if(case, &mut Job::new(options, comm, record), |quantised, job| {
+    mesher::mesh(case, &mut Job::new(options, comm, record), |quantised, job| {
         if is_forced {
             return Ok(());
         }
-        let boxes = Boxes::new(&quantised.rules.boxes);
-        let run = &mut |shift| pilot(quantised, &boxes, shift, options, comm);
-        uncounted(comm, || Problem::new(quantised, &boxes, job).check(run))
+        let run = &mut |shift| pilot(quantised, shift, options, comm);
+        uncounted(comm, || Problem::new(quantised, job).check(run))
     })
 }
 
@@ -145,15 +140,13 @@ pub fn plan(
     let mut job = Job::new(options, comm, record);
     let quantised = mesher::quantised(case, &mut job)?;
     job.record.report_status("plan");
-    let boxes = Boxes::new(&quantised.rules.boxes);
-    let run = &mut |shift| pilot(&quantised, &boxes, shift, options, comm);
-    uncounted(comm, || Problem::new(&quantised, &boxes, &job).plan(run))
+    let run = &mut |shift| pilot(&quantised, shift, options, comm);
+    uncounted(comm, || Problem::new(&quantised, &job).plan(run))
 }
 
 /// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
 fn pilot(
     quantised: &Quantised,
-    boxes: &Boxes,
     shift: Level,
     options: &Options,
     comm: &dyn Comm,
@@ -162,15 +155,11 @@ fn pilot(
     let run = |rules: Rules| {
         let mut record = Recorder::default();
         let job = &mut Job::new(&options, comm, &mut record);
-        let mut bytes_sides = 0.0;
-        let count = |tree: &Tree, ownership: &Ownership| {
-            bytes_sides = pilot::bytes_sides(tree, &Counts::of_rank(tree, ownership));
-        };
         let facets = &quantised.facets[..];
         let counts = quantised.counts;
-        let mesh = grow(Quantised { rules, facets, counts }, job, count)?;
+        let mesh = grow(Quantised { rules, facets, counts }, job)?;
         let (counts, ..) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
-        Ok(pilot::amounts(bytes_sides, &mesh, counts.total(), job, boxes))
+        Ok(pilot::amounts(&mesh, counts.total(), job, &quantised.rules.boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     match run(rules.clone()) {
@@ -181,7 +170,7 @@ fn pilot(
 }
 
 impl<'a> Problem<'a> {
-    fn new(quantised: &'a Quantised, boxes: &Boxes, job: &Job<'a>) -> Self {
+    fn new(quantised: &'a Quantised, job: &Job<'a>) -> Self {
         let rules = &quantised.rules;
         let face = (edge(rules.level_surface) as f64).powi(2);
         let faces = job.comm.sum((area::total(&quantised.facets) / face) as u64) as f64;
@@ -190,7 +179,10 @@ impl<'a> Problem<'a> {
         let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);
         Self {
             rules,
-            rough: [faces * area::leaves_per_surface_cell(rules) as f64, boxes.cells()],
+            rough: [
+                faces * area::leaves_per_surface_cell(rules) as f64,
+                boxed_in(&rules.boxes, 0, 0),
+            ],
             times_s: [gather(job.comm, &[before]).iter().sum(), times.map(|(_, time)| time).sum()],
             comm: job.comm,
         }
@@ -279,13 +271,8 @@ impl Plan {
     /// # Panics
     /// If an invariant at the head of this file is violated.
     pub fn check_invariants(&self) {
-        assert_eq!(self.memory_peak_bytes.len(), self.ranks, "an entry for each rank");
         let words = self.words_bytes * self.ranks as u64;
         assert!(words / 8 >= self.cells / 2, "{words} bytes of words for {} cells", self.cells);
-        let fits = self.tightest.is_none_or(|t| t.fits());
-        assert_eq!(self.fits, fits, "the tightest limit must decide: {:?}", self.tightest);
-        let factor = self.spacing_factor_fits;
-        assert!(factor.is_none_or(|f| !fits && f > 1.0), "{factor:?} for a plan that fits");
         let time = self.time_cpu_s;
         assert!(time.is_finite() && time >= 0.0, "{time} s of CPU time");
         let factors = |p: &[PilotEntry]| p[0].spacing_factor > p[1].spacing_factor;
@@ -323,14 +310,6 @@ impl Plan {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for p in &self.pilots {
-            let (factor, cells) = (p.spacing_factor, grouped(p.cells));
-            writeln!(
-                f,
-                "pilot          {factor} times the spacings: {cells} cells, {:.2} s of CPU time",
-                p.time_cpu_s
-            )?;
-        }
         writeln!(f, "cells          {}", self.about())?;
         writeln!(f, "time           {:.2} s of CPU time over all ranks", self.time_cpu_s)?;
         let peaks = &self.memory_peak_bytes;

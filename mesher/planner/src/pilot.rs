@@ -6,12 +6,12 @@
 //! overlap, and with slower terms for the far field. Two pilot runs give the first term and one for all others, whose base lies
 //! between 2 and 1 for the slower ones.
 
-use bricks::brickset::ones;
+use bricks::brick;
+use bricks::brickset::{BrickSet, ones};
 use bricks::octant::{Level, corner, edge};
-use bricks::tree::{PerLevel, Tree};
+use bricks::tree::PerLevel;
 use bytemuck::{Pod, Zeroable};
 use mesher::input::lattice::{ExtentBox, Rules};
-use mesher::partition::cost::Counts;
 use mesher::{Job, Mesh};
 
 /// Number of quantities in [`Amounts`].
@@ -60,12 +60,6 @@ impl Amounts {
     }
 }
 
-/// Bytes of a brick in a set: half a key and 64 bits.
-const BRICK: f64 = 12.0;
-/// Bytes of a brick in `sides`: its first component; and its split octants and first child if its level has any.
-const NODE: [f64; 2] = [4.0, 12.0];
-/// Bytes of a local component: its octants, its parent in the union-find and its class.
-const COMPONENT: f64 = 13.0;
 /// Copies of the graded sets that exist at a time in gradation: the sets, and for one level also the octants reached and the union that
 /// replaces the set. Measured on a sphere with layers of 4 to 30 cells.
 const COPIES_GRADED: f64 = 1.75;
@@ -85,22 +79,13 @@ pub fn coarser(rules: &Rules, shift: Level) -> Rules {
     }
 }
 
-/// Bytes that this rank needs while the sides of the base tree are decided.
-pub fn bytes_sides(tree: &Tree, counts: &Counts) -> f64 {
-    let linked: usize = (0..tree.depth()).map(|l| Tree::exists(&tree.split, l).count()).sum();
-    BRICK * (bricks(&tree.split) + bricks(&tree.crossing))
-        + NODE[0] * counts.bricks as f64
-        + NODE[1] * linked as f64
-        + COMPONENT * counts.components as f64
+fn bytes(sets: &PerLevel) -> f64 {
+    sets.iter().map(BrickSet::bytes).sum::<usize>() as f64
 }
 
-fn bricks(sets: &PerLevel) -> f64 {
-    sets.iter().map(|s| s.len() as f64).sum()
-}
-
-/// What this rank needs for a pilot run of some cells.
-pub fn amounts(bytes_sides: f64, mesh: &Mesh, cells: u64, job: &Job, boxes: &Boxes) -> Amounts {
-    let stored = bricks(&mesh.crossing) + bricks(&mesh.sides.stored);
+/// What this rank needs for a pilot run of some cells of a case with some boxes.
+pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amounts {
+    let stored = bytes(&mesh.crossing) + bytes(&mesh.sides.stored);
     let time = |of: &[&str]| -> f64 {
         let phases = job.record.phases().iter();
         phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
@@ -110,11 +95,11 @@ pub fn amounts(bytes_sides: f64, mesh: &Mesh, cells: u64, job: &Job, boxes: &Box
     let time_cells_s = time(&["sides", "leaks", "grade", "rebalance", "share top", "leaves"]);
     Amounts {
         cells: cells as f64,
-        cells_boxed_deleted: boxes.deleted(mesh),
+        cells_boxed_deleted: boxed_in_deleted(boxes, mesh),
         tests: job.counters.facet_brick_tests as f64
             + job.counters.bricks_voxelised as f64 / VISITS_PER_TEST,
-        bytes_sides,
-        bytes_graded: BRICK * (stored + COPIES_GRADED * bricks(&mesh.split)),
+        bytes_sides: mesh.sides.bytes as f64,
+        bytes_graded: stored + COPIES_GRADED * bytes(&mesh.split),
         time_refine_s,
         time_cells_s,
         time_fixed_s: all - time_refine_s - time_cells_s,
@@ -181,74 +166,41 @@ fn shell_at(further: i32, fine: f64, coarse: Option<f64>) -> f64 {
     of_area * by_area + (fine - of_area) * by_length
 }
 
-/// More boxes are not intersected with each other, which takes the cube of their number: their overlaps count repeatedly.
-const INTERSECTED_MAX: usize = 24;
+/// Deepest level of the octants in which overlapping boxes are told apart.
+const LEVEL_OVERLAP: Level = 6;
 
-/// The disjoint parts of extent boxes, where boxes overlap of the finest of them.
-#[derive(Clone, Debug, Default)]
-pub struct Boxes(Vec<ExtentBox>);
+/// The cells that boxes ask for in an octant; where boxes overlap, the finest of them.
+pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
+    let (min, h) = (corner(l, code), edge(l));
+    let near: Vec<ExtentBox> = boxes.iter().filter(|b| b.meets(min, h)).copied().collect();
+    if near.len() > 1 && l < LEVEL_OVERLAP {
+        return (code << 3..).take(8).map(|child| boxed_in(&near, l + 1, child)).sum();
+    }
+    let cells = |b: &ExtentBox| {
+        let span = |a: usize| b.max[a].min(min[a] + h) - b.min[a].max(min[a]);
+        (0..3).map(|a| span(a) as f64 / edge(b.level) as f64).product()
+    };
+    near.iter().map(cells).fold(0.0, f64::max)
+}
 
-impl Boxes {
-    /// The disjoint parts of some boxes.
-    pub fn new(boxes: &[ExtentBox]) -> Self {
-        if boxes.len() > INTERSECTED_MAX {
-            return Self(boxes.to_vec());
+/// The cells that boxes ask for in deleted leaves that this rank owns.
+fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
+    let mut cells = 0.0;
+    for (l, deleted) in (0..).zip(mesh.sides.deleted()) {
+        let is_near =
+            |key: u64| boxes.iter().any(|b| b.meets(brick::min_corner(l, key), 4 * edge(l)));
+        for b in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key) && is_near(b.key)) {
+            let leaves = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
+            cells += leaves.map(|code| boxed_in(boxes, l, code)).sum::<f64>();
         }
-        let ends: [Vec<i64>; 3] = std::array::from_fn(|a| {
-            let mut ends: Vec<i64> = boxes.iter().flat_map(|b| [b.min[a], b.max[a]]).collect();
-            ends.sort_unstable();
-            ends.dedup();
-            ends
-        });
-        let mut parts = Vec::new();
-        for z in ends[2].windows(2) {
-            for y in ends[1].windows(2) {
-                for x in ends[0].windows(2) {
-                    let (min, max) = ([x[0], y[0], z[0]], [x[1], y[1], z[1]]);
-                    let holds =
-                        |b: &&ExtentBox| (0..3).all(|a| b.min[a] <= min[a] && max[a] <= b.max[a]);
-                    let level = boxes.iter().filter(holds).map(|b| b.level).max();
-                    parts.extend(level.map(|level| ExtentBox { min, max, level }));
-                }
-            }
-        }
-        Self(parts)
     }
-
-    /// The cells that the boxes ask for in the root.
-    pub fn cells(&self) -> f64 {
-        self.cells_in([0; 3], edge(0))
-    }
-
-    /// The cells that the boxes ask for in a cube.
-    fn cells_in(&self, corner: [i64; 3], h: i64) -> f64 {
-        let in_part = |part: &ExtentBox| -> f64 {
-            let ends = |a: usize| (part.max[a].min(corner[a] + h), part.min[a].max(corner[a]));
-            let along = |a: usize| (ends(a).0 - ends(a).1).max(0) as f64 / edge(part.level) as f64;
-            (0..3).map(along).product()
-        };
-        self.0.iter().map(in_part).sum()
-    }
-
-    /// The cells that the boxes ask for in deleted leaves that this rank owns.
-    fn deleted(&self, mesh: &Mesh) -> f64 {
-        let mut cells = 0.0;
-        for (l, deleted) in (0..).zip(mesh.sides.deleted()).filter(|_| !self.0.is_empty()) {
-            for brick in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
-                if self.cells_in(corner(l, brick.key << 6), 4 * edge(l)) > 0.0 {
-                    let at = |bit| corner(l, brick.key << 6 | u64::from(bit));
-                    cells +=
-                        ones(brick.bits).map(|bit| self.cells_in(at(bit), edge(l))).sum::<f64>();
-                }
-            }
-        }
-        cells
-    }
+    cells
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bricks::octant::morton;
 
     #[test]
     fn shells_and_boxes_grow_as_their_dimensions() {
@@ -309,12 +261,18 @@ mod tests {
         let h = edge(5);
         let coarse = ExtentBox { min: [0; 3], max: [4 * h; 3], level: 5 };
         let fine = ExtentBox { min: [3 * h; 3], max: [5 * h; 3], level: 6 };
-        let boxes = Boxes::new(&[coarse, coarse, fine]);
-        assert_eq!(boxes.cells(), 63.0 + 64.0);
-        assert_eq!(boxes.cells_in([3 * h; 3], h), 8.0);
-        assert_eq!(boxes.cells_in([5 * h; 3], h), 0.0);
-        assert_eq!(Boxes::new(&[]).cells(), 0.0);
-        let counted = |copies: usize| Boxes::new(&vec![coarse; copies]).cells();
-        assert_eq!((counted(24), counted(25)), (64.0, 25.0 * 64.0));
+        let boxes = [coarse, coarse, fine];
+        assert_eq!(boxed_in(&boxes, 0, 0), 63.0 + 64.0);
+        assert_eq!(boxed_in(&boxes, 5, morton([3; 3])), 8.0);
+        assert_eq!(boxed_in(&boxes, 5, morton([5; 3])), 0.0);
+        assert_eq!(boxed_in(&[], 0, 0), 0.0);
+        // Below the level to which overlaps are resolved, the finest box counts where several meet.
+        let h = edge(LEVEL_OVERLAP + 1);
+        let [low, high] = [[0; 3], [h; 3]].map(|min| ExtentBox {
+            min,
+            max: min.map(|c| c + h),
+            level: LEVEL_OVERLAP + 1,
+        });
+        assert_eq!((boxed_in(&[low], 0, 0), boxed_in(&[low, high], 0, 0)), (1.0, 1.0));
     }
 }

@@ -45,15 +45,10 @@ fn the_finer_pilot_takes_a_moment_or_has_a_64th_of_the_cells() {
     assert!(plan.words_bytes.abs_diff(ROUGH as u64 * 8 + WORDS_HEADER) <= 8);
     assert!(plan.tree_bytes.abs_diff((ROUGH * TREE_BYTES_PER_CELL) as u64) <= 1);
     plan.check_invariants();
-    let corruptions: [&dyn Fn(&mut Plan); 7] = [
-        &|p| p.fits = false,
-        &|p| p.spacing_factor_fits = Some(2.0),
-        &|p| _ = p.memory_peak_bytes.pop(),
-        &|p| p.words_bytes /= 3,
-        &|p| p.time_cpu_s = f64::NAN,
-        &|p| p.pilots.reverse(),
-        &|p| p.pilots[1].spacing_factor = 1.0,
-    ];
+    let corruptions: [&dyn Fn(&mut Plan); 4] =
+        [&|p| p.words_bytes /= 3, &|p| p.time_cpu_s = f64::NAN, &|p| p.pilots.reverse(), &|p| {
+            p.pilots[1].spacing_factor = 1.0
+        }];
     for (number, corrupt) in corruptions.into_iter().enumerate() {
         let mut wrong = plan.clone();
         corrupt(&mut wrong);
@@ -77,7 +72,7 @@ fn what_is_written_takes_time() {
         let mut record = Recorder::default();
         let mut job = Job::new(&options, &Solo, &mut record);
         let quantised = mesher::quantised(&case(), &mut job).unwrap();
-        Problem::new(&quantised, &Boxes::default(), &job).times_s[1]
+        Problem::new(&quantised, &job).times_s[1]
     };
     assert_eq!([time(true, false), time(false, true), time(true, true)], [4e-9, 2.5e-9, 6.5e-9]);
 }
@@ -139,9 +134,8 @@ fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
         let quantised =
             mesher::quantised(&case(), &mut Job::new(&options, comm, &mut Recorder::default()))
                 .unwrap();
-        let boxes = Boxes::new(&quantised.rules.boxes);
-        let run = |shift| pilot(&quantised, &boxes, shift, &options, comm).unwrap();
-        ([2, 1, 0].map(run), boxes.cells())
+        let run = |shift| pilot(&quantised, shift, &options, comm).unwrap();
+        ([2, 1, 0].map(run), boxed_in(&quantised.rules.boxes, 0, 0))
     };
     let all = match ranks {
         1 => vec![on_rank(&Solo)],
@@ -163,7 +157,7 @@ fn two_pilot_runs_predict_the_mesh() {
     let counted =
         |a: &Amounts| [a.cells, a.cells_boxed_deleted, a.tests, a.bytes_sides, a.bytes_graded];
     // These repeat exactly: a change of what is counted shows here.
-    assert_eq!(counted(&mesh), [764868.0, 27894.96431997696, 22726.6, 313493.0, 195327.0]);
+    assert_eq!(counted(&mesh), [764868.0, 27894.96431997696, 22726.6, 313581.0, 195327.0]);
     assert!(mesh.cells_boxed_deleted > 1000.0 && mesh.cells > 1e5, "{mesh:?}");
     let pilot = Pilot { shift: 1, amounts: fine, coarser: Some(coarse), cells_boxed };
     let predicted = pilot.at(0);
@@ -184,7 +178,7 @@ fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
         let options = options();
         let quantised =
             mesher::quantised(&case, &mut Job::new(&options, &Solo, &mut Recorder::default()))?;
-        pilot(&quantised, &Boxes::default(), shift, &options, &Solo)
+        pilot(&quantised, shift, &options, &Solo)
     };
     // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
     assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
@@ -225,9 +219,7 @@ fn a_plan_says_all_that_a_run_takes() {
     let mut plan = plan_for_people();
     assert_eq!(
         plan.to_string(),
-        "pilot          4 times the spacings: 12,345 cells, 0.50 s of CPU time\n\
-         pilot          2 times the spacings: 12,345 cells, 0.50 s of CPU time\n\
-         cells          about 1.2e6\n\
+        "cells          about 1.2e6\n\
          time           12.60 s of CPU time over all ranks\n\
          peak memory    5.5 MB over all ranks, 3.5 MB on a rank at most\n\
          files          leaf words of 4.1 MB per rank; or a tree of 1.2 kB\n\

@@ -10,7 +10,7 @@ use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
 use mesher::record::Recorder;
-use ranks::{Comm, STALLED, Solo, agree, launch, sim, text_of_first, uncounted};
+use ranks::{Comm, STALLED, Solo, agree, first_other, launch, sim, text_of_first, uncounted};
 use std::env::args_os;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
@@ -88,26 +88,7 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
-/// Time for rank 0 to end the job.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
-const ADDRESS_SPACE_MPI: f64 = 384e6;
-
 fn run_mpi(asked: &Result<Args, Error>) -> i32 {
-    let left = planner::address_space_left();
-    if left < ADDRESS_SPACE_MPI {
-        let e = Error::memory(format!(
-            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
-            left / 1e6,
-            (ADDRESS_SPACE_MPI - left) / 1e6
-        ));
-        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
-        if !launch::is_first() {
-            sleep(PATIENCE);
-        }
-        return fail(&e, true);
-    }
     let comm = launch::join();
     match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
@@ -166,20 +147,14 @@ fn print(done: &Done) -> i32 {
 
 /// The command line of rank 0, which all ranks follow. Collective.
 fn of_first(asked: &Result<Args, Error>, comm: &dyn Comm) -> Result<Args, Error> {
-    let words = args_os().skip(1).map(|w| w.to_string_lossy().into_owned());
-    let mine: Vec<String> = once(env!("VERSION").to_owned()).chain(words).collect();
-    let mine = mine.join("\0");
+    if let Some(rank) = first_other(comm, &env!("VERSION")) {
+        return Err(Error::input(format!(
+            "rank {rank} is another version of the mesher than rank 0: start the same program on all ranks"
+        )));
+    }
+    let words: Vec<_> = args_os().map(|w| w.to_string_lossy().into_owned()).collect();
+    let mine = words.join("\0");
     let first = text_of_first(comm, &mine);
-    let version = first.split('\0').next().unwrap_or_default();
-    let is_same = match version == env!("VERSION") {
-        true => Ok(()),
-        false => Err(Error::input(format!(
-            "rank {} is a mesher of version {}, rank 0 of {version}: start the same program on all ranks",
-            comm.rank(),
-            env!("VERSION")
-        ))),
-    };
-    agree(comm, is_same)?;
     if first == mine { asked.clone() } else { parse(first.split('\0')) }
 }
 
@@ -253,7 +228,6 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     interrupt::decided();
     record.report_status("done");
     if let Some(limit) = args.stall_limit {
-        comm.enter("done");
         interrupt::stop_at(format_args!("done:{}", comm.rank()));
         comm.barrier();
         end_within(limit);
@@ -326,7 +300,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
             }),
         )?;
     }
-    let options = options(args)?;
+    let options = options(args);
     let mut bytes = Vec::new();
     let done = if args.plan {
         let plan = planner::plan(&case, &options, comm, record)?;

@@ -51,11 +51,6 @@ impl Mpi {
     }
 }
 
-/// Name and version of the MPI library, in the library's own words.
-pub fn library() -> String {
-    mpi::environment::library_version().unwrap_or_else(|_| "of unknown version".to_owned())
-}
-
 /// Ends all ranks of the job at once.
 pub fn abort(code: i32) -> ! {
     // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation; panics
@@ -183,19 +178,13 @@ impl Comm for Mpi {
     fn limit_calls(&self, limit: Duration) {
         self.watch.get_or_init(|| Watch::new(&self.world, limit));
     }
-
-    fn enter(&self, phase: &'static str) {
-        if let Some(watch) = self.watch.get() {
-            watch.enter(phase);
-        }
-    }
 }
 
 /// Waits for a collective call under a limit.
-fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, request: Request<'a, D, S>) {
-    let mut pending = Some(request);
-    watch.wait(|| {
-        pending = pending.take().and_then(|request| request.test().err());
-        pending.is_none()
-    });
+fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, mut request: Request<'a, D, S>) {
+    watch.start();
+    while let Err(pending) = request.test() {
+        watch.poll();
+        request = pending;
+    }
 }

@@ -9,7 +9,7 @@ mod schedule;
 mod world;
 
 pub use schedule::{Adversary, Arrival, Schedule};
-pub use world::{Next, World};
+pub use world::World;
 
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
@@ -66,7 +66,7 @@ const STOPPED: &str = "stopped because another simulated rank panicked";
 /// Ranks as threads.
 struct Threads {
     world: World,
-    next: Mutex<Next>,
+    next: Mutex<Option<usize>>,
     /// One per rank, so that passing the token wakes one thread only.
     turns: Vec<Condvar>,
 }
@@ -76,15 +76,15 @@ impl Threads {
         let next = self.world.next();
         *self.lock() = next;
         match next {
-            Next::Run(rank) => self.turns[rank].notify_one(),
-            Next::End | Next::Stop => self.turns.iter().for_each(Condvar::notify_one),
+            Some(rank) => self.turns[rank].notify_one(),
+            None => self.turns.iter().for_each(Condvar::notify_one),
         }
     }
 
     fn wait(&self, rank: usize) {
         let mut next = self.lock();
-        while *next != Next::Run(rank) {
-            if *next == Next::Stop {
+        while *next != Some(rank) {
+            if next.is_none() {
                 drop(next);
                 panic_any(STOPPED);
             }
@@ -92,7 +92,7 @@ impl Threads {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Next> {
+    fn lock(&self) -> MutexGuard<'_, Option<usize>> {
         self.next.lock().unwrap_or_else(|p| p.into_inner())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::output::manifest::{self, Manifest, MeshEntry};
+use crate::output::manifest::{MeshEntry, gather, manifest};
 use crate::output::stream::Counts;
 use crate::output::write::{OutDir, Part, part_name};
 use bricks::digest::Digests;
@@ -47,13 +47,13 @@ pub fn finish(
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<MeshEntry, Error> {
-    let (digests, parts) = manifest::gather(counts.total(), digests, comm);
+    let (digests, parts) = gather(counts.total(), digests, comm);
     let counts = counts.gather(comm);
     let entry = MeshEntry::new(mesh, &counts, &digests);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
             stop_at(format_args!("manifest:0"));
-            out.manifest(&Manifest::new(&out.output, &entry, &digests, &parts))
+            out.manifest(&manifest(&out.output, &entry, &digests, &parts))
         }
         _ => Ok(()),
     };

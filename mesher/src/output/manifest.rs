@@ -64,18 +64,6 @@ impl MeshEntry {
     }
 }
 
-/// Contents of `mesh.json`.
-#[derive(Clone, Debug, Serialize)]
-pub struct Manifest<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    mesh: &'a MeshEntry,
-    octant_digests: Vec<String>,
-    parts: Vec<Value>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    hyper_tree_grid: Option<&'static str>,
-}
-
 /// A part: its number of leaves and its digest.
 pub type Part = (u64, u128);
 
@@ -96,16 +84,16 @@ pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<Par
     (digests, parts)
 }
 
-impl<'a> Manifest<'a> {
-    /// The manifest of a mesh with these digests and parts; parts and tree are named as far as `output` has them.
-    pub fn new(output: &Output, mesh: &'a MeshEntry, digests: &Digests, parts: &[Part]) -> Self {
-        let part = |(rank, &(leaves, digest)): (usize, &Part)| json!({ "file": part_name(rank), "leaves": leaves, "digest": hex(digest) });
-        Self {
-            schema: "octree-leaf-set/1",
-            mesh,
-            octant_digests: digests.octants.iter().map(|&d| hex(d)).collect(),
-            parts: parts.iter().enumerate().filter(|_| output.words).map(part).collect(),
-            hyper_tree_grid: output.tree.then_some(TREE),
-        }
+/// Contents of `mesh.json`: a mesh with these digests and parts; parts and tree are named as far as `output` has them.
+pub fn manifest(output: &Output, mesh: &MeshEntry, digests: &Digests, parts: &[Part]) -> Value {
+    let part = |(rank, &(leaves, digest)): (usize, &Part)| json!({ "file": part_name(rank), "leaves": leaves, "digest": hex(digest) });
+    let parts = parts.iter().enumerate().filter(|_| output.words).map(part);
+    let mut manifest = json!(mesh);
+    manifest["schema"] = "octree-leaf-set/1".into();
+    manifest["octant_digests"] = digests.octants.iter().map(|&d| hex(d)).collect();
+    manifest["parts"] = parts.collect();
+    if output.tree {
+        manifest["hyper_tree_grid"] = TREE.into();
     }
+    manifest
 }

@@ -38,9 +38,6 @@ pub fn add_boxes(
     light: u64,
     within: &Range<u64>,
 ) {
-    if rules.boxes.is_empty() {
-        return;
-    }
     let mut open = vec![(0, 0)];
     while let Some((l, code)) = open.pop() {
         let span = start57(l, code)..start57(l, code + 1);

@@ -1,8 +1,8 @@
 //! Intervals of the Morton curve with equal weight, one for each rank.
 //!
 //! Weights are summed in *bins*: octants of one level, small compared with the load of a rank. A partition of the curve is given by
-//! its *boundaries*: positions in ascending order, the first of which is 0, each with the rank that owns the curve
-//! from there to the next. If all weights are zero, a first partition gives everything to rank 0, and a repartition changes nothing.
+//! its *boundaries*: positions in ascending order, each with the rank that owns the curve from there to the next, or to one that repeats
+//! it; the first rank owns what comes before as well. If all weights are zero, rank 0 owns everything.
 
 use bricks::octant::LEVEL_MAX;
 use ranks::{Comm, Entry, gather};
@@ -18,22 +18,17 @@ pub type Boundary = (u64, usize);
 /// The whole curve.
 pub const ALL: Range<u64> = 0..1 << (3 * LEVEL_MAX);
 
-/// The boundaries of intervals with equal weight: each bin goes to the rank in whose part its middle lies. The bins of a rank
-/// are in order, and come after all bins of lower ranks. Collective; the same on all ranks.
-pub fn partition(bins: &[Bin], comm: &dyn Comm) -> Vec<Boundary> {
-    let boundaries = partition_at(bins, comm, |loads| equal(loads.iter().sum(), comm.size()));
-    boundaries.unwrap_or(vec![(0, 0)])
+/// The boundaries of intervals with equal weight, one for each of `ranks`: each bin goes to the rank in whose part its middle lies. The
+/// bins of a rank of `comm` are in order, and come after all bins of lower ranks; where every rank knows all bins, it partitions them as
+/// a single rank. Collective; the same on all ranks.
+pub fn partition(bins: &[Bin], ranks: usize, comm: &dyn Comm) -> Vec<Boundary> {
+    partition_at(bins, comm, |loads| equal(loads.iter().sum(), ranks))
 }
 
 /// The same for ranks that already own the octants of their bins. The least weight changes owner such that no load exceeds the
 /// mean by more than the fraction `tolerance`. `first_own` is the first position that this rank owns; what it owns before its
 /// first bin goes with that bin. Collective; the same on all ranks.
-pub fn repartition(
-    bins: &[Bin],
-    first_own: u64,
-    tolerance: f64,
-    comm: &dyn Comm,
-) -> Option<Vec<Boundary>> {
+pub fn repartition(bins: &[Bin], first_own: u64, tolerance: f64, comm: &dyn Comm) -> Vec<Boundary> {
     let mut bins = bins.to_vec();
     if let Some(first) = bins.first_mut() {
         first[0] = first_own;
@@ -46,25 +41,16 @@ fn partition_at(
     bins: &[Bin],
     comm: &dyn Comm,
     begins: impl Fn(&[u128]) -> Vec<u128>,
-) -> Option<Vec<Boundary>> {
-    let load: u64 = bins.iter().map(|b| b[1]).sum();
+) -> Vec<Boundary> {
+    // So many leaves that no mesh has them saturate.
+    let load = bins.iter().fold(0, |sum: u64, b| sum.saturating_add(b[1]));
     let loads: Vec<u128> = gather(comm, &[load]).into_iter().map(u128::from).collect();
     if loads.iter().all(|&load| load == 0) {
-        return None;
+        return vec![(0, 0)];
     }
     let before = loads[..comm.rank()].iter().sum();
-    let local = boundaries(bins, before, &begins(&loads));
-    let local: Vec<[u64; 2]> = local.into_iter().map(|(at, owner)| [at, owner as u64]).collect();
-    let all = gather(comm, &local).into_iter();
-    Some(without_repeats(all.map(|[start, owner]| (start, owner as usize))))
-}
-
-/// The same as [`partition`] for bins that are the same on all ranks. Not collective.
-pub fn partition_known(bins: &[Bin], ranks: usize) -> Vec<Boundary> {
-    match bins.iter().map(|b| u128::from(b[1])).sum::<u128>() {
-        0 => vec![(0, 0)],
-        total => without_repeats(boundaries(bins, 0, &equal(total, ranks)).into_iter()),
-    }
+    let all = gather(comm, &boundaries(bins, before, &begins(&loads)));
+    all.into_iter().map(|[start, owner]| (start, owner as usize)).collect()
 }
 
 /// The cumulative weight at which each rank begins, where all loads are equal.
@@ -101,39 +87,31 @@ fn nearly_equal(loads: &[u128], tolerance: f64) -> Vec<u128> {
     (0..).zip(ahead).map(begin).collect()
 }
 
-/// The boundaries among some bins, with the weight `before` ahead of them, where ranks begin at the cumulative weights `begins`.
-fn boundaries(bins: &[Bin], mut before: u128, begins: &[u128]) -> Vec<Boundary> {
+/// The boundaries among some bins, with the weight `before` ahead of them, where ranks begin at the cumulative weights `begins`: each
+/// with its owner.
+fn boundaries(bins: &[Bin], mut before: u128, begins: &[u128]) -> Vec<[u64; 2]> {
     let mut owner = begins.partition_point(|&b| b <= before).saturating_sub(1);
-    let mut found: Vec<Boundary> = Vec::new();
+    let mut found: Vec<[u64; 2]> = Vec::new();
     for &[start, weight] in bins {
         let middle = 2 * before + u128::from(weight);
         before += u128::from(weight);
         while begins.get(owner + 1).is_some_and(|b| 2 * b <= middle) {
             owner += 1;
         }
-        if found.last().is_none_or(|b| b.1 != owner) {
-            found.push((start, owner));
+        if found.last().is_none_or(|b| b[1] != owner as u64) {
+            found.push([start, owner as u64]);
         }
     }
     found
 }
 
-/// The boundaries of the whole curve: the owner of the first bin owns the curve from its start.
-fn without_repeats(boundaries: impl Iterator<Item = Boundary>) -> Vec<Boundary> {
-    let mut all: Vec<Boundary> = boundaries.collect();
-    all.dedup_by_key(|b| b.1);
-    if let Some(first) = all.first_mut() {
-        first.0 = 0;
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::partition::ownership::Ownership;
     use bricks::octant::start57;
     use proptest::prelude::*;
-    use ranks::sim;
+    use ranks::{Solo, sim};
     use std::collections::BTreeMap;
 
     /// Bins of level 3, in order, some without weight.
@@ -142,11 +120,16 @@ mod tests {
             .prop_map(|all| all.into_iter().map(|(code, w)| [start57(3, code), w]).collect())
     }
 
+    /// The boundaries of the whole curve, without those between intervals of one owner.
+    fn whole(boundaries: Vec<Boundary>, ranks: usize) -> Vec<Boundary> {
+        Ownership::along(0, ranks, boundaries).boundaries().to_vec()
+    }
+
     proptest! {
         #[test]
         fn loads_differ_from_the_mean_by_a_bin_at_most(bins in bins(), ranks in 1usize..9) {
             let total: u64 = bins.iter().map(|b| b[1]).sum();
-            let boundaries = partition_known(&bins, ranks);
+            let boundaries = whole(partition(&bins, ranks, &Solo), ranks);
             prop_assert_eq!(boundaries[0].0, 0);
             prop_assert!(boundaries.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1));
             let heaviest = bins.iter().map(|b| b[1]).max().unwrap_or(0) as f64;
@@ -163,12 +146,12 @@ mod tests {
             mut ends in prop::collection::vec(0usize..60, 4),
         ) {
             ends.sort_unstable();
-            let all = partition_known(&bins, 5);
+            let all = whole(partition(&bins, 5, &Solo), 5);
             let found = sim::run(5, 3, |comm| {
                 let end = |i: usize| ends[i].min(bins.len());
                 let from = if comm.rank() == 0 { 0 } else { end(comm.rank() - 1) };
                 let to = if comm.rank() == 4 { bins.len() } else { end(comm.rank()) };
-                partition(&bins[from..to], comm)
+                whole(partition(&bins[from..to], 5, comm), 5)
             });
             prop_assert!(found.into_iter().all(|t| t == all));
         }
@@ -237,14 +220,12 @@ mod tests {
             let found = sim::run(ranks, 3, |comm| {
                 let own = own(comm.rank());
                 let mine: Vec<Bin> = bins.iter().filter(|b| own.contains(&b[0])).copied().collect();
-                repartition(&mine, own.start, tolerance, comm)
+                whole(repartition(&mine, own.start, tolerance, comm), ranks)
             });
             prop_assert!(found.iter().all(|f| *f == found[0]));
             let total: u64 = bins.iter().map(|b| b[1]).sum();
-            let Some(boundaries) = &found[0] else {
-                prop_assert_eq!(total, 0);
-                return Ok(());
-            };
+            let boundaries = &found[0];
+            prop_assume!(total > 0);
             prop_assert_eq!(boundaries[0].0, 0);
             prop_assert!(boundaries.is_sorted_by(|a, b| a.0 < b.0 && a.1 < b.1));
             let owner = |start: u64| boundaries[boundaries.partition_point(|c| c.0 <= start) - 1].1;

@@ -17,7 +17,7 @@ use crate::partition::ownership::Ownership;
 use crate::partition::{Division, Partitioner, Weights};
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, edge};
-use ranks::{Comm, MessageBuffer, all_gather_reduced, combine};
+use ranks::{Comm, MessageBuffer, Solo, all_gather_reduced, combine};
 
 /// Fine octants per rank, about, which are the base leaves: boundaries lie between them.
 const FINE_PER_RANK: u64 = 16;
@@ -98,7 +98,7 @@ impl Estimate<'_> {
             Partitioner::Morton | Partitioner::Paper => None,
         };
         let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
-        let along_curve = || curve::partition_known(&leaves, comm.size());
+        let along_curve = || curve::partition(&leaves, comm.size(), &Solo);
         let boundaries = by_metis.unwrap_or_else(along_curve);
         Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
     }
@@ -107,7 +107,7 @@ impl Estimate<'_> {
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
         let (bins, light) = self.all_bins(&local, coarse, 1);
-        let boundaries = curve::partition_known(&bins, comm.size());
+        let boundaries = curve::partition(&bins, comm.size(), &Solo);
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
@@ -116,7 +116,7 @@ impl Estimate<'_> {
             area::add_boxes(&mut bins, self.rules, fine, light, &interval);
         }
         combine(&mut bins, u64::wrapping_add);
-        Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm))
+        Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
     }
 
     /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves

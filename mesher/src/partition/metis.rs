@@ -2,11 +2,8 @@
 
 use crate::error::Error;
 use crate::partition::curve::{Bin, Boundary};
-use bricks::octant::Level;
-#[cfg(feature = "metis")]
-use bricks::octant::{LEVEL_MAX, neighbour, start57};
+use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
 use ranks::{Comm, agree, gather};
-#[cfg(feature = "metis")]
 use std::sync::{Mutex, PoisonError};
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
@@ -47,10 +44,7 @@ pub fn assign_equal(leaves: &[Leaf], ranks: usize) -> Result<Vec<Boundary>, Erro
 }
 
 fn boundaries(leaves: &[Leaf], parts: Vec<u64>) -> Vec<Boundary> {
-    let owners = parts.into_iter().map(|part| part as usize);
-    let mut boundaries: Vec<Boundary> = leaves.iter().map(|leaf| leaf.0).zip(owners).collect();
-    boundaries[0].0 = 0;
-    boundaries
+    leaves.iter().map(|leaf| leaf.0).zip(parts.into_iter().map(|part| part as usize)).collect()
 }
 
 /// Whether base leaves are enough for METIS, which bisects recursively, and prints complaints on standard
@@ -62,7 +56,6 @@ fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
 }
 
 /// The part of each base leaf.
-#[cfg(feature = "metis")]
 fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Error> {
     let total: u128 = weights.iter().copied().map(u128::from).sum();
     let (xadj, adjncy) = graph(leaves);
@@ -85,16 +78,7 @@ fn parts(leaves: &[Leaf], weights: &[u64], ranks: usize) -> Result<Vec<u64>, Err
     Ok(parts.into_iter().map(|part| part as u64).collect())
 }
 
-/// The part of each base leaf.
-#[cfg(not(feature = "metis"))]
-fn parts(_: &[Leaf], _: &[u64], _: usize) -> Result<Vec<u64>, Error> {
-    Err(Error::input(
-        "this mesher was built without METIS: use --partitioner morton, or build with --features metis",
-    ))
-}
-
 /// The graph of base leaves that share part of a face, in the compressed form of METIS.
-#[cfg(feature = "metis")]
 fn graph(leaves: &[Leaf]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
     // The leaf that contains an octant.
     let leaf_at = |start: u64, l: Level| {
@@ -117,7 +101,6 @@ fn graph(leaves: &[Leaf]) -> (Vec<metis::Idx>, Vec<metis::Idx>) {
 }
 
 #[cfg(test)]
-#[cfg(feature = "metis")]
 mod tests {
     use super::*;
     use bricks::octant::position;

@@ -60,10 +60,11 @@ impl Ownership {
         Self::along(0, 1, [(0, 0)])
     }
 
-    /// The ownership given by boundaries: level-19 codes, ascending from 0, each with the owner from there on.
+    /// The ownership given by boundaries: level-19 codes in ascending order, each with the owner from there on. The first owner owns the
+    /// curve from its start.
     ///
     /// # Panics
-    /// If the codes do not ascend from 0, or an owner is not a rank.
+    /// If the codes do not ascend, or an owner is not a rank.
     pub fn along(
         rank: usize,
         ranks: usize,
@@ -72,10 +73,9 @@ impl Ownership {
         let mut all: Vec<Boundary> = Vec::new();
         for (start, owner) in boundaries {
             assert!(owner < ranks, "an owner must be a rank");
-            let ascends = all.last().map_or(start == 0, |last| last.0 < start);
-            assert!(ascends, "boundaries must ascend from 0");
+            assert!(all.last().is_none_or(|last| last.0 < start), "boundaries must ascend");
             if all.last().is_none_or(|last| last.1 != owner) {
-                all.push((start, owner));
+                all.push((if all.is_empty() { 0 } else { start }, owner));
             }
         }
         assert!(!all.is_empty(), "every octant must have an owner");

@@ -149,10 +149,9 @@ impl<'a> Loads<'a> {
 
     /// The partition in which loads are equal but for `tolerance`. Collective.
     fn repartition(self, tolerance: f64, comm: &dyn Comm) -> Ownership {
-        let (ownership, first_own) = (self.ownership, self.ownership.longest().start);
+        let first_own = self.ownership.longest().start;
         let boundaries = curve::repartition(&self.into_bins(), first_own, tolerance, comm);
-        let along = |boundaries| Ownership::along(comm.rank(), comm.size(), boundaries);
-        boundaries.map_or_else(|| ownership.clone(), along)
+        Ownership::along(comm.rank(), comm.size(), boundaries)
     }
 }
 

@@ -10,10 +10,10 @@ use super::nodes::open_bricks;
 use super::vote::{Candidate, FirstLeaf};
 use super::{Base, Components, EnclosedComponents, Verdict};
 use crate::error::Error;
-use crate::input::lattice::{Enclosed, Keep, Seed};
+use crate::input::lattice::{Enclosed, Keep};
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, morton};
-use bricks::tree::{LEVELS, Tree};
+use bricks::tree::LEVELS;
 use ranks::{all_gather_reduced, gather};
 use std::collections::{HashMap, HashSet};
 
@@ -21,23 +21,14 @@ use std::collections::{HashMap, HashSet};
 pub(super) fn find(base: &Base, components: &Components) -> HashMap<u64, Label> {
     let mut mine = Vec::new();
     for (number, seed) in (0..).zip(&base.rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
-        let (l, code) = leaf_at(base.tree, seed);
-        let (key, bit) = (code >> 6, code & 63);
-        if base.ownership.owns(l, key) {
-            components.nodes.find(l, key, 1 << bit, |c| mine.push([number, components.label(c)]));
+        let code = morton(seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32));
+        // The owner of a part of a leaf holds the leaf's brick.
+        if base.ownership.owner_at(code) == base.comm.rank() {
+            let found = |c| mine.push([number, components.label(c)]);
+            components.nodes.find(LEVEL_MAX, code >> 6, 1 << (code & 63), found);
         }
     }
     gather(base.comm, &mine).into_iter().map(|[number, label]| (number, label)).collect()
-}
-
-/// Level and code of the leaf that contains a seed, or of an octant above it in a brick that this rank does not
-/// own.
-fn leaf_at(tree: &Tree, seed: &Seed) -> (Level, u64) {
-    let position = seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32);
-    let code = |l: Level| morton(position) >> (3 * (LEVEL_MAX - l));
-    let is_split = |l: &Level| tree.split[*l as usize].contains(code(*l));
-    let l = (0..LEVEL_MAX).take_while(is_split).count() as Level;
-    (l, code(l))
 }
 
 /// The components that have a seed, of seeds that were [found](find). Collective; the same on all ranks.

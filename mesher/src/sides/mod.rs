@@ -27,6 +27,7 @@ use crate::input::lattice::{Keep, Rules};
 use crate::partition::ownership::Ownership;
 use crate::record::Options;
 use bricks::brick::Brick;
+use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
@@ -65,6 +66,8 @@ pub struct Sides {
     pub summary: Summary,
     /// Rays cast, over all ranks.
     pub rays: u64,
+    /// Bytes that the base tree and its components took on this rank while sides were decided.
+    pub bytes: usize,
 }
 
 /// The components of the base tree, in numbers. The same on all ranks.
@@ -147,6 +150,13 @@ impl Components {
         Self { nodes, merged, labels, candidates, all, at_boundary }
     }
 
+    /// Bytes that they take with their tree, and with the class of each local component.
+    fn bytes(&self, tree: &Tree) -> usize {
+        let sets = [&tree.split, &tree.crossing].into_iter().flatten();
+        let of_local = size_of::<u32>() + size_of::<Class>();
+        sets.map(BrickSet::bytes).sum::<usize>() + self.nodes.bytes() + of_local * self.merged.len()
+    }
+
     /// The label of a local component.
     fn label(&self, c: Component) -> Label {
         self.labels[self.merged[c as usize] as usize]
@@ -191,6 +201,7 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
         let flow = flow::of_seeds(&flow::find(base, &components), base)?;
         flow::decide(&components.all, flow, rules.keep)
     };
+    let bytes = components.bytes(base.tree);
     components.nodes.drop_links();
 
     let at_boundary = components.at_boundary.iter().map(|&c| components.label(c));
@@ -207,7 +218,7 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
     drop(merged);
     let keep = if options.ungraded { Keep::All } else { rules.keep };
     let mut sides =
-        Sides { keep, stored: per_level(), summary: verdict.summary, rays: verdict.rays };
+        Sides { keep, stored: per_level(), summary: verdict.summary, rays: verdict.rays, bytes };
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
     let leaves_enclosed = sides.store(base, &nodes, &of_local, &mut regions);
     let inside = verdict.inside.len() as u64;
@@ -294,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "octant 0.0.0 of level 3 has a side, but is no leaf off the surface")]
+    #[should_panic(expected = "octant 000 of level 3 has a side, but is no leaf off the surface")]
     fn a_side_of_a_crossing_leaf_is_found() {
         let (tree, mut sides) = decided(Keep::Outside);
         sides.stored[3] = set(&[0]);

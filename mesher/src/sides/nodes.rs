@@ -126,6 +126,15 @@ impl Nodes {
         }
     }
 
+    /// Bytes that the nodes and their components take.
+    pub fn bytes(&self) -> usize {
+        let of_level = |level: &LevelNodes| {
+            let numbers = level.first_child.len() + level.components.len();
+            size_of_val(&level.split[..]) + numbers * size_of::<u32>()
+        };
+        self.levels.iter().map(of_level).sum::<usize>() + size_of_val(&self.masks[..])
+    }
+
     /// Number of local components.
     pub fn component_count(&self) -> Component {
         self.masks.len() as Component

@@ -3,7 +3,7 @@
 
 use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
-use ranks::sim::{Next, Schedule, Sim, World};
+use ranks::sim::{Schedule, Sim, World};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -37,18 +37,14 @@ pub fn run<T: 'static>(
         })
         .collect();
     let mut results: Vec<Option<T>> = (0..size).map(|_| None).collect();
-    loop {
-        match world.next() {
-            Next::Run(rank) => {
-                if let CoroutineResult::Return(result) = ranks[rank].resume(()) {
-                    results[rank] = Some(result);
-                    world.end(rank, false);
-                }
-            }
-            Next::End => break,
-            Next::Stop => panic!("ranks wait for a call that another rank does not make"),
+    while let Some(rank) = world.next() {
+        if let CoroutineResult::Return(result) = ranks[rank].resume(()) {
+            results[rank] = Some(result);
+            world.end(rank, false);
         }
     }
+    let is_done = ranks.iter().all(Coroutine::done);
+    assert!(is_done, "ranks wait for a call that another rank does not make");
     STACKS.with_borrow_mut(|s| s.extend(ranks.into_iter().map(Coroutine::into_stack)));
     results.into_iter().map(|r| r.expect("every rank has ended")).collect()
 }

@@ -9,7 +9,7 @@ use mesher::input::case::Case;
 use mesher::record::Recorder;
 use mesher::sides::Summary;
 use mesher::sides::leaks::Leak;
-use mesher::{Options, mesh};
+use mesher::{Job, Options, mesh};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -105,7 +105,8 @@ pub fn part(case: &Case, options: &Options, whole: bool, comm: &dyn Comm) -> Par
     let reported = match whole {
         false => None,
         true => {
-            let report = mesh(case, options, comm, &mut Recorder::default())?;
+            let mut record = Recorder::default();
+            let report = mesh(case, &mut Job::new(options, comm, &mut record), |_, _| Ok(()))?;
             Some((report.mesh.digest, report.cells))
         }
     };

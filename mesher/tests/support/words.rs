@@ -18,7 +18,7 @@ pub fn words(
 ) -> Result<(Vec<u64>, Summary, Vec<Leak>), Error> {
     let mut record = Recorder::default();
     let job = &mut Job::new(options, comm, &mut record);
-    let mesh = grow(quantised(case, job)?, job, |_, _| {})?;
+    let mesh = grow(quantised(case, job)?, job)?;
     let mut words = Vec::new();
     mesh.emit(|w| {
         words.extend_from_slice(w);

@@ -6,7 +6,7 @@ use contract::htg::TreeFile;
 use mesher::output::write::{Output, TREE};
 use mesher::partition::Partitioner;
 use mesher::record::Recorder;
-use mesher::{Options, mesh};
+use mesher::{Job, Options, mesh};
 use proptest::prelude::*;
 use ranks::sim;
 use std::fs;
@@ -19,7 +19,9 @@ fn tree_of(case: &Small, run: &Run, ungraded: bool, place: &Path) -> Vec<u8> {
     let options = Options { out: Some(output), ..crate::support::options(run.division, ungraded) };
     let case = case.mesher_case();
     let reports = sim::run(run.ranks, run.seed, |comm| {
-        mesh(&case, &options, comm, &mut Recorder::default()).map(|report| report.cells)
+        let mut record = Recorder::default();
+        let mut job = Job::new(&options, comm, &mut record);
+        mesh(&case, &mut job, |_, _| Ok(())).map(|report| report.cells)
     });
     assert!(reports.iter().all(Result::is_ok), "{:?}", reports.iter().find(|r| r.is_err()));
     let names = || fs::read_dir(&directory).expect("the mesh").flatten().map(|e| e.file_name());

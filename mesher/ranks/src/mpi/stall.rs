@@ -23,7 +23,6 @@ const END: i32 = 3;
 pub struct Watch {
     side: SimpleCommunicator,
     limit: Duration,
-    phase: Cell<&'static str>,
     /// The start of the present call, or the time of the question.
     since: Cell<Instant>,
     /// The ranks that have answered; none if there was no question.
@@ -36,29 +35,15 @@ impl Watch {
         Self {
             side: world.duplicate(),
             limit,
-            phase: Cell::new("start"),
             since: Cell::new(Instant::now()),
             answered: RefCell::new(None),
         }
-    }
-
-    /// Notes the phase that the rank is in.
-    pub fn enter(&self, phase: &'static str) {
-        self.phase.set(phase);
     }
 
     /// Begins a call.
     pub fn start(&self) {
         self.since.set(Instant::now());
         *self.answered.borrow_mut() = None;
-    }
-
-    /// Waits until `is_done`.
-    pub fn wait(&self, mut is_done: impl FnMut() -> bool) {
-        self.start();
-        while !is_done() {
-            self.poll();
-        }
     }
 
     /// Answers questions, and asks when the limit is exceeded. Again and again during a call.
@@ -112,9 +97,8 @@ impl Watch {
             .map(|r| r.to_string())
             .collect();
         let line = format!(
-            "mesher: the other ranks have waited in phase {} for {} s, and rank {} does not answer: look at it with a debugger, or \
+            "mesher: the other ranks have waited for {} s, and rank {} does not answer: look at it with a debugger, or \
              give a greater --stall-limit\n",
-            self.phase.get(),
             self.limit.as_secs_f64(),
             silent.join(", ")
         );

@@ -10,17 +10,6 @@ pub struct World {
     state: Mutex<State>,
 }
 
-/// What happens next in a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Next {
-    /// This rank runs until its next call.
-    Run(usize),
-    /// All ranks have ended.
-    End,
-    /// No rank can go on: one has panicked, or ranks wait for a call that a rank that has ended will never make.
-    Stop,
-}
-
 /// What a rank does.
 enum Rank {
     /// It can run, with the result of its last call unless it has taken it.
@@ -66,21 +55,14 @@ impl World {
         self.size
     }
 
-    /// Chooses the next rank to run.
-    pub fn next(&self) -> Next {
+    /// Chooses the next rank, which runs until its next call. None can go on if all have ended, one has panicked, or ranks wait for a call
+    /// that a rank that has ended will never make.
+    pub fn next(&self) -> Option<usize> {
         let state = &mut *self.lock();
         let is_ready = |rank: &usize| matches!(state.ranks[*rank], Rank::Ready(_));
         let ready: Vec<usize> = (0..self.size).filter(is_ready).collect();
-        if state.broken {
-            Next::Stop
-        } else if !ready.is_empty() {
-            Next::Run(ready[state.schedule.next(&ready)])
-        } else if state.ranks.iter().any(|rank| matches!(rank, Rank::Waiting(..))) {
-            state.broken = true;
-            Next::Stop
-        } else {
-            Next::End
-        }
+        let can_run = !state.broken && !ready.is_empty();
+        can_run.then(|| ready[state.schedule.next(&ready)])
     }
 
     /// Notes that a rank has ended, normally or by a panic.
