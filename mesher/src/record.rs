@@ -56,6 +56,7 @@ impl<'a> Job<'a> {
     pub fn phase<T>(&mut self, name: &'static str, work: impl FnOnce(&dyn Comm) -> T) -> T {
         let (comm, record) = (self.comm, &mut *self.record);
         record.report_status(name);
+        comm.enter(name);
         stop_at(format_args!("{name}:{}", comm.rank()));
         let before = comm.traffic();
         let (wall, cpu) = (Instant::now(), ThreadTime::now());

@@ -21,7 +21,7 @@ mod pilot;
 #[cfg(test)]
 mod tests;
 
-pub use memory::Tightest;
+pub use memory::{Tightest, address_space_left};
 
 use bricks::octant::{Level, edge};
 use memory::Ranks;

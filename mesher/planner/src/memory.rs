@@ -86,7 +86,7 @@ fn pages() -> [f64; 2] {
 }
 
 /// What the limit on its address space leaves this process, in bytes; infinity without a limit.
-fn address_space_left() -> f64 {
+pub fn address_space_left() -> f64 {
     let limit = getrlimit(Resource::As).current;
     limit.map_or(f64::INFINITY, |bytes| (bytes as f64 - pages()[0]).max(0.0))
 }

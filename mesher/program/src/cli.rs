@@ -45,9 +45,9 @@ pub struct Args {
     /// Method that assigns base leaves to ranks
     #[arg(long, visible_alias = "preset", value_enum, default_value = "morton")]
     partitioner: Partitioner,
-    /// Weights of the partition; every cell of the base mesh of --preset paper has weight 1
-    #[arg(long, value_enum, default_value = "rebalance")]
-    weights: Weights,
+    /// Weights of the partition [default: rebalance; unit with --preset paper]
+    #[arg(long, value_enum)]
+    weights: Option<Weights>,
     /// Level of the base leaves: 0 to 19, or auto
     #[arg(long, default_value = "auto", value_parser = level_base)]
     level_base: LevelBase,
@@ -174,12 +174,23 @@ pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> R
 }
 
 /// The options of a run.
-pub fn options(args: &Args) -> Options {
-    let &Args { partitioner, weights, level_base, .. } = args;
+///
+/// # Errors
+/// If the weights contradict the paper's.
+pub fn options(args: &Args) -> Result<Options, Error> {
+    let weights = match (args.partitioner, args.weights) {
+        (Partitioner::Paper, None | Some(Weights::Unit)) => Weights::Unit,
+        (Partitioner::Paper, Some(_)) => {
+            let why =
+                "--preset paper gives every cell of the base mesh weight 1: leave out --weights";
+            return Err(Error::input(why));
+        }
+        (_, weights) => weights.unwrap_or_default(),
+    };
     let has = |files| args.write.contains(&files);
     let (words, tree) = (has(Files::Words), has(Files::Htg));
-    Options {
-        division: Division { partitioner, weights, level_base },
+    Ok(Options {
+        division: Division { partitioner: args.partitioner, weights, level_base: args.level_base },
         ungraded: args.ungraded,
         out: args.out.clone().map(|directory| Output { directory, words, tree }),
         check: args.check,
@@ -188,7 +199,7 @@ pub fn options(args: &Args) -> Options {
             true => args.input().display().to_string(),
             false => "CASE".to_owned(),
         },
-    }
+    })
 }
 
 fn is_case_file(args: &Args) -> bool {

@@ -88,7 +88,26 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
+/// Time for rank 0 to end the job.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+const ADDRESS_SPACE_MPI: f64 = 384e6;
+
 fn run_mpi(asked: &Result<Args, Error>) -> i32 {
+    let left = planner::address_space_left();
+    if left < ADDRESS_SPACE_MPI {
+        let e = Error::memory(format!(
+            "the limit on its address space leaves a rank {:.0} MB of memory, too little for MPI: raise it (ulimit -v) by {:.0} MB",
+            left / 1e6,
+            (ADDRESS_SPACE_MPI - left) / 1e6
+        ));
+        // The launcher ends all ranks with the first one: rank 0 speaks for those that have the same limit.
+        if !launch::is_first() {
+            sleep(PATIENCE);
+        }
+        return fail(&e, true);
+    }
     let comm = launch::join();
     match launch::check_size(&*comm) {
         Ok(()) => obey(asked, &*comm),
@@ -228,6 +247,7 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     interrupt::decided();
     record.report_status("done");
     if let Some(limit) = args.stall_limit {
+        comm.enter("done");
         interrupt::stop_at(format_args!("done:{}", comm.rank()));
         comm.barrier();
         end_within(limit);
@@ -300,7 +320,7 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
             }),
         )?;
     }
-    let options = options(args);
+    let options = options(args)?;
     let mut bytes = Vec::new();
     let done = if args.plan {
         let plan = planner::plan(&case, &options, comm, record)?;

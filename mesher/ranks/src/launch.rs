@@ -62,16 +62,27 @@ pub fn abort(code: i32) -> ! {
 /// # Errors
 /// If the launcher has started another number of ranks than the MPI library sees, in a sentence.
 pub fn check_size(comm: &dyn Comm) -> Result<(), String> {
-    check(launcher(), comm.size())
+    #[cfg(feature = "mpi")]
+    let library = mpi::library();
+    #[cfg(not(feature = "mpi"))]
+    let library = String::new();
+    check(launcher(), comm.size(), &library)
 }
 
-fn check(launcher: Option<(&str, usize)>, size: usize) -> Result<(), String> {
+fn check(launcher: Option<(&str, usize)>, size: usize, library: &str) -> Result<(), String> {
     match launcher {
         Some((name, ranks)) if ranks != size => Err(format!(
-            "{name} has started {ranks} ranks, but the MPI library of this mesher sees {size}: use the mpirun of that library"
+            "{name} has started {ranks} ranks, but the MPI library of this mesher, {}, sees {size}: use the mpirun of that library",
+            name_of(library)
         )),
         _ => Ok(()),
     }
+}
+
+/// The first words of what an MPI library says of itself: some go on for pages.
+fn name_of(library: &str) -> String {
+    let first = library.split(['\n', ',']).next().unwrap_or_default();
+    first.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Whether a launcher has started this process as a rank of an MPI job.
@@ -93,10 +104,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_communicator_of_another_size_than_the_job_is_refused() {
-        let message = check(Some(SIZES[0]).map(|(_, name)| (name, 3)), 1).unwrap_err();
-        let expected = "Open MPI's mpirun has started 3 ranks, but the MPI library of this mesher sees 1: use the mpirun of that library";
+    fn a_communicator_of_another_size_than_the_job_is_refused_with_both_names() {
+        let library = "MPICH Version:\t4.0.2\nMPICH Release date";
+        let message = check(Some(SIZES[0]).map(|(_, name)| (name, 3)), 1, library).unwrap_err();
+        let expected = "Open MPI's mpirun has started 3 ranks, but the MPI library of this mesher, MPICH Version: 4.0.2, sees 1: \
+                        use the mpirun of that library";
         assert_eq!(message, expected);
-        assert!(check(Some(("srun", 3)), 3).is_ok() && check(None, 1).is_ok());
+        assert!(check(Some(("srun", 3)), 3, library).is_ok() && check(None, 1, library).is_ok());
     }
 }

@@ -73,6 +73,9 @@ pub trait Comm {
     /// Ends the job if a rank keeps the others waiting in a call for longer than `limit`; ranks of one process never do. Collective.
     fn limit_calls(&self, _limit: Duration) {}
 
+    /// Notes the phase that the rank is in.
+    fn enter(&self, _phase: &'static str) {}
+
     /// Returns after all ranks have called it. Collective.
     fn barrier(&self) {
         self.sums(&[0]);

@@ -112,6 +112,10 @@ impl<C: Comm> Comm for Metered<C> {
     fn limit_calls(&self, limit: Duration) {
         self.comm.limit_calls(limit);
     }
+
+    fn enter(&self, phase: &'static str) {
+        self.comm.enter(phase);
+    }
 }
 
 #[cfg(test)]

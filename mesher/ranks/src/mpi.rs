@@ -51,6 +51,11 @@ impl Mpi {
     }
 }
 
+/// Name and version of the MPI library, in the library's own words.
+pub fn library() -> String {
+    mpi::environment::library_version().unwrap_or_else(|_| "of unknown version".to_owned())
+}
+
 /// Ends all ranks of the job at once.
 pub fn abort(code: i32) -> ! {
     // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation; panics
@@ -177,6 +182,12 @@ impl Comm for Mpi {
 
     fn limit_calls(&self, limit: Duration) {
         self.watch.get_or_init(|| Watch::new(&self.world, limit));
+    }
+
+    fn enter(&self, phase: &'static str) {
+        if let Some(watch) = self.watch.get() {
+            watch.enter(phase);
+        }
     }
 }
 

@@ -180,7 +180,16 @@ impl fmt::Display for Report {
         writeln!(f, "digest         {}", mesh.digest)?;
         let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
         let lambda = imbalance(&leaves);
-        writeln!(f, "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}")?;
+        let partitioned = match self.partitioner {
+            None => "",
+            Some(Partitioner::Metis) => ", partitioned by METIS",
+            Some(Partitioner::Morton) => ", partitioned along the curve",
+            Some(Partitioner::Paper) => ", partitioned as in the paper",
+        };
+        writeln!(
+            f,
+            "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}{partitioned}"
+        )?;
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
         for PhaseEntry { name, time_wall_s, time_cpu_s, .. } in &self.phases {
             let wall = time_wall_s.iter().copied().fold(0.0, f64::max);
@@ -294,7 +303,7 @@ mod tests {
                     level  2                1,234   edge 2e0\n\
                     components     outside 1,500, inside 1; deleted as enclosed 1,000, decided by majority 7\n\
                     digest         abc\n\
-                    ranks          2, cells max/mean 1.500, base level 1\n\
+                    ranks          2, cells max/mean 1.500, base level 1, partitioned along the curve\n\
                     phase              wall s     cpu s   cpu max/mean\n  \
                     sides             0.500     4.000      1.500\n\
                     time           0.500 s wall, 6.00 M cells/s\n\

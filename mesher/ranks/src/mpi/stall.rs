@@ -23,6 +23,7 @@ const END: i32 = 3;
 pub struct Watch {
     side: SimpleCommunicator,
     limit: Duration,
+    phase: Cell<&'static str>,
     /// The start of the present call, or the time of the question.
     since: Cell<Instant>,
     /// The ranks that have answered; none if there was no question.
@@ -35,9 +36,15 @@ impl Watch {
         Self {
             side: world.duplicate(),
             limit,
+            phase: Cell::new("start"),
             since: Cell::new(Instant::now()),
             answered: RefCell::new(None),
         }
+    }
+
+    /// Notes the phase that the rank is in.
+    pub fn enter(&self, phase: &'static str) {
+        self.phase.set(phase);
     }
 
     /// Begins a call.
@@ -97,8 +104,9 @@ impl Watch {
             .map(|r| r.to_string())
             .collect();
         let line = format!(
-            "mesher: the other ranks have waited for {} s, and rank {} does not answer: look at it with a debugger, or \
+            "mesher: the other ranks have waited in phase {} for {} s, and rank {} does not answer: look at it with a debugger, or \
              give a greater --stall-limit\n",
+            self.phase.get(),
             self.limit.as_secs_f64(),
             silent.join(", ")
         );
