@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
+use crate::lattice::{FacetLattice, Root};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
 use crate::stl::{self, Body, Solid};
 
@@ -223,13 +223,8 @@ fn shown([x, y, z]: [f64; 3]) -> String {
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
     let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
         let outside = || {
-            let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
-            format!(
-                "seed {i} at {} lies outside the root, from {} to {}; move it into the flow",
-                shown(seed),
-                shown(root.rounded(from)),
-                shown(root.rounded(to))
-            )
+            let at = shown(seed);
+            format!("seed {i} at {at} lies outside the root, {root}; move it into the flow")
         };
         root.quantise_seed(seed).ok_or_else(outside)
     };
@@ -241,17 +236,9 @@ fn positive(what: &str, value: f64) -> Result<(), String> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(why()) }
 }
 
-/// A TOML error in one line, with the line of the file, counted from 1, and the key or table on it.
+/// A TOML error in one line, with the line of the file, counted from 1.
 pub fn explain(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().replace("expected f64", "expected a number").replace('\n', " ");
-    let at = error.span().map_or(0, |span| span.start);
-    let begin = text[..at].rfind('\n').map_or(0, |at| at + 1);
-    let number = text[..begin].matches('\n').count() + 1;
-    let line = text[begin..].lines().next().unwrap_or_default();
-    let key = line.split('=').next().unwrap_or_default().trim();
-    match at == 0 && message.starts_with("missing") {
-        // Of the file as a whole.
-        true => message,
-        false => format!("line {number}, {key}: {message}"),
-    }
+    let before = error.span().map_or("", |span| &text[..span.start]);
+    format!("line {}: {message}", before.matches('\n').count() + 1)
 }

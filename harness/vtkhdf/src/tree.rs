@@ -188,7 +188,7 @@ pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec
         numbers.iter().map(|(name, numbers)| (*name, out.small(&Value::ints(numbers)))).collect();
     members.push((SPLIT, out.chunked(split)));
     // Without a mask, no leaf is missing.
-    if has_chunks(mask) {
+    if mask.chunks.iter().any(Option::is_some) {
         members.push((MASK, out.chunked(mask)));
     }
     for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
@@ -206,11 +206,6 @@ pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec
     let grid = out.group(&attributes, &members);
     let root = out.group(&[], &[(GROUP, grid)]);
     out.finish(root)
-}
-
-/// Whether an array has more than zeros.
-pub(crate) fn has_chunks(array: &Chunked) -> bool {
-    array.chunks.iter().any(Option::is_some)
 }
 
 /// A file that is being written: chunks in any order first, then the metadata.

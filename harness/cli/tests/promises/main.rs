@@ -160,7 +160,7 @@ fn an_engine_in_a_format_of_its_own_needs_neither_digest_nor_ranks() {
     fixture.write("case.toml", "spacing_min = 'fine'\n");
     let refused = fixture.harness(verify);
     assert_eq!((refused.code, fixture.path("seen").exists()), (2, false), "{}", refused.printed);
-    let why = "case.toml: line 1, spacing_min: invalid type: string \"fine\", expected a number";
+    let why = "case.toml: line 1: invalid type: string \"fine\", expected a number";
     assert!(refused.printed.contains(why), "{}", refused.printed);
 }
 
