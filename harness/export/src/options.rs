@@ -118,13 +118,6 @@ impl Options<'_> {
     pub fn check_at(&self, count: u64) -> Result<(), Failure> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
-
-    /// Reports from time to time that `done` of `total` leaves are written.
-    pub fn progress(&self, done: u64, total: u64) {
-        if done.is_multiple_of(1 << 16) {
-            self.watch.progress(done, total);
-        }
-    }
 }
 
 /// Refuses to replace a file, or a directory with something in it: what exists may be the only copy of a body, or the case of a solver.

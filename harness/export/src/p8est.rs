@@ -53,7 +53,6 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         out.write_all(&start(0)).map_err(named)?;
         let (mut written, mut count) = (Written::default(), 0);
         quadrants(export, &mut |octant, data| {
-            export.options.progress(written.cells, leaves);
             count += 1;
             written.add(&octant, data != FILLER);
             let Octant { corner: [x, y, z], level } = octant;
