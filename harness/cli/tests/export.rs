@@ -103,7 +103,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         (
             "front.vtp",
             &["--case", "cube-small"],
-            "the mesh has a root of edge 8 at (0, 0, 0) and surface level",
+            "has another root (corner [0.0, 0.0, 0.0], edge 8): give the case",
         ),
         (
             "case/constant/polyMesh",
