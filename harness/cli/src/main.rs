@@ -20,7 +20,7 @@ use std::sync::Once;
 #[global_allocator]
 static HEAP: Heap = Heap {
     program: "harness",
-    advice: "use a smaller mesh, fewer --jobs or a machine with more memory",
+    advice: "use a smaller mesh or a machine with more memory",
     end: interrupt::out_of_memory,
 };
 

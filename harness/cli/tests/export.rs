@@ -38,16 +38,16 @@ fn names(place: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_file_does_not_depend_on_the_number_of_threads_and_replaces_an_older_one() {
+fn a_file_is_reproducible_and_replaces_an_older_one() {
     let place = mesh();
     fs::write(place.path().join("mesh.vtu"), "old").unwrap();
-    let contents = ["1", "2", "5"].map(|jobs| {
-        let (code, output, error) = export(&place, "mesh.vtu", &["--jobs", jobs]);
+    let contents = [1, 2].map(|_| {
+        let (code, output, error) = export(&place, "mesh.vtu", &[]);
         assert_eq!((code, error.as_str()), (0, ""));
         assert!(output.starts_with("mesh.vtu: 148 cells, "), "{output}");
         fs::read(place.path().join("mesh.vtu")).unwrap()
     });
-    assert!(contents[0] == contents[1] && contents[1] == contents[2]);
+    assert!(contents[0] == contents[1]);
     assert_eq!(names(place.path()), ["mesh", "mesh.vtu"]);
 }
 
@@ -62,7 +62,7 @@ fn conditions_of_a_selection_must_all_hold() {
         (&["--level-max", "2"], 4 + 16),
         (&["--side", "outside"], 128),
         (&["--rank", "0"], 49),
-        (&["--rank", "1", "--jobs", "3"], 99),
+        (&["--rank", "1"], 99),
         (&["--slice", "x=0.3", "--clip", "0,0,0,2,1,1"], 1),
     ] {
         let (code, output, error) = export(&place, "part.vtu", options);
@@ -103,7 +103,7 @@ fn an_export_that_cannot_be_made_is_one_sentence_and_leaves_no_file() {
         (
             "front.vtp",
             &["--case", "cube-small"],
-            "the mesh has a root of edge 8 at (0, 0, 0) and surface level",
+            "has another root (corner [0.0, 0.0, 0.0], edge 8): give the case",
         ),
         (
             "case/constant/polyMesh",
@@ -139,7 +139,7 @@ fn an_interrupted_export_leaves_no_file() {
     let words = words_with_sides(|o| o.level < 7, |_| Some(Side::Outside));
     leaf_set(vec![words]).create(&place.path().join("mesh")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
-    command.current_dir(place.path()).args(["export", "mesh", "all.vtu", "--jobs", "2"]);
+    command.current_dir(place.path()).args(["export", "mesh", "all.vtu"]);
     let child = command.stderr(Stdio::piped()).spawn().unwrap();
     while names(place.path()).len() == 1 {
         std::thread::yield_now();
@@ -259,7 +259,7 @@ fn the_surface_towards_the_body_is_polygons_or_triangles() {
     let replaced = stated.replacen('{', &geometry, 1);
     let digest = stated.split("\"digest\":\"").nth(1).unwrap()[..32].to_owned();
     for (manifest_text, case, why) in [
-        (stated.clone(), "other.toml", "the case a root of edge 4 at"),
+        (stated.clone(), "other.toml", "has another root (corner"),
         (replaced, "case.toml", "another geometry"),
         (
             stated.replacen("\"digest\":\"", "\"digest\":\"0", 1),

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
+use crate::lattice::{FacetLattice, Root};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
 use crate::stl::{self, Body, Solid};
 
@@ -224,13 +224,8 @@ fn shown([x, y, z]: [f64; 3]) -> String {
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
     let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
         let outside = || {
-            let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
-            format!(
-                "seed {i} at {} lies outside the root, from {} to {}; move it into the flow",
-                shown(seed),
-                shown(root.rounded(from)),
-                shown(root.rounded(to))
-            )
+            let at = shown(seed);
+            format!("seed {i} at {at} lies outside the root, {root}; move it into the flow")
         };
         root.quantise_seed(seed).ok_or_else(outside)
     };

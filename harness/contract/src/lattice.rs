@@ -65,9 +65,7 @@ impl Root {
     /// A seed on the lattice; `None` if it is not finite or lies outside the root, and so in no leaf. Leaves are
     /// half-open, so the root's maximum faces are outside.
     pub fn quantise_seed(&self, at: [f64; 3]) -> Option<[i64; 3]> {
-        let q = self.units(at);
-        let inside = 0.0..UNITS_PER_EDGE as f64;
-        q.iter().all(|v| inside.contains(v)).then(|| q.map(|v| v as i64))
+        self.quantise(at).filter(|q| q.iter().all(|c| (0..UNITS_PER_EDGE).contains(c)))
     }
 
     /// Lattice coordinates as floating-point numbers.

@@ -112,11 +112,6 @@ pub struct Region {
 }
 
 impl Region {
-    /// An octant enlarged by `margin` on every side.
-    pub fn around(octant: &Octant, margin: i64) -> Self {
-        Self::along(octant, [margin; 3])
-    }
-
     /// An octant enlarged on both sides of each axis by the margin for that axis.
     pub fn along(octant: &Octant, margins: [i64; 3]) -> Self {
         let edge = i64::from(octant.edge());

@@ -16,7 +16,7 @@ use contract::word::{self, Side};
 use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window, groups};
 use vtkhdf::write::Deflater;
 
-use crate::options::{Export, Summary, Written};
+use crate::options::{Export, Summary};
 
 /// Writes the file.
 ///
@@ -26,14 +26,11 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let Export { mesh, options, .. } = export;
     mesh.require_sides()?;
     let leaves = export.count()?;
-    let (mut families, mut written) = (Families::default(), Written::default());
+    let mut families = Families::default();
     export.visit(&mut |leaf| {
-        options.progress(written.cells, leaves);
-        written.add(&leaf.octant, true);
         families.push(&leaf);
         Ok(())
     })?;
-    written.check_invariants(leaves);
     let Root { origin, edge } = mesh.manifest.root;
     let below_root = families.levels[1..].iter().map(|level| 8 * level.len() as u64);
     let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };

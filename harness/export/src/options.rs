@@ -7,7 +7,6 @@
 //! - in a format without holes, octants and fillers tile the root.
 
 use std::fs;
-use std::num::NonZero;
 use std::path::Path;
 
 use contract::case::Case;
@@ -55,10 +54,7 @@ impl Export<'_> {
     /// Refuses an export without leaves.
     pub(crate) fn require_some(&self, leaves: u64) -> Result<u64, Failure> {
         match leaves {
-            0 if self.mesh.leaf_count() == 0 => Err(Failure::input("the mesh has no leaves")),
-            0 => Err(Failure::input(
-                "no leaf satisfies all conditions of the selection: remove one of them",
-            )),
+            0 => Err(Failure::input("no leaf satisfies all conditions, or the mesh has none")),
             _ => Ok(leaves),
         }
     }
@@ -72,8 +68,6 @@ impl Export<'_> {
 /// Options of every export.
 #[derive(Clone, Copy)]
 pub struct Options<'a> {
-    /// Number of threads.
-    pub jobs: NonZero<usize>,
     /// Whoever waits for the export.
     pub watch: &'a dyn Watch,
     /// The case of the mesh: its solids become patches of OpenFOAM, and its facets are those to which a surface has gaps.
@@ -124,13 +118,6 @@ impl Options<'_> {
     pub fn check_at(&self, count: u64) -> Result<(), Failure> {
         if count.is_multiple_of(1 << 14) { self.check() } else { Ok(()) }
     }
-
-    /// Reports from time to time that `done` of `total` leaves are written.
-    pub fn progress(&self, done: u64, total: u64) {
-        if done.is_multiple_of(1 << 16) {
-            self.watch.progress(done, total);
-        }
-    }
 }
 
 /// Refuses to replace a file, or a directory with something in it: what exists may be the only copy of a body, or the case of a solver.
@@ -167,8 +154,8 @@ pub(crate) struct Written {
     pub cells: u64,
     /// Volume of all octants in level-19 cells.
     pub volume: u64,
-    /// Morton codes of the first octant and after the last one.
-    ends: Option<(u64, u64)>,
+    /// Morton code after the last octant.
+    end: u64,
 }
 
 impl Written {
@@ -177,24 +164,12 @@ impl Written {
     /// # Panics
     /// If it does not follow the last one, or is not in the root.
     pub(crate) fn add(&mut self, octant: &Octant, is_cell: bool) {
-        let begin = word::key_of(octant.corner);
-        let end = begin + word::span(octant.level);
-        let one = Self { cells: u64::from(is_cell), volume: end - begin, ends: Some((begin, end)) };
-        self.append(&one);
-    }
-
-    /// Adds octants that follow the last one.
-    ///
-    /// # Panics
-    /// If they do not follow it, or are not in the root.
-    pub(crate) fn append(&mut self, next: &Self) {
-        let Some((begin, end)) = next.ends else { return };
-        let (first, last) = self.ends.unwrap_or((begin, 0));
+        let (begin, last) = (word::key_of(octant.corner), self.end);
         assert!(last <= begin, "an octant at {begin} is written after one that ends at {last}");
-        assert!(end <= KEY_END, "an octant that ends at {end} is outside of the root");
-        self.cells += next.cells;
-        self.volume += next.volume;
-        self.ends = Some((first, end));
+        self.end = begin + word::span(octant.level);
+        assert!(self.end <= KEY_END, "an octant that ends at {} is outside of the root", self.end);
+        self.cells += u64::from(is_cell);
+        self.volume += self.end - begin;
     }
 
     /// Asserts that the cells are as many as were selected.
@@ -242,6 +217,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "outside of the root")]
     fn an_octant_outside_of_the_root_is_noticed() {
-        Written::default().append(&Written { ends: Some((0, KEY_END + 1)), ..Written::default() });
+        Written::default().add(&Octant { corner: [1, 0, 0], level: 0 }, true);
     }
 }

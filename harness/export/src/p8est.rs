@@ -53,7 +53,6 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         out.write_all(&start(0)).map_err(named)?;
         let (mut written, mut count) = (Written::default(), 0);
         quadrants(export, &mut |octant, data| {
-            export.options.progress(written.cells, leaves);
             count += 1;
             written.add(&octant, data != FILLER);
             let Octant { corner: [x, y, z], level } = octant;
@@ -145,7 +144,8 @@ mod tests {
     use super::*;
     use crate::selection::Selection;
     use crate::testing::{options, stored};
-    use contract::import::{Format, Request, leaf_set, read};
+    use contract::import::p4est::read;
+    use contract::import::{Request, leaf_set};
     use contract::leafset::LeafSet;
     use contract::mesh::Mesh;
     use contract::testing::{random_words, words_of};
@@ -163,7 +163,7 @@ mod tests {
     /// The leaf set that a reader makes of a file, with or without the data of the quadrants.
     fn import(path: &Path, sides: bool) -> LeafSet {
         let request = Request { sides: sides.then(|| "data".to_owned()), ..Request::default() };
-        let cells = read(path, Format::P4est, &request).unwrap();
+        let cells = read(path, &request).unwrap();
         leaf_set(&cells, None, None, "test".to_owned()).unwrap()
     }
 
@@ -231,7 +231,7 @@ mod tests {
             bytes[at] ^= 1 << bit;
             fs::write(&path, bytes).unwrap();
             let request = Request { sides: Some("data".to_owned()), ..Request::default() };
-            let read = read(&path, Format::P4est, &request)
+            let read = read(&path, &request)
                 .and_then(|cells| leaf_set(&cells, None, None, "test".to_owned()));
             prop_assert!(read.map_or(true, |set| set.manifest.digest != mesh.manifest.digest));
         }

@@ -8,7 +8,6 @@ use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
 use contract::mesh::Mesh;
 use contract::watch::Watch;
-use std::num::NonZero;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -32,8 +31,8 @@ fn no_script(_: &str, _: &Path, _: &Path) -> Result<(), Failure> {
 /// The default options.
 pub fn options<'a>() -> Options<'a> {
     let (label, regions) = (Label::default(), Regions::default());
-    let (jobs, watch, script) = (NonZero::<usize>::MIN, &Unwatched, no_script);
-    Options { jobs, watch, case: None, label, regions, script }
+    let (watch, script) = (&Unwatched, no_script);
+    Options { watch, case: None, label, regions, script }
 }
 
 /// An export of all leaves of a mesh.

@@ -16,7 +16,6 @@ use export::options::{Export, Label, Options, Regions};
 use export::selection::{Selection, Slice};
 use proptest::prelude::*;
 use std::fs;
-use std::num::NonZero;
 use std::path::Path;
 use tempfile::TempDir;
 use vtkhdf::tree::{Shape, Siblings, TreeWriter, Window};
@@ -48,8 +47,7 @@ fn as_tree(mesh: &Mesh, selection: &Selection) -> Option<(TempDir, Mesh)> {
     let path = dir.path().join("mesh.vtkhdf");
     let script = |_: &str, _: &Path, _: &Path| unreachable!("no script makes this format");
     let (label, regions) = (Label::Bits32, Regions::All);
-    let jobs = NonZero::<usize>::MIN;
-    let options = Options { jobs, watch: &Quiet, case: None, label, regions, script };
+    let options = Options { watch: &Quiet, case: None, label, regions, script };
     match export::htg::write(&Export { mesh, selection, options: &options }, &path) {
         Err(Failure { code: EXIT_INPUT, .. }) => return None,
         written => assert_eq!(written.unwrap().bytes, fs::metadata(&path).unwrap().len()),

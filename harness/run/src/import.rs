@@ -129,7 +129,8 @@ fn read(
     limit: Duration,
 ) -> Result<Cells, Failure> {
     let (name, script) = match format {
-        Format::LeafWords | Format::P4est => return import::read(path, format, request),
+        Format::LeafWords => return import::words::read(path, request),
+        Format::P4est => return import::p4est::read(path, request),
         Format::Vtk => ("vtk", "import_vtk.py"),
         Format::Openfoam | Format::Table | Format::Discretize => ("numpy", "import_cells.py"),
     };

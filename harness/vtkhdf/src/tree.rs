@@ -83,11 +83,6 @@ pub struct Siblings {
     pub inside: u8,
 }
 
-/// Node number of the first of some siblings, counted in groups of eight from the root's children on.
-pub fn first_node(group: u64) -> u64 {
-    1 + 8 * group
-}
-
 /// The groups of siblings with a node in a window; the first and the last may have others outside of it. The root is in no group.
 pub fn groups(window: u64) -> Range<u64> {
     (window * WINDOW / 8).saturating_sub(1)..(window + 1) * WINDOW / 8
@@ -127,8 +122,8 @@ impl Window {
     /// Sets those nodes of a group that are in the window.
     #[inline]
     pub fn put(&mut self, group: u64, siblings: Siblings) {
-        // The first sibling is the second node of a byte.
-        let first = first_node(group);
+        // The first sibling is the second node of a byte, because the root is in no group.
+        let first = 1 + 8 * group;
         let byte = (first / 8).wrapping_sub(self.first / 8) as usize;
         for (bits, new) in
             [(&mut self.split, siblings.split), (&mut self.deleted, siblings.deleted)]
@@ -188,7 +183,7 @@ pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec
         numbers.iter().map(|(name, numbers)| (*name, out.small(&Value::ints(numbers)))).collect();
     members.push((SPLIT, out.chunked(split)));
     // Without a mask, no leaf is missing.
-    if has_chunks(mask) {
+    if mask.chunks.iter().any(Option::is_some) {
         members.push((MASK, out.chunked(mask)));
     }
     for (name, low) in COORDINATES.into_iter().zip(shape.origin) {
@@ -206,11 +201,6 @@ pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec
     let grid = out.group(&attributes, &members);
     let root = out.group(&[], &[(GROUP, grid)]);
     out.finish(root)
-}
-
-/// Whether an array has more than zeros.
-pub(crate) fn has_chunks(array: &Chunked) -> bool {
-    array.chunks.iter().any(Option::is_some)
 }
 
 /// A file that is being written: chunks in any order first, then the metadata.

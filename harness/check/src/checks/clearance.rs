@@ -52,7 +52,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
         let present = || (0..).zip(&children).filter_map(|(digit, of)| Some((digit, of.as_ref()?)));
         let Some(margin) = present().map(|(_, of)| of.margin).max() else { return };
         let bound = present().filter_map(|(_, of)| of.own.or(of.below)).max();
-        let around = |(digit, _)| Region::around(&octant.child(digit), margin);
+        let around = |(digit, _)| Region::along(&octant.child(digit), [margin; 3]);
         let region = || present().map(around).reduce(Region::hull).expect("a child is present");
         let nearby = trail.coarsest_nearby(self.tree, margin, bound.unwrap_or(0), region);
         for (digit, &Required { margin, own, below }) in present() {

@@ -9,9 +9,7 @@ use export::options::{Export, Label, Options, Regions, Summary};
 use run::engine::paths::Paths;
 use run::progress::Progress;
 use run::python;
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
-use std::thread::available_parallelism;
 use std::time::Duration;
 
 /// The script reads all of a mesh into memory, which limits its size long before its time.
@@ -34,9 +32,6 @@ pub struct Arguments {
     /// Regions of cells that no face connects, for OpenFOAM and CGNS [default: all]
     #[arg(long)]
     regions: Option<Regions>,
-    /// Number of threads, for .vtu [default: all cores]
-    #[arg(short, long, value_name = "N")]
-    jobs: Option<NonZero<usize>>,
     /// Which cells are written.
     #[command(flatten)]
     selection: SelectionArguments,
@@ -64,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
-    let Arguments { mesh, file, case, label, regions, jobs, selection } = arguments;
+    let Arguments { mesh, file, case, label, regions, selection } = arguments;
     let given = [
         ("--case", case.is_some()),
         ("--label", label.is_some()),
@@ -80,7 +75,6 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let selection = selection.of(&mesh)?;
     let progress = Progress::default();
     let options = Options {
-        jobs: jobs.or(available_parallelism().ok()).unwrap_or(NonZero::<usize>::MIN),
         watch: &progress,
         case: case.as_ref(),
         label: label.unwrap_or_default(),

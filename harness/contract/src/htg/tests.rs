@@ -4,7 +4,7 @@ use crate::testing::words_with_sides;
 use crate::word::{Side, key, key_of, level, span};
 use std::fs;
 use tempfile::NamedTempFile;
-use vtkhdf::tree::{Siblings, TreeWriter, WINDOW, Window, first_node, groups};
+use vtkhdf::tree::{Siblings, TreeWriter, WINDOW, Window, groups};
 use vtkhdf::write::Deflater;
 
 const ROOT: Root = Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 };
@@ -60,7 +60,7 @@ fn file_of(nodes: &Nodes) -> NamedTempFile {
             window.put_root(siblings(0));
         }
         for group in groups(index).take_while(|group| 8 * group + 1 < shape.nodes_total()) {
-            window.put(group, siblings(first_node(group) as usize));
+            window.put(group, siblings(1 + 8 * group as usize));
         }
         out.add(index, &window.compress(&shape, &mut Deflater::default())).unwrap();
     }

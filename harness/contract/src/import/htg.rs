@@ -39,7 +39,6 @@ impl ImportedTree {
         case: Option<&Case>,
         program: String,
     ) -> Result<Option<Self>, Failure> {
-        let content = |error: TreeError| Failure::input(error.to_string());
         // Another array is VTK's to find.
         if sides.is_some_and(|sides| sides != SIDE) {
             return Ok(None);
@@ -47,14 +46,14 @@ impl ImportedTree {
         let tree = match TreeFile::open(path) {
             Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
             Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
-            Err(error) => return Err(content(error)),
+            Err(error) => return Err(Failure::input(error)),
         };
         let mut manifest = leaf_set::manifest(tree.root, case, program);
         tree.words(&mut |run| {
             run.iter().for_each(|&word| manifest.add(word));
             true
         })
-        .map_err(content)?;
+        .map_err(Failure::input)?;
         manifest.finish();
         assert_eq!(manifest.leaves, tree.leaves, "leaves of the walk, and of the bits of nodes");
         Ok(Some(Self { tree, manifest }))

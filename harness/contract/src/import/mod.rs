@@ -19,7 +19,6 @@ use crate::failure::Failure;
 use crate::lattice::Root;
 use crate::manifest;
 use crate::word::Side;
-use cells::Cells;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::Read;
@@ -156,18 +155,6 @@ pub fn poly_mesh(path: &Path) -> Option<PathBuf> {
     let has_points =
         |place: &PathBuf| ["points", "points.gz"].iter().any(|name| place.join(name).is_file());
     below.into_iter().find(has_points)
-}
-
-/// Reads the cells of a file in a format that is read here.
-///
-/// # Errors
-/// If the file cannot be read, or is not of this format.
-pub fn read(path: &Path, format: Format, request: &Request) -> Result<Cells, Failure> {
-    match format {
-        Format::LeafWords => words::read(path, request),
-        Format::P4est => p4est::read(path, request),
-        _ => Err(Failure::input("is read in Python")),
-    }
 }
 
 /// The side with this code in a cell array.

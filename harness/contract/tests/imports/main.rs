@@ -6,7 +6,7 @@ mod trees;
 use contract::failure::Failure;
 use contract::import::cells::Cells;
 use contract::import::htg::ImportedTree;
-use contract::import::{self, Request, leaf_set};
+use contract::import::{self, Format, Request, leaf_set};
 use contract::lattice::Root;
 use contract::leafset::{self, LeafSet};
 use contract::npy;
@@ -28,7 +28,11 @@ fn root([x, y, z, edge]: [f64; 4]) -> Root {
 }
 
 fn imported(path: &Path, request: &Request) -> Result<LeafSet, Failure> {
-    let cells = import::read(path, import::guess(path)?, request)?;
+    let cells = match import::guess(path)? {
+        Format::LeafWords => import::words::read(path, request)?,
+        Format::P4est => import::p4est::read(path, request)?,
+        _ => return Err(Failure::input("is read in Python")),
+    };
     leaf_set(&cells, request.root, None, "test".to_owned())
 }
 
@@ -100,7 +104,7 @@ fn the_root_of_a_case_moves_forests_in_the_unit_cube_only() {
     let request = Request { root, is_root_of_case: true, ..Request::default() };
     assert!(imported(&sample("unitcube.p8est"), &request).is_ok());
     let why = imported(&sample("brick.p8est"), &request).unwrap_err().to_string();
-    assert!(why.contains("give --root to move the forest"), "{why}");
+    assert!(why.contains("where the root has the corner [-1.0, 2.0, 0.5]"), "{why}");
     let given = Request { is_root_of_case: false, ..request };
     assert!(imported(&sample("brick.p8est"), &given).is_ok());
 }

@@ -47,14 +47,9 @@ pub struct Face {
 }
 
 impl Face {
-    /// Whether the leaf is on the positive side.
-    fn is_leaf_above(&self) -> bool {
-        !self.square.is_high
-    }
-
     /// The four corners in level-19 cells, counterclockwise as seen from the leaf.
     fn corners(&self) -> [[u32; 3]; 4] {
-        self.square.corners(self.is_leaf_above())
+        self.square.corners(!self.square.is_high)
     }
 }
 

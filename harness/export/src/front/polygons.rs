@@ -63,7 +63,7 @@ impl Polygons {
             let edge = i64::from(face.square.edge());
             let mut expected = [0; 3];
             expected[face.square.axis] =
-                if face.is_leaf_above() { 2 * edge * edge } else { -2 * edge * edge };
+                if face.square.is_high { -2 * edge * edge } else { 2 * edge * edge };
             assert_eq!(area, expected, "twice the area of {face:?}");
             (0..3).for_each(|a| sum[a] += area[a]);
         }

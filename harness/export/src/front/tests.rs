@@ -29,7 +29,7 @@ fn the_gap_to_a_plate_is_the_height_above_it() {
     let gaps = gaps(&case, &faces, &options()).unwrap();
     assert_eq!(faces.len(), 128);
     for (face, gap) in faces.iter().zip(&gaps) {
-        let expected = if face.is_leaf_above() { 0.7 } else { 0.3 };
+        let expected = if face.square.is_high { 0.3 } else { 0.7 };
         assert!((gap - expected).abs() < 1e-6, "{gap} of {face:?}");
     }
     // Both sheets end at the root's boundary, along 32 edges each.
@@ -137,7 +137,7 @@ proptest! {
         for face in &faces {
             let (u, v) = ((face.square.axis + 1) % 3, (face.square.axis + 2) % 3);
             let leaf = leaf_of(face).unwrap();
-            prop_assert_eq!(leaf, (face.leaf, face.is_leaf_above()));
+            prop_assert_eq!(leaf, (face.leaf, !face.square.is_high));
             let edge = face.square.edge() / scale;
             for i in 0..edge * edge {
                 let mut at = face.square.corner.map(|c| c / scale);

@@ -1,8 +1,7 @@
 //! Cells as VTK's unstructured grid, in one `.vtu` file.
 //!
-//! Each leaf is a hexahedron. The mesh is written in pieces of at most [`PIECE`] leaves, one per thread at a time, so memory does
-//! not depend on the size of the mesh: about 60 MB per thread. A file depends on mesh and selection alone, and not on the
-//! number of threads.
+//! Each leaf is a hexahedron. The mesh is written in pieces of at most [`PIECE`] leaves, so memory does not depend on the size of
+//! the mesh: about 60 MB.
 //!
 //! - `piece`: the arrays of a piece, compressed.
 
@@ -11,14 +10,13 @@ mod piece;
 use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
-use std::thread;
 
 use contract::digest::Digest;
 use contract::files;
 use contract::lattice::Root;
 use contract::manifest::Sides;
 
-use crate::options::{Export, Summary, Written};
+use crate::options::{Export, Summary};
 use contract::failure::Failure;
 use piece::{Encoder, Piece};
 
@@ -58,24 +56,35 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     };
     let arrays: Vec<Array> = ARRAYS.into_iter().filter(is_known).collect();
     let offsets = vec![u64::MAX; arrays.len()];
-    let mut longest = Piece { points: u64::MAX, offsets, ..Piece::default() };
-    longest.written.cells = u64::MAX;
+    let longest = Piece { points: u64::MAX, cells: u64::MAX, offsets, bytes: Vec::new() };
     let root = &mesh.manifest.root;
     let named = |error| Failure::at(path, error);
     let bytes = files::fill_atomically(path, |file| {
         let (mut pieces, mut data_bytes) = (Vec::new(), 0);
         let longest = vec![longest; leaves.div_ceil(PIECE as u64) as usize];
-        let header_bytes = header(root, &arrays, &longest, 0).len();
+        let header_bytes = header(root, &arrays, &longest, Digest::default(), 0).len();
         file.seek(SeekFrom::Start(header_bytes as u64)).map_err(named)?;
-        encode(export, leaves, &arrays, &mut |mut piece| {
+        let mut encoder = Encoder::default();
+        let mut flush = |encoder: &mut Encoder| {
+            let mut piece = encoder.encode(root, &arrays);
             // The user's interrupt waits for a flush to end, so none may have much to flush.
             file.write_all(&piece.bytes).and_then(|()| file.sync_data()).map_err(named)?;
             piece.offsets.iter_mut().for_each(|offset| *offset += data_bytes);
             data_bytes += piece.bytes.len() as u64;
             pieces.push(Piece { bytes: Vec::new(), ..piece });
+            export.options.watch.progress(encoder.written.cells, leaves);
+            export.options.check()
+        };
+        export.visit(&mut |leaf| {
+            if encoder.leaves.len() == PIECE {
+                flush(&mut encoder)?;
+            }
+            encoder.leaves.push(leaf);
             Ok(())
         })?;
-        let header = header(root, &arrays, &pieces, header_bytes);
+        flush(&mut encoder)?;
+        encoder.written.check_invariants(leaves);
+        let header = header(root, &arrays, &pieces, encoder.digest, header_bytes);
         file.write_all(END.as_bytes()).map_err(named)?;
         file.seek(SeekFrom::Start(0)).map_err(named)?;
         file.write_all(header.as_bytes()).and_then(|()| file.sync_all()).map_err(named)?;
@@ -84,54 +93,15 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     Ok(Summary { leaves, bytes, notes: Vec::new() })
 }
 
-/// Encodes the selected leaves, of which the number is known, and hands their pieces to `take` in order. As many pieces as there are threads are
-/// read one after the other and encoded together.
-fn encode(
-    export: &Export<'_>,
-    leaves: u64,
-    arrays: &[Array],
-    take: &mut dyn FnMut(Piece) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let (mut written, options) = (Written::default(), export.options);
-    let root = &export.mesh.manifest.root;
-    let mut flush = |encoders: &mut [Encoder]| {
-        options.check()?;
-        let filled = encoders.iter_mut().filter(|encoder| !encoder.leaves.is_empty());
-        let pieces: Vec<Piece> = thread::scope(|scope| {
-            let threads: Vec<_> =
-                filled.map(|encoder| scope.spawn(|| encoder.encode(root, arrays))).collect();
-            threads.into_iter().map(|thread| thread.join().expect("it does not panic")).collect()
-        });
-        for piece in pieces {
-            options.check()?;
-            written.append(&piece.written);
-            take(piece)?;
-            options.watch.progress(written.cells, leaves);
-        }
-        Ok::<(), Failure>(())
-    };
-    let jobs = options.jobs.get().min(leaves.div_ceil(PIECE as u64) as usize);
-    let mut encoders: Vec<Encoder> = (0..jobs).map(|_| Encoder::default()).collect();
-    let mut waiting = 0;
-    export.visit(&mut |leaf| {
-        if waiting == jobs * PIECE {
-            flush(&mut encoders)?;
-            waiting = 0;
-        }
-        encoders[waiting / PIECE].leaves.push(leaf);
-        waiting += 1;
-        Ok(())
-    })?;
-    flush(&mut encoders)?;
-    written.check_invariants(leaves);
-    Ok(())
-}
-
 /// The file up to the appended data, filled up with blanks to `length` bytes.
-fn header(root: &Root, arrays: &[Array], pieces: &[Piece], length: usize) -> String {
+fn header(
+    root: &Root,
+    arrays: &[Array],
+    pieces: &[Piece],
+    digest: Digest,
+    length: usize,
+) -> String {
     let Root { origin: [x, y, z], edge } = root;
-    let mut digest = Digest::default();
-    pieces.iter().for_each(|piece| digest.merge(piece.digest));
     // VTK reads text as the codes of its characters.
     let codes: String = digest.to_string().bytes().map(|byte| format!("{byte} ")).collect();
     let mut xml = format!(
@@ -153,8 +123,7 @@ fn header(root: &Root, arrays: &[Array], pieces: &[Piece], length: usize) -> Str
 
 /// Appends the description of a piece.
 fn describe(arrays: &[Array], piece: &Piece, xml: &mut String) {
-    let Piece { points, written, offsets, .. } = piece;
-    let cells = written.cells;
+    let Piece { points, cells, offsets, .. } = piece;
     *xml += &format!("    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n");
     let arrays: Vec<_> = arrays.iter().zip(offsets).collect();
     for arrays in arrays.chunk_by(|(a, _), (b, _)| a.0 == b.0) {

@@ -24,25 +24,27 @@ const CORNERS: [[u32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
 /// A piece in the form in which it is written.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Piece {
     /// Number of points.
     pub points: u64,
-    /// The cells.
-    pub written: Written,
+    /// Number of cells.
+    pub cells: u64,
     /// Position of each array in the appended data, or in the piece's.
     pub offsets: Vec<u64>,
-    /// Digest of the leaves.
-    pub digest: Digest,
     /// The compressed arrays.
     pub bytes: Vec<u8>,
 }
 
-/// The memory of a thread that encodes pieces. New memory for every piece would cost a page fault per page.
+/// Encodes pieces one after the other. New memory for every piece would cost a page fault per page.
 #[derive(Default)]
 pub struct Encoder {
     /// The leaves of the next piece, which are in Morton order.
     pub leaves: Vec<Leaf>,
+    /// The cells of all pieces.
+    pub written: Written,
+    /// The digest of their leaves.
+    pub digest: Digest,
     points: Points,
     /// Eight points for each leaf, in VTK's order.
     connectivity: Vec<u32>,
@@ -54,12 +56,11 @@ impl Encoder {
     pub fn encode(&mut self, root: &Root, arrays: &[Array]) -> Piece {
         self.connect();
         self.check_invariants();
-        let (mut written, mut digest) = (Written::default(), Digest::default());
         for Leaf { octant, side, .. } in &self.leaves {
-            written.add(octant, true);
-            digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
+            self.written.add(octant, true);
+            self.digest.add(word::encode(&word::Leaf { octant: *octant, side: *side }));
         }
-        let Self { leaves, points, connectivity, zlib } = self;
+        let Self { leaves, points, connectivity, zlib, .. } = self;
         let points = &points.all;
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);
         let point = |at: &Point| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
@@ -81,7 +82,7 @@ impl Encoder {
             }
         }
         leaves.clear();
-        Piece { points: points.len() as u64, written, offsets, digest, bytes }
+        Piece { points: points.len() as u64, cells: cells.len() as u64, offsets, bytes }
     }
 
     /// Finds the points.

@@ -6,8 +6,8 @@ use check::audit::audit;
 use check::checks::CheckResult;
 use check::promises::Touching;
 use contract::htg::TreeFile;
+use contract::import::Request;
 use contract::import::htg::ImportedTree;
-use contract::import::{Format, Request};
 use contract::lattice::Root;
 use contract::manifest::Manifest;
 use contract::npy::PartFile;
@@ -61,7 +61,7 @@ pub(super) fn words(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let part = PartFile::open(path);
     let words = part.as_ref().ok().map(|part| part.read_all().expect("a file of this length"));
     let request = Request { sides: Some("side".to_owned()), ..Request::default() };
-    let cells = import::read(path, Format::LeafWords, &request);
+    let cells = import::words::read(path, &request);
     assert!(
         cells.is_err()
             || words.is_some_and(|words| words.len() == cells.as_ref().map_or(0, |c| c.count()))
@@ -88,7 +88,7 @@ pub(super) fn forest(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         root: (options & 2 == 2).then_some(Root { origin: [-1.0, 2.0, 0.5], edge: 2.0 }),
         ..Request::default()
     };
-    let Ok(cells) = import::read(path, Format::P4est, &request) else { return false };
+    let Ok(cells) = import::p4est::read(path, &request) else { return false };
     let count = cells.count();
     let Ok(set) = import::leaf_set(&cells, request.root, None, "fuzz".to_owned()) else {
         return false;
