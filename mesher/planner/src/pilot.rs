@@ -169,11 +169,19 @@ fn shell_at(further: i32, fine: f64, coarse: Option<f64>) -> f64 {
 /// Deepest level of the octants in which overlapping boxes are told apart.
 const LEVEL_OVERLAP: Level = 6;
 
+/// The boxes that meet a cube.
+fn near(boxes: &[ExtentBox], min: [i64; 3], h: i64) -> Vec<ExtentBox> {
+    boxes.iter().filter(|b| b.meets(min, h)).copied().collect()
+}
+
 /// The cells that boxes ask for in an octant; where boxes overlap, the finest of them.
 pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
     let (min, h) = (corner(l, code), edge(l));
-    let near: Vec<ExtentBox> = boxes.iter().filter(|b| b.meets(min, h)).copied().collect();
-    if near.len() > 1 && l < LEVEL_OVERLAP {
+    let near = near(boxes, min, h);
+    let finest = near.iter().map(|b| b.level).max();
+    let fills = |b: &ExtentBox| (0..3).all(|a| b.min[a] <= min[a] && min[a] + h <= b.max[a]);
+    let is_one = near.iter().any(|b| Some(b.level) == finest && fills(b));
+    if near.len() > 1 && !is_one && l < LEVEL_OVERLAP {
         return (code << 3..).take(8).map(|child| boxed_in(&near, l + 1, child)).sum();
     }
     let cells = |b: &ExtentBox| {
@@ -187,11 +195,12 @@ pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
 fn boxed_in_deleted(boxes: &[ExtentBox], mesh: &Mesh) -> f64 {
     let mut cells = 0.0;
     for (l, deleted) in (0..).zip(mesh.sides.deleted()) {
-        let is_near =
-            |key: u64| boxes.iter().any(|b| b.meets(brick::min_corner(l, key), 4 * edge(l)));
-        for b in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key) && is_near(b.key)) {
-            let leaves = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
-            cells += leaves.map(|code| boxed_in(boxes, l, code)).sum::<f64>();
+        for b in deleted.bricks().filter(|b| mesh.ownership.owns(l, b.key)) {
+            let near = near(boxes, brick::min_corner(l, b.key), 4 * edge(l));
+            if !near.is_empty() {
+                let leaves = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
+                cells += leaves.map(|code| boxed_in(&near, l, code)).sum::<f64>();
+            }
         }
     }
     cells

@@ -55,9 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     };
     let (meshed, case) = source.open(&layout, *ungraded)?;
     let mesh = Mesh::open(&meshed.dir)?;
-    if let (Some(_), Some(case)) = (&source.case, &case) {
-        mesh.require_case(case)?;
-    }
+    case.as_ref().map_or(Ok(()), |case| mesh.require_case(case))?;
     let request = Request {
         selection: arguments.selection.of(&mesh)?,
         body: case.as_ref().map(|case| &case.facets[..]),

@@ -37,7 +37,7 @@ fn seeds_are_points_of_the_root_and_enclosed_components_are_deleted_by_default()
     let why = with("seeds = [[0, 0, 0], [4, 0, 0]]").unwrap_err();
     assert!(
         why.starts_with(
-            "seed 1 at (4, 0, 0) lies outside the root, from (-4, -4, -4) to (4, 4, 4);"
+            "seed 1 at (4, 0, 0) lies outside the root, corner [-4.0, -4.0, -4.0], edge 8;"
         ),
         "{why}"
     );
