@@ -343,7 +343,7 @@ mod tests {
             deep.ends_with("does not support leaves of this level (level_max in [limits])"),
             "{deep}"
         );
-        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
+        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("value of keep"));
         let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
         assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
         let enclosed =
