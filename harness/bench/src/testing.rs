@@ -63,7 +63,7 @@ pub fn history() -> Vec<Record> {
             BTreeMap::from([("uav/words".to_owned(), words), ("uav/cells".to_owned(), 8.0)]);
         let commit = format!("{i:040x}");
         Record {
-            time: format!("2026-01-{:02}T00:00:00Z", i + 1).parse().unwrap(),
+            time: Some(format!("2026-01-{:02}T00:00:00Z", i + 1).parse().unwrap()),
             subject: "<b>".into(),
             metrics,
             ..Record::new(commit)

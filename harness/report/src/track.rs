@@ -22,7 +22,8 @@ pub fn page(records: &[Record], all: &[Series], link: Option<&str>) -> String {
     sorted.sort_by_key(|series| series.changes.is_empty());
     let ends = [("from", records.first()), ("to", records.last())];
     let dated = |record: &Record| {
-        let date = record.time.strftime("%Y-%m-%d");
+        let date = record.time.map(|time| time.strftime("%Y-%m-%d").to_string());
+        let date = date.as_deref().unwrap_or("no date");
         html! { (linked(&record.commit, link)) " (" (date) ")" }
     };
     let content = html! {

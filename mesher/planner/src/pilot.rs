@@ -184,11 +184,12 @@ pub fn boxed_in(boxes: &[ExtentBox], l: Level, code: u64) -> f64 {
     if near.len() > 1 && !is_one && l < LEVEL_OVERLAP {
         return (code << 3..).take(8).map(|child| boxed_in(&near, l + 1, child)).sum();
     }
-    let cells = |b: &ExtentBox| {
+    let cells = |b: &ExtentBox| -> f64 {
         let span = |a: usize| b.max[a].min(min[a] + h) - b.min[a].max(min[a]);
         (0..3).map(|a| span(a) as f64 / edge(b.level) as f64).product()
     };
-    near.iter().map(cells).fold(0.0, f64::max)
+    let all = finest.map_or(0.0, |finest| (h as f64 / edge(finest) as f64).powi(3));
+    near.iter().map(cells).sum::<f64>().min(all)
 }
 
 /// The cells that boxes ask for in deleted leaves that this rank owns.
@@ -275,13 +276,14 @@ mod tests {
         assert_eq!(boxed_in(&boxes, 5, morton([3; 3])), 8.0);
         assert_eq!(boxed_in(&boxes, 5, morton([5; 3])), 0.0);
         assert_eq!(boxed_in(&[], 0, 0), 0.0);
-        // Below the level to which overlaps are resolved, the finest box counts where several meet.
+        // Below the level to which overlaps are resolved, boxes add up.
         let h = edge(LEVEL_OVERLAP + 1);
         let [low, high] = [[0; 3], [h; 3]].map(|min| ExtentBox {
             min,
             max: min.map(|c| c + h),
             level: LEVEL_OVERLAP + 1,
         });
-        assert_eq!((boxed_in(&[low], 0, 0), boxed_in(&[low, high], 0, 0)), (1.0, 1.0));
+        assert_eq!((boxed_in(&[low], 0, 0), boxed_in(&[low, high], 0, 0)), (1.0, 2.0));
+        assert_eq!(boxed_in(&[low; 9], 0, 0), 8.0, "no more than the octant has");
     }
 }

@@ -41,9 +41,8 @@ pub struct Record {
     pub schema: String,
     /// Full hash of the commit.
     pub commit: String,
-    /// When it was committed.
-    #[serde(default)]
-    pub time: Timestamp,
+    /// When it was committed. A record that was written by hand may not say.
+    pub time: Option<Timestamp>,
     /// First line of its message.
     #[serde(default)]
     pub subject: String,
@@ -79,7 +78,7 @@ impl Record {
         let mut next = || lines.next().unwrap_or_default();
         let (commit, time, subject) = (next(), next(), next());
         let time = time.parse().map_err(|why| format!("the time of {named}: {why}"))?;
-        Ok(Self { time, subject, ..Self::new(commit) })
+        Ok(Self { time: Some(time), subject, ..Self::new(commit) })
     }
 
     /// Checks that the metrics can be analysed.
@@ -246,7 +245,7 @@ mod tests {
             ("b", "2026-03-01T11:30:00+02:00"),
             ("e", "2026-03-01T12:00:00+01:00"),
         ] {
-            let time = time.parse().unwrap();
+            let time = Some(time.parse().unwrap());
             append(&path, &Record { time, ..record(commit, &[("x", 1.0)]) }).unwrap();
         }
         // By hand, without a time.
@@ -256,7 +255,7 @@ mod tests {
         let commits: Vec<&str> = records.iter().map(|record| record.commit.as_str()).collect();
         assert_eq!(commits, ["f", "a", "b", "c", "e"]);
         let line = serde_json::to_string(&record("f", &[])).unwrap();
-        fs::write(&path, line.replace("1970-01-01T00:00:00Z", "noon") + "\n").unwrap();
+        fs::write(&path, line.replace("null", "\"noon\"") + "\n").unwrap();
         let error = read(&path).unwrap_err();
         assert!(error.contains("line 1: "), "{error}");
         fs::write(&path, "").unwrap();

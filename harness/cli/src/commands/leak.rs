@@ -153,14 +153,11 @@ fn write(arguments: &Arguments, answers: &Answers) -> Result<(), Failure> {
     if interrupt::requested() {
         return Err(Failure::interrupted());
     }
-    if let Some(file) = &arguments.json {
-        put(file, pretty(answers))?;
-    }
-    let of_path = arguments.vtk.as_deref().filter(|_| !passages.is_empty());
-    of_path.map_or(Ok(()), |file| {
+    if let Some(file) = arguments.vtk.as_deref().filter(|_| !passages.is_empty()) {
         let written = write_atomically(file, |out| polydata::paths(&passages, out));
-        written.map_err(|error| Failure::at(file, error))
-    })
+        written.map_err(|error| Failure::at(file, error))?;
+    }
+    arguments.json.as_ref().map_or(Ok(()), |file| put(file, pretty(answers)))
 }
 
 fn target(text: &str) -> Result<Target, String> {

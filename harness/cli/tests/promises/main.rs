@@ -209,7 +209,7 @@ fn shrinking_keeps_the_named_check_and_no_other() {
 fn a_case_that_the_engine_declines_is_left_out_by_every_command() {
     let fixture = Fixture::new();
     fixture.engine("right", "complete = true\n[limits]\nlevel_max = 4");
-    let why = "foreign.toml does not support leaves of this level (level_max in [limits])";
+    let why = "foreign.toml does not support level 5 (level_max in [limits])";
     let gate =
         "gate --engine foreign.toml --rules gate.toml --layers correctness --reference ./engine";
     let verify = "verify case.toml --engine foreign.toml --reference ./engine --no-oracles --no-p4est --no-mpi";

@@ -52,9 +52,15 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
         (&[origin], &[edge]) => Root { origin, edge },
         _ => trees.least_root()?,
     };
-    // The cells of a forest that a case does not move must be leaves in the case's root.
-    let moves = !request.is_root_of_case || stated == UNIT;
-    let placed = request.root.filter(|_| moves).unwrap_or(stated);
+    let placed = request.root.unwrap_or(stated);
+    let units = 1e-9 * placed.edge;
+    let ends = |root: &Root| [root.origin[0], root.origin[1], root.origin[2], root.edge];
+    let is_there = ends(&stated).iter().zip(ends(&placed)).all(|(a, b)| (a - b).abs() <= units);
+    if request.is_root_of_case && stated != UNIT && !is_there {
+        return Err(Failure::input(format!(
+            "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
+        )));
+    }
     let scale = placed.edge / stated.edge;
     let sides = with_sides.then(Vec::new);
     let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };

@@ -204,23 +204,29 @@ impl Description {
     /// Why the engine is not run on a case; `None` if it is.
     pub fn declines(&self, case: &Case) -> Option<String> {
         let (takes, limits) = (&self.takes, &self.limits);
-        let is_too_deep = limits.level_max.is_some_and(|max| case.level_deepest() > max);
-        let is_too_large = limits.facets_max.is_some_and(|max| case.facets.len() as u64 > max);
+        let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
+        let keep = format!("{:?}", case.keep).to_lowercase();
         let is_enclosed_kept = case.enclosed == Enclosed::Keep;
         let beyond = [
-            (is_too_deep, "leaves of this level (level_max in [limits])"),
-            (is_too_large, "so many facets (facets_max in [limits])"),
-            (!case.boxes.is_empty() && !takes.boxes, "extent boxes (boxes in [takes])"),
+            (
+                limits.level_max.is_some_and(|max| level > max),
+                format!("level {level} (level_max in [limits])"),
+            ),
+            (
+                limits.facets_max.is_some_and(|max| facets > max),
+                format!("{facets} facets (facets_max in [limits])"),
+            ),
+            (!case.boxes.is_empty() && !takes.boxes, "extent boxes (boxes in [takes])".to_owned()),
             (
                 !case.keep_crossing && !takes.drop_crossing,
-                "keep_crossing = false (drop_crossing in [takes])",
+                "keep_crossing = false (drop_crossing in [takes])".to_owned(),
             ),
-            (!case.seeds.is_empty() && !takes.seeds, "seeds (seeds in [takes])"),
+            (!case.seeds.is_empty() && !takes.seeds, "seeds (seeds in [takes])".to_owned()),
             (
                 is_enclosed_kept && !takes.keep_enclosed,
-                "enclosed = keep (keep_enclosed in [takes])",
+                "enclosed = keep (keep_enclosed in [takes])".to_owned(),
             ),
-            (!takes.keep.contains(&case.keep), "this value of keep (keep in [takes])"),
+            (!takes.keep.contains(&case.keep), format!("keep = {keep} (keep in [takes])")),
         ];
         let (_, what) = beyond.into_iter().find(|(is_beyond, _)| *is_beyond)?;
         Some(format!("{} does not support {what}", self.name))
@@ -339,11 +345,8 @@ mod tests {
         };
         assert_eq!(declines("spacing_min = 1.0\nkeep = 'all'\nROOT"), None);
         let deep = declines("spacing_min = 0.5\nkeep = 'all'\nROOT").unwrap();
-        assert!(
-            deep.ends_with("does not support leaves of this level (level_max in [limits])"),
-            "{deep}"
-        );
-        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("value of keep"));
+        assert!(deep.ends_with("does not support level 4 (level_max in [limits])"), "{deep}");
+        assert!(declines("spacing_min = 1.0\nROOT").unwrap().contains("outside"));
         let seeds = declines("spacing_min = 1.0\nkeep = 'all'\nseeds = [[1, 1, 1]]\nROOT").unwrap();
         assert!(seeds.ends_with("does not support seeds (seeds in [takes])"), "{seeds}");
         let enclosed =

@@ -106,7 +106,8 @@ impl CaseRun<'_> {
         let mut check = match answers.is_empty() {
             false => count(step, case, &sample, &answers),
             true => {
-                let why = needs.silent.borrow().first().map(Failure::to_string);
+                let silent = needs.silent.borrow();
+                let why = failures.first().or(silent.first()).map(Failure::to_string);
                 Check::new(step.0, step.1, Outcome::left_out(why.unwrap_or_default()))
             }
         };

@@ -22,7 +22,22 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
     if let Some(counted) = &manifest.components {
         possible(tree, counted, manifest.tree, terms, result);
     }
+    let is_base = manifest.tree == Kind::Base;
+    let counts = manifest.components.as_ref().map(|counted| {
+        let deleted = if is_base { 0 } else { counted.enclosed.count };
+        let outside = counted.outside.saturating_sub(deleted);
+        let counts = [(Side::Outside, outside), (Side::Inside, counted.inside)];
+        counts.into_iter().filter(|(side, _)| is_base || terms.keeps(*side as u8))
+    });
     let Some(octants) = uniform_octants(tree) else {
+        let is_there = |side| tree.kinds(tree.root()) & 1 << side as u8 != 0;
+        for (side, expected) in counts.into_iter().flatten() {
+            if (expected > 0) != is_there(side) {
+                result.report(format_args!(
+                    "the manifest leaves {expected} {side} components, which its leaves contradict"
+                ));
+            }
+        }
         let why = format!("over {OCTANTS_MAX} octants have leaves of one side");
         result.note = format!("components are not known: {why}");
         return;
@@ -49,12 +64,7 @@ pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: 
         }
     }
     let Some(counted) = &manifest.components else { return };
-    let is_base = manifest.tree == Kind::Base;
-    let deleted = if is_base { 0 } else { counted.enclosed.count };
-    let outside = counted.outside.saturating_sub(deleted);
-    let counts = [(Side::Outside, outside), (Side::Inside, counted.inside)];
-    let is_of_tree = |(side, _): &(Side, u64)| is_base || terms.keeps(*side as u8);
-    for (side, expected) in counts.into_iter().filter(is_of_tree) {
+    for (side, expected) in counts.into_iter().flatten() {
         let found = found.iter().filter(|component| component.side == side).count() as u64;
         if found != expected {
             result.report(format_args!(
