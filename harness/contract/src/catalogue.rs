@@ -107,7 +107,8 @@ impl Catalogue {
             if Path::new(name).exists() {
                 return format!("{name} is neither the name of a case nor a case file: its name must end in .toml");
             }
-            let alike = |case: &&Selected| strsim::jaro_winkler(name, &case.name);
+            let last = name.rsplit('/').next().unwrap_or_default();
+            let alike = |case: &&Selected| strsim::jaro_winkler(last, &case.name);
             let near = cases.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
             let near = near.map_or(String::new(), |near| format!("; the most similar name there is {}", near.name));
             format!(
