@@ -166,7 +166,7 @@ fn shell_at(further: i32, fine: f64, coarse: Option<f64>) -> f64 {
     of_area * by_area + (fine - of_area) * by_length
 }
 
-/// Deepest level of the octants in which overlapping boxes are told apart.
+/// Deepest level of the octants in which overlapping boxes are distinguished.
 const LEVEL_OVERLAP: Level = 6;
 
 /// The boxes that meet a cube.

@@ -27,8 +27,8 @@ use parry3d_f64::query::PointQuery as _;
 const PRECISION: f64 = 1.05;
 /// Cells of a smaller half diagonal, in radii of the ball that passes, show the clearance to `PRECISION`.
 const SMALL: f64 = 0.015;
-/// Searches for the widest path, at most. If they do not suffice, as along a slit in which many places are equally narrow, the bounds on
-/// the width are wider apart than 5 %.
+/// Searches for the widest path, at most, once some ball passes along it. If they do not suffice, the bounds on the width are wider apart
+/// than 5 %.
 const SEARCHES_MAX: usize = 300;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
@@ -59,6 +59,12 @@ impl Way {
 
     fn clearance(&self) -> f64 {
         self.points[self.narrowest()].clearance
+    }
+
+    /// The radius of a ball that passes along all legs.
+    fn passing(&self) -> f64 {
+        let legs = self.points.windows(2).map(|leg| passing(&leg[0], &leg[1]));
+        legs.fold(self.clearance(), f64::min)
     }
 }
 
@@ -150,7 +156,8 @@ impl Search<'_> {
             }
             self.searches += 1;
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
-            if self.searches >= SEARCHES_MAX || !self.divide(&way) {
+            let is_last = self.searches >= SEARCHES_MAX && way.passing() > 0.0;
+            if is_last || !self.divide(&way) {
                 return Ok(way);
             }
         }
@@ -174,8 +181,8 @@ impl Search<'_> {
         points.into_iter().map(place).collect()
     }
 
-    /// Divides the cells in which a path may be too narrow for the ball that its bound promises, and those near its narrow points that
-    /// promise this ball but do not have it. Returns whether there are any.
+    /// Divides the cells in which a path may be too narrow for the ball that its bound promises, and those near its narrow legs that
+    /// promise this ball but do not show it: along a slit, many are equally wide. Returns whether there are any.
     fn divide(&mut self, way: &Way) -> bool {
         let (points, radius) = (&way.points, way.bound);
         let wanted = radius / PRECISION;
@@ -188,13 +195,16 @@ impl Search<'_> {
                 divided.extend([points[i.saturating_sub(1)].cell, place.cell]);
             }
             if points.get(i + 1).is_some_and(|next| passing(place, next) < wanted) {
+                narrow.push(place.at);
                 divided.push(place.cell);
             }
         }
         let is_near = |at: Point| narrow.iter().any(|narrow| at.distance(*narrow) < 2.0 * radius);
         let cells = self.space.cells.iter().zip(0..).filter(|(cell, _)| {
             let clearance = f64::from(cell.clearance);
-            let promises = clearance < wanted && clearance + cell.half_diagonal() >= radius;
+            // Along the leg from its centre to a face.
+            let shown = clearance - cell.edge() / 4.0;
+            let promises = shown < wanted && clearance + cell.half_diagonal() >= radius;
             cell.is_open && promises && is_near(cell.centre())
         });
         divided.extend(cells.map(|(_, i)| i));
@@ -237,7 +247,6 @@ fn described(
     let unit = case.root.edge / UNITS_PER_EDGE as f64;
     let narrowest = way.narrowest();
     let Place { at, clearance, .. } = way.points[narrowest];
-    let passing = way.points.windows(2).map(|leg| passing(&leg[0], &leg[1]));
     let first = before.len() - 1;
     let inner = (first, first + way.points.len() - 1);
     // A path to the far field counts to its end.
@@ -253,7 +262,7 @@ fn described(
         narrowest: Narrowest {
             at: to_user(&case.root, at),
             width,
-            width_min: 2.0 * unit * passing.fold(clearance, f64::min),
+            width_min: 2.0 * unit * way.passing(),
             width_max: 2.0 * unit * way.bound,
             width_cells: width / case.root.edge_of(case.level_surface),
             facets: rim.into_iter().map(|(facet, _)| facet).collect(),

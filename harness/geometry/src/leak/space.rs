@@ -20,6 +20,8 @@ use contract::word::{self, KEY_END, Order, Side};
 pub struct Cell {
     low: [u32; 3],
     edge: u32,
+    /// Whether no facet touches the leaf that it is part of.
+    is_free: bool,
     /// Whether paths may enter it. Of a cell that facets cross, its parts that they do not touch become passable.
     pub is_open: bool,
     /// Distance from the centre to the nearest facet; not a number before it is needed.
@@ -79,7 +81,8 @@ impl<'a> Space<'a> {
         let cell = |&word: &u64| {
             let (low, high) = word::octant(word).bounds();
             let (low, edge) = (low.map(|c| c as u32), (high[0] - low[0]) as u32);
-            Cell { low, edge, is_open: is_free(word), clearance: f32::NAN }
+            let is_free = is_free(word);
+            Cell { low, edge, is_free, is_open: is_free, clearance: f32::NAN }
         };
         let cells: Vec<Cell> = words.iter().map(cell).collect();
         let order = cells.iter().zip(0..).map(|(cell, i)| (key(cell.low), i)).collect();
@@ -150,6 +153,17 @@ impl<'a> Space<'a> {
         }
     }
 
+    /// No ball of a greater radius passes from one cell to another through the common part of their faces. Only between cells that facets
+    /// cross can it be less than that of both: a wall may lie in these faces.
+    fn through(&self, a: u32, b: u32) -> f64 {
+        let ends = [a, b].map(|cell| self.cells[cell as usize]);
+        if ends.iter().any(|cell| cell.is_free) {
+            return f64::INFINITY;
+        }
+        let half_diagonal = 0.5f64.sqrt() * ends[0].edge().min(ends[1].edge());
+        (self.facets.distance(self.between(a, b)) + half_diagonal) * (1.0 + 1e-6)
+    }
+
     /// The centre of the common part of two cells' faces.
     pub fn between(&self, a: u32, b: u32) -> Point {
         let [a, b] = [a, b].map(|cell| self.cells[cell as usize]);
@@ -218,7 +232,7 @@ impl<'a> Space<'a> {
                 if !self.cells[next as usize].is_open {
                     continue;
                 }
-                let wide = width(self, next) as f32;
+                let wide = width(self, next).min(self.through(cell, next)) as f32;
                 let [here, there] = [cell, next].map(|cell| self.cells[cell as usize]);
                 let step = here.centre().distance(there.centre()) as f32;
                 // Up to twice its length or more where the step is as narrow as possible.

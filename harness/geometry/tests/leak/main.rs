@@ -135,6 +135,15 @@ proptest! {
     }
 }
 
+/// Opened leaves share faces with each other in which a wall lies: no path passes through it.
+#[test]
+fn a_slit_in_a_wall_between_cells_is_measured() {
+    let body = slit([0.4, 0.0795]);
+    let root = Root { origin: [-4.0, -4.0694, -4.0], edge: 8.0 };
+    let report = ask(&case_in(root, &body.facets, 7), [0.0; 3], Target::Far).unwrap();
+    assert_describes(&report, &body, "a wall in a plane of cells");
+}
+
 #[test]
 fn the_widest_of_several_openings_is_reported() {
     for (level, radius, opposite) in [(7, 0.2, 0.185), (8, 0.15, 0.14)] {

@@ -2,7 +2,7 @@
 //!
 //! A rank that has waited for longer than the limit asks all others for a sign, on a communicator of its own. Ranks that wait themselves
 //! answer at once, as they look for questions while they wait. Those that do not answer compute, hang, or have been stopped. The rank that
-//! names them tells the others so before, which then say nothing, however long the end of the job takes.
+//! names them informs the others before, which then say nothing, however long the end of the job takes.
 
 use crate::STALLED;
 use files::interrupt;
