@@ -130,9 +130,9 @@ impl Service {
     fn start(command: &mut Command, shared: Option<TempDir>) -> io::Result<Self> {
         let errors = tempfile::Builder::new().append(true).tempfile()?.into_file();
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(errors.try_clone()?);
-        let (session, mut child) = Session::start(command)?;
-        let answers = lines_of(child.stdout.take().expect("it is a pipe"))?;
-        let (requests, sent) = (child.stdin.take(), Instant::now());
+        let (session, (requests, output)) = Session::start(command)?;
+        let answers = lines_of(output.expect("it is a pipe"))?;
+        let sent = Instant::now();
         Ok(Self { session, requests, answers, errors, sent, _shared: shared })
     }
 

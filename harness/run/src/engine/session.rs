@@ -8,12 +8,13 @@ use rustix::process::{Pid, Signal, WaitOptions, kill_process, setsid, waitpid};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, Command, ExitStatus};
+use std::os::unix::process::CommandExt;
+use std::process::{ChildStdin, ChildStdout, Command, ExitStatus};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Mutex, MutexGuard};
 use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
+use wait4::{ResourceUsage, Wait4};
 
 /// Time for child processes to remove their files.
 pub(super) const PATIENCE: Duration = Duration::from_millis(350);
@@ -30,6 +31,9 @@ fn running() -> MutexGuard<'static, Vec<Pid>> {
 /// How a child ended, and the CPU time, in seconds, of it and of all its descendants that were waited for.
 pub(super) type Ended = (ExitStatus, f64);
 
+/// The pipes to a child's standard input and from its standard output, if they are such.
+pub(super) type Pipes = (Option<ChildStdin>, Option<ChildStdout>);
+
 /// The session of a child.
 #[derive(Debug)]
 pub(super) struct Session {
@@ -41,20 +45,30 @@ pub(super) struct Session {
 
 impl Session {
     /// Starts the leader.
-    pub(super) fn start(command: &mut Command) -> io::Result<(Self, Child)> {
+    pub(super) fn start(command: &mut Command) -> io::Result<(Self, Pipes)> {
         // SAFETY: setsid is async-signal-safe and touches no memory of the parent.
         unsafe { command.pre_exec(|| setsid().map(drop).map_err(io::Error::from)) };
         let (sender, waited) = sync_channel(1);
         // Either `end_all` finds the child, or it was started after that.
         let mut running = running();
-        let child = command.spawn()?;
+        let mut child = command.spawn()?;
         let leader = Pid::from_child(&child);
         running.push(leader);
         drop(running);
         let session = Self { leader, waited, ended: None };
-        let wait = move || wait_for(leader).and_then(|ended| sender.send(ended).ok());
+        let pipes = (child.stdin.take(), child.stdout.take());
+        let wait = move || {
+            let used = loop {
+                match child.wait4() {
+                    Err(why) if why.kind() == io::ErrorKind::Interrupted => {}
+                    used => break used.ok()?,
+                }
+            };
+            let ResourceUsage { utime, stime, .. } = used.rusage;
+            sender.send((used.status, (utime + stime).as_secs_f64())).ok()
+        };
         thread::Builder::new().name("wait".into()).stack_size(64 << 10).spawn(wait)?;
-        Ok((session, child))
+        Ok((session, pipes))
     }
 
     /// How the leader ended; `None` if it runs for longer than this.
@@ -88,24 +102,6 @@ impl Drop for Session {
         running.retain(|&other| other != self.leader);
         kill(&[self.leader], &running);
     }
-}
-
-/// Waits for a child. `Child::wait` gives no CPU time.
-fn wait_for(child: Pid) -> Option<Ended> {
-    let id = child.as_raw_nonzero().get();
-    let mut status = 0;
-    // SAFETY: all bits zero are a valid `rusage`, which contains only integers.
-    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
-    loop {
-        // SAFETY: both pointers are to live local variables.
-        match unsafe { libc::wait4(id, &raw mut status, 0, &raw mut usage) } {
-            reaped if reaped == id => break,
-            _ if io::Error::last_os_error().kind() == io::ErrorKind::Interrupted => {}
-            _ => return None,
-        }
-    }
-    let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
-    Some((ExitStatus::from_raw(status), seconds(usage.ru_utime) + seconds(usage.ru_stime)))
 }
 
 /// Ends all sessions at the same time, and removes what they left. None is started as long as the result exists.
@@ -237,9 +233,9 @@ mod tests {
     #[test]
     fn a_pause_ends_with_the_child() {
         let mut command = Command::new("cat");
-        let (mut session, mut child) = Session::start(command.stdin(Stdio::piped())).unwrap();
+        let (mut session, pipes) = Session::start(command.stdin(Stdio::piped())).unwrap();
         assert!(session.wait(Duration::ZERO).unwrap().is_none());
-        drop(child.stdin.take());
+        drop(pipes);
         let start = Instant::now();
         assert!(session.wait(Duration::from_secs(600)).unwrap().unwrap().0.success());
         assert!(start.elapsed() < Duration::from_secs(300));
