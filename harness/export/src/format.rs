@@ -25,13 +25,6 @@ pub struct Format {
     pub write: Write,
 }
 
-impl Format {
-    /// Whether it has the faces towards the body, not cells.
-    pub fn is_surface(&self) -> bool {
-        [".vtp", ".stl"].contains(&self.ending)
-    }
-}
-
 /// All formats.
 pub const FORMATS: &[Format] = &[
     Format {

@@ -78,13 +78,9 @@ impl Mesh<'_> {
             })
     }
 
-    /// Whether a rule requires a leaf to be split. The answer is not remembered: about a leaf it is asked once.
-    pub(super) fn requires_split(&self, leaf: &Octant) -> bool {
-        self.is_forced(leaf, leaf.level + 1)
-    }
-
-    /// Whether T0, the extra layer or a leaf of a level from `first` on forces an octant to split.
-    fn is_forced(&self, octant: &Octant, first: u8) -> bool {
+    /// Whether T0, the extra layer or a leaf of a level from `first` on forces an octant to split. The answer is not remembered: about a leaf it is
+    /// asked once.
+    pub(super) fn is_forced(&self, octant: &Octant, first: u8) -> bool {
         let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
         self.base_splits(octant)
             || self.extra_layer(octant).is_some()

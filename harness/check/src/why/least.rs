@@ -39,7 +39,7 @@ impl Mesh<'_> {
         } else if handle.as_leaf().is_some() {
             let is_missing = match self.has_nothing_finer(trail) {
                 true => self.base_splits(&octant),
-                false => self.requires_split(&octant),
+                false => self.is_forced(&octant, octant.level + 1),
             };
             visit(octant, is_missing.then_some(MISSING));
         }

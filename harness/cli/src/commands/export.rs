@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let format = format::of(&arguments.file)?;
     let Summary { leaves, bytes, notes } = write(format, arguments)?;
     let file = arguments.file.display();
-    let what = if format.is_surface() { "face" } else { "cell" };
+    let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
     let per_cell = bytes as f64 / leaves as f64;
     println!("{file}: {leaves} {what}s, {bytes} bytes ({per_cell:.2} per {what})");
     notes.iter().for_each(|note| println!("  {note}"));

@@ -20,8 +20,6 @@ use parry3d_f64::shape::Segment;
 
 /// Exceeds the rounding of printed points, in lattice units.
 const ROUNDING: f64 = 2.0;
-/// Legs that are compared with a facet at once, most of which are far from it.
-const GROUP: usize = 32;
 
 /// Two positions or lengths on the lattice are equal but for rounding.
 fn is_near(a: f64, b: f64) -> bool {
@@ -67,19 +65,14 @@ impl Passage {
             let is_inner = (self.inner.0..self.inner.1).contains(&i);
             let is_free = is_free(leaf_at(words, ends[0].midpoint(ends[1])));
             assert!(is_inner || is_free, "leg {i} leads through a leaf that facets cross");
-            (Segment::new(ends[0], ends[1]), if is_inner { least } else { 0.0 })
+            let leg = Segment::new(ends[0], ends[1]);
+            let clearance = if is_inner { least } else { 0.0 };
+            (leg, clearance, leg.local_aabb().loosened(clearance))
         };
-        let legs: Vec<(Segment, f64)> = points.windows(2).enumerate().map(leg).collect();
-        let bounds = |legs: &[(Segment, f64)]| {
-            let boxes = legs.iter().map(|(leg, _)| leg.local_aabb());
-            let whole: Option<Aabb> = boxes.reduce(|a, b| a.merged(&b));
-            whole.expect("a group has legs").loosened(least)
-        };
-        let groups: Vec<_> = legs.chunks(GROUP).map(|legs| (bounds(legs), legs)).collect();
+        let legs: Vec<(Segment, f64, Aabb)> = points.windows(2).enumerate().map(leg).collect();
         for (number, facet) in case.facets_lattice.iter().map(triangle).enumerate() {
             let around = facet.local_aabb();
-            let near = groups.iter().filter(|(bounds, _)| bounds.intersects(&around));
-            for (leg, clearance) in near.flat_map(|(_, legs)| legs.iter()) {
+            for (leg, clearance, _) in legs.iter().filter(|leg| leg.2.intersects(&around)) {
                 let is_met = met(&facet, &Ray::new(leg.a, leg.b - leg.a), 1.0).is_some();
                 let of_ends = from_point(leg.a, &facet).min(from_point(leg.b, &facet));
                 let distance = if is_met { -1.0 } else { of_ends.min(from_edges(leg, &facet)) };

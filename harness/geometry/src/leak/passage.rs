@@ -3,10 +3,11 @@
 //! The *radius* of a cell is the distance from its centre to the nearest facet plus half of its diagonal: no larger ball has its centre in
 //! the cell. The path whose least radius is greatest bounds the balls that pass. Along a leg of length l between points of clearance a and
 //! b, the clearance is at least (a + b - l) / 2, which shows which ball does pass. Where the two differ by more than 5 %, the cells of the
-//! leg are divided, and those near it that promise more than their centres have, and the path is searched again.
+//! leg are divided, and those near it that promise this ball but do not show it, and the path is searched again.
 //!
 //! An opening of fewer than 3.5 cells can have the centre of its ball in a leaf that facets cross. Such leaves are opened near the
-//! narrow places of the path: their parts that no facet touches are passable.
+//! narrow places of the path: their parts that no facet touches are passable. As a wall may lie in the common face of two of them, the ball
+//! must fit through that as well.
 //!
 //! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
 //! the width counts from there.
@@ -27,8 +28,8 @@ use parry3d_f64::query::PointQuery as _;
 const PRECISION: f64 = 1.05;
 /// Cells of a smaller half diagonal, in radii of the ball that passes, show the clearance to `PRECISION`.
 const SMALL: f64 = 0.015;
-/// Searches for the widest path, at most, once some ball passes along it. If they do not suffice, the bounds on the width are wider apart
-/// than 5 %.
+/// Searches for the widest path through the same leaves, at most, once some ball passes along it. If they do not suffice, the bounds on the
+/// width are wider apart than 5 %. A ball passes once the cells are so small that no path through a wall seems as wide as one around it.
 const SEARCHES_MAX: usize = 300;
 /// Times that crossed leaves are opened.
 const OPENED_MAX: usize = 6;
@@ -77,8 +78,6 @@ fn passing(from: &Place, to: &Place) -> f64 {
 struct Search<'a> {
     space: Space<'a>,
     ends: Ends,
-    /// Number of searches so far.
-    searches: usize,
     watch: &'a dyn Watch,
 }
 
@@ -96,7 +95,7 @@ pub fn widest(
     let before = approach(&space, from);
     let after: Vec<Point> = to.map(|to| approach(&space, to)).unwrap_or_default();
     let ends = (before[before.len() - 1], after.last().copied());
-    let mut search = Search { space, ends, searches: 0, watch };
+    let mut search = Search { space, ends, watch };
     let leaf = UNITS_PER_EDGE as f64 / f64::from(1u32 << level);
     let mut way = search.converge()?;
     for _ in 0..OPENED_MAX {
@@ -145,7 +144,7 @@ fn root() -> Aabb {
 impl Search<'_> {
     /// The widest path.
     fn converge(&mut self) -> Result<Way, Failure> {
-        let mut cap = f32::INFINITY;
+        let (mut cap, mut searches) = (f32::INFINITY, 0);
         loop {
             let found = self.space.widest(self.ends, cap, Space::radius, self.watch)?;
             let (cells, width) = found.expect("free leaves join the ends");
@@ -154,9 +153,9 @@ impl Search<'_> {
                 cap = width;
                 continue;
             }
-            self.searches += 1;
+            searches += 1;
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
-            let is_last = self.searches >= SEARCHES_MAX && way.passing() > 0.0;
+            let is_last = searches >= SEARCHES_MAX && way.passing() > 0.0;
             if is_last || !self.divide(&way) {
                 return Ok(way);
             }
@@ -186,28 +185,21 @@ impl Search<'_> {
     fn divide(&mut self, way: &Way) -> bool {
         let (points, radius) = (&way.points, way.bound);
         let wanted = radius / PRECISION;
-        let mut narrow = Vec::new();
-        let mut divided = Vec::new();
-        for (i, place) in points.iter().enumerate() {
-            if place.clearance < wanted {
-                narrow.push(place.at);
-                // A leg begins and ends on the faces of cells.
-                divided.extend([points[i.saturating_sub(1)].cell, place.cell]);
-            }
-            if points.get(i + 1).is_some_and(|next| passing(place, next) < wanted) {
-                narrow.push(place.at);
-                divided.push(place.cell);
-            }
-        }
-        let is_near = |at: Point| narrow.iter().any(|narrow| at.distance(*narrow) < 2.0 * radius);
+        let is_narrow = |&(i, place): &(usize, &Place)| {
+            passing(place, points.get(i + 1).unwrap_or(place)) < wanted
+        };
+        let narrow: Vec<&Place> =
+            points.iter().enumerate().filter(is_narrow).map(|(_, place)| place).collect();
+        let is_near = |at: Point| narrow.iter().any(|place| at.distance(place.at) < 2.0 * radius);
         let cells = self.space.cells.iter().zip(0..).filter(|(cell, _)| {
             let clearance = f64::from(cell.clearance);
-            // Along the leg from its centre to a face.
+            // Of the leg from its centre to a face, if this is as far from facets.
             let shown = clearance - cell.edge() / 4.0;
             let promises = shown < wanted && clearance + cell.half_diagonal() >= radius;
             cell.is_open && promises && is_near(cell.centre())
         });
-        divided.extend(cells.map(|(_, i)| i));
+        let mut divided: Vec<u32> = cells.map(|(_, i)| i).collect();
+        divided.extend(narrow.iter().map(|place| place.cell));
         divided.sort_unstable();
         divided.dedup();
         divided.retain(|&i: &u32| {

@@ -153,8 +153,8 @@ impl<'a> Space<'a> {
         }
     }
 
-    /// No ball of a greater radius passes from one cell to another through the common part of their faces. Only between cells that facets
-    /// cross can it be less than that of both: a wall may lie in these faces.
+    /// No ball of a greater radius passes from one cell to another through the common part of their faces. It is not needed if one of them is
+    /// free, because no wall lies in its faces.
     fn through(&self, a: u32, b: u32) -> f64 {
         let ends = [a, b].map(|cell| self.cells[cell as usize]);
         if ends.iter().any(|cell| cell.is_free) {
@@ -188,8 +188,9 @@ impl<'a> Space<'a> {
         (self.clearance(cell) + self.cells[cell as usize].half_diagonal()) * (1.0 + 1e-6)
     }
 
-    /// The path between the cells of two ends, through open ones, whose least width is greatest, widths above `cap` being equal, and this width. Of paths that are
-    /// wider than `cap` throughout, it is a short one that keeps away from facets. `None` if no path exists.
+    /// The path between the cells of two ends, through open ones, whose least width is greatest, widths above `cap` being equal, and this
+    /// width. Between cells that facets cross it is no more than what passes through their common face. Of paths that are wider than `cap`
+    /// throughout, it is a short one that keeps away from facets. `None` if no path exists.
     ///
     /// # Errors
     /// If `watch` is interrupted.
@@ -238,12 +239,12 @@ impl<'a> Space<'a> {
                 // Up to twice its length or more where the step is as narrow as possible.
                 let clearance = there.clearance;
                 let detour = if cap.is_finite() { (cap / clearance).min(8.0) } else { 0.0 };
-                let through = (label.0.min(wide), label.1 + step * (1.0 + detour));
+                let reached = (label.0.min(wide), label.1 + step * (1.0 + detour));
                 let best = labels[next as usize];
-                if through.0 > best.0 || (through.0 == best.0 && through.1 < best.1) {
-                    labels[next as usize] = through;
+                if reached.0 > best.0 || (reached.0 == best.0 && reached.1 < best.1) {
+                    labels[next as usize] = reached;
                     via[next as usize] = cell;
-                    queue.push(key(through, next));
+                    queue.push(key(reached, next));
                 }
             }
         }

@@ -31,7 +31,7 @@ fn running() -> MutexGuard<'static, Vec<Pid>> {
 /// How a child ended, and the CPU time, in seconds, of it and of all its descendants that were waited for.
 pub(super) type Ended = (ExitStatus, f64);
 
-/// The pipes to a child's standard input and from its standard output, if they are such.
+/// The pipes to a child's standard input and from its standard output; none where the command asks for none.
 pub(super) type Pipes = (Option<ChildStdin>, Option<ChildStdout>);
 
 /// The session of a child.
@@ -57,6 +57,7 @@ impl Session {
         drop(running);
         let session = Self { leader, waited, ended: None };
         let pipes = (child.stdin.take(), child.stdout.take());
+        // `Child::wait` gives no CPU time.
         let wait = move || {
             let used = loop {
                 match child.wait4() {

@@ -173,12 +173,12 @@ fn a_job_that_is_interrupted_or_killed_leaves_no_files_and_no_ranks() {
                 continue;
             }
             // The launcher kills ranks that have not ended within a second, and the MPI library ends those of a dead launcher: what is
-            // left of them is no mesh without its manifest, and has its final name only if the stopped rank went on to the end. The rank
-            // that has a signal handled removes its own files and the claim.
-            let own = format!("leaves-{rank:05}.npy");
+            // left of them is no mesh without its manifest, and has its final name only if all went on to the commit. The rank that has a
+            // signal handled removes its own files and the claim.
+            let own = format!("leaves-{rank:05}.npy.draft");
             let is_handled = !to_launcher && signals != ["KILL"];
             for name in left(&workspace, &["case.toml", "mesh"]) {
-                let is_own = name.contains(&own) || name.ends_with("mesh.json.draft");
+                let is_own = name.ends_with(&own) || name.ends_with("mesh.json.draft");
                 let is_of_leaves = to_launcher && name.starts_with("mesh/leaves-");
                 let is_unfinished = name.ends_with(".draft") || is_of_leaves;
                 let may_be_left = is_unfinished && !(is_handled && is_own);
