@@ -64,11 +64,10 @@ impl Diagnosis {
         }
         let more = count - places.len() as u64;
         // Two facets of a thin sheet are listed once.
-        match kind {
-            Kind::ThinWalls | Kind::ThinGaps => Ok(()),
-            _ if more > 0 => writeln!(f, "  and {more} more (--limit)"),
-            _ => Ok(()),
+        if more > 0 && !matches!(kind, Kind::ThinWalls | Kind::ThinGaps) {
+            writeln!(f, "  and {more} more (--limit)")?;
         }
+        Ok(())
     }
 
     /// A length with a word after it, and in cells if their size is known.

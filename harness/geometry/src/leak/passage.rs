@@ -155,8 +155,7 @@ impl Search<'_> {
             }
             searches += 1;
             let way = Way { points: self.points(&cells), bound: f64::from(cap) };
-            let is_last = searches >= SEARCHES_MAX && way.passing() > 0.0;
-            if is_last || !self.divide(&way) {
+            if searches >= SEARCHES_MAX && way.passing() > 0.0 || !self.divide(&way) {
                 return Ok(way);
             }
         }
@@ -185,11 +184,10 @@ impl Search<'_> {
     fn divide(&mut self, way: &Way) -> bool {
         let (points, radius) = (&way.points, way.bound);
         let wanted = radius / PRECISION;
-        let is_narrow = |&(i, place): &(usize, &Place)| {
-            passing(place, points.get(i + 1).unwrap_or(place)) < wanted
-        };
+        // The last point is a leg of no length.
+        let legs = points.iter().zip(points[1..].iter().chain(points.last()));
         let narrow: Vec<&Place> =
-            points.iter().enumerate().filter(is_narrow).map(|(_, place)| place).collect();
+            legs.filter(|(from, to)| passing(from, to) < wanted).map(|(from, _)| from).collect();
         let is_near = |at: Point| narrow.iter().any(|place| at.distance(place.at) < 2.0 * radius);
         let cells = self.space.cells.iter().zip(0..).filter(|(cell, _)| {
             let clearance = f64::from(cell.clearance);

@@ -43,10 +43,6 @@ impl Cell {
     pub fn half_diagonal(&self) -> f64 {
         3f64.sqrt() / 2.0 * self.edge()
     }
-
-    fn is_at_boundary(&self) -> bool {
-        self.low.iter().any(|&c| c == 0 || i64::from(c + self.edge) == UNITS_PER_EDGE)
-    }
 }
 
 /// The cells.
@@ -92,7 +88,8 @@ impl<'a> Space<'a> {
     fn is_far(&self, cell: u32) -> bool {
         let cell = &self.cells[cell as usize];
         let is_outside = |words| word::side(leaf_at(words, cell.centre())) == Side::Outside;
-        cell.is_at_boundary() && self.outside.is_none_or(is_outside)
+        let is_at_face = |&c: &u32| c == 0 || i64::from(c + cell.edge) == UNITS_PER_EDGE;
+        cell.low.iter().any(is_at_face) && self.outside.is_none_or(is_outside)
     }
 
     /// The cell that contains a point of the root.
@@ -173,19 +170,14 @@ impl<'a> Space<'a> {
         }))
     }
 
-    /// Distance from the centre of a cell to the nearest facet.
-    pub fn clearance(&mut self, cell: u32) -> f64 {
+    /// No ball of a greater radius has its centre in the cell.
+    pub fn radius(&mut self, cell: u32) -> f64 {
         let cell = &mut self.cells[cell as usize];
         if cell.clearance.is_nan() {
             cell.clearance = self.facets.distance(cell.centre()) as f32;
         }
-        cell.clearance.into()
-    }
-
-    /// No ball of a greater radius has its centre in the cell.
-    pub fn radius(&mut self, cell: u32) -> f64 {
         // Exceeds the rounding to f32.
-        (self.clearance(cell) + self.cells[cell as usize].half_diagonal()) * (1.0 + 1e-6)
+        (f64::from(cell.clearance) + cell.half_diagonal()) * (1.0 + 1e-6)
     }
 
     /// The path between the cells of two ends, through open ones, whose least width is greatest, widths above `cap` being equal, and this
