@@ -54,13 +54,13 @@ pub struct Sides {
 #[serde(rename_all = "lowercase")]
 pub enum Touching {
     /// In part of a face
-    #[value(name = "faces")]
+    #[value(name = "faces", alias = "face")]
     Face,
     /// In part of a face or an edge
-    #[value(name = "edges")]
+    #[value(name = "edges", alias = "edge")]
     Edge,
     /// In a face, an edge or a corner
-    #[value(name = "corners")]
+    #[value(name = "corners", alias = "corner")]
     Corner,
 }
 

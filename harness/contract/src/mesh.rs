@@ -235,7 +235,7 @@ impl Mesh {
     /// # Errors
     /// If they are not.
     pub fn require_sides(&self) -> Result<(), Failure> {
-        let why = "the sides of this mesh are unknown, and this needs them: only .vtu and polyMesh can be written without";
+        let why = "the sides of this mesh are unknown, and this needs them: hyper-tree grids and surfaces cannot be written without";
         match self.manifest.sides {
             Sides::Known => Ok(()),
             Sides::Unknown => Err(Failure::input(why)),
