@@ -31,6 +31,11 @@ fn index([x, y, z]: [i32; 3]) -> usize {
     (SELF as i32 + x + 3 * y + 9 * z) as usize
 }
 
+/// The index of the octant across a face.
+fn face(axis: usize, side: i32) -> usize {
+    index(array::from_fn(|a| if a == axis { side } else { 0 }))
+}
+
 /// The contents of an octant and of its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbourhood {
@@ -58,8 +63,7 @@ impl Neighbourhood {
 
     /// The content across a face of a child, on the low (-1) or high (1) side of an axis.
     pub fn across(&self, tree: &Tree, digit: u8, axis: usize, side: i32) -> Handle {
-        let neighbour = index(array::from_fn(|a| if a == axis { side } else { 0 }));
-        let (index, digit) = DESCENT[usize::from(digit)][neighbour];
+        let (index, digit) = DESCENT[usize::from(digit)][face(axis, side)];
         tree.child(self.handles[index], digit, self.octant.level)
     }
 
@@ -77,9 +81,9 @@ impl Neighbourhood {
         self.handles[SELF]
     }
 
-    /// The content of the neighbour at an offset in edges.
-    pub fn at_offset(&self, offset: [i32; 3]) -> Handle {
-        self.handles[index(offset)]
+    /// The content across a face, on the low (-1) or high (1) side of an axis.
+    pub fn at_face(&self, axis: usize, side: i32) -> Handle {
+        self.handles[face(axis, side)]
     }
 
     /// Level of the coarsest leaf in all 27 octants, deleted leaves excluded.

@@ -20,13 +20,9 @@ fn below(
     around: &Neighbourhood,
     visit: &mut impl FnMut(Octant, Kind, Kinds),
 ) {
-    let across = |(axis, side, _)| {
-        let mut offset = [0; 3];
-        offset[axis] = side;
-        around.at_offset(offset)
-    };
-    let near = FACES.into_iter().map(across).chain([around.centre()]);
-    if !around.centre().is_node() || near.fold(0, |all, h| all | tree.kinds(h)) & sought == 0 {
+    let across = FACES.map(|(axis, side, _)| around.at_face(axis, side));
+    let near = |h| tree.kinds(h) & sought != 0;
+    if !around.centre().is_node() || !(near(around.centre()) || across.into_iter().any(near)) {
         return;
     }
     for digit in 0..8 {
