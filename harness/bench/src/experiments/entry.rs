@@ -216,9 +216,9 @@ impl Spread {
         is_of_ranks && all.all(|v| *v >= 0.0 && v.is_finite()) && *max <= sum + rounding(1, *sum)
     }
 
-    /// Maximum over mean: 1 if all values are equal, also if all are 0.
+    /// Maximum over mean: 1 if all values are equal, also if all are 0, or too small to be kept.
     pub fn lambda(&self, ranks: usize) -> f64 {
-        if self.sum > 0.0 { self.max * ranks as f64 / self.sum } else { 1.0 }
+        if self.sum.min(self.max) > 0.0 { self.max * ranks as f64 / self.sum } else { 1.0 }
     }
 }
 
@@ -410,6 +410,8 @@ mod tests {
         let many = Spread::of(&[1.0; BY_RANK_MAX + 1]);
         assert_eq!((many.sum, many.by_rank.len()), ((BY_RANK_MAX + 1) as f64, 0));
         assert_eq!(Spread::of(&[0.0, 0.0]).lambda(2), 1.0);
+        // The sum is a microsecond, the maximum less than half of one.
+        assert_eq!(Spread::of(&[2e-7, 4e-7, 0.0]).lambda(3), 1.0);
     }
 
     #[test]
