@@ -16,7 +16,6 @@ pub mod testing;
 pub mod track;
 
 use run::engine::failure::{End, Failure};
-use run::engine::process::{self, Watch};
 use run::engine::runner::Engine;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,12 +31,10 @@ fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
     reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
 }
 
-/// Returns what a command prints; `None` if it fails, or has not ended after a minute.
+/// Returns what a command prints; `None` if it fails.
 fn printed(command: &mut Command) -> Option<String> {
-    let place = tempfile::tempdir().ok()?;
-    let watch = Watch::new("printed", std::time::Duration::from_secs(60), place.path());
-    let text = std::fs::read(process::run(command, &watch).ok()?.stdout).ok()?;
-    Some(String::from_utf8_lossy(&text).trim_end().to_owned())
+    let output = command.output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 /// Returns what git prints in a directory; `None` if it fails.

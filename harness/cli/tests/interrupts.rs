@@ -117,36 +117,26 @@ fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
     }
 }
 
-/// The record of a study that is interrupted while its launcher hangs in this script.
-fn interrupted_in(launcher: &str) -> String {
+/// A network that is assumed instead would change the projections of the record.
+#[test]
+fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
     let fixture = Fixture::new();
     fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
     fixture.program("pingpong", "");
-    fixture.program("launcher", &format!("#!/bin/sh\n{launcher}\n"));
+    // It is asked for its version first.
+    fixture.program("launcher", "#!/bin/sh\ntest $1 = --version || exec ./mesher\n");
     let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [2]\n";
     fs::write(fixture.path().join("study.toml"), series).unwrap();
     let launcher = ["--launcher", "./launcher {ranks}", "--mesher", "./mesher"];
     let bench = ["bench", "study.toml", "--record", "record.jsonl"];
     let mut run = fixture.start(&[&bench[..], &launcher].concat());
     while fixture.ids().len() < 2 {
-        assert!(run.try_wait().unwrap().is_none(), "it ended before the launcher hung");
+        assert!(run.try_wait().unwrap().is_none(), "it ended before the ping-pong");
         sleep(Duration::from_millis(5));
     }
     fixture.interrupt(run, &["INT"]);
-    fs::read_to_string(fixture.path().join("record.jsonl")).unwrap_or_default()
-}
-
-/// A network that is assumed instead would change the projections of the record.
-#[test]
-fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
-    let record = interrupted_in("test $1 = --version || exec ./mesher");
+    let record = fs::read_to_string(fixture.path().join("record.jsonl")).unwrap();
     assert!(record.contains("session") && !record.contains("network"), "{record}");
-}
-
-#[test]
-fn a_launcher_that_does_not_tell_its_version_is_ended() {
-    let record = interrupted_in("exec ./mesher");
-    assert!(!record.contains("network"), "{record}");
 }
 
 #[test]
