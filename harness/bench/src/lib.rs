@@ -16,6 +16,7 @@ pub mod testing;
 pub mod track;
 
 use run::engine::failure::{End, Failure};
+use run::engine::process::printed;
 use run::engine::runner::Engine;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,12 +30,6 @@ fn name_of(variant: &impl serde::Serialize) -> String {
 /// Returns the first reason that applies.
 fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
     reasons.iter().find(|(applies, _)| *applies).map_or(Ok(()), |(_, why)| Err((*why).to_owned()))
-}
-
-/// Returns what a command prints; `None` if it fails.
-fn printed(command: &mut Command) -> Option<String> {
-    let output = command.output().ok().filter(|output| output.status.success())?;
-    Some(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
 }
 
 /// Returns what git prints in a directory; `None` if it fails.

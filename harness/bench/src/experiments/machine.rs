@@ -1,8 +1,9 @@
 //! The description of the machine that runs the measurements.
 
 use super::entry::Machine;
-use crate::{git, printed};
+use crate::git;
 use contract::digest::mix;
+use run::engine::process::printed;
 use rustix::system::{sysinfo, uname};
 use std::fmt;
 use std::fs;

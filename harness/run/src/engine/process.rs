@@ -10,17 +10,21 @@ use super::interrupt;
 use super::session::{Session, peak_bytes};
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
-use std::io;
+use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
+use std::thread;
 use std::time::{Duration, Instant};
 
 /// Longest output of a child, in bytes.
 const OUTPUT_MAX: u64 = 64 << 20;
 /// Bytes at the end of a standard error in which the error is looked for.
 const ERROR_MAX: u64 = 1 << 20;
+
+/// Time for a program to say its version, and for git to answer.
+const QUERY: Duration = Duration::from_secs(10);
 
 /// Looks at a child of any age, at least: what a short run uses last is missed as seldom as in a long one.
 const LOOKS: u32 = 16;
@@ -97,6 +101,21 @@ impl<'a> Watch<'a> {
 /// If the child cannot be started or does not exit with code 0.
 pub fn run(command: &mut Command, watch: &Watch) -> Result<Finished, Failure> {
     to_its_end(command, watch).map_err(|end| Failure::new(watch.name, end))
+}
+
+/// What a program prints that answers at once; none if it fails, or takes longer than [`QUERY`]. The output goes through a pipe: git does
+/// not repeat a write to a file that a signal interrupts.
+pub fn printed(command: &mut Command) -> Option<String> {
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let (mut session, (_, out)) = Session::start(command).ok()?;
+    let mut out = out?;
+    let (mut bytes, reader) = (Vec::new(), thread::Builder::new());
+    let reader = reader.spawn(move || out.read_to_end(&mut bytes).map(|_| bytes)).ok()?;
+    let (status, _) = session.wait(QUERY).ok()??;
+    // Descendants that hold the pipe end with the session.
+    drop(session);
+    let bytes = reader.join().ok()?.ok().filter(|_| status.success())?;
+    Some(String::from_utf8_lossy(&bytes).trim_end().to_owned())
 }
 
 fn to_its_end(command: &mut Command, watch: &Watch) -> Result<Finished, End> {
@@ -315,6 +334,16 @@ mod tests {
     fn a_child_that_ignores_sigterm_is_killed() {
         let end = end_of("trap '' TERM; while :; do sleep 1; done", 200);
         assert!(matches!(end, End::TimedOut { .. }), "{end:?}");
+    }
+
+    #[test]
+    fn an_answer_ends_with_its_program() {
+        let of = |script: &str| printed(Command::new("sh").arg("-c").arg(script));
+        assert_eq!(of("echo yes; sleep 600 &").as_deref(), Some("yes"));
+        assert_eq!(
+            (of("echo no; exit 1"), printed(&mut Command::new("/no/program"))),
+            (None, None)
+        );
     }
 
     #[test]
