@@ -131,8 +131,7 @@ fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) ->
     for (style, (name, value)) in factors.into_iter().enumerate() {
         let factor = |(g, e): (&&Group, &Efficiency)| Point::exact(g.setup.ranks as f64, value(e));
         let points = sims.iter().zip(&efficiencies).map(factor).collect();
-        let name = format!("{}: {name}", subject.engine);
-        series.push(Series::new(&name, Provenance::Projected, style, points));
+        series.push(Series::new(name, Provenance::Projected, style, points));
     }
     let experiment = &last.setup.experiment;
     let size = match experiment.as_str() {
@@ -219,8 +218,7 @@ fn phases(subject: Subject, simulated: &[&Group], file: &str) -> Option<Figure> 
             let sum: f64 = names.iter().map(|name| time(g, name)).sum();
             if is_weak { sum / (g.cells() as f64 / 1e6) } else { sum }
         };
-        let name = format!("{}: {label}", subject.engine);
-        bars(&name, Provenance::Projected, style, simulated.iter().map(length))
+        bars(label, Provenance::Projected, style, simulated.iter().map(length))
     };
     let (shown, rest) = names.split_at(names.len().min(PHASES_SHOWN));
     let others = (!rest.is_empty()).then_some(("others", rest));
@@ -254,9 +252,8 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
     let ends = (-0.5, of.len() as f64 - 0.5);
-    let name = format!("{}: cells", subject.engine);
     let mut series = vec![
-        bars(&name, Provenance::Measured, 0, lambdas.into_iter()),
+        bars("cells", Provenance::Measured, 0, lambdas.into_iter()),
         Series::vertical("target, 1.10", 1, 1.1, ends),
     ];
     // A base leaf is never divided, so no partition beats a rank that has only the largest one.

@@ -11,12 +11,12 @@ const PREAMBLE: &str = "\\usepackage{pgfplots} \\pgfplotsset{compat=1.16}";
 
 /// Filled and hollow marker of every style.
 const MARKS: [(&str, &str); MARKERS.len()] = [
-    ("*", "o"),
-    ("square*", "square"),
-    ("triangle*", "triangle"),
-    ("diamond*", "diamond"),
-    ("triangle*, mark options={rotate=180}", "triangle, mark options={rotate=180}"),
-    ("pentagon*", "pentagon"),
+    ("*", "o, mark options=solid"),
+    ("square*", "square, mark options=solid"),
+    ("triangle*", "triangle, mark options=solid"),
+    ("diamond*", "diamond, mark options=solid"),
+    ("triangle*, mark options={rotate=180}", "triangle, mark options={solid, rotate=180}"),
+    ("pentagon*", "pentagon, mark options=solid"),
 ];
 
 /// The intervals of points.
@@ -45,6 +45,13 @@ pub fn csv(figure: &Figure) -> String {
     format!("# {title}\n# x: {}; y: {}\n{columns}\n{}", x.label, y.label, rows.collect::<String>())
 }
 
+/// Greatest length of names of which a legend has two columns at the width of a text's column.
+const NAME_MAX: usize = 22;
+
+fn longest<'a>(names: impl IntoIterator<Item = &'a String>) -> usize {
+    names.into_iter().map(|name| name.chars().count()).max().unwrap_or(0)
+}
+
 /// A name without what ends a field or means something to TeX.
 fn plain(text: &str) -> String {
     text.replace(", ", "; ")
@@ -61,23 +68,25 @@ pub fn tex(figure: &Figure) -> String {
         let _ = writeln!(out, "\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}");
     }
     let [x, y] = figure.scales();
-    let (kind, errors) = match figure.y.names.is_empty() {
-        true => ("", ERRORS),
-        false => ("xbar stacked, bar width=8pt, ", ""),
-    };
+    let kind = if figure.y.names.is_empty() { "" } else { "xbar stacked, bar width=8pt, " };
+    let columns = if longest(figure.series.iter().map(|s| &s.name)) > NAME_MAX { 1 } else { 2 };
+    // Of the width, pgfplots keeps 45 pt for labels of four digits.
+    let beyond = (4.2 * longest(&figure.y.names) as f64 - 14.0).max(4.0);
     let _ = writeln!(
         out,
-        "\\begin{{axis}}[\n  width=\\linewidth, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
-         legend style={{at={{(0.5,1.03)}},anchor=south,legend columns=2,draw=none,font=\\footnotesize}},\n  {},\n  {}\n]",
+        "\\begin{{axis}}[\n  width=\\linewidth-{beyond:.0}pt, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
+         scaled ticks=false, tick label style={{font=\\footnotesize}}, label style={{font=\\footnotesize}},\n  \
+         legend style={{at={{(1,1.03)}},anchor=south east,legend columns={columns},draw=none,font=\\footnotesize}},\n  {},\n  {}\n]",
         axis_options("x", &figure.x, &x),
         axis_options("y", &figure.y, &y)
     );
     let plot = |(plot, s): (usize, &Series)| {
         let (style, id, name) = (s.style % COLOURS.len(), &figure.id, escape(&s.name));
+        let errors = if s.points.iter().all(|p| p.low == p.high) { "" } else { ERRORS };
         match (s.kind, &s.points[..]) {
             (Kind::Line, [Point { x, .. }, ..]) => format!(
                 "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
-                 \\addlegendimage{{style{style}, line legend}}\n\\addlegendentry{{{name}}}\n"
+                 \\addlegendimage{{legend image code/.code={{\\draw[style{style}] (0pt,0pt) -- (15pt,0pt);}}}}\n\\addlegendentry{{{name}}}\n"
             ),
             _ => format!(
                 "\\addplot[{}] table[col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, \
