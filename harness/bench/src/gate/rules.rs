@@ -68,7 +68,7 @@ impl Default for TimeRules {
     fn default() -> Self {
         Self {
             rounds_min: 15,
-            rounds_max: 60,
+            rounds_max: 120,
             budget_s: 20.0,
             alpha: 0.001,
             effect_min: 1.0,
