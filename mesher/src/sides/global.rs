@@ -25,8 +25,12 @@ pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u3
     }
     let mut pairs = label_replicated(&mut labels, base, nodes, merged);
     pairs.extend(across_ranks(nodes, faces, merged, &labels, comm));
-    let mut unions = Unions::of(&gather(comm, &group_forest(pairs, comm)));
-    labels.iter().map(|&n| unions.find(n)).collect()
+    let all = forest(&gather(comm, &group_forest(pairs, comm)));
+    let least = |label: Label| {
+        let at = all.binary_search_by_key(&label, |pair| pair[0]);
+        at.map_or(label, |at| all[at][1])
+    };
+    labels.into_iter().map(least).collect()
 }
 
 /// A spanning forest of the pairs of all ranks in a group, on the group's first rank, and none on the others.
@@ -36,9 +40,9 @@ fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
     let mut messages = MessageBuffer::default();
-    messages.write_values(first, &Unions::of(&pairs).pairs());
+    messages.write_values(first, &forest(&pairs));
     let received: Vec<_> = comm.sparse_all_to_all(messages).values().collect();
-    Unions::of(&received).pairs()
+    forest(&received)
 }
 
 /// Labels the merged components that have a part in a fully replicated brick by the number of this part's
@@ -105,37 +109,18 @@ fn across_ranks(
     pairs
 }
 
-/// The sets into which pairs unite labels. The least label represents a set.
-struct Unions {
-    /// All labels of the pairs, ascending.
-    labels: Vec<Label>,
-    /// The sets of their numbers.
-    sets: UnionFind,
-}
-
-impl Unions {
-    fn of(pairs: &[[Label; 2]]) -> Self {
-        let mut labels = pairs.as_flattened().to_vec();
-        labels.sort_unstable();
-        labels.dedup();
-        let mut sets = UnionFind::new(labels.len() as u32);
-        for pair in pairs {
-            let [a, b] = pair.map(|label| labels.partition_point(|&l| l < label) as u32);
-            sets.unite(a, b);
-        }
-        Self { labels, sets }
+/// Pairs that unite the same labels as `pairs`: one for each label but the least of its set, with that one. Ascending.
+fn forest(pairs: &[[Label; 2]]) -> Vec<[Label; 2]> {
+    let mut labels = pairs.as_flattened().to_vec();
+    labels.sort_unstable();
+    labels.dedup();
+    let mut sets = UnionFind::new(labels.len() as u32);
+    for pair in pairs {
+        let [a, b] = pair.map(|label| labels.partition_point(|&l| l < label) as u32);
+        sets.unite(a, b);
     }
-
-    fn find(&mut self, label: Label) -> Label {
-        let number = self.labels.binary_search(&label);
-        number.map_or(label, |n| self.labels[self.sets.find(n as u32) as usize])
-    }
-
-    /// Pairs that unite the same labels: one for each but the least of its set.
-    fn pairs(mut self) -> Vec<[Label; 2]> {
-        let all = self.labels.clone().into_iter().map(|label| [label, self.find(label)]);
-        all.filter(|[label, least]| label != least).collect()
-    }
+    let all = (0..).zip(&labels).map(|(n, &label)| [label, labels[sets.find(n) as usize]]);
+    all.filter(|[label, least]| label != least).collect()
 }
 
 #[cfg(test)]
@@ -144,11 +129,8 @@ mod tests {
 
     #[test]
     fn labels_unite_through_chains() {
-        let mut j = Unions::of(&[[9, 8], [5, 6], [8, 6], [1, 2], [7, 9]]);
-        assert!([5, 6, 7, 8, 9].iter().all(|&n| j.find(n) == 5));
-        assert_eq!((j.find(2), j.find(1), j.find(3)), (1, 1, 3));
-        let pairs = j.pairs();
-        assert_eq!(pairs.len(), 5, "one for each label but the least of its set");
-        assert_eq!(Unions::of(&pairs).find(9), 5);
+        let pairs = forest(&[[9, 8], [5, 6], [8, 6], [1, 2], [7, 9]]);
+        assert_eq!(pairs, [[2, 1], [6, 5], [7, 5], [8, 5], [9, 5]]);
+        assert_eq!(forest(&pairs), pairs);
     }
 }
