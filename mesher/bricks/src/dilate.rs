@@ -48,35 +48,31 @@ impl<'t> Reach<'t> {
     pub fn dilate(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
         // A radius greater than the root's width reaches no more than the root.
         let radius = radius.min(1 << self.level);
-        if radius <= MARGIN as u32 {
-            self.words += self.tile.pass(sources, radius, false, &mut self.out);
-            return;
-        }
-        let near = self.near(sources, MARGIN as u32, false);
-        self.dilate(near.bricks(), radius - MARGIN as u32);
+        let first = radius.min(MARGIN as u32);
+        self.pass(sources, first, false, radius - first);
     }
 
     /// Adds the parents of all octants within `radius` of a source, with sources and radius one level deeper than
     /// the union. Sources come in Morton order.
     pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
-        if radius < 2 {
-            self.words += self.tile.pass(sources, radius, true, &mut self.out);
-            return;
-        }
-        let odd = self.near(sources, radius & 1, true);
-        self.dilate(odd.bricks(), radius / 2);
+        self.pass(sources, radius & 1, true, radius / 2);
     }
 
-    /// The octants that one pass reaches.
-    fn near(
+    /// Adds all octants within `rest` of those that a pass reaches.
+    fn pass(
         &mut self,
         sources: impl Iterator<Item = Brick>,
         radius: u32,
         to_parents: bool,
-    ) -> BrickSet {
+        rest: u32,
+    ) {
+        if rest == 0 {
+            self.words += self.tile.pass(sources, radius, to_parents, &mut self.out);
+            return;
+        }
         let mut near = Gathered::new(self.level);
         self.words += self.tile.pass(sources, radius, to_parents, &mut near);
-        near.into_set()
+        self.dilate(near.into_set().bricks(), rest);
     }
 
     /// The octants reached, and the work done.
