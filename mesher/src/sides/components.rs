@@ -99,6 +99,7 @@ enum Across {
 /// A brick on the path from the root.
 #[derive(Clone, Copy)]
 struct Frame {
+    level: Level,
     key: u64,
     node: Node,
     exists: u64,
@@ -119,8 +120,8 @@ pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
         },
         path: Vec::new(),
     };
-    let root = Frame { key: 0, node: 0, exists: 1, across: [[Across::Nothing; 2]; 3] };
-    w.visit(0, &root);
+    let across = [[Across::Nothing; 2]; 3];
+    w.visit(&Frame { level: 0, key: 0, node: 0, exists: 1, across });
     w.local
 }
 
@@ -133,25 +134,25 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn visit(&mut self, l: Level, frame: &Frame) {
-        self.merge_brick(l, frame);
+    fn visit(&mut self, frame: &Frame) {
+        self.merge_brick(frame);
         let nodes = self.nodes;
-        let family = nodes.family(l, frame.node);
+        let family = nodes.family(frame.level, frame.node);
         if family.bricks == 0 {
             return;
         }
         self.path.push(*frame);
         for j in ones(u64::from(family.bricks)) {
-            if let Some(child) = step_down(nodes, l, frame, &family, u64::from(j)) {
-                self.visit(l + 1, &child);
+            if let Some(child) = step_down(nodes, frame, &family, u64::from(j)) {
+                self.visit(&child);
             }
         }
         self.path.pop();
     }
 
     /// Merges the components of one brick with those across its faces.
-    fn merge_brick(&mut self, l: Level, frame: &Frame) {
-        let nodes = self.nodes;
+    fn merge_brick(&mut self, frame: &Frame) {
+        let (nodes, l) = (self.nodes, frame.level);
         let is_replica = nodes.placement(l, frame.node) == Placement::PartiallyReplicated
             && !self.ownership.owns(l, frame.key);
         for (c, bits) in nodes.components(l, frame.node) {
@@ -164,12 +165,12 @@ impl Walk<'_> {
                 self.local.at_boundary.push(c);
             }
             let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
-            self.merge_coarser(l, c, frame.key, inner, None);
+            self.merge_coarser(frame, c, inner, None);
             for axis in 0..3 {
                 for up in 0..2 {
                     let faced = brick::across(bits, axis, up == 1) & brick::valid(l);
                     if faced != 0 {
-                        self.merge_across(l, frame, c, faced, axis, up);
+                        self.merge_across(frame, c, faced, (axis, up));
                     }
                 }
             }
@@ -177,19 +178,11 @@ impl Walk<'_> {
     }
 
     #[inline]
-    fn merge_across(
-        &mut self,
-        l: Level,
-        frame: &Frame,
-        c: Component,
-        faced: u64,
-        axis: usize,
-        up: usize,
-    ) {
-        let nodes = self.nodes;
+    fn merge_across(&mut self, frame: &Frame, c: Component, faced: u64, side: (usize, usize)) {
+        let (nodes, l, (axis, up)) = (self.nodes, frame.level, side);
         match frame.across[axis][up] {
             Across::Nothing => self.local.at_boundary.push(c),
-            Across::Coarser => self.merge_coarser(l, c, frame.key, faced, Some((axis, up))),
+            Across::Coarser => self.merge_coarser(frame, c, faced, Some(side)),
             Across::Remote => {
                 // The other rank holds a fully replicated brick as well.
                 let is_everywhere = nodes.placement(l, frame.node) == Placement::FullyReplicated;
@@ -203,7 +196,7 @@ impl Walk<'_> {
                     self.unite(c, l, n, faced);
                 }
                 if faced & !exists != 0 {
-                    self.merge_coarser(l, c, frame.key, faced & !exists, Some((axis, up)));
+                    self.merge_coarser(frame, c, faced & !exists, Some(side));
                 }
             }
         }
@@ -225,18 +218,17 @@ impl Walk<'_> {
         self.local.faces.push(FacedOctants { rank, level, key, component, bits });
     }
 
-    /// Merges a component of brick `key` of level `l` with the coarser leaves that cover the octants `faced`:
-    /// octants of the brick itself if `side` is none, of its neighbour on this side otherwise.
+    /// Merges a component of a brick with the coarser leaves that cover the octants `faced`: octants of the brick
+    /// itself if `side` is none, of its neighbour on this side otherwise.
     #[inline]
     fn merge_coarser(
         &mut self,
-        l: Level,
+        frame: &Frame,
         c: Component,
-        mut key: u64,
         mut faced: u64,
         mut side: Option<(usize, usize)>,
     ) {
-        let mut m = l;
+        let (mut m, mut key) = (frame.level, frame.key);
         while faced != 0 && m > 0 {
             let mut group = key & 7;
             if let Some((axis, up)) = side {
@@ -268,7 +260,8 @@ impl Walk<'_> {
 
 /// The frame of child brick `j`; none if this rank does not hold it.
 #[inline]
-fn step_down(nodes: &Nodes, l: Level, frame: &Frame, family: &Family, j: u64) -> Option<Frame> {
+fn step_down(nodes: &Nodes, frame: &Frame, family: &Family, j: u64) -> Option<Frame> {
+    let l = frame.level;
     let (node, exists) = family.child(j)?;
     if let Placement::Remote(_) = nodes.placement(l + 1, node) {
         return None;
@@ -286,7 +279,7 @@ fn step_down(nodes: &Nodes, l: Level, frame: &Frame, family: &Family, j: u64) ->
             }
         }
     }
-    Some(Frame { key: frame.key << 3 | j, node, exists, across })
+    Some(Frame { level: l + 1, key: frame.key << 3 | j, node, exists, across })
 }
 
 /// The other side of a face of a child brick: octant group `j` of the brick across, whose children are `family`.
