@@ -47,16 +47,12 @@ pub struct Estimate<'a> {
 impl Estimate<'_> {
     /// Partitions T0. Collective.
     pub fn partition(&self, division: &Division) -> Result<Partition, Error> {
-        let (ownership, level_base, partitioner) = if division.is_of_curve() {
-            let levels = self.levels();
-            (self.by_area(levels), levels[1], Partitioner::Morton)
-        } else {
-            let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
-            let level = level.min(level_last(self.rules));
-            let (ownership, partitioner) = self.by_base_leaves(division, level)?;
-            (ownership, level, partitioner)
-        };
-        Ok(Partition { ownership, level_base, partitioner: Some(partitioner) })
+        if !division.is_of_curve() {
+            return self.by_base_leaves(division);
+        }
+        let levels = self.levels();
+        let (ownership, partitioner) = (self.by_area(levels), Some(Partitioner::Morton));
+        Ok(Partition { ownership, level_base: levels[1], partitioner })
     }
 
     /// The coarse and the fine level, of which octants near facets and in boxes number about [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] on
@@ -80,14 +76,11 @@ impl Estimate<'_> {
         })
     }
 
-    /// The base leaves of a level with their owners, and the partitioner that chose them: METIS is not used where there are too few base
-    /// leaves for it. Collective.
-    fn by_base_leaves(
-        &self,
-        division: &Division,
-        level: Level,
-    ) -> Result<(Ownership, Partitioner), Error> {
+    /// The partition by base leaves. METIS is not used where there are too few of them for it. Collective.
+    fn by_base_leaves(&self, division: &Division) -> Result<Partition, Error> {
         let comm = self.comm;
+        let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
+        let level = level.min(level_last(self.rules));
         let (mut leaves, _) =
             self.all_bins(&area::of(self.facets, self.rules, level), level, FINE_PER_RANK);
         if division.weights == Weights::Unit {
@@ -97,10 +90,12 @@ impl Estimate<'_> {
             Partitioner::Metis => metis::assign(&leaves, level, comm)?,
             Partitioner::Morton | Partitioner::Paper => None,
         };
-        let partitioner = if by_metis.is_some() { Partitioner::Metis } else { Partitioner::Morton };
-        let along_curve = || curve::partition(&leaves, comm.size(), &Solo);
-        let boundaries = by_metis.unwrap_or_else(along_curve);
-        Ok((Ownership::along(comm.rank(), comm.size(), boundaries), partitioner))
+        let (boundaries, partitioner) = match by_metis {
+            Some(boundaries) => (boundaries, Partitioner::Metis),
+            None => (curve::partition(&leaves, comm.size(), &Solo), Partitioner::Morton),
+        };
+        let ownership = Ownership::along(comm.rank(), comm.size(), boundaries);
+        Ok(Partition { ownership, level_base: level, partitioner: Some(partitioner) })
     }
 
     /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
