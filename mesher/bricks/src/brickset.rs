@@ -54,17 +54,7 @@ impl BrickSet {
     /// The set of all octants of some bricks, which may be in any order and repeat keys.
     pub fn from_unsorted(mut bricks: Vec<Brick>) -> Self {
         bricks.sort_unstable_by_key(|b| b.key);
-        let mut set = Self::default();
-        set.reserve_exact(bricks.len());
-        for b in bricks {
-            set.push(b.key, b.bits);
-        }
-        set
-    }
-
-    fn reserve_exact(&mut self, more: usize) {
-        self.low.reserve_exact(more);
-        self.bits.reserve_exact(more);
+        bricks.into_iter().collect()
     }
 
     /// Adds octants to the last brick or after it.
@@ -127,7 +117,7 @@ impl BrickSet {
     /// The bits of brick `key`; 0 if the set has no octant in it.
     pub fn get(&self, key: u64) -> u64 {
         let at = self.position(key);
-        if at < self.len() && self.key_at(at) == key { self.bits[at] } else { 0 }
+        if at < self.len() && self.brick(at).key == key { self.bits[at] } else { 0 }
     }
 
     /// Whether the octant with this Morton code is in the set.

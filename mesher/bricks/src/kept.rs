@@ -59,11 +59,10 @@ impl<'a> Kept<'a> {
 mod tests {
     use super::*;
     use crate::brickset::tests::set;
-    use crate::tree::per_level;
 
     #[test]
     fn nothing_is_kept_below_a_deleted_root() {
-        let (mut deleted, split) = (per_level(), per_level());
+        let (mut deleted, split) = (PerLevel::default(), PerLevel::default());
         deleted[0] = set(&[0]);
         let kept = Kept::new(&deleted);
         assert!(kept.only(&split, 0, set(&[0])).is_empty());

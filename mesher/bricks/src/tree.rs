@@ -17,27 +17,16 @@ use crate::octant::{LEVEL_MAX, Level, path};
 pub const LEVELS: usize = LEVEL_MAX as usize + 2;
 
 /// One set for each level.
-pub type PerLevel = Vec<BrickSet>;
-
-/// Empty sets for all levels.
-pub fn per_level() -> PerLevel {
-    vec![BrickSet::default(); LEVELS]
-}
+pub type PerLevel = [BrickSet; LEVELS];
 
 /// An oct-tree whose crossing leaves are marked. The leaves of level `l` are the children of
 /// `split[l - 1]` that are not in `split[l]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tree {
     /// Octants that have children.
     pub split: PerLevel,
     /// Leaves that a facet crosses.
     pub crossing: PerLevel,
-}
-
-impl Default for Tree {
-    fn default() -> Self {
-        Self { split: per_level(), crossing: per_level() }
-    }
 }
 
 impl Tree {
@@ -88,7 +77,6 @@ pub fn check_split(split: &PerLevel) {
 /// # Panics
 /// If one has not; `violation` completes the sentence that names it.
 pub fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
-    assert_eq!((split.len(), sets.len()), (LEVELS, LEVELS), "one set for each level");
     for (l, set) in (0..).zip(sets) {
         set.check_invariants();
         let mut above = split[(l as usize).saturating_sub(1)].cursor();
@@ -145,7 +133,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "octant 001 of level 3 is deleted")]
     fn a_deleted_leaf_that_crosses_is_found() {
-        let mut deleted = per_level();
+        let mut deleted = PerLevel::default();
         deleted[3] = set(&[1, 2]);
         let tree = small();
         tree.check_apart(&deleted, &[&tree.split, &tree.crossing], "is deleted");

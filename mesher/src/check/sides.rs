@@ -9,7 +9,7 @@ use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::{Level, corner, edge, path};
-use bricks::tree::{LEVELS, PerLevel, per_level};
+use bricks::tree::{LEVELS, PerLevel};
 
 /// Components whose rays are cast: enough to find a fault, on any geometry.
 const COMPONENTS_MAX: usize = 64;
@@ -18,7 +18,7 @@ const COMPONENTS_MAX: usize = 64;
 pub fn agree_over_faces(sides: &Sides, base: &Base) {
     let &Base { tree, ownership, comm, .. } = base;
     let stored = &sides.stored;
-    let mut others: PerLevel = per_level();
+    let mut others = PerLevel::default();
     for l in 0..LEVELS as Level {
         let mut on_side = stored[l as usize].cursor();
         for b in open_bricks(tree, ownership, l) {

@@ -282,7 +282,7 @@ fn a_brick_of_another_rank_is_found() {
         let rank = if comm.rank() == 1 { 2 } else { comm.rank() };
         let crossing = if comm.rank() == 1 {
             let l = deepest(&m.crossing);
-            let mut other = bricks::tree::per_level();
+            let mut other = bricks::tree::PerLevel::default();
             let (start, _) = boundaries[2];
             add(&mut other[l], start >> (3 * (LEVEL_MAX - l as Level)) | 0o777);
             other

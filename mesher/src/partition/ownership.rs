@@ -15,7 +15,7 @@ mod redistribute;
 use crate::partition::curve::Boundary;
 use bricks::brick::Brick;
 use bricks::octant::{LEVEL_MAX, Level, morton, position, start57};
-use bricks::tree::Tree;
+use bricks::tree::{PerLevel, Tree};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -142,13 +142,6 @@ impl Ownership {
         self.boundaries[self.at(start)].1
     }
 
-    /// The owner of all of an octant; none if it has several.
-    #[inline]
-    pub fn sole_owner(&self, l: Level, code: u64) -> Option<usize> {
-        let interval = self.at(start57(l, code));
-        (self.end(interval) >= start57(l, code + 1)).then(|| self.boundaries[interval].1)
-    }
-
     /// The ranks whose octants touch this rank's over a face, an edge or a corner; each with the level-19 code of one of this
     /// rank's octants that it touches.
     pub fn neighbours(&self) -> Vec<(usize, u64)> {
@@ -187,8 +180,9 @@ impl Ownership {
         accepts: &impl Fn(Level, u64) -> bool,
         found: &mut impl FnMut(usize),
     ) {
-        if let Some(owner) = self.sole_owner(l, code) {
-            return found(owner);
+        let interval = self.at(start57(l, code));
+        if self.end(interval) >= start57(l, code + 1) {
+            return found(self.boundaries[interval].1);
         }
         for child in (code << 3..).take(8).filter(|&child| accepts(l + 1, child)) {
             self.owners_in(l + 1, child, accepts, found);
@@ -197,15 +191,15 @@ impl Ownership {
 
     /// The fully replicated bricks of a tree: the same on all ranks.
     pub fn fully_replicated(&self, tree: &Tree) -> Tree {
-        let mut top = Tree::default();
-        for (to, from) in [(&mut top.split, &tree.split), (&mut top.crossing, &tree.crossing)] {
+        let of = |sets: &PerLevel| {
+            let mut held = PerLevel::default();
             for l in 0..=self.level_fully_replicated {
-                let is_everywhere =
-                    |b: &Brick| self.placement(l, b.key) == Placement::FullyReplicated;
-                to[l as usize] = from[l as usize].bricks().filter(is_everywhere).collect();
+                let is_full = |b: &Brick| self.placement(l, b.key) == Placement::FullyReplicated;
+                held[l as usize] = sets[l as usize].bricks().filter(is_full).collect();
             }
-        }
-        top
+            held
+        };
+        Tree { split: of(&tree.split), crossing: of(&tree.crossing) }
     }
 
     /// Which ranks hold brick `key` of level `l`.

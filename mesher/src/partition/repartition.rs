@@ -159,13 +159,12 @@ impl<'a> Loads<'a> {
 mod tests {
     use super::*;
     use bricks::octant::start57;
-    use bricks::tree::per_level;
 
     const LEVEL: Level = 5;
 
     /// All bricks of the next level, with the same octants in each and more in some.
     fn split() -> PerLevel {
-        let mut split = per_level();
+        let mut split = PerLevel::default();
         let l = LEVEL as usize + 1;
         for key in 0..1 << (3 * (LEVEL - 1)) {
             let more = if key >> 9 == 3 { 0xffff << 20 } else { 0 };

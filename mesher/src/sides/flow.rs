@@ -88,16 +88,10 @@ pub fn decide(components: &[FirstLeaf], flow: HashSet<Label>, keep: Keep) -> Ver
 }
 
 impl Verdict {
-    /// Compares the components with those at the root's boundary, of which `at_boundary` are this rank's, some more
-    /// than once. Collective.
-    pub fn compare_with_boundary(
-        &mut self,
-        base: &Base,
-        components: &[FirstLeaf],
-        at_boundary: impl Iterator<Item = Label>,
-    ) {
-        let rules = base.rules;
-        let outside = components.iter().map(|c| c.0).filter(|label| !self.inside.contains(label));
+    /// Compares the components with those at the root's boundary. Collective.
+    pub(super) fn compare_with_boundary(&mut self, base: &Base, components: &Components) {
+        let (rules, all) = (base.rules, &components.all);
+        let outside = all.iter().map(|c| c.0).filter(|label| !self.inside.contains(label));
         let outside: HashSet<Label> = outside.collect();
         let by_rays = rules.seeds.is_empty();
         let matters = match rules.keep {
@@ -110,7 +104,7 @@ impl Verdict {
         if !matters {
             return;
         }
-        let mine = at_boundary.map(|label| [label, 0]).collect();
+        let mine = components.at_boundary.iter().map(|&c| [components.label(c), 0]).collect();
         let far_field =
             all_gather_reduced(mine, u64::min, base.comm).into_iter().map(|[label, _]| label);
         let far_field: HashSet<Label> = far_field.collect();

@@ -17,9 +17,8 @@ use super::vote::{self, Candidate};
 use super::{Base, Components, flow};
 use crate::input::lattice::{Keep, Rules};
 use bricks::brick::Brick;
-use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level};
-use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
+use bricks::tree::{LEVELS, PerLevel, Tree};
 use ranks::{all_gather_reduced, uncounted};
 use serde::Serialize;
 use std::collections::HashSet;
@@ -81,7 +80,7 @@ impl Region {
         let region = |&is_inside: &bool| Self {
             is_inside,
             cut: rules.level_surface - 1,
-            walls: per_level(),
+            walls: PerLevel::default(),
         };
         sides.iter().map(region).collect()
     }
@@ -108,9 +107,9 @@ impl Region {
         }
         // A rank knows the walls in its own part of a brick that others have part of, too.
         base.ownership.synchronise_replicas(&mut [&mut walls], base.comm);
-        let mut split = base.tree.split[..cut].to_vec();
-        split.resize(LEVELS, BrickSet::default());
-        Tree { split, crossing: walls }
+        let mut tree = Tree { crossing: walls, ..Tree::default() };
+        tree.split[..cut].clone_from_slice(&base.tree.split[..cut]);
+        tree
     }
 }
 

@@ -30,14 +30,13 @@ use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::Level;
-use bricks::tree::{LEVELS, PerLevel, Tree, per_level};
+use bricks::tree::{LEVELS, PerLevel, Tree};
 use components::LocalMerge;
 use global::Label;
 use nodes::{Component, Nodes};
 use ranks::Comm;
 use serde::Serialize;
 use std::collections::HashSet;
-use std::sync::LazyLock;
 use vote::{FirstLeaf, FirstLeaves};
 
 /// The base tree as one rank holds it, and what its sides depend on.
@@ -203,9 +202,7 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
     };
     let bytes = components.bytes(base.tree);
     components.nodes.drop_links();
-
-    let at_boundary = components.at_boundary.iter().map(|&c| components.label(c));
-    verdict.compare_with_boundary(base, &components.all, at_boundary);
+    verdict.compare_with_boundary(base, &components);
     let class = |label| match () {
         () if verdict.inside.contains(label) => Class::Inside,
         () if verdict.enclosed.contains(label) => Class::Enclosed,
@@ -213,12 +210,11 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
     };
     let Components { nodes, merged, labels, all, .. } = components;
     let classes: Vec<Class> = labels.iter().map(class).collect();
-    let mut of_local = Vec::with_capacity(merged.len());
-    of_local.extend(merged.iter().map(|&c| classes[c as usize]));
+    let of_local: Vec<Class> = merged.iter().map(|&c| classes[c as usize]).collect();
     drop(merged);
     let keep = if options.ungraded { Keep::All } else { rules.keep };
-    let mut sides =
-        Sides { keep, stored: per_level(), summary: verdict.summary, rays: verdict.rays, bytes };
+    let (stored, summary, rays) = (PerLevel::default(), verdict.summary, verdict.rays);
+    let mut sides = Sides { keep, stored, summary, rays, bytes };
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
     let leaves_enclosed = sides.store(base, &nodes, &of_local, &mut regions);
     let inside = verdict.inside.len() as u64;
@@ -269,7 +265,7 @@ impl Sides {
 
     /// The deleted leaves: none if everything is kept.
     pub fn deleted(&self) -> &PerLevel {
-        static NONE: LazyLock<PerLevel> = LazyLock::new(per_level);
+        static NONE: PerLevel = [const { BrickSet::EMPTY }; LEVELS];
         if self.keep == Keep::All { &NONE } else { &self.stored }
     }
 

@@ -1,6 +1,6 @@
 //! Parts of sets: finding, removing, sending and uniting them.
 
-use super::{BrickSet, LOW_BITS, Run, high_of};
+use super::{BrickSet, Run, high_of};
 use crate::brick::Brick;
 use std::ops::Range;
 
@@ -18,15 +18,11 @@ impl BrickSet {
         }
     }
 
-    /// The key of the brick at a position.
-    pub fn key_at(&self, position: usize) -> u64 {
-        let run = self.runs.partition_point(|r| r.start <= position) - 1;
-        self.runs[run].high | u64::from(self.low[position])
-    }
-
     /// The brick at a position.
     pub fn brick(&self, position: usize) -> Brick {
-        Brick { key: self.key_at(position), bits: self.bits[position] }
+        let run = self.runs.partition_point(|r| r.start <= position) - 1;
+        let key = self.runs[run].high | u64::from(self.low[position]);
+        Brick { key, bits: self.bits[position] }
     }
 
     /// Removes all bricks except those at a range of positions.
@@ -59,9 +55,9 @@ impl BrickSet {
         words.reserve(2 + 2 * runs.len() + low.len().div_ceil(2) + bits.len());
         words.extend([runs.len() as u64, bits.len() as u64]);
         words.extend(runs.iter().flat_map(|r| [r.high, r.start as u64]));
-        let (pairs, last) = low.as_chunks::<2>();
-        words.extend(pairs.iter().map(|&[a, b]| u64::from(a) | u64::from(b) << LOW_BITS));
-        words.extend(last.iter().map(|&low| u64::from(low)));
+        let start = words.len();
+        words.resize(start + low.len().div_ceil(2), 0);
+        bytemuck::cast_slice_mut(&mut words[start..])[..low.len()].copy_from_slice(low);
         words.extend_from_slice(bits);
     }
 
@@ -76,13 +72,11 @@ impl BrickSet {
         let (low, words) = words.split_at((head[1] as usize).div_ceil(2));
         let (bits, words) = words.split_at(head[1] as usize);
         let runs = runs.as_chunks().0.iter();
-        let mut set = Self {
-            low: Vec::with_capacity(2 * low.len()),
+        let set = Self {
+            low: bytemuck::cast_slice(low)[..bits.len()].to_vec(),
             bits: bits.to_vec(),
             runs: runs.map(|&[high, start]| Run { high, start: start as usize }).collect(),
         };
-        low.iter().for_each(|w| set.low.extend([*w as u32, (w >> LOW_BITS) as u32]));
-        set.low.truncate(bits.len());
         (set, words)
     }
 
@@ -102,7 +96,8 @@ impl BrickSet {
         let common = rest.bricks().filter(|b| cursor.get(b.key) != 0).count();
         let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
         let mut k = set.len() + rest.len() - common;
-        set.reserve_exact(k - set.len());
+        set.low.reserve_exact(k - set.len());
+        set.bits.reserve_exact(k - set.len());
         set.low.resize(k, 0);
         set.bits.resize(k, 0);
         // New runs, in descending order; the runs before them do not change.

@@ -27,13 +27,10 @@ impl Ownership {
     /// Replaces each set by its union over all ranks, restricted to the bricks that this rank holds. Afterwards all
     /// replicas agree. Also moves bricks to their new holders after a change of partition. Collective.
     pub fn synchronise_replicas(&self, sets: &mut [&mut PerLevel], comm: &dyn Comm) {
-        let take_levels =
-            |set: &mut &mut PerLevel| (0..).zip(std::mem::take(*set)).collect::<Vec<_>>();
-        let (synchronised, _) =
-            self.redistribute_all(sets.iter_mut().flat_map(take_levels).collect(), comm);
-        let mut synchronised = synchronised.into_iter();
-        for set in sets {
-            **set = synchronised.by_ref().take(bricks::tree::LEVELS).collect();
+        let levels = sets.iter_mut().flat_map(|set| (0..).zip(std::mem::take(*set)));
+        let (synchronised, _) = self.redistribute_all(levels.collect(), comm);
+        for (set, whole) in sets.iter_mut().flat_map(|set| set.iter_mut()).zip(synchronised) {
+            *set = whole;
         }
     }
 
@@ -98,7 +95,7 @@ impl Ownership {
             for others in [0..local.start, local.end..set.len()] {
                 let mut first = others.start;
                 while first < others.end {
-                    let interval = self.at(brick_start(l, set.key_at(first)));
+                    let interval = self.at(brick_start(l, set.brick(first).key));
                     let same_owner = first..position_of(set, self.end(interval));
                     first = same_owner.end;
                     out.queue(set_index, set, same_owner, self.boundaries[interval].1);
@@ -117,16 +114,10 @@ impl Ownership {
                 out.full.push(entry);
                 return 0;
             }
-            if placement != Placement::Local {
-                // Such bricks are few: queued as single entries.
-                let others = intervals.iter().filter(|i| Some(i.1) != self.rank);
-                out.queue.extend(others.map(|&(_, owner)| (owner, ENTRIES, entry)));
-            }
-            if matches!(placement, Placement::Local | Placement::PartiallyReplicated) {
-                b.bits
-            } else {
-                0
-            }
+            // Such bricks are few: queued as single entries.
+            let others = intervals.iter().filter(|i| Some(i.1) != self.rank);
+            out.queue.extend(others.map(|&(_, owner)| (owner, ENTRIES, entry)));
+            if let Placement::Remote(_) = placement { 0 } else { b.bits }
         });
         0..set.len()
     }

@@ -1,4 +1,5 @@
 use super::*;
+use bricks::tree::PerLevel;
 use proptest::prelude::*;
 use ranks::{Comm, sim};
 use std::collections::{BTreeMap, BTreeSet};
@@ -105,7 +106,7 @@ proptest! {
             *sums.entry((set, l, key(l, draw))).or_default() |= bits;
         }
         let got = sim::run(RANKS, 7, |comm| {
-            let mut sets = [bricks::tree::per_level(), bricks::tree::per_level()];
+            let mut sets = [PerLevel::default(), PerLevel::default()];
             let mut mine: Vec<_> = sent.iter().filter(|t| t.0 == comm.rank()).collect();
             mine.sort_by_key(|t| key(t.2, t.3));
             for &&(_, set, l, draw, bits) in &mine {
