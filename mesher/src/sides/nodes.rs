@@ -63,7 +63,7 @@ pub fn open_bricks<'a>(
 }
 
 /// A node's children.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Family {
     /// The node's split octants.
     pub split: u64,
@@ -86,43 +86,36 @@ impl Family {
 impl Nodes {
     /// Links the bricks of a base tree and finds their local components.
     pub fn new(tree: &Tree, ownership: &Ownership) -> Self {
-        let mut nodes = Self { levels: Vec::with_capacity(LEVELS), masks: Vec::new() };
+        let (mut levels, mut masks) = (Vec::with_capacity(LEVELS), Vec::new());
         for l in 0..LEVELS as Level {
-            let level = nodes.build(tree, ownership, l);
-            nodes.levels.push(level);
-        }
-        nodes
-    }
-
-    fn build(&mut self, tree: &Tree, ownership: &Ownership, l: Level) -> LevelNodes {
-        let mut out = LevelNodes::default();
-        let splits = !tree.split[l as usize].is_empty();
-        let mut children = 0;
-        for (n, b) in open_bricks(tree, ownership, l).enumerate() {
-            if splits {
-                out.split.push(b.split);
-                out.first_child.push(children);
-                children += brick::parents(b.split).count_ones();
+            let mut out = LevelNodes::default();
+            let splits = !tree.split[l as usize].is_empty();
+            let mut children = 0;
+            for (n, b) in open_bricks(tree, ownership, l).enumerate() {
+                if splits {
+                    out.split.push(b.split);
+                    out.first_child.push(children);
+                    children += brick::parents(b.split).count_ones();
+                }
+                if l < 2 || ownership.is_replicated(l) || !b.is_held || !out.placements.is_empty() {
+                    out.placements.resize(n, Placement::Local);
+                    out.placements.push(ownership.placement(l, b.key));
+                }
+                out.components.push(masks.len() as Component);
+                masks.extend(brick::components(b.open));
             }
-            if l < 2 || ownership.is_replicated(l) || !b.is_held || !out.placements.is_empty() {
-                out.placements.resize(n, Placement::Local);
-                out.placements.push(ownership.placement(l, b.key));
-            }
-            out.components.push(self.masks.len() as Component);
-            self.masks.extend(brick::components(b.open));
+            let end = Component::try_from(masks.len()).expect("fewer than 2^32 components");
+            out.components.push(end);
+            levels.push(out);
         }
-        out.components
-            .push(Component::try_from(self.masks.len()).expect("fewer than 2^32 components"));
-        out
+        Self { levels, masks }
     }
 
     /// Frees the links between bricks, which take much of the memory; the components remain.
     pub fn drop_links(&mut self) {
         for level in &mut self.levels {
-            *level = LevelNodes {
-                components: std::mem::take(&mut level.components),
-                ..LevelNodes::default()
-            };
+            let components = std::mem::take(&mut level.components);
+            *level = LevelNodes { components, ..LevelNodes::default() };
         }
     }
 
@@ -144,13 +137,10 @@ impl Nodes {
     #[inline]
     pub fn family(&self, l: Level, n: Node) -> Family {
         let level = &self.levels[l as usize];
-        match level.split.get(n as usize) {
-            Some(&split) => {
-                let (bricks, first) = (brick::parents(split), level.first_child[n as usize]);
-                Family { split, bricks, first }
-            }
-            None => Family { split: 0, bricks: 0, first: 0 },
-        }
+        level.split.get(n as usize).map_or(Family::default(), |&split| {
+            let (bricks, first) = (brick::parents(split), level.first_child[n as usize]);
+            Family { split, bricks, first }
+        })
     }
 
     /// The placement of the node's brick.
