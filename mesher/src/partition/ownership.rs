@@ -205,10 +205,19 @@ impl Ownership {
     /// Which ranks hold brick `key` of level `l`.
     #[inline]
     pub fn placement(&self, l: Level, key: u64) -> Placement {
-        match () {
-            () if l < 2 => Placement::FullyReplicated,
-            () if self.ranks == 1 || self.is_within(l, key) => Placement::Local,
-            () => self.placement_among(l, self.meeting_in(l, key)),
+        if l < 2 {
+            return Placement::FullyReplicated;
+        }
+        if self.ranks == 1 || self.is_within(l, key) {
+            return Placement::Local;
+        }
+        let intervals = self.meeting_in(l, key);
+        let is_own = |interval: &Boundary| Some(interval.1) == self.rank;
+        match intervals.len() {
+            OWNERS_MANY.. => Placement::FullyReplicated,
+            1 if is_own(&intervals[0]) => Placement::Local,
+            _ if intervals.iter().any(is_own) => Placement::PartiallyReplicated,
+            _ => Placement::Remote(intervals[0].1),
         }
     }
 
@@ -218,24 +227,12 @@ impl Ownership {
         self.own.start <= brick_start(l, key) && brick_start(l, key + 1) <= self.own.end
     }
 
-    /// The intervals that meet in a brick, in order; not all if there are many.
+    /// The intervals that meet in a brick of level `l`, which is 2 or more, in order; not all if there are many.
     #[inline]
     fn meeting_in(&self, l: Level, key: u64) -> &[Boundary] {
-        let first = self.at(brick_start(l, key));
-        let end = if l < 2 { 1 << (3 * LEVEL_MAX) } else { brick_start(l, key + 1) };
+        let (first, end) = (self.at(brick_start(l, key)), brick_start(l, key + 1));
         let more = self.boundaries[first + 1..].iter().take(OWNERS_MANY);
         &self.boundaries[first..first + 1 + more.take_while(|b| b.0 < end).count()]
-    }
-
-    #[inline]
-    fn placement_among(&self, l: Level, intervals: &[Boundary]) -> Placement {
-        let is_own = |interval: &Boundary| Some(interval.1) == self.rank;
-        match intervals.len() {
-            n if l < 2 || n >= OWNERS_MANY => Placement::FullyReplicated,
-            1 if is_own(&intervals[0]) => Placement::Local,
-            _ if intervals.iter().any(is_own) => Placement::PartiallyReplicated,
-            _ => Placement::Remote(intervals[0].1),
-        }
     }
 
     /// The rank that owns brick `key` of level `l`.

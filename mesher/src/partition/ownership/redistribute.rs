@@ -104,18 +104,17 @@ impl Ownership {
             return local;
         }
         set.retain(|b| {
-            if l >= 2 && self.is_within(l, b.key) {
+            let placement = self.placement(l, b.key);
+            if placement == Placement::Local {
                 return b.bits;
             }
-            let intervals = self.meeting_in(l, b.key);
-            let placement = self.placement_among(l, intervals);
             let entry = [(set_index as u64) << KEY_BITS | b.key, b.bits];
             if placement == Placement::FullyReplicated {
                 out.full.push(entry);
                 return 0;
             }
             // Such bricks are few: queued as single entries.
-            let others = intervals.iter().filter(|i| Some(i.1) != self.rank);
+            let others = self.meeting_in(l, b.key).iter().filter(|i| Some(i.1) != self.rank);
             out.queue.extend(others.map(|&(_, owner)| (owner, ENTRIES, entry)));
             if let Placement::Remote(_) = placement { 0 } else { b.bits }
         });
