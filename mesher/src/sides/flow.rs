@@ -36,9 +36,8 @@ pub(super) fn find(base: &Base, components: &Components) -> HashMap<u64, Label> 
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
 pub fn of_seeds(found: &HashMap<u64, Label>, base: &Base) -> Result<HashSet<Label>, Error> {
-    let seeds = (0..).zip(&base.rules.seeds);
-    if let Some((number, seed)) = seeds.into_iter().find(|(number, _)| !found.contains_key(number))
-    {
+    let mut seeds = (0..).zip(&base.rules.seeds);
+    if let Some((number, seed)) = seeds.find(|(number, _)| !found.contains_key(number)) {
         let problem = match seed.is_in_root() {
             true => "lies in a leaf that the geometry crosses",
             false => "lies outside the root",
@@ -105,9 +104,8 @@ impl Verdict {
             return;
         }
         let mine = components.at_boundary.iter().map(|&c| [components.label(c), 0]).collect();
-        let far_field =
-            all_gather_reduced(mine, u64::min, base.comm).into_iter().map(|[label, _]| label);
-        let far_field: HashSet<Label> = far_field.collect();
+        let far_field = all_gather_reduced(mine, u64::min, base.comm);
+        let far_field: HashSet<Label> = far_field.into_iter().map(|[label, _]| label).collect();
         match rules.keep {
             Keep::Inside => {
                 self.summary.inside_reaches_boundary = !self.inside.is_disjoint(&far_field);

@@ -51,15 +51,13 @@ pub fn is_sheet(mine: &[Facet], comm: &dyn Comm) -> bool {
     // The sum of the normals, and that of their lengths, each rounded down.
     let mut sums = [0i128; 4];
     for f in mine {
-        let normal = f.normal();
-        let length = normal.iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
-        (0..3).for_each(|a| sums[a] += i128::from(normal[a]));
-        sums[3] += length as i128;
+        let normal = f.normal().map(i128::from);
+        (0..3).for_each(|a| sums[a] += normal[a]);
+        sums[3] += length(normal) as i128;
     }
     let add = |sum: [i128; 4], of: [i128; 4]| std::array::from_fn(|i| sum[i] + of[i]);
     let [x, y, z, area] = over_ranks(sums, add, comm);
-    let closing = [x, y, z].iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt();
-    closing.min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
+    length([x, y, z]).min(enclosed_by_boundary(mine, comm)) >= SHEET * area as f64
 }
 
 /// Twice the area that the boundary of the facets of all ranks encloses: of each of its loops, the vector area. Collective.
@@ -81,50 +79,41 @@ fn enclosed_by_boundary(mine: &[Facet], comm: &dyn Comm) -> f64 {
     if uncounted(comm, || comm.sum(odd.len() as u64)) > EDGES_MAX {
         return f64::INFINITY;
     }
-    let edges = uncounted(comm, || gather(comm, &odd)).into_iter().map(bytemuck::cast);
-    loops(edges).iter().map(|of| vector_area(of)).sum()
+    enclosed(uncounted(comm, || gather(comm, &odd)).into_iter().map(bytemuck::cast))
 }
 
-/// The closed loops of some edges, an even number of which meet in every vertex.
-fn loops(edges: impl Iterator<Item = [Vertex; 2]>) -> Vec<Vec<Vertex>> {
+/// Twice the area that the closed loops of some edges enclose: of each loop, the vector area. An even number of edges meets in every vertex.
+fn enclosed(edges: impl Iterator<Item = [Vertex; 2]>) -> f64 {
     let mut ends: BTreeMap<Vertex, BTreeSet<Vertex>> = BTreeMap::new();
     for [from, to] in edges {
         ends.entry(from).or_default().insert(to);
         ends.entry(to).or_default().insert(from);
     }
-    let mut found = Vec::new();
+    let mut total = 0.0;
     let vertices: Vec<Vertex> = ends.keys().copied().collect();
     for start in vertices {
         while let Some(mut to) = ends.get_mut(&start).and_then(BTreeSet::pop_first) {
-            let (mut path, mut from) = (Vec::new(), start);
+            let (mut sum, mut from) = ([0; 3], start);
             loop {
-                path.push(from);
                 let of = ends.get_mut(&to).expect("every end is a vertex");
                 of.remove(&from);
+                let normal = Facet { v: [start, from, to] }.normal();
+                (0..3).for_each(|a| sum[a] += i128::from(normal[a]));
                 if to == start {
                     break;
                 }
                 from = to;
                 to = of.pop_first().expect("an even number of edges meets in a vertex");
             }
-            found.push(path);
+            total += length(sum);
         }
     }
-    found
+    total
 }
 
-/// Length of the sum of the cross products of a loop: twice the area, if it is plane.
-fn vector_area(of: &[Vertex]) -> f64 {
-    let from_start = |v: Vertex| [0, 1, 2].map(|a| f64::from(v[a]) - f64::from(of[0][a]));
-    let mut sum = [0.0; 3];
-    for pair in of.windows(2) {
-        let [p, q] = [from_start(pair[0]), from_start(pair[1])];
-        for a in 0..3 {
-            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-            sum[a] += p[b] * q[c] - p[c] * q[b];
-        }
-    }
-    sum.iter().map(|n| n * n).sum::<f64>().sqrt()
+/// The length of a vector.
+fn length(v: [i128; 3]) -> f64 {
+    v.iter().map(|&n| (n as f64).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Whether every facet of all ranks, of which `mine` are this rank's, appears an even number of times, so that no ray finds an inside.
