@@ -146,14 +146,11 @@ impl Ownership {
     /// rank's octants that it touches.
     pub fn neighbours(&self) -> Vec<(usize, u64)> {
         let mut found = vec![false; self.ranks];
-        if let Some(rank) = self.rank {
-            found[rank] = true;
-        }
         let mut neighbours = Vec::new();
         for (l, code) in self.octants() {
             let p = position(code).map(i64::from);
             let mut add = |owner: usize| {
-                if !std::mem::replace(&mut found[owner], true) {
+                if Some(owner) != self.rank && !std::mem::replace(&mut found[owner], true) {
                     neighbours.push((owner, start57(l, code)));
                 }
             };

@@ -109,17 +109,13 @@ struct Frame {
 
 /// Merges all components that share part of a face, in the bricks that this rank holds.
 pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
-    let mut w = Walk {
-        nodes,
-        ownership,
-        local: LocalMerge {
-            merged: UnionFind::new(nodes.component_count()),
-            faces: Vec::new(),
-            // Enough for most meshes, so that it does not grow in many steps.
-            at_boundary: Vec::with_capacity(1 << 12),
-        },
-        path: Vec::new(),
+    let local = LocalMerge {
+        merged: UnionFind::new(nodes.component_count()),
+        faces: Vec::new(),
+        // Enough for most meshes, so that it does not grow in many steps.
+        at_boundary: Vec::with_capacity(1 << 12),
     };
+    let mut w = Walk { nodes, ownership, local, path: Vec::new() };
     let across = [[Across::Nothing; 2]; 3];
     w.visit(&Frame { level: 0, key: 0, node: 0, exists: 1, across });
     w.local

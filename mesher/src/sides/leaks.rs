@@ -118,8 +118,7 @@ impl Region {
 pub fn find(base: &Base, regions: Vec<Region>, has_inside: bool) -> Leaks {
     let (rules, mut leaks) = (base.rules, Vec::new());
     uncounted(base.comm, || {
-        let is_large = || crossing_leaves(base) > MOST_FOR_T0_1;
-        let skips = has_inside && !regions.is_empty() && is_large();
+        let skips = has_inside && !regions.is_empty() && crossing_leaves(base) > MOST_FOR_T0_1;
         for region in regions {
             let before = leaks.len();
             for k in (1..=COARSER.min(rules.level_surface)).rev() {

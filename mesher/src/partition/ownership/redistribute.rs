@@ -50,25 +50,23 @@ impl Ownership {
             self.select(index, *l, set, &mut out)
         };
         let retained: Vec<Range<usize>> = sets.iter_mut().enumerate().map(select).collect();
-        let Outgoing { mut queue, mut full } = out;
-        if any_full && let Some(to_reducers) = split_by_reducer(&mut full, |a, b| a | b, comm) {
-            full.clear();
-            queue.extend(to_reducers.into_iter().map(|(to, e)| (to, ENTRIES_TO_REDUCE, e)));
+        if any_full && let Some(to_reducers) = split_by_reducer(&mut out.full, |a, b| a | b, comm) {
+            out.full.clear();
+            out.queue.extend(to_reducers.into_iter().map(|(to, e)| (to, ENTRIES_TO_REDUCE, e)));
         }
-        let (messages, sent) = messages(queue, &sets);
-        let retained_part = |((_, mut set), range): ((Level, BrickSet), Range<usize>)| {
-            set.keep(range);
-            vec![set]
-        };
+        let (messages, sent) = messages(out.queue, &sets);
         // The parts of each set on this rank: the retained one and those received.
-        let mut parts: Vec<Vec<BrickSet>> =
-            sets.into_iter().zip(retained).map(retained_part).collect();
+        let mut parts = Vec::with_capacity(sets.len());
+        for ((_, mut set), range) in sets.into_iter().zip(retained) {
+            set.keep(range);
+            parts.push(vec![set]);
+        }
         let mut received: Vec<Entry> = Vec::new();
         for (_, words) in comm.sparse_all_to_all(messages).messages() {
-            read_message(words, &mut parts, &mut received, &mut full);
+            read_message(words, &mut parts, &mut received, &mut out.full);
         }
         if any_full {
-            received.extend(all_gather_from_reducers(full, |a, b| a | b, comm));
+            received.extend(all_gather_from_reducers(out.full, |a, b| a | b, comm));
         }
         received.sort_by_key(|e| e[0]);
         for entries in received.chunk_by(|a, b| a[0] >> KEY_BITS == b[0] >> KEY_BITS) {
@@ -89,14 +87,13 @@ impl Ownership {
     ) -> Range<usize> {
         if self.is_single && l > self.level_replicated {
             // No brick has several owners, and the bricks of each interval are contiguous.
-            let position_of =
-                |set: &BrickSet, start: u64| set.position(start >> (3 * (LEVEL_MAX + 2 - l)));
-            let local = position_of(set, self.own.start)..position_of(set, self.own.end);
+            let position = |start: u64| set.position(start >> (3 * (LEVEL_MAX + 2 - l)));
+            let local = position(self.own.start)..position(self.own.end);
             for others in [0..local.start, local.end..set.len()] {
                 let mut first = others.start;
                 while first < others.end {
                     let interval = self.at(brick_start(l, set.brick(first).key));
-                    let same_owner = first..position_of(set, self.end(interval));
+                    let same_owner = first..position(self.end(interval));
                     first = same_owner.end;
                     out.queue(set_index, set, same_owner, self.boundaries[interval].1);
                 }
