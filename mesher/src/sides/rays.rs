@@ -7,34 +7,70 @@
 //! Exactness: as in [`bricks::facet`]; edge functions are below 2^60 in magnitude, plane values are i128.
 
 use bricks::facet::Facet;
+use bricks::octant::{ROOT_BITS, ROOT_EDGE};
 
 /// For each point the parities of its six rays: bit `2 a + 1` is set if the ray in the positive direction of
 /// axis `a` meets an odd number of the facets, bit `2 a` if the one in the negative direction does. The
 /// points are in the root and on no facet.
 pub fn parities(facets: &[Facet], points: &[[i64; 3]]) -> Vec<u8> {
     let mut odd = vec![0; points.len()];
-    // The indices of the points, in the order of their coordinates along each axis. There are usually far fewer points than facets.
-    let sorted: [Vec<usize>; 3] = std::array::from_fn(|a| {
-        let mut sorted: Vec<usize> = (0..points.len()).collect();
-        sorted.sort_unstable_by_key(|&i| points[i][a]);
-        sorted
-    });
+    let grids: [Grid; 3] = std::array::from_fn(|a| Grid::new(points, a));
     for f in facets {
-        let extent: [_; 3] = std::array::from_fn(|a| f.range(a));
-        for axis in 0..3 {
-            let (u, w) = ((axis + 1) % 3, (axis + 2) % 3);
-            let ((u0, u1), (w0, w1)) = (extent[u], extent[w]);
-            let from = sorted[w].partition_point(|&i| points[i][w] < w0);
-            for &i in sorted[w][from..].iter().take_while(|&&i| points[i][w] <= w1) {
-                let p = &points[i];
-                let is_near = (u0..=u1).contains(&p[u]);
-                if is_near && let Some(up) = meets(f, p, axis) {
-                    odd[i] ^= 1 << (2 * axis + usize::from(up));
+        let extent = std::array::from_fn(|a| f.range(a));
+        grids.iter().for_each(|grid| grid.count(f, &extent, points, &mut odd));
+    }
+    odd
+}
+
+/// Points binned by their projection along an axis. There are usually far fewer points than facets.
+struct Grid {
+    axis: usize,
+    /// Squares per side, as a power of two.
+    side_log2: u32,
+    /// The points, each after its square, sorted.
+    members: Vec<(usize, u32)>,
+}
+
+impl Grid {
+    fn new(points: &[[i64; 3]], axis: usize) -> Self {
+        let side_log2 = (points.len().max(1).ilog2() / 2).min(10);
+        let mut grid = Self { axis, side_log2, members: Vec::new() };
+        let mut members: Vec<_> = points.iter().map(|p| grid.square_of(p)).zip(0..).collect();
+        members.sort_unstable();
+        grid.members = members;
+        grid
+    }
+
+    /// Index, along one side, of the square of a lattice coordinate, clamped to the root.
+    fn index(&self, c: i64) -> usize {
+        (c.clamp(0, ROOT_EDGE - 1) >> (ROOT_BITS - self.side_log2)) as usize
+    }
+
+    fn square_of(&self, p: &[i64; 3]) -> usize {
+        self.index(p[(self.axis + 2) % 3]) << self.side_log2 | self.index(p[(self.axis + 1) % 3])
+    }
+
+    /// Flips the parities of the points whose rays along the axis meet the facet.
+    #[inline]
+    fn count(&self, f: &Facet, extent: &[(i64, i64); 3], points: &[[i64; 3]], odd: &mut [u8]) {
+        let (u, w) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let ((u0, u1), (w0, w1)) = (extent[u], extent[w]);
+        if u1 < 0 || w1 < 0 || u0 > ROOT_EDGE || w0 > ROOT_EDGE {
+            return;
+        }
+        for row in self.index(w0)..=self.index(w1) {
+            let base = row << self.side_log2;
+            let (first, last) = (base + self.index(u0), base + self.index(u1));
+            let from = self.members.partition_point(|m| m.0 < first);
+            for &(_, i) in self.members[from..].iter().take_while(|m| m.0 <= last) {
+                let p = &points[i as usize];
+                let near = (u0..=u1).contains(&p[u]) && (w0..=w1).contains(&p[w]);
+                if near && let Some(up) = meets(f, p, self.axis) {
+                    odd[i as usize] ^= 1 << (2 * self.axis + usize::from(up));
                 }
             }
         }
     }
-    odd
 }
 
 /// Whether the line along `axis` through the displaced point meets the facet in the positive direction from
