@@ -70,7 +70,7 @@ pub fn mesh(
     let report = finish(&mesh, out.as_ref(), job)?;
     stop_at(format_args!("complete:{}", job.comm.rank()));
     if let Some(out) = out {
-        out.keep();
+        out.claim.keep();
     }
     Ok(report)
 }

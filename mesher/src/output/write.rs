@@ -41,12 +41,13 @@ fn names(rank: usize) -> impl Iterator<Item = String> {
     [part_name(rank)].into_iter().chain((rank == 0).then(|| TREE.to_owned()))
 }
 
-/// The directory that a mesh is written to. Its files are removed, unless it is [kept](Self::keep).
+/// The directory that a mesh is written to. Its files are removed, unless its claim is kept: on all ranks, after the
+/// [manifest](Self::manifest).
 #[derive(Debug)]
 pub struct OutDir {
     /// The files that it gets.
     pub output: Output,
-    claim: Claim,
+    pub(crate) claim: Claim,
 }
 
 fn output(path: &Path, e: impl Display) -> Error {
@@ -64,31 +65,27 @@ impl OutDir {
     pub fn claim(files: &Output, comm: &dyn Comm) -> Result<Self, Error> {
         let path = &files.directory;
         let all = || (0..comm.size()).flat_map(names).collect();
+        let failed = |e: io::Error| match e.kind() {
+            ErrorKind::DirectoryNotEmpty => {
+                Error::input(format!("{}: {e}: choose another --out", path.display()))
+            }
+            // The directory lies on a disk of rank 0's machine alone.
+            ErrorKind::NotFound if comm.rank() > 0 => Error::output(format!(
+                "{}: rank {} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share",
+                path.display(),
+                comm.rank()
+            )),
+            _ => output(path, e),
+        };
         let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
-        let created = agree(
-            comm,
-            created.map_err(|e| match e.kind() {
-                ErrorKind::DirectoryNotEmpty => {
-                    Error::input(format!("{}: {e}: choose another --out", path.display()))
-                }
-                _ => output(path, e),
-            }),
-        )?;
+        let created = agree(comm, created.map_err(failed))?;
         let is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
         let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
         let claim = match created {
             Some(claim) => Ok(claim),
-            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(|e| match e.kind() {
-                // The directory lies on a disk of rank 0's machine alone.
-                ErrorKind::NotFound => Error::output(format!(
-                    "{}: rank {} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share",
-                    path.display(),
-                    comm.rank()
-                )),
-                _ => output(path, e),
-            }),
+            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(failed),
         };
         Ok(Self { output: files.clone(), claim: agree(comm, claim)? })
     }
@@ -114,11 +111,6 @@ impl OutDir {
     pub fn manifest(&self, manifest: &impl Serialize) -> Result<(), Error> {
         let write = |to: &mut dyn Write| write_json(to, manifest);
         self.claim.commit(write).map_err(|e| output(&self.output.directory, e))
-    }
-
-    /// Keeps the mesh. On all ranks, after the [manifest](Self::manifest).
-    pub fn keep(self) {
-        self.claim.keep();
     }
 }
 
