@@ -9,7 +9,8 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
 pub struct Error {
-    exit_code: i32,
+    /// The process's exit code.
+    pub exit_code: i32,
     message: String,
 }
 
@@ -32,11 +33,6 @@ impl Error {
     /// The memory does not suffice.
     pub fn memory(message: impl Into<String>) -> Self {
         Self::from((OUT_OF_MEMORY, message.into()))
-    }
-
-    /// The process's exit code.
-    pub fn exit_code(&self) -> i32 {
-        self.exit_code
     }
 }
 

@@ -101,17 +101,14 @@ pub struct Phase {
 /// Times phases, in the order in which they run, and reports the current one.
 #[derive(Debug, Default)]
 pub struct Recorder {
-    phases: Vec<Phase>,
+    /// The phases so far.
+    pub phases: Vec<Phase>,
+    /// Whether the name of the current phase is written to standard error.
+    pub progress: bool,
     status: Option<PathBuf>,
-    progress: bool,
 }
 
 impl Recorder {
-    /// A recorder that writes the name of the current phase to standard error if `progress` is true.
-    pub fn new(progress: bool) -> Self {
-        Self { progress, ..Self::default() }
-    }
-
     /// Also writes the name of the current phase to a file from now on.
     ///
     /// # Errors
@@ -132,11 +129,6 @@ impl Recorder {
         if self.progress {
             let _ = write!(std::io::stderr(), "\r\x1b[K{phase}");
         }
-    }
-
-    /// The phases so far.
-    pub fn phases(&self) -> &[Phase] {
-        &self.phases
     }
 }
 
@@ -187,7 +179,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary directory");
         sim::run(2, 1, |comm| {
             let status = folder.path().join(comm.rank().to_string());
-            let mut record = Recorder::new(false);
+            let mut record = Recorder::default();
             record.keep_status(status.clone()).expect("no input");
             comm.sum(1);
             let (before, since) = (comm.traffic(), ThreadTime::now());
@@ -202,7 +194,7 @@ mod tests {
             let worked_s = [("a", 1), ("b", 0), ("a", 2)]
                 .map(|(name, calls)| job.phase(name, |_| work(calls)));
             let all_s = since.elapsed().as_secs_f64();
-            let [a, b] = record.phases() else { panic!("two names: {record:?}") };
+            let [a, b] = record.phases[..] else { panic!("two names: {record:?}") };
             assert_eq!((a.name, b.name), ("a", "b"));
             let after = comm.traffic();
             assert_eq!(a.traffic.messages, after.messages - before.messages);

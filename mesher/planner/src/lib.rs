@@ -174,7 +174,7 @@ impl<'a> Problem<'a> {
         let rules = &quantised.rules;
         let face = (edge(rules.level_surface) as f64).powi(2);
         let faces = job.comm.sum((area::total(&quantised.facets) / face) as u64) as f64;
-        let before: f64 = job.record.phases().iter().map(|p| p.time_cpu_s).sum();
+        let before: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
         let written = job.options.out.as_ref().map_or([false; 2], |o| [o.words, o.tree]);
         let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);
         Self {

@@ -87,10 +87,10 @@ fn bytes(sets: &PerLevel) -> f64 {
 pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amounts {
     let stored = bytes(&mesh.crossing) + bytes(&mesh.sides.stored);
     let time = |of: &[&str]| -> f64 {
-        let phases = job.record.phases().iter();
+        let phases = job.record.phases.iter();
         phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
     };
-    let all: f64 = job.record.phases().iter().map(|p| p.time_cpu_s).sum();
+    let all: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
     let time_refine_s = time(&["refine"]);
     let time_cells_s = time(&["sides", "leaks", "grade", "rebalance", "share top", "leaves"]);
     Amounts {

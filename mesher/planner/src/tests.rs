@@ -105,7 +105,7 @@ fn only_runs_that_may_not_fit_are_planned_and_refused() {
         assert_eq!(problem.check(few), Ok(()));
         assert!(pilots > 1);
         let many = &mut |shift| Ok(amounts(1e12, 1e18, shift));
-        assert_eq!(problem.check(many).unwrap_err().exit_code(), 71);
+        assert_eq!(problem.check(many).unwrap_err().exit_code, 71);
     });
     // A small case is meshed.
     let plan =
@@ -182,7 +182,7 @@ fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
     };
     // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
     assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());
-    assert_eq!(run(0.5, 0).unwrap_err().exit_code(), 2);
+    assert_eq!(run(0.5, 0).unwrap_err().exit_code, 2);
 }
 
 #[test]

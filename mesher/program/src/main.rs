@@ -135,7 +135,7 @@ fn fail(e: &Error, prints: bool) -> i32 {
     if prints {
         complain(&format_args!("mesher: {e}"));
     }
-    e.exit_code()
+    e.exit_code
 }
 
 /// Prints a line on the standard error; returns whether that was possible.
@@ -241,7 +241,8 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
         comm.limit_calls(limit);
     }
     let progress = first && !args.quiet && std::io::stderr().is_terminal();
-    let mut record = Recorder::new(progress);
+    let mut record = Recorder::default();
+    record.progress = progress;
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decided();

@@ -314,7 +314,7 @@ mod tests {
         let facets = try_open(&bytes).unwrap();
         assert_eq!(facets[1], [[15.0, 16.0, 17.0], [18.0, 19.0, 20.0], [21.0, 22.0, 23.0]]);
         for cut in [0, 1, 83, 84, 100, bytes.len() - 1] {
-            assert_eq!(try_open(&bytes[..cut]).unwrap_err().exit_code(), 2, "cut at {cut}");
+            assert_eq!(try_open(&bytes[..cut]).unwrap_err().exit_code, 2, "cut at {cut}");
         }
         bytes.push(0);
         assert!(try_open(&bytes).is_err());

@@ -74,7 +74,7 @@ impl Report {
             .expect("counters are numbers with names");
         let mut words = vec![peak_rss_bytes() / comm.ranks_in_process() as u64];
         words.extend(counters.values());
-        words.extend(record.phases().iter().flat_map(|p| {
+        words.extend(record.phases.iter().flat_map(|p| {
             let t = p.traffic;
             let [wall, cpu, comm_wall, comm_cpu] =
                 [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s].map(f64::to_bits);
@@ -98,7 +98,7 @@ impl Report {
                 message_bytes: column(),
             }
         };
-        let phases: Vec<PhaseEntry> = record.phases().iter().map(phase).collect();
+        let phases: Vec<PhaseEntry> = record.phases.iter().map(phase).collect();
         let total = |r: usize| phases.iter().map(|p| p.time_wall_s[r]).sum::<f64>();
         let report = Self {
             schema: "octree-mesher-run/2",

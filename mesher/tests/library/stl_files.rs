@@ -177,7 +177,7 @@ proptest! {
 /// One sentence, and the exit code of unusable input.
 fn is_input_error(error: &Error) -> Result<(), TestCaseError> {
     let text = error.to_string();
-    prop_assert!(error.exit_code() == 2 && !text.is_empty() && !text.contains('\n'), "{}", text);
+    prop_assert!(error.exit_code == 2 && !text.is_empty() && !text.contains('\n'), "{}", text);
     Ok(())
 }
 
