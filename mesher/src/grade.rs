@@ -86,20 +86,6 @@ pub fn grade(
     (g.split, g.counters)
 }
 
-/// The kept leaves of level `l` in bricks that this rank owns.
-fn kept_leaves<'a>(
-    split: &'a PerLevel,
-    l: Level,
-    kept: &Kept<'a>,
-    ownership: &'a Ownership,
-) -> impl Iterator<Item = Brick> + 'a {
-    let (mut splits, mut deleted) = (split[l as usize].cursor(), kept.deleted(l).cursor());
-    Tree::exists(split, l)
-        .filter(move |b| ownership.owns(l, b.key))
-        .map(move |b| Brick { bits: b.bits & !splits.get(b.key) & !deleted.get(b.key), ..b })
-        .filter(|b| b.bits != 0)
-}
-
 struct Gradation<'a> {
     split: PerLevel,
     crossing: &'a PerLevel,
@@ -116,7 +102,9 @@ impl Gradation<'_> {
     /// Splits the parents of the split octants of level `l`, and those of the octants `touched`, of
     /// level `l - 1`, that are kept. Collective: another rank may own the parent of an octant.
     fn close(&mut self, l: Level, touched: BrickSet) {
-        let fresh = self.parents_of_split(l).without(&self.split[l as usize - 1]);
+        let split = self.split[l as usize].bricks().filter(|b| self.ownership.owns(l, b.key));
+        let parents: BrickSet = split.map(Brick::parents).collect();
+        let fresh = parents.without(&self.split[l as usize - 1]);
         let ([fresh, touched], sent) =
             self.ownership.redistribute(l - 1, [fresh, touched], self.comm);
         self.counters.halo_bricks += sent;
@@ -124,18 +112,17 @@ impl Gradation<'_> {
         self.split_kept(l - 1, touched);
     }
 
-    /// The parents of the split octants of level `l` in bricks that this rank owns.
-    fn parents_of_split(&self, l: Level) -> BrickSet {
-        let split = self.split[l as usize].bricks();
-        split.filter(|b| self.ownership.owns(l, b.key)).map(Brick::parents).collect()
-    }
-
     /// The octants of level `l - 1` that the kept leaves of level `l` in bricks that this rank owns
     /// reach within `radius` cells.
     fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
         self.reached(l - 1, |g, reach| {
             if l > g.surface {
-                let leaves = kept_leaves(&g.split, l, g.kept, g.ownership);
+                let mut split = g.split[l as usize].cursor();
+                let mut deleted = g.kept.deleted(l).cursor();
+                let leaves = Tree::exists(&g.split, l)
+                    .filter(|b| g.ownership.owns(l, b.key))
+                    .map(|b| Brick { bits: b.bits & !split.get(b.key) & !deleted.get(b.key), ..b })
+                    .filter(|b| b.bits != 0);
                 return reach.dilate_children(leaves, radius);
             }
             let exhausted = g.groups_without_kept_leaf(l);
