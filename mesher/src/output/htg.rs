@@ -35,10 +35,9 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let numbering = Numbering::new(mesh, comm);
     let (origin, edge) = (mesh.rules.root.origin, mesh.rules.root.edge);
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
-    let is_first = comm.rank() == 0;
     let begin = || TreeWriter::new(out.file(TREE)?, shape.clone());
     let failed = out.failed(TREE);
-    let file = is_first.then(begin).transpose().map_err(&failed);
+    let file = (comm.rank() == 0).then(begin).transpose().map_err(&failed);
     let mut file = ranks::agree(comm, file)?;
     let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
@@ -74,11 +73,9 @@ fn messages(
     windows: Range<u64>,
 ) -> MessageBuffer {
     let mut messages = MessageBuffer::default();
-    let mut found = Vec::new();
     for (to, window) in windows.enumerate() {
         let range = groups(window);
-        found.clear();
-        found.extend(last.filter(|(group, _)| range.contains(group)));
+        let mut found = Vec::from_iter(last.filter(|(group, _)| range.contains(group)));
         while let Some(next) = own.next_if(|(group, _)| *group < range.end) {
             found.push(next);
         }
@@ -143,55 +140,51 @@ fn add(messages: &MessageBuffer, file: &mut TreeFile) -> io::Result<()> {
 
 /// Where siblings are in the file. They are numbered from the root's children, which have number 0, level by level, and in Morton order
 /// within a level.
-struct Numbering<'a> {
+struct Numbering {
     /// Number of nodes of each level that has any, over all ranks.
     nodes: Vec<u64>,
     /// The first number in each interval of the curve, level by level.
     first: Vec<u64>,
-    ownership: &'a Ownership,
 }
 
-impl<'a> Numbering<'a> {
+impl Numbering {
     /// Counts siblings by interval of the curve, and numbers them. Collective.
-    fn new(mesh: &'a Mesh, comm: &dyn Comm) -> Self {
+    fn new(mesh: &Mesh, comm: &dyn Comm) -> Self {
         let ownership = &mesh.ownership;
         let intervals = ownership.boundaries().len();
-        let first = vec![0; LEVELS * intervals];
-        let mut numbering = Self { nodes: vec![1], first, ownership };
+        let (mut nodes, mut first) = (vec![1], vec![0; LEVELS * intervals]);
         for l in 1..LEVELS as Level {
             for b in Tree::exists(&mesh.split, l).filter(|b| ownership.owns(l, b.key)) {
-                let place = numbering.place(l, b.key);
-                numbering.first[place] += u64::from(b.bits.count_ones() / 8);
+                first[place(ownership, l, b.key)] += u64::from(b.bits.count_ones() / 8);
             }
         }
         // Each interval has one owner, which has counted its siblings.
-        let counted = (0..).zip(&numbering.first).filter(|c| *c.1 > 0);
+        let counted = (0..).zip(&first).filter(|c| *c.1 > 0);
         let counted: Vec<[u64; 2]> = counted.map(|(place, &count)| [place, count]).collect();
         for [place, count] in gather(comm, &counted) {
-            numbering.first[place as usize] = count;
+            first[place as usize] = count;
         }
         let mut next = 0;
-        for level in numbering.first.chunks_mut(intervals) {
+        for level in first.chunks_mut(intervals) {
             let begin = next;
             for count_or_first in level {
                 next += std::mem::replace(count_or_first, next);
             }
-            numbering.nodes.extend((next > begin).then(|| 8 * (next - begin)));
+            nodes.extend((next > begin).then(|| 8 * (next - begin)));
         }
-        numbering
+        Self { nodes, first }
     }
+}
 
-    /// The place in `first` of the interval that contains the minimum corner of a brick.
-    fn place(&self, l: Level, key: u64) -> usize {
-        let intervals = self.first.len() / LEVELS;
-        l as usize * intervals + self.ownership.interval(l, key)
-    }
+/// The place in a numbering of the interval that contains the minimum corner of a brick.
+fn place(ownership: &Ownership, l: Level, key: u64) -> usize {
+    l as usize * ownership.boundaries().len() + ownership.interval(l, key)
 }
 
 /// The siblings in the bricks that this rank owns, with their numbers, in ascending order.
 fn own_siblings<'a>(
     mesh: &'a Mesh,
-    numbering: &'a Numbering<'a>,
+    numbering: &'a Numbering,
 ) -> impl Iterator<Item = Numbered> + 'a {
     let of_level = move |l: Level| {
         let mut path = Path::new(mesh, l);
@@ -199,7 +192,7 @@ fn own_siblings<'a>(
         let (mut last, mut next) = (None, 0);
         let bricks = mesh.split[l as usize - 1].child_bricks();
         bricks.filter(move |b| mesh.ownership.owns(l, b.key)).flat_map(move |b| {
-            let place = numbering.place(l, b.key);
+            let place = place(&mesh.ownership, l, b.key);
             if last.replace(place) != Some(place) {
                 next = numbering.first[place];
             }
@@ -222,29 +215,19 @@ fn siblings(brick: Octants, j: u64, exist: u8) -> Siblings {
     Siblings { split, deleted, crossing, inside }
 }
 
-/// The bricks that contain the current one, of all coarser levels, and readers of the sets.
-struct Path<'a>(Vec<PathLevel<'a>>);
-
-struct PathLevel<'a> {
-    cursors: LevelCursors<'a>,
-    key: Option<u64>,
-    brick: Octants,
-}
+/// Readers of the sets, level by level, and the bricks that contain the current one, each with its key.
+struct Path<'a>(Vec<(LevelCursors<'a>, Option<(u64, Octants)>)>);
 
 impl<'a> Path<'a> {
     /// A path to bricks of level `deepest`.
     fn new(mesh: &'a Mesh, deepest: Level) -> Self {
-        let level = |l: usize| {
-            let cursors = LevelCursors::new(mesh, l);
-            PathLevel { cursors, key: None, brick: Octants::default() }
-        };
-        Self((0..=deepest as usize).map(level).collect())
+        Self((0..=deepest as usize).map(|l| (LevelCursors::new(mesh, l), None)).collect())
     }
 
     /// Reads a brick. Keys must not descend.
     fn load(&mut self, l: Level, key: u64) -> Octants {
-        if self.0[l as usize].key == Some(key) {
-            return self.0[l as usize].brick;
+        if let Some((_, brick)) = self.0[l as usize].1.filter(|current| current.0 == key) {
+            return brick;
         }
         let (mut crossing, mut inside) = (0, 0);
         if l > 0 {
@@ -252,9 +235,9 @@ impl<'a> Path<'a> {
             let below = |sides: u64| children(byte(sides & above.split, key & 7));
             (crossing, inside) = (below(above.crossing), below(above.inside));
         }
-        let level = &mut self.0[l as usize];
-        level.key = Some(key);
-        level.brick = level.cursors.read(key, crossing, inside);
-        level.brick
+        let (cursors, current) = &mut self.0[l as usize];
+        let brick = cursors.read(key, crossing, inside);
+        *current = Some((key, brick));
+        brick
     }
 }
