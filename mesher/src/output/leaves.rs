@@ -48,8 +48,8 @@ pub fn finish(
     comm: &dyn Comm,
 ) -> Result<MeshEntry, Error> {
     let (digests, parts) = gather(counts.total(), digests, comm);
-    let counts = counts.gather(comm);
-    let entry = MeshEntry::new(mesh, &counts, &digests);
+    let by_level = comm.sums(counts.by_level.as_flattened());
+    let entry = MeshEntry::new(mesh, by_level.as_chunks().0, &digests);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {
             stop_at(format_args!("manifest:0"));

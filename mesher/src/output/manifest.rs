@@ -2,7 +2,6 @@
 
 use crate::input::lattice::Rules;
 use crate::mesh::Mesh;
-use crate::output::stream::Counts;
 use crate::output::write::{Output, TREE, part_name};
 use crate::sides::leaks::Leak;
 use crate::sides::{Ambiguous, Summary};
@@ -43,10 +42,11 @@ pub struct MeshEntry {
 }
 
 impl MeshEntry {
-    /// The mesh with these leaves on all ranks.
-    pub fn new(mesh: &Mesh, counts: &Counts, digests: &Digests) -> Self {
+    /// The mesh with these numbers of leaves on all ranks, by level and side.
+    pub fn new(mesh: &Mesh, by_level: &[[u64; 3]], digests: &Digests) -> Self {
         let Mesh { rules, sides, .. } = mesh;
-        let by_level = &counts.by_level[..=LEVEL_MAX as usize];
+        let leaves = by_level.as_flattened().iter().sum();
+        let by_level = &by_level[..=LEVEL_MAX as usize];
         let by_side = [0, 1, 2].map(|side| by_level.iter().map(|l| l[side]).sum());
         Self {
             program: concat!("mesher ", env!("CARGO_PKG_VERSION")),
@@ -54,7 +54,7 @@ impl MeshEntry {
             rules: rules.clone(),
             geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
             leaks: mesh.leaks.0.clone(),
-            leaves: counts.total(),
+            leaves,
             leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
             leaves_by_side: SIDES.into_iter().zip(by_side).collect(),
             components: sides.summary,

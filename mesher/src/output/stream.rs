@@ -27,14 +27,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// The sums over all ranks. Collective.
-    pub fn gather(&self, comm: &dyn ranks::Comm) -> Self {
-        let mut sum = Self::default();
-        let sums = comm.sums(self.by_level.as_flattened());
-        sum.by_level.as_flattened_mut().copy_from_slice(&sums);
-        sum
-    }
-
     /// Number of all leaves.
     pub fn total(&self) -> u64 {
         self.by_level.iter().flatten().sum()
@@ -64,8 +56,7 @@ impl Mesh {
 
 /// Cursors over the sets of one level.
 pub struct LevelCursors<'a> {
-    keep: Keep,
-    drops_crossing: bool,
+    mesh: &'a Mesh,
     split: Cursor<'a>,
     crossing: Cursor<'a>,
     stored: Cursor<'a>,
@@ -88,8 +79,7 @@ impl<'a> LevelCursors<'a> {
     /// The cursors of level `l`.
     pub fn new(mesh: &'a Mesh, l: usize) -> Self {
         Self {
-            keep: mesh.sides.keep,
-            drops_crossing: mesh.drops_crossing(),
+            mesh,
             split: mesh.split[l].cursor(),
             crossing: mesh.crossing[l].cursor(),
             stored: mesh.sides.stored[l].cursor(),
@@ -100,13 +90,13 @@ impl<'a> LevelCursors<'a> {
     #[inline]
     pub fn read(&mut self, key: u64, crossing: u64, inside: u64) -> Octants {
         let stored = self.stored.get(key);
-        let (inside, deleted) = match self.keep {
+        let (inside, deleted) = match self.mesh.sides.keep {
             Keep::Outside => (0, stored),
             Keep::Inside => (u64::MAX, stored),
             Keep::All => (stored | inside, 0),
         };
         let crossing = self.crossing.get(key) | crossing;
-        let deleted = if self.drops_crossing { deleted | crossing } else { deleted };
+        let deleted = if self.mesh.drops_crossing() { deleted | crossing } else { deleted };
         Octants { split: self.split.get(key), crossing, inside: inside & !crossing, deleted }
     }
 }
