@@ -145,7 +145,9 @@ pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
     let mut sum = 0u64;
     for (number, sets) in [split, crossing, &sides.stored].into_iter().enumerate() {
         for (l, b) in bricks_of(sets).filter(|(l, b)| ownership.owns(*l, b.key)) {
-            sum = sum.wrapping_add(hash(&(number, l, b.key, b.bits)));
+            let mut hasher = DefaultHasher::new();
+            (number, l, b.key, b.bits).hash(&mut hasher);
+            sum = sum.wrapping_add(hasher.finish());
         }
     }
     comm.sum(sum)
@@ -154,12 +156,6 @@ pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
 /// The bricks of all levels, each with its level.
 fn bricks_of(sets: &PerLevel) -> impl Iterator<Item = (Level, Brick)> {
     (0..).zip(sets).flat_map(|(l, set)| set.bricks().map(move |b| (l, b)))
-}
-
-fn hash(value: &impl Hash) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    hasher.finish()
 }
 
 /// Every rank that holds a brick has the same octants in it; no other rank has any. Owners and holders are found by the boundaries
@@ -213,21 +209,15 @@ fn to_owners(set: BrickSet, l: Level, ownership: &Ownership, comm: &dyn Comm) ->
     BrickSet::from_unsorted(received.values().collect())
 }
 
-/// The octants one step from those of a brick of level `l`. Some of the bricks may be empty.
-fn face_neighbours(l: Level, b: Brick) -> impl Iterator<Item = Brick> {
-    (0..3).flat_map(move |axis| beside(l, b, axis))
-}
-
 /// The octants one step along an axis from those of a brick of level `l`. Some of the bricks may be empty.
-fn beside(l: Level, b: Brick, axis: usize) -> [Brick; 4] {
-    let step = |up| {
+fn beside(l: Level, b: Brick, axis: usize) -> impl Iterator<Item = Brick> {
+    let step = move |up| {
         let within = brick::moved(b.bits, axis, up) & brick::valid(l);
         let next = if l < 2 { None } else { neighbour(l - 2, b.key, axis, up) };
         let across = if next.is_some() { brick::across(b.bits, axis, up) } else { 0 };
         [Brick { bits: within, ..b }, Brick { key: next.unwrap_or(b.key), bits: across }]
     };
-    let [[w, x], [y, z]] = [false, true].map(step);
-    [w, x, y, z]
+    [false, true].into_iter().flat_map(step)
 }
 
 /// Whether an octant is one of some leaves or lies in one.

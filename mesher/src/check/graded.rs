@@ -67,7 +67,7 @@ fn dilated(mut set: BrickSet, l: Level, radius: u32) -> BrickSet {
     for axis in 0..3 {
         for _ in 0..radius.min(1 << l) {
             let before = set.count();
-            let steps = |b: Brick| beside(l, b, axis).into_iter().chain([b]);
+            let steps = |b: Brick| beside(l, b, axis).chain([b]);
             let reached = set.bricks().flat_map(steps).filter(|b| b.bits != 0).collect();
             set = BrickSet::from_unsorted(reached);
             if set.count() == before {

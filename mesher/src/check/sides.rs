@@ -1,7 +1,7 @@
 //! Sides by their definition: over faces, by rays and by seeds. The rays, the search for a seed's leaf and the messages share no code
 //! with the phase.
 
-use super::{face_neighbours, is_in_leaf, to_owners};
+use super::{beside, is_in_leaf, to_owners};
 use crate::input::lattice::Keep;
 use crate::sides::nodes::open_bricks;
 use crate::sides::{Base, Decided, Sides};
@@ -28,9 +28,10 @@ pub fn agree_over_faces(sides: &Sides, base: &Base) {
     for (here, there) in [(stored, &others), (&others, stored)] {
         for l in 0..LEVELS as Level {
             let owned = here[l as usize].bricks().filter(|b| ownership.owns(l, b.key));
-            let beside: Vec<Brick> = owned.flat_map(|b| face_neighbours(l, b)).collect();
-            let beside = to_owners(BrickSet::from_unsorted(beside), l, ownership, comm);
-            for code in beside.without(&here[l as usize]).without(&tree.split[l as usize]).codes() {
+            let steps = |b: Brick| (0..3).flat_map(move |axis| beside(l, b, axis));
+            let near = BrickSet::from_unsorted(owned.flat_map(steps).collect());
+            let near = to_owners(near, l, ownership, comm);
+            for code in near.without(&here[l as usize]).without(&tree.split[l as usize]).codes() {
                 let place = path(l, code);
                 assert!(
                     !is_in_leaf(there, l, code),
