@@ -66,12 +66,6 @@ impl ContainingOctant {
     pub fn start(self) -> u64 {
         self.0 >> 5
     }
-
-    /// The first octant, in sorting order, whose minimum corner is at `start`: for range searches.
-    #[inline]
-    fn first_in(start: u64) -> Self {
-        Self(start << 5)
-    }
 }
 
 /// Facets sorted by containing octant.
@@ -85,9 +79,8 @@ impl BinnedFacets {
     /// Sorts facets by containing octant; drops those that miss the root.
     pub fn new(facets: &[Facet]) -> Self {
         let mut order: Vec<(ContainingOctant, u32)> = Vec::with_capacity(facets.len());
-        order.extend(
-            facets.iter().zip(0..).filter_map(|(f, i)| Some((ContainingOctant::of(f)?, i))),
-        );
+        let found = facets.iter().zip(0..);
+        order.extend(found.filter_map(|(f, i)| Some((ContainingOctant::of(f)?, i))));
         order.sort_unstable_by_key(|o| o.0);
         Self {
             containing: order.iter().map(|o| o.0).collect(),
@@ -172,16 +165,11 @@ impl Voxeliser<'_> {
         let crossing = (straddling.fold(0, |all, i| all | self.test(self.lists[i], l, min_corner))
             | self.bin_contained(&facets.contained, l, min_corner, &mut runs))
             & allowed;
-        let near: Vec<ExtentBox> = boxes
-            .iter()
-            .filter(|b| b.level >= l && box_mask(b, min_corner, l) != 0)
-            .copied()
-            .collect();
+        let is_near = |b: &&ExtentBox| b.level >= l && box_mask(b, min_corner, l) != 0;
+        let near: Vec<ExtentBox> = boxes.iter().filter(is_near).copied().collect();
         let asked = |least: Level| {
-            near.iter()
-                .filter(|b| b.level > least)
-                .map(|b| box_mask(b, min_corner, l))
-                .fold(0, |m, b| m | b)
+            let asking = near.iter().filter(|b| b.level > least);
+            asking.fold(0, |mask, b| mask | box_mask(b, min_corner, l))
         };
         let split = if l < self.surface { crossing } else { 0 } | asked(l) & allowed;
         let exists = if l == 0 {
@@ -254,7 +242,8 @@ impl Voxeliser<'_> {
                 continue;
             }
             let code = octant.start() >> (3 * (LEVEL_MAX - l));
-            let end = ContainingOctant::first_in((code + 1) << (3 * (LEVEL_MAX - l)));
+            // The first one, in sorting order, at the minimum corner of the next octant.
+            let end = ContainingOctant(start57(l, code + 1) << 5);
             let after = &self.binned.containing[i..contained.end];
             let run = i + after.partition_point(|octant| *octant < end);
             runs[(code & 63) as usize] = (i as u32, run as u32);
