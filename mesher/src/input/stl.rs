@@ -4,8 +4,9 @@
 
 use crate::error::Error;
 use geometries::Facet;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -27,13 +28,11 @@ pub struct Stl {
 /// # Errors
 /// If the file cannot be read or is no STL file.
 pub fn open(path: &Path) -> Result<Stl, Error> {
-    let fail = |e: std::io::Error| {
-        Error::input(format!("{}: {e}: give a readable STL file", path.display()))
-    };
-    let file = files::open(path).map_err(fail)?;
-    let length = file.metadata().map_err(fail)?.len();
+    let failed = |e: io::Error| fail(path, format_args!("{e}: give a readable STL file"));
+    let file = files::open(path).map_err(failed)?;
+    let length = file.metadata().map_err(failed)?.len();
     let mut head = vec![0; length.min(1024) as usize];
-    file.read_exact_at(&mut head, 0).map_err(fail)?;
+    file.read_exact_at(&mut head, 0).map_err(failed)?;
     let count = head.get(80..).and_then(|after| after.first_chunk());
     let count = count.map(|&bytes| u64::from(u32::from_le_bytes(bytes)));
     let binary = count.filter(|count| length == HEADER + RECORD * count);
@@ -42,7 +41,7 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     if binary.is_some() || may_begin_with_solid(&head) && !head.contains(&0) {
         return Ok(stl);
     }
-    Err(stl.fail(match count {
+    Err(fail(path, match count {
         Some(count) => format!(
             "the header promises {count} facets, which take {} bytes, but the file has {length}: it is truncated, longer or not an STL; export it again",
             HEADER + RECORD * count
@@ -51,11 +50,11 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     }))
 }
 
-impl Stl {
-    fn fail(&self, what: impl std::fmt::Display) -> Error {
-        Error::input(format!("{}: {what}", self.path.display()))
-    }
+fn fail(path: &Path, what: impl Display) -> Error {
+    Error::input(format!("{}: {what}", path.display()))
+}
 
+impl Stl {
     /// Facets `first..end` of a binary file.
     ///
     /// # Errors
@@ -69,7 +68,7 @@ impl Stl {
             let bytes = &mut buffer[..(count * RECORD) as usize];
             self.file
                 .read_exact_at(bytes, HEADER + RECORD * at)
-                .map_err(|e| self.fail(format!("{e} at facet {at}: export it again")))?;
+                .map_err(|e| fail(&self.path, format!("{e} at facet {at}: export it again")))?;
             out.extend(bytes.as_chunks::<{ RECORD as usize }>().0.iter().map(record));
         }
         Ok(out)
@@ -81,8 +80,8 @@ impl Stl {
     /// If the file cannot be read, or is malformed or truncated.
     pub fn read_text(mut self) -> Result<Vec<Facet>, Error> {
         let mut bytes = Vec::new();
-        self.file.read_to_end(&mut bytes).map_err(|e| self.fail(e))?;
-        parse(&bytes).map_err(|why| self.fail(format!("{why}: export it again")))
+        self.file.read_to_end(&mut bytes).map_err(|e| fail(&self.path, e))?;
+        parse(&bytes).map_err(|why| fail(&self.path, format!("{why}: export it again")))
     }
 }
 
@@ -151,10 +150,6 @@ struct Text<'a> {
 
 fn is_white(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t'..=b'\r')
-}
-
-fn ends_line(byte: u8) -> bool {
-    matches!(byte, b'\n' | b'\r')
 }
 
 impl<'a> Text<'a> {
@@ -238,7 +233,7 @@ impl<'a> Text<'a> {
     /// Skips the rest of the line up to words of which the first ones satisfy `ends`. Returns whether there are such words.
     fn skip_name(&mut self, ends: impl Fn(&[&[u8]; NAME_AHEAD]) -> bool) -> bool {
         let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|&byte| ends_line(byte)).unwrap_or(rest.len());
+        let length = rest.iter().position(|byte| b"\n\r".contains(byte)).unwrap_or(rest.len());
         let mut line = Text { bytes: &self.bytes[..self.at + length], at: self.at };
         while !line.is_at_end() {
             let mut ahead = Text { ..line };
