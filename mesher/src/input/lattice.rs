@@ -45,12 +45,6 @@ impl Bounds {
         Self { lo: lo.map(f64::from), hi: hi.map(f64::from) }
     }
 
-    /// Whether these bounds extend beyond the root, after rounding to its lattice.
-    pub fn exceed(&self, root: &Root) -> bool {
-        root.nearest(self.lo).iter().any(|&c| c < 0)
-            || root.nearest(self.hi).iter().any(|&c| c > ROOT_EDGE)
-    }
-
     /// Bounds of the union of both sets.
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -78,15 +72,10 @@ impl Root {
         Ok(Self { origin, edge })
     }
 
-    /// The nearest lattice coordinate, ties to even; saturates.
-    #[inline]
-    pub fn quantise(&self, axis: usize, x: f64) -> i64 {
-        ((x - self.origin[axis]) * (ROOT_EDGE as f64 / self.edge)).round_ties_even() as i64
-    }
-
-    /// The nearest lattice point.
+    /// The nearest lattice point, ties to even; saturates.
     pub fn nearest(&self, p: [f64; 3]) -> [i64; 3] {
-        std::array::from_fn(|a| self.quantise(a, p[a]))
+        let scale = ROOT_EDGE as f64 / self.edge;
+        std::array::from_fn(|a| rounded(p[a], self.origin[a], scale) as i64)
     }
 
     /// Coordinates of a lattice point in the unit of the geometry.
@@ -269,11 +258,9 @@ pub enum Keep {
 impl Rules {
     /// Deepest level that a rule asks for.
     pub fn level_deepest(&self) -> Level {
-        self.boxes
-            .iter()
-            .filter(|b| (0..3).all(|a| b.min[a] < b.max[a]))
-            .map(|b| b.level)
-            .fold(self.level_surface, Level::max)
+        let has_volume = |b: &&ExtentBox| (0..3).all(|a| b.min[a] < b.max[a]);
+        let levels = self.boxes.iter().filter(has_volume).map(|b| b.level);
+        levels.fold(self.level_surface, Level::max)
     }
 }
 
@@ -318,7 +305,7 @@ mod tests {
     #[test]
     fn ties_round_to_even_and_errors_name_the_facet_that_is_too_far_out() {
         let root = Root { origin: [0.0; 3], edge: (ROOT_EDGE * 2) as f64 };
-        assert_eq!([1.0, 3.0, 5.0].map(|x| root.quantise(0, x)), [0, 2, 2]);
+        assert_eq!(root.nearest([1.0, 3.0, 5.0]), [0, 2, 2]);
         let near = [[0.0f32; 3]; 3];
         let far = [[0.0; 3], [0.0; 3], [0.0, 3.1 * ROOT_EDGE as f32 * 2.0, 0.0]];
         assert_eq!(root.facets(vec![near], &Bounds::of(&[near]), 0).unwrap().len(), 1);

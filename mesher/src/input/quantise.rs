@@ -6,6 +6,7 @@ use crate::input::ingest::Slice;
 use crate::input::lattice::{Bounds, Rules};
 use bricks::digest;
 use bricks::facet::Facet;
+use bricks::octant::ROOT_EDGE;
 use ranks::{Comm, agree, gather, uncounted};
 
 /// The facets of all ranks, in numbers.
@@ -38,7 +39,8 @@ pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised,
     let bounds = gather(comm, &[local]).into_iter().fold(Bounds::EMPTY, Bounds::union);
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
-    let beyond_root = bounds.exceed(&rules.root);
+    let [low, high] = [bounds.lo, bounds.hi].map(|corner| rules.root.nearest(corner));
+    let beyond_root = low.iter().any(|&c| c < 0) || high.iter().any(|&c| c > ROOT_EDGE);
     // Each facet is in one slice.
     let digests = uncounted(comm, || gather(comm, &[digest::of_facets(&facets)]));
     let digest = digests.into_iter().fold(0, u128::wrapping_add);

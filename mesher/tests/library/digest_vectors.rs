@@ -123,7 +123,7 @@ fn roots_around_bodies_equal_the_vectors() {
 fn lattice_points_equal_the_vectors() {
     for v in vectors("quantised") {
         let (root, vertex) = (root(&v), point(&v["vertex"]));
-        let at: [i64; 3] = std::array::from_fn(|a| root.quantise(a, vertex[a]));
+        let at = root.nearest(vertex);
         let near = vertex.map(|c| c as f32);
         if v["lattice"].is_null() {
             // The nearest vertex in f32, with the root translated by the difference.
