@@ -74,24 +74,21 @@ fn distribute(
     make: impl FnOnce() -> Result<Vec<Facet>, Error>,
 ) -> Result<Slice, Error> {
     let made = if comm.rank() == 0 { make() } else { Ok(Vec::new()) };
-    let facets = agree(comm, made)?;
+    let mut facets = agree(comm, made)?;
     let total = comm.sum(facets.len() as u64);
     let (first, end) = range(total, comm.rank(), comm);
-    if comm.size() == 1 {
-        return Ok(Slice { facets, first, total });
-    }
-    let mut messages = MessageBuffer::default();
-    if comm.rank() == 0 {
-        for r in 1..comm.size() {
+    if comm.size() > 1 {
+        let mut messages = MessageBuffer::default();
+        let receivers = if comm.rank() == 0 { 1..comm.size() } else { 0..0 };
+        for r in receivers {
             let (start, end) = range(total, r, comm);
             messages.write_values(r, &facets[start as usize..end as usize]);
         }
+        // Rank 0 keeps its own slice, and the others have none yet.
+        facets.truncate(end as usize);
+        facets.shrink_to_fit();
+        facets.extend(comm.sparse_all_to_all(messages).values::<Facet>());
     }
-    let received = comm.sparse_all_to_all(messages);
-    let facets = match comm.rank() {
-        0 => facets[..end as usize].to_vec(),
-        _ => received.values().collect(),
-    };
     Ok(Slice { facets, first, total })
 }
 
