@@ -72,17 +72,16 @@ pub fn grow<F: Borrow<[Facet]>>(
             ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
         });
     }
+    let slice = facets.borrow();
+    let base = Base { tree: &tree, ownership: &ownership, facets: slice, rules: &rules, comm };
     job.check(|comm| {
         check::ownership(&ownership, comm);
-        let (tree, ownership, rules) = (&tree, &ownership, &rules);
-        check::base_tree(&Base { tree, ownership, facets: &all_facets, rules, comm });
+        check::base_tree(&Base { facets: &all_facets, ..base });
     });
     drop(all_facets);
     let is_whole = check::is_whole(options, &tree.split, comm);
 
     // 6. Sides: inside or outside, for every component of non-crossing leaves; and which of them are kept.
-    let slice = facets.borrow();
-    let base = Base { tree: &tree, ownership: &ownership, facets: slice, rules: &rules, comm };
     let is_closed = job.phase("leaks", |comm| openness::is_closed(slice, comm));
     let decided = job.phase("sides", |_| sides::decide(&base, options, is_closed))?;
     job.check(|_| {
