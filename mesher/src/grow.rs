@@ -175,23 +175,20 @@ fn of_base_mesh(
     let options = Options { ungraded: true, ..Options::default() };
     let mut record = Recorder::default();
     let quantised = Quantised { rules: base, facets, counts };
-    let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record));
+    // An error is the same on all ranks, as they grow the same mesh.
+    let mesh = grow(quantised, &mut Job::new(&options, &Solo, &mut record))?;
     let gone = match rules.keep {
         Keep::Outside => Some(Side::Inside as u64),
         Keep::Inside => Some(Side::Outside as u64),
         Keep::All => None,
     };
-    let leaves = mesh.map(|mesh| {
-        let mut leaves = Vec::new();
-        let kept = |words: &[u64]| {
-            let kept = words.iter().filter(|&word| Some(word & 3) != gone);
-            leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
-            Ok::<(), Infallible>(())
-        };
-        let Ok(_) = mesh.emit(kept);
-        leaves
+    let mut leaves = Vec::new();
+    let Ok(_) = mesh.emit(|words| {
+        let kept = words.iter().filter(|&word| Some(word & 3) != gone);
+        leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
+        Ok::<(), Infallible>(())
     });
-    let boundaries = leaves.and_then(|leaves| metis::assign_equal(&leaves, comm.size()));
+    let boundaries = metis::assign_equal(&leaves, comm.size());
     let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
     Ok(Partition { ownership, level_base: depth, partitioner: Some(Partitioner::Paper) })
 }
