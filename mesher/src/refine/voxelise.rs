@@ -116,7 +116,7 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
         pairs: Vec::new(),
         counters: Counters::default(),
     };
-    let all = BrickFacets { contained: 0..binned.facets.len(), straddling: 0..0 };
+    let all = [0..binned.facets.len(), 0..0];
     // The tested levels have the parity of the surface level, so that one of them is that level.
     v.brick(rules.level_surface & 1, 0, all, &rules.boxes);
     (v.tree, v.counters)
@@ -135,10 +135,7 @@ struct Voxeliser<'a> {
 }
 
 /// The facets of a brick: those contained in the octant that it fills, and those that straddle its boundary.
-struct BrickFacets {
-    contained: Range<usize>,
-    straddling: Range<usize>,
-}
+type BrickFacets = [Range<usize>; 2];
 
 impl Voxeliser<'_> {
     /// The octants of level `l` in a brick in which the rank owns a part.
@@ -157,13 +154,13 @@ impl Voxeliser<'_> {
 
     /// Decides the octants of level `l` in a brick and their parents, and continues with their descendants.
     fn brick(&mut self, l: Level, key: u64, facets: BrickFacets, boxes: &[ExtentBox]) {
+        let [contained, straddling] = facets;
         self.counters.bricks_voxelised += 1;
         let (min_corner, allowed) = (brick::min_corner(l, key), self.allowed(l, key));
         let first_pair = self.pairs.len();
         let mut runs = [(0u32, 0u32); 64];
-        let straddling = facets.straddling.clone();
         let crossing = (straddling.fold(0, |all, i| all | self.test(self.lists[i], l, min_corner))
-            | self.bin_contained(&facets.contained, l, min_corner, &mut runs))
+            | self.bin_contained(contained, l, min_corner, &mut runs))
             & allowed;
         let is_near = |b: &&ExtentBox| b.level >= l && box_mask(b, min_corner, l) != 0;
         let near: Vec<ExtentBox> = boxes.iter().filter(is_near).copied().collect();
@@ -185,14 +182,10 @@ impl Voxeliser<'_> {
         }
         for bit in ones(split) {
             let begin = self.lists.len();
-            let reach =
-                self.pairs[first_pair..].iter().filter(|p| p.1 >> bit & 1 == 1).map(|p| p.0);
-            self.lists.extend(reach);
+            let reach = self.pairs[first_pair..].iter().filter(|p| p.1 >> bit & 1 == 1);
+            self.lists.extend(reach.map(|p| p.0));
             let (from, to) = runs[bit as usize];
-            let facets = BrickFacets {
-                contained: from as usize..to as usize,
-                straddling: begin..self.lists.len(),
-            };
+            let facets = [from as usize..to as usize, begin..self.lists.len()];
             self.brick(l + 2, key << 6 | u64::from(bit), facets, &near);
             self.lists.truncate(begin);
         }
@@ -227,7 +220,7 @@ impl Voxeliser<'_> {
     /// brick contains. Returns the octants that are crossed.
     fn bin_contained(
         &mut self,
-        contained: &Range<usize>,
+        contained: Range<usize>,
         l: Level,
         min_corner: [i64; 3],
         runs: &mut [(u32, u32); 64],
