@@ -42,20 +42,22 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
-    let mut begin = 0;
-    while begin < shape.windows() {
+    for begin in (0..shape.windows()).step_by(round as usize) {
         let windows = begin..shape.windows().min(begin + round);
         let mine = comm.sparse_all_to_all(messages(&mut own, &mut last, windows.clone()));
         let mut chunks = MessageBuffer::default();
         let window = begin + comm.rank() as u64;
         if windows.contains(&window) {
-            let filled = fill(mesh, window, &mine);
-            pack(window, &filled.compress(&shape, &mut deflater), &mut chunks);
+            let compressed = fill(mesh, window, &mine).compress(&shape, &mut deflater);
+            // Its number, then for each array the bytes of its chunk, none for no chunk.
+            chunks.append(0, |words| {
+                words.extend([window, compressed.len() as u64]);
+                compressed.iter().for_each(|c| pack_bytes(c.as_deref().unwrap_or_default(), words));
+            });
         }
         let compressed = comm.sparse_all_to_all(chunks);
         let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
         ranks::agree(comm, written.map_err(&failed))?;
-        begin = windows.end;
     }
     let publish = |file: TreeFile| file.finish()?.into_inner()?.publish();
     ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
@@ -111,15 +113,6 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer) -> Window {
         }
     }
     filled
-}
-
-/// Appends a window's chunks to the message to rank 0: its number, then for each array the bytes of its chunk, none for no
-/// chunk.
-fn pack(window: u64, chunks: &Chunks, messages: &mut MessageBuffer) {
-    messages.append(0, |words| {
-        words.extend([window, chunks.len() as u64]);
-        chunks.iter().for_each(|c| pack_bytes(c.as_deref().unwrap_or_default(), words));
-    });
 }
 
 /// Writes the chunks that all ranks have sent, in the order of their windows.
