@@ -70,14 +70,13 @@ pub type Part = (u64, u128);
 /// The digests by octant and the parts of the mesh, gathered from all ranks. Collective.
 pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<Part>) {
     let words = |number: u64, digest: u128| [number, (digest >> 64) as u64, digest as u64];
+    let read = |&[n, high, low]: &[u64; 3]| (n, u128::from(high) << 64 | u128::from(low));
     // The leaves of a rank lie in few of the octants.
     let octants = (0..).zip(&mine.octants).filter(|(_, d)| **d != 0).map(|(i, d)| words(i, *d));
     let mine: Vec<[u64; 3]> = once(words(leaves, mine.whole())).chain(octants).collect();
     let (mut digests, mut parts) = (Digests::default(), Vec::new());
     for (_, theirs) in comm.all_gather(mine.as_flattened()).messages() {
-        let theirs = theirs.as_chunks().0.iter();
-        let mut theirs =
-            theirs.map(|&[n, high, low]| (n, u128::from(high) << 64 | u128::from(low)));
+        let mut theirs = theirs.as_chunks().0.iter().map(read);
         parts.extend(theirs.next());
         digests.merge(theirs.map(|(octant, digest)| (octant as usize, digest)));
     }
