@@ -15,13 +15,13 @@ use crate::input::ingest::Slice;
 use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
 use crate::mesh::Mesh;
-use crate::output::stream::Counts;
+use crate::output::stream::{Counts, total};
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::record::Options;
 use crate::sides::{Base, Sides};
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
-use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour};
+use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour, path};
 use bricks::tree::{PerLevel, check_existing, check_split};
 use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
@@ -220,6 +220,12 @@ fn beside(l: Level, b: Brick, axis: usize) -> impl Iterator<Item = Brick> {
     [false, true].into_iter().flat_map(step)
 }
 
+/// Panics with the place of an octant unless it is right.
+#[track_caller]
+fn require(is_right: bool, l: Level, code: u64, violation: &str) {
+    assert!(is_right, "octant {} of level {l} {violation}", path(l, code));
+}
+
 /// Whether an octant is one of some leaves or lies in one.
 fn is_in_leaf(leaves: &PerLevel, l: Level, code: u64) -> bool {
     (0..=l).any(|m| leaves[m as usize].contains(code >> (3 * (l - m))))
@@ -239,7 +245,7 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         volume += words.iter().map(|w| volume_of(level_of(*w), 1)).sum::<u64>();
         Ok::<(), std::convert::Infallible>(())
     });
-    assert_eq!(counts.total(), number, "counts must add up");
+    assert_eq!(total(counts), number, "counts must add up");
     let mut add = |sets| {
         let owned = bricks_of(sets).filter(|(l, b)| mesh.ownership.owns(*l, b.key));
         volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();

@@ -1,7 +1,7 @@
 //! Gradation by its definition: every octant is split that a rule asks for, and no other. Each octant of a layer is reached by steps
 //! from one octant to the next, and messages go to owners alone: nothing is shared with tiles, whole groups and redistribution.
 
-use super::{beside, is_in_leaf, to_owners};
+use super::{beside, is_in_leaf, require, to_owners};
 use crate::mesh::Mesh;
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
@@ -49,12 +49,8 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
             panic!("octant {} of level {} is split without need", path(l - 1, code), l - 1);
         }
         for code in asked.without(above).codes() {
-            assert!(
-                is_in_leaf(sides.deleted(), l - 1, code),
-                "octant {} of level {} must be split for a layer or balance",
-                path(l - 1, code),
-                l - 1
-            );
+            let is_deleted = is_in_leaf(sides.deleted(), l - 1, code);
+            require(is_deleted, l - 1, code, "must be split for a layer or balance");
         }
         let all = owned(l, &BrickSet::from_unsorted(Tree::exists(split, l).collect()));
         touched =

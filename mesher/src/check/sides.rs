@@ -1,7 +1,7 @@
 //! Sides by their definition: over faces, by rays and by seeds. The rays, the search for a seed's leaf and the messages share no code
 //! with the phase.
 
-use super::{beside, is_in_leaf, to_owners};
+use super::{beside, is_in_leaf, require, to_owners};
 use crate::input::lattice::Keep;
 use crate::sides::nodes::open_bricks;
 use crate::sides::{Base, Decided, Sides};
@@ -32,11 +32,8 @@ pub fn agree_over_faces(sides: &Sides, base: &Base) {
             let near = BrickSet::from_unsorted(owned.flat_map(steps).collect());
             let near = to_owners(near, l, ownership, comm);
             for code in near.without(&here[l as usize]).without(&tree.split[l as usize]).codes() {
-                let place = path(l, code);
-                assert!(
-                    !is_in_leaf(there, l, code),
-                    "octant {place} of level {l} is on another side than a leaf across a face"
-                );
+                let is_apart = !is_in_leaf(there, l, code);
+                require(is_apart, l, code, "is on another side than a leaf across a face");
             }
         }
     }
@@ -97,11 +94,8 @@ pub fn seeds(sides: &Sides, base: &Base) {
             let is_stored = sides.stored[l as usize].contains(code);
             let is_crossing = tree.crossing[l as usize].contains(code);
             let wanted = sides.keep == Keep::All && rules.keep == Keep::Inside;
-            let place = path(l, code);
-            assert!(
-                is_stored == wanted && !is_crossing,
-                "octant {place} of level {l} has a seed, but is no flow"
-            );
+            let is_flow = is_stored == wanted && !is_crossing;
+            require(is_flow, l, code, "has a seed, but is no flow");
         }
     }
 }

@@ -468,7 +468,7 @@ fn overlapping_leaves_are_found() {
 fn check_leaves(corrupt: impl Fn(&mut Mesh) + Sync, miscount: u64) {
     run(false, corrupt, |m, comm| {
         let (mut counts, ..) = finished::emit(&m, None, comm).expect("no interrupt");
-        counts.by_level[0][0] += miscount;
+        counts[0][0] += miscount;
         leaves(&m, &counts, comm);
     });
 }
