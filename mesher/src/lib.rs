@@ -50,7 +50,7 @@ use input::quantise::Quantised;
 use input::{ingest, quantise};
 use output::report::Report;
 use output::write::OutDir;
-use output::{htg, leaves};
+use output::{htg, leaves, stream};
 
 /// Meshes a case: all ten phases, if `may_run` has no error after phase 2: it sees the facets and the rules on the lattice. The report is the
 /// same on all ranks. Collective.
@@ -105,7 +105,7 @@ fn finish(mesh: &Mesh, out: Option<&OutDir>, job: &mut Job) -> Result<Report, Er
 
     // 10. Finish: sums over the ranks, and the manifest.
     let entry = job.phase("finish", |comm| leaves::finish(mesh, &counts, &digests, out, comm))?;
-    job.counters.leaves = counts.total();
+    job.counters.leaves = stream::total(&counts);
     job.counters.base_leaf_cells_max = heaviest;
     // The number of rays is a sum over the ranks, the same on all.
     job.counters.rays = if job.comm.rank() == 0 { mesh.sides.rays } else { 0 };

@@ -14,6 +14,7 @@ use mesher::input::ingest::{Slice, Source, read};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
 use mesher::input::quantise::FacetCounts;
 use mesher::input::stl;
+use mesher::output::stream::total;
 use mesher::partition::curve;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
@@ -168,7 +169,7 @@ pub fn kernels() -> Vec<Kernel> {
                     black_box(w);
                     Ok::<(), Infallible>(())
                 });
-                counts.total()
+                total(&counts)
             }),
         ),
         kernel("digest", leaves, Box::new(|| digest::digest(black_box(words)) as u64)),

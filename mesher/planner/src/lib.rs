@@ -31,6 +31,7 @@ use mesher::input::lattice::Rules;
 use mesher::input::quantise::Quantised;
 use mesher::output::leaves;
 use mesher::output::report::{Report, grouped};
+use mesher::output::stream::total;
 use mesher::partition::area;
 use mesher::record::Recorder;
 use mesher::{Job, Options, grow};
@@ -159,7 +160,7 @@ fn pilot(
         let counts = quantised.counts;
         let mesh = grow(Quantised { rules, facets, counts }, job)?;
         let (counts, ..) = job.phase("leaves", |comm| leaves::emit(&mesh, None, comm))?;
-        Ok(pilot::amounts(&mesh, counts.total(), job, &quantised.rules.boxes))
+        Ok(pilot::amounts(&mesh, total(&counts), job, &quantised.rules.boxes))
     };
     let rules = pilot::coarser(&quantised.rules, shift);
     match run(rules.clone()) {

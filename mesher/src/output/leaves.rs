@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::output::manifest::{MeshEntry, gather, manifest};
-use crate::output::stream::Counts;
+use crate::output::stream::{Counts, total};
 use crate::output::write::{OutDir, Part, part_name};
 use bricks::digest::Digests;
 use bricks::octant::{LEVEL_MAX, Level};
@@ -31,7 +31,7 @@ pub fn emit(
             digests.add(words);
             part.as_mut().map_or(Ok(()), |part| part.add(words))
         })?;
-        part.map_or(Ok(()), |part| part.finish(counts.total()))?;
+        part.map_or(Ok(()), |part| part.finish(total(&counts)))?;
         Ok((counts, digests))
     };
     let failed = |e: io::Error| out.expect("only files can fail").failed(&name)(e);
@@ -47,8 +47,8 @@ pub fn finish(
     out: Option<&OutDir>,
     comm: &dyn Comm,
 ) -> Result<MeshEntry, Error> {
-    let (digests, parts) = gather(counts.total(), digests, comm);
-    let by_level = comm.sums(counts.by_level.as_flattened());
+    let (digests, parts) = gather(total(counts), digests, comm);
+    let by_level = comm.sums(counts.as_flattened());
     let entry = MeshEntry::new(mesh, by_level.as_chunks().0, &digests);
     let publish = || match out {
         Some(out) if comm.rank() == 0 => {

@@ -10,7 +10,6 @@
 
 use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
-use crate::partition::ownership::Ownership;
 use bricks::brick;
 use bricks::brickset::{Cursor, ones};
 use bricks::octant::{Level, Side, start57};
@@ -19,18 +18,12 @@ use bricks::tree::LEVELS;
 /// Number of words that are buffered before they are passed to the sink.
 const CHUNK: usize = 4096;
 
-/// Number of leaves by level and side.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// `by_level[l][side]`.
-    pub by_level: [[u64; 3]; LEVELS],
-}
+/// Number of leaves, `[level][side]`.
+pub type Counts = [[u64; 3]; LEVELS];
 
-impl Counts {
-    /// Number of all leaves.
-    pub fn total(&self) -> u64 {
-        self.by_level.iter().flatten().sum()
-    }
+/// Number of all leaves.
+pub fn total(counts: &Counts) -> u64 {
+    counts.as_flattened().iter().sum()
 }
 
 impl Mesh {
@@ -42,7 +35,7 @@ impl Mesh {
     pub fn emit<E>(&self, sink: impl FnMut(&[u64]) -> Result<(), E>) -> Result<Counts, E> {
         let mut walk = Walk {
             levels: (0..LEVELS).map(|l| LevelCursors::new(self, l)).collect(),
-            ownership: &self.ownership,
+            mesh: self,
             buffer: Vec::with_capacity(CHUNK + 512),
             counts: Counts::default(),
             sink,
@@ -112,7 +105,7 @@ struct Loaded {
 
 struct Walk<'a, S> {
     levels: Vec<LevelCursors<'a>>,
-    ownership: &'a Ownership,
+    mesh: &'a Mesh,
     buffer: Vec<u64>,
     counts: Counts,
     sink: S,
@@ -122,12 +115,12 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     /// Reads a brick whose octants `exists` exist; `crossing` and `inside` are inherited from base leaves.
     #[inline]
     fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
-        let (ownership, cursors) = (self.ownership, &mut self.levels[l as usize]);
+        let (ownership, cursors) = (&self.mesh.ownership, &mut self.levels[l as usize]);
         let mut octants = cursors.read(key, crossing, inside);
         octants.split &= exists;
         let Octants { split, crossing, inside, deleted } = octants;
         let leaves = if ownership.owns(l, key) { exists & !split & !deleted } else { 0 };
-        let counts = &mut self.counts.by_level[l as usize];
+        let counts = &mut self.counts[l as usize];
         let count = |side: u64| u64::from((leaves & side).count_ones());
         counts[Side::Crossing as usize] += count(crossing);
         counts[Side::Inside as usize] += count(inside);
