@@ -67,10 +67,9 @@ pub fn grade(
     comm: &dyn Comm,
 ) -> (PerLevel, Counters) {
     let surface = rules.level_surface;
-    let tile = Tile::default();
     let counters = Counters::default();
-    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, tile, counters };
-    if !rules.keep_crossing && rules.layer_cells_min < 3 {
+    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, counters };
+    if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
     // Grandparents reached for balance are redistributed together with the parents of the next level.
@@ -93,8 +92,6 @@ struct Gradation<'a> {
     surface: Level,
     ownership: &'a Ownership,
     comm: &'a dyn Comm,
-    /// Scratch; empty between dilations.
-    tile: Tile,
     counters: Counters,
 }
 
@@ -150,12 +147,11 @@ impl Gradation<'_> {
 
     /// The octants of level `l` that `dilate` reaches; counts the work.
     fn reached(&mut self, l: Level, dilate: impl FnOnce(&Self, &mut Reach)) -> BrickSet {
-        let mut tile = std::mem::take(&mut self.tile);
+        let mut tile = Tile::default();
         let mut reach = Reach::new(l, &mut tile);
         dilate(self, &mut reach);
         let (reached, words) = reach.finish();
         self.counters.words_dilated += words;
-        self.tile = tile;
         reached
     }
 
@@ -184,12 +180,9 @@ impl Gradation<'_> {
     }
 
     /// The layer of finest cells that a mesh without crossing leaves starts from: kept octants of the
-    /// surface level that touch a crossing leaf. Collective.
+    /// surface level, which is not 0, that touch a crossing leaf. Collective.
     fn extra_layer(&mut self) {
         let surface = self.surface;
-        if surface == 0 {
-            return;
-        }
         for m in (surface..self.crossing.len() as Level).rev() {
             let mut touched = self.reached(m - 1, |g, reach| {
                 let leaves = g.crossing[m as usize].bricks();
