@@ -131,7 +131,7 @@ mod tests {
         for spacing_min in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-9] {
             assert!(Case { spacing_min, ..c.clone() }.rules(&unit).is_err());
         }
-        assert!(c.rules(&Bounds::EMPTY).is_err());
+        assert!(c.rules(&Bounds::of(&[])).is_err());
         assert!(Case { layer_cells_min: 0, ..c.clone() }.rules(&unit).is_err());
         let boxed = |min: [f64; 3]| Case {
             boxes: vec![BoxSpec { min, max: [1.0; 3], spacing: 0.1 }],

@@ -31,9 +31,6 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of no vertices.
-    pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
-
     /// Bounds of facets. Their coordinates must be finite.
     pub fn of(facets: &[geometries::Facet]) -> Self {
         let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);

@@ -36,7 +36,7 @@ pub struct Quantised<F = Vec<Facet>> {
 /// If the case has no valid rules for these facets, or a facet is too far from the root.
 pub fn quantise(case: &Case, slice: Slice, comm: &dyn Comm) -> Result<Quantised, Error> {
     let local = Bounds::of(&slice.facets);
-    let bounds = gather(comm, &[local]).into_iter().fold(Bounds::EMPTY, Bounds::union);
+    let bounds = gather(comm, &[local]).into_iter().reduce(Bounds::union).unwrap_or(local);
     let rules = case.rules(&bounds)?;
     let facets = agree(comm, rules.root.facets(slice.facets, &local, slice.first))?;
     let [low, high] = [bounds.lo, bounds.hi].map(|corner| rules.root.nearest(corner));

@@ -165,7 +165,7 @@ fn boxes_on_the_lattice_equal_the_vectors() {
             seeds: Vec::new(),
             enclosed: Enclosed::Delete,
         };
-        let rules = case.rules(&Bounds::EMPTY).expect("the box is good");
+        let rules = case.rules(&Bounds::of(&[])).expect("the box is good");
         assert_eq!(rules.boxes[0].min, integers(&v["lattice_min"]));
         assert_eq!(rules.boxes[0].max, integers(&v["lattice_max"]));
     }
