@@ -57,9 +57,7 @@ impl Case {
     /// If a parameter is out of range.
     pub fn rules(&self, bounds: &Bounds) -> Result<Rules, Error> {
         positive("spacing_min", self.spacing_min)?;
-        if self.layer_cells_min == 0 {
-            return Err(Error::input("layer_cells_min is 0: a layer has at least 1 cell"));
-        }
+        require(self.layer_cells_min > 0, "layer_cells_min is 0: a layer has at least 1 cell")?;
         let root = match self.root {
             RootSpec::Exact(root) => root,
             RootSpec::Scale(scale) => {
@@ -68,9 +66,9 @@ impl Case {
             }
         };
         positive("the root's edge", root.edge)?;
-        let finite = |what: &str, point: [f64; 3]| match point.iter().all(|c| c.is_finite()) {
-            true => Ok(()),
-            false => Err(Error::input(format!("{what} is not finite: give three numbers"))),
+        let finite = |what: &str, point: [f64; 3]| {
+            let why = format!("{what} is not finite: give three numbers");
+            require(point.iter().all(|c| c.is_finite()), why)
         };
         finite("the root's origin", root.origin)?;
         let level_surface = root.level_of(self.spacing_min, "spacing_min")?;
@@ -94,22 +92,22 @@ impl Case {
     }
 }
 
+/// Refuses the case, unless it is right.
+fn require(is_right: bool, why: impl Into<String>) -> Result<(), Error> {
+    if is_right { Ok(()) } else { Err(Error::input(why)) }
+}
+
 fn positive(what: &str, v: f64) -> Result<(), Error> {
-    match v.is_finite() && v > 0.0 {
-        true => Ok(()),
-        false => Err(Error::input(format!("{what} is {v}: give a positive number"))),
-    }
+    require(v.is_finite() && v > 0.0, format!("{what} is {v}: give a positive number"))
 }
 
 impl BoxSpec {
     /// The box on the lattice; `number`, from 0, identifies it in errors.
     fn on(&self, root: &Root, number: usize) -> Result<ExtentBox, Error> {
         let [min, max] = [self.min, self.max];
-        if !(0..3).all(|a| min[a] < max[a] && min[a].is_finite() && max[a].is_finite()) {
-            return Err(Error::input(format!(
-                "box {number}: min must be below max on every axis, and both finite"
-            )));
-        }
+        let is_right = (0..3).all(|a| min[a] < max[a] && min[a].is_finite() && max[a].is_finite());
+        let why = "min must be below max on every axis, and both finite";
+        require(is_right, format!("box {number}: {why}"))?;
         let spacing = format!("box {number}: spacing");
         positive(&spacing, self.spacing)?;
         let level = root.level_of(self.spacing, &spacing)?;
