@@ -188,6 +188,7 @@ fn of_base_mesh(
         leaves.extend(kept.map(|word| (word >> 7, (word >> 2 & 31) as Level)));
         Ok::<(), Infallible>(())
     });
+    drop(mesh);
     let boundaries = metis::assign_equal(&leaves, comm.size());
     let ownership = Ownership::along(comm.rank(), comm.size(), agree(comm, boundaries)?);
     Ok(Partition { ownership, level_base: depth, partitioner: Some(Partitioner::Paper) })

@@ -87,9 +87,8 @@ impl Stl {
 
 /// The vertices of a binary record. They follow the normal, which is not used.
 fn record(bytes: &[u8; RECORD as usize]) -> Facet {
-    let coordinate =
-        |i: usize| f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
-    std::array::from_fn(|v| std::array::from_fn(|a| coordinate(12 + 12 * v + 4 * a)))
+    let coordinates = bytes[12..].as_chunks().0;
+    std::array::from_fn(|v| std::array::from_fn(|a| f32::from_le_bytes(coordinates[3 * v + a])))
 }
 
 /// Checks that all coordinates are finite; `first` is the index of the first facet, for the error.
