@@ -112,19 +112,13 @@ type Run<'a> = &'a mut dyn FnMut(Level) -> Result<Amounts, Error>;
 ///
 /// # Errors
 /// The same on all ranks. Then nothing is left in the output directory.
-pub fn mesh(
-    case: &Case,
-    options: &Options,
-    is_forced: bool,
-    comm: &dyn Comm,
-    record: &mut Recorder,
-) -> Result<Report, Error> {
-    mesher::mesh(case, &mut Job::new(options, comm, record), |quantised, job| {
+pub fn mesh(case: &Case, is_forced: bool, job: &mut Job) -> Result<Report, Error> {
+    mesher::mesh(case, job, |quantised, job| {
         if is_forced {
             return Ok(());
         }
-        let run = &mut |shift| pilot(quantised, shift, options, comm);
-        uncounted(comm, || Problem::new(quantised, job).check(run))
+        let run = &mut |shift| pilot(quantised, shift, job);
+        uncounted(job.comm, || Problem::new(quantised, job).check(run))
     })
 }
 
@@ -132,30 +126,19 @@ pub fn mesh(
 ///
 /// # Errors
 /// The same on all ranks.
-pub fn plan(
-    case: &Case,
-    options: &Options,
-    comm: &dyn Comm,
-    record: &mut Recorder,
-) -> Result<Plan, Error> {
-    let mut job = Job::new(options, comm, record);
-    let quantised = mesher::quantised(case, &mut job)?;
+pub fn plan(case: &Case, job: &mut Job) -> Result<Plan, Error> {
+    let quantised = mesher::quantised(case, job)?;
     job.record.report_status("plan");
-    let run = &mut |shift| pilot(&quantised, shift, options, comm);
-    uncounted(comm, || Problem::new(&quantised, &job).plan(run))
+    let run = &mut |shift| pilot(&quantised, shift, job);
+    uncounted(job.comm, || Problem::new(&quantised, job).plan(run))
 }
 
 /// A pilot run, coarser by `shift` levels: what this rank needs for it. Collective.
-fn pilot(
-    quantised: &Quantised,
-    shift: Level,
-    options: &Options,
-    comm: &dyn Comm,
-) -> Result<Amounts, Error> {
-    let options = Options { check: false, out: None, strict: false, ..options.clone() };
+fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<Amounts, Error> {
+    let options = Options { check: false, out: None, strict: false, ..job.options.clone() };
     let run = |rules: Rules| {
         let mut record = Recorder::default();
-        let job = &mut Job::new(&options, comm, &mut record);
+        let job = &mut Job::new(&options, job.comm, &mut record);
         let facets = &quantised.facets[..];
         let counts = quantised.counts;
         let mesh = grow(Quantised { rules, facets, counts }, job)?;

@@ -131,10 +131,10 @@ fn pilots_of_runs_that_cannot_fit_are_short() {
 fn pilots(ranks: usize) -> (Vec<Amounts>, f64) {
     let options = options();
     let on_rank = |comm: &dyn Comm| {
-        let quantised =
-            mesher::quantised(&case(), &mut Job::new(&options, comm, &mut Recorder::default()))
-                .unwrap();
-        let run = |shift| pilot(&quantised, shift, &options, comm).unwrap();
+        let mut record = Recorder::default();
+        let job = &mut Job::new(&options, comm, &mut record);
+        let quantised = mesher::quantised(&case(), job).unwrap();
+        let run = |shift| pilot(&quantised, shift, job).unwrap();
         ([2, 1, 0].map(run), boxed_in(&quantised.rules.boxes, 0, 0))
     };
     let all = match ranks {
@@ -175,10 +175,9 @@ fn two_pilot_runs_predict_the_mesh() {
 fn pilot_runs_do_without_seeds_in_cells_that_only_they_cross() {
     let run = |x: f64, shift: Level| {
         let case = Case { seeds: vec![[x, 0.0, 0.0]], boxes: Vec::new(), ..case() };
-        let options = options();
-        let quantised =
-            mesher::quantised(&case, &mut Job::new(&options, &Solo, &mut Recorder::default()))?;
-        pilot(&quantised, shift, &options, &Solo)
+        let (options, mut record) = (options(), Recorder::default());
+        let job = &mut Job::new(&options, &Solo, &mut record);
+        pilot(&mesher::quantised(&case, job)?, shift, job)
     };
     // The sphere has radius 0.5, a pilot that is coarser by three levels has cells of 0.0625.
     assert!(run(0.53, 3).is_ok() && run(0.7, 3).is_ok());

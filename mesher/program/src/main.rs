@@ -6,6 +6,7 @@ mod cli;
 
 use cli::{Args, CommChoice, UNPRINTED, case, options, parse};
 use files::{BUG, Heap, check_writable, interrupt, message, write_atomically};
+use mesher::Job;
 use mesher::error::Error;
 use mesher::input::ingest::{self, Source};
 use mesher::output::write::write_json;
@@ -322,14 +323,15 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         )?;
     }
     let options = options(args)?;
+    let job = &mut Job::new(&options, comm, record);
     let mut bytes = Vec::new();
     let done = if args.plan {
-        let plan = planner::plan(&case, &options, comm, record)?;
+        let plan = planner::plan(&case, job)?;
         let refusal = (!plan.fits && !args.force).then(|| plan.refusal());
         json.map_or(Ok(()), |_| write_json(&mut bytes, &plan)).expect(WRITABLE);
         Done { text: plan.to_string(), warnings: Vec::new(), refusal }
     } else {
-        let report = planner::mesh(&case, &options, args.force, comm, record)?;
+        let report = planner::mesh(&case, args.force, job)?;
         json.map_or(Ok(()), |_| write_json(&mut bytes, &report)).expect(WRITABLE);
         Done { text: report.to_string(), warnings: report.warnings, refusal: None }
     };
