@@ -159,14 +159,15 @@ pub struct Counters {
 
 /// Peak resident memory of this process, in bytes; 0 on systems that do not provide it.
 pub fn peak_rss_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    kilobytes(&status, "VmHWM:").unwrap_or(0) * 1024
+    stated_bytes("/proc/self/status", "VmHWM:").unwrap_or(0)
 }
 
-/// The number of kilobytes in a line of a file of the kernel.
-pub fn kilobytes(text: &str, name: &str) -> Option<u64> {
+/// The bytes that a file of the kernel states in one of its lines; none on systems that do not provide it.
+pub fn stated_bytes(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
     let line = text.lines().find_map(|l| l.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse().ok()
+    let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kilobytes * 1024)
 }
 
 #[cfg(test)]

@@ -3,13 +3,12 @@
 
 use crate::pilot::Amounts;
 use bytemuck::{Pod, Zeroable};
-use mesher::record::{kilobytes, peak_rss_bytes};
+use mesher::record::{peak_rss_bytes, stated_bytes};
 use ranks::{Comm, gather};
-use rustix::param::page_size;
 use rustix::process::{Resource, getrlimit};
 use serde::Serialize;
 use std::fs::read_to_string;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::path::Path;
 
 /// Bytes of the holes that sets leave which grow in the heap: this part of the sets, as long as they are smaller than the blocks that get
@@ -63,36 +62,25 @@ impl Rank {
     /// The memory and the limits of this process.
     fn read(amounts: Amounts) -> Self {
         let text = |path: &str| read_to_string(path).unwrap_or_default();
-        let mut node = DefaultHasher::new();
-        text("/proc/sys/kernel/random/boot_id").hash(&mut node);
-        let [_, resident] = pages();
+        let boot = text("/proc/sys/kernel/random/boot_id");
+        let available = stated_bytes("/proc/meminfo", "MemAvailable:");
         Self {
             amounts,
-            resident,
+            resident: stated_bytes("/proc/self/status", "VmRSS:").unwrap_or(0) as f64,
             peak: peak_rss_bytes() as f64,
             address_space: address_space_left(),
             control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
-            machine: available(&text("/proc/meminfo")),
-            node: node.finish(),
+            machine: available.map_or(f64::INFINITY, |bytes| bytes as f64),
+            node: BuildHasherDefault::<DefaultHasher>::new().hash_one(boot),
         }
     }
 }
 
-/// The size of this process's address space and its resident memory, in bytes; zeros where the system does not report them.
-fn pages() -> [f64; 2] {
-    let statm = read_to_string("/proc/self/statm").unwrap_or_default();
-    let mut pages = statm.split_whitespace().map_while(|n| n.parse::<f64>().ok());
-    [(); 2].map(|()| pages.next().unwrap_or(0.0) * page_size() as f64)
-}
-
 /// What the limit on its address space leaves this process, in bytes; infinity without a limit.
 pub fn address_space_left() -> f64 {
+    let used = stated_bytes("/proc/self/status", "VmSize:").unwrap_or(0) as f64;
     let limit = getrlimit(Resource::As).current;
-    limit.map_or(f64::INFINITY, |bytes| (bytes as f64 - pages()[0]).max(0.0))
-}
-
-fn available(meminfo: &str) -> f64 {
-    kilobytes(meminfo, "MemAvailable:").map_or(f64::INFINITY, |kib| kib as f64 * 1024.0)
+    limit.map_or(f64::INFINITY, |bytes| (bytes as f64 - used).max(0.0))
 }
 
 /// The least that the groups of this process leave, from its own group to the root of the hierarchy below `mount`. Inside a container
@@ -288,8 +276,10 @@ mod tests {
 
     #[test]
     fn memory_that_is_available_is_read() {
-        assert_eq!(available("MemTotal: 9 kB\nMemAvailable:   7 kB\n"), 7168.0);
-        assert_eq!(available(""), f64::INFINITY);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(&file, "MemTotal: 9 kB\nMemAvailable:   7 kB\n").unwrap();
+        let found = |file: &Path| stated_bytes(file.to_str().unwrap(), "MemAvailable:");
+        assert_eq!((found(file.path()), found(Path::new("missing"))), (Some(7168), None));
         if cfg!(target_os = "linux") {
             assert!(Rank::read(Amounts::default()).machine.is_finite());
         }

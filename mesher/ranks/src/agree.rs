@@ -1,7 +1,7 @@
 //! Errors and texts that all ranks agree on.
 
 use crate::{Comm, gather};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash};
 
 /// Makes ranks agree on errors: all return the error of the lowest rank that has one. An error is an exit code and a sentence.
 /// Collective.
@@ -29,9 +29,7 @@ where
 
 /// The first rank with another value than rank 0, by its hash. Collective.
 pub fn first_other(comm: &dyn Comm, value: &impl Hash) -> Option<usize> {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    let hashes = gather(comm, &[hasher.finish()]);
+    let hashes = gather(comm, &[BuildHasherDefault::<DefaultHasher>::new().hash_one(value)]);
     hashes.iter().position(|&hash| hash != hashes[0])
 }
 
