@@ -48,6 +48,7 @@ fn main() {
     let _ = interrupt::install(message, if is_parallel { LINGER } else { Duration::ZERO });
     abort_on_panic();
     exit(match choose(asked.as_ref().map_or(CommChoice::Auto, |args| args.comm)) {
+        #[cfg(feature = "mpi")]
         Ok(CommChoice::Mpi) => run_mpi(&asked),
         Ok(CommChoice::Sim { ranks, seed }) => sim::run(ranks, seed, |comm| obey(&asked, comm))[0],
         Ok(_) => obey(&asked, &Solo),
@@ -75,13 +76,11 @@ fn fix_heap() {
 fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     match asked {
         CommChoice::Auto if !launch::is_mpi_job() => Ok(CommChoice::Solo),
-        CommChoice::Auto | CommChoice::Mpi if launch::HAS_MPI => Ok(CommChoice::Mpi),
-        CommChoice::Auto | CommChoice::Mpi => match launch::ranks() {
-            Some(1) => Ok(CommChoice::Solo),
-            _ => Err(Error::input(
-                "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
-            )),
-        },
+        CommChoice::Auto | CommChoice::Mpi if cfg!(feature = "mpi") => Ok(CommChoice::Mpi),
+        CommChoice::Auto | CommChoice::Mpi if launch::ranks() == Some(1) => Ok(CommChoice::Solo),
+        CommChoice::Auto | CommChoice::Mpi => Err(Error::input(
+            "this mesher was built without MPI: build it with --features mpi, or run it without mpirun",
+        )),
         _ if launch::ranks().is_some_and(|ranks| ranks > 1) => Err(Error::input(
             "each rank of this job would mesh on its own: leave out --comm, or start the mesher without mpirun",
         )),
@@ -89,13 +88,12 @@ fn choose(asked: CommChoice) -> Result<CommChoice, Error> {
     }
 }
 
-/// Time for rank 0 to end the job.
-const PATIENCE: Duration = Duration::from_secs(10);
-
-/// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
-const ADDRESS_SPACE_MPI: f64 = 384e6;
-
+#[cfg(feature = "mpi")]
 fn run_mpi(asked: &Result<Args, Error>) -> i32 {
+    /// Address space that a rank must have left, in bytes: with less, MPI libraries crash or hang while they start.
+    const ADDRESS_SPACE_MPI: f64 = 384e6;
+    /// Time for rank 0 to end the job.
+    const PATIENCE: Duration = Duration::from_secs(10);
     let left = planner::address_space_left();
     if left < ADDRESS_SPACE_MPI {
         let e = Error::memory(format!(

@@ -1,6 +1,6 @@
 //! Communication between ranks: one small trait, [`Comm`], with three implementations. This crate knows no octants.
 //!
-//! [`Solo`] is a single rank and needs no library. With the feature `mpi`, [`launch::join`] makes a process a rank of an MPI job.
+//! [`Solo`] is a single rank and needs no library. With the feature `mpi`, `launch::join` makes a process a rank of an MPI job.
 //! [`sim::run`] simulates any number of ranks in one process, one at a time, in an order drawn from a seed. [`Metered`] counts and times
 //! the calls of any of them.
 //!
