@@ -22,7 +22,7 @@ where
         None => Ok(value.expect("no rank has an error")),
         Some((_, words)) => {
             let (sentence, _) = unpack_bytes(&words[1..]);
-            Err(E::from((words[0] as i32, String::from_utf8_lossy(&sentence).into_owned())))
+            Err(E::from((words[0] as i32, String::from_utf8_lossy(sentence).into_owned())))
         }
     }
 }
@@ -39,25 +39,23 @@ pub fn text_of_first(comm: &dyn Comm, text: &str) -> String {
     if comm.rank() == 0 {
         pack_bytes(text.as_bytes(), &mut packed);
     }
-    let (bytes, _) = unpack_bytes(comm.all_gather(&packed).words());
-    String::from_utf8_lossy(&bytes).into_owned()
+    let gathered = comm.all_gather(&packed);
+    String::from_utf8_lossy(unpack_bytes(gathered.words()).0).into_owned()
 }
 
 /// Appends bytes to a message, after their number.
 pub fn pack_bytes(bytes: &[u8], words: &mut Vec<u64>) {
     words.push(bytes.len() as u64);
-    words.extend(bytes.chunks(8).map(|part| {
-        let mut word = [0; 8];
-        word[..part.len()].copy_from_slice(part);
-        u64::from_le_bytes(word)
-    }));
+    let start = words.len();
+    words.resize(start + bytes.len().div_ceil(8), 0);
+    bytemuck::cast_slice_mut(&mut words[start..])[..bytes.len()].copy_from_slice(bytes);
 }
 
 /// The bytes at the front of a message, and the words after them.
-pub fn unpack_bytes(words: &[u64]) -> (Vec<u8>, &[u64]) {
+pub fn unpack_bytes(words: &[u64]) -> (&[u8], &[u64]) {
     let bytes = words[0] as usize;
     let (packed, rest) = words[1..].split_at(bytes.div_ceil(8));
-    (packed.iter().flat_map(|w| w.to_le_bytes()).take(bytes).collect(), rest)
+    (&bytemuck::cast_slice(packed)[..bytes], rest)
 }
 
 #[cfg(test)]
