@@ -222,7 +222,7 @@ impl<'a> Problem<'a> {
     /// The plan that the last pilot run results in.
     fn plan_of(&self, pilots: Vec<PilotEntry>, pilot: &Pilot, ranks: &Ranks) -> Plan {
         let tightest_at = |shift| ranks.tightest(&ranks.growth(&pilot.at(shift)));
-        let fits = |tightest: Option<Tightest>| tightest.is_none_or(|t| t.fits());
+        let fits = |t: Option<Tightest>| t.is_none_or(|t| t.needed_bytes <= t.left_bytes);
         let Amounts { cells, .. } = pilot.at(0);
         let tightest = tightest_at(0);
         let fitting = || (1..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));

@@ -51,13 +51,6 @@ pub struct Tightest {
     pub needed_bytes: u64,
 }
 
-impl Tightest {
-    /// Whether the limit leaves what is needed.
-    pub fn fits(&self) -> bool {
-        self.needed_bytes <= self.left_bytes
-    }
-}
-
 impl Rank {
     /// The memory and the limits of this process.
     fn read(amounts: Amounts) -> Self {

@@ -107,7 +107,6 @@ pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amoun
 }
 
 /// A pilot run of a case and its extrapolation.
-#[derive(Clone, Debug)]
 pub struct Pilot {
     /// By how many levels it is coarser than the case.
     pub shift: Level,

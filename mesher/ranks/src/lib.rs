@@ -102,7 +102,6 @@ pub fn uncounted<T>(comm: &dyn Comm, body: impl FnOnce() -> T) -> T {
 }
 
 /// A single rank.
-#[derive(Debug, Default)]
 pub struct Solo;
 
 impl Comm for Solo {

@@ -24,17 +24,15 @@ pub struct Traffic {
 /// - An allgather takes one message per doubling of the number of ranks (recursive doubling, Bruck), and so does that of the lengths
 ///   before it; a rank sends as many words as all other ranks have on average.
 /// - A sum takes one message with all words per doubling.
-#[derive(Debug)]
 pub struct Metered<C> {
     comm: C,
     total: Cell<Traffic>,
-    is_paused: Cell<bool>,
 }
 
 impl<C: Comm> Metered<C> {
     /// Meters the calls of a rank.
     pub fn new(comm: C) -> Self {
-        Self { comm, total: Cell::default(), is_paused: Cell::default() }
+        Self { comm, total: Cell::default() }
     }
 
     /// Doublings from one rank to all ranks.
@@ -46,15 +44,13 @@ impl<C: Comm> Metered<C> {
     fn metered<T>(&self, call: impl FnOnce(&C) -> T, sent: impl FnOnce(&T) -> [u64; 2]) -> T {
         let (wall, cpu) = (Instant::now(), ThreadTime::now());
         let result = call(&self.comm);
-        if !self.is_paused.get() {
-            let (total, [messages, words]) = (self.total.get(), sent(&result));
-            self.total.set(Traffic {
-                messages: total.messages + messages,
-                bytes: total.bytes + 8 * words,
-                time_wall_s: total.time_wall_s + wall.elapsed().as_secs_f64(),
-                time_cpu_s: total.time_cpu_s + cpu.elapsed().as_secs_f64(),
-            });
-        }
+        let (total, [messages, words]) = (self.total.get(), sent(&result));
+        self.total.set(Traffic {
+            messages: total.messages + messages,
+            bytes: total.bytes + 8 * words,
+            time_wall_s: total.time_wall_s + wall.elapsed().as_secs_f64(),
+            time_cpu_s: total.time_cpu_s + cpu.elapsed().as_secs_f64(),
+        });
         result
     }
 }
@@ -99,9 +95,9 @@ impl<C: Comm> Comm for Metered<C> {
     }
 
     fn uncounted(&self, body: &mut dyn FnMut()) {
-        let before = self.is_paused.replace(true);
+        let before = self.total.get();
         body();
-        self.is_paused.set(before);
+        self.total.set(before);
     }
 
     fn next_run(&self) {

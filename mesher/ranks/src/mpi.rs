@@ -205,7 +205,7 @@ impl Comm for Mpi {
 
     fn enter(&self, phase: &'static str) {
         if let Some(watch) = self.watch.get() {
-            watch.enter(phase);
+            watch.phase.set(phase);
         }
     }
 }

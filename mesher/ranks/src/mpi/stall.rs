@@ -23,7 +23,8 @@ const END: i32 = 3;
 pub struct Watch {
     side: SimpleCommunicator,
     limit: Duration,
-    phase: Cell<&'static str>,
+    /// The phase that the rank is in.
+    pub phase: Cell<&'static str>,
     /// The start of the present call, or the time of the question.
     since: Cell<Instant>,
     /// The ranks that have answered; none if there was no question.
@@ -40,11 +41,6 @@ impl Watch {
             since: Cell::new(Instant::now()),
             answered: RefCell::new(None),
         }
-    }
-
-    /// Notes the phase that the rank is in.
-    pub fn enter(&self, phase: &'static str) {
-        self.phase.set(phase);
     }
 
     /// Begins a call.
