@@ -21,8 +21,8 @@ pub fn fill_atomically(
 ) -> Result<u64, Failure> {
     let named = |error| Failure::at(path, error);
     let mut draft = Draft::create(path).map_err(named)?;
-    fill(draft.file_mut())?;
-    let bytes = draft.file_mut().metadata().map_err(named)?.len();
+    fill(&mut draft.file)?;
+    let bytes = draft.file.metadata().map_err(named)?.len();
     draft.publish().map_err(named)?;
     Ok(bytes)
 }

@@ -25,7 +25,8 @@ pub struct Claim {
     unfinished: Unfinished,
     /// The file that becomes the last one.
     last: File,
-    is_new: bool,
+    /// Whether the directory was created for this run.
+    pub is_new: bool,
 }
 
 /// The temporary and the final name of a file.
@@ -93,11 +94,6 @@ impl Claim {
             let _ = unlinkat(CWD, path, AtFlags::REMOVEDIR);
         }
         opened.map(|opened| (opened, is_new))
-    }
-
-    /// Whether the directory was created for this run.
-    pub fn is_new(&self) -> bool {
-        self.is_new
     }
 
     /// Begins a file of the directory.

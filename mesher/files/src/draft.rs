@@ -3,11 +3,12 @@
 use crate::unfinished::{Output, Unfinished, locked, open_file, rename_to_new};
 use crate::uses::register_output;
 use rustix::fs::{CWD, Mode, OFlags, openat, renameat};
+use rustix::stdio::{stderr, stdout};
 use std::ffi::CString;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// A file that is being written, removed if it is dropped before [`publish`](Self::publish).
 #[derive(Debug)]
 pub struct Draft {
-    file: File,
+    /// To write or to seek in; what is not a regular file may not allow the latter.
+    pub file: File,
     place: Place,
 }
 
@@ -65,28 +67,14 @@ impl Draft {
         Ok(Self { file, place: Place::Claimed { dir, names } })
     }
 
-    /// The file, to write or to seek in; what is not a regular file may not allow the latter.
-    pub fn file_mut(&mut self) -> &mut File {
-        &mut self.file
-    }
-
-    /// Synchronises the file with the disk, so that publishing it takes no time.
-    ///
-    /// # Errors
-    /// If that fails.
-    pub fn synchronise(&self) -> io::Result<()> {
-        match self.place {
-            Place::Through => Ok(()),
-            _ => self.file.sync_all(),
-        }
-    }
-
     /// Synchronises the file with the disk and gives it its final name.
     ///
     /// # Errors
     /// If that fails; the file is removed.
     pub fn publish(self) -> io::Result<()> {
-        self.synchronise()?;
+        if !matches!(self.place, Place::Through) {
+            self.file.sync_all()?;
+        }
         match self.place {
             Place::Through => {}
             Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
@@ -171,8 +159,7 @@ fn target(path: &Path) -> PathBuf {
 
 /// The standard output or error, if that is the file: opening `/dev/stdout` again would overwrite what has been printed.
 fn standard_stream(file: &Metadata) -> Option<OwnedFd> {
-    let (out, err) = (io::stdout(), io::stderr());
-    [out.as_fd(), err.as_fd()].into_iter().find_map(|stream| {
+    [stdout(), stderr()].into_iter().find_map(|stream| {
         let open = rustix::fs::fstat(stream).ok()?;
         let is_same = (open.st_dev, open.st_ino) == (file.dev(), file.ino());
         is_same.then(|| stream.try_clone_to_owned().ok())?

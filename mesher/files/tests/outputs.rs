@@ -190,7 +190,7 @@ fn a_run_that_fails_removes_its_files_and_no_others() {
     let refused = claim(&path).unwrap_err();
     assert_eq!(refused.kind(), ErrorKind::DirectoryNotEmpty);
     assert!(refused.to_string().contains("another run"), "{refused}");
-    let other = Claim::join(&path, LAST, vec!["other".to_owned()], first.is_new()).unwrap();
+    let other = Claim::join(&path, LAST, vec!["other".to_owned()], first.is_new).unwrap();
     fill_part(&first, "part");
     fill_part(&other, "other");
     // One process of the run gives up: the other cannot complete the directory.
@@ -236,7 +236,7 @@ fn fill_part(claim: &Claim, name: &str) {
 fn an_existing_directory_stays_and_so_do_complete_files() {
     let place = tempfile::tempdir().unwrap();
     let out = claim(place.path()).unwrap();
-    assert!(!out.is_new());
+    assert!(!out.is_new);
     fill_part(&out, "part");
     drop(out);
     assert!(names(place.path()).is_empty());

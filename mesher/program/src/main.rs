@@ -249,7 +249,8 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     if let Some(limit) = args.stall_limit {
         comm.enter("done");
         interrupt::stop_at(format_args!("done:{}", comm.rank()));
-        comm.barrier();
+        // A barrier.
+        comm.sum(0);
         end_within(limit);
     }
     interrupt::stop_at(format_args!("end:{}", comm.rank()));

@@ -76,11 +76,6 @@ pub trait Comm {
     /// Notes the phase that the rank is in.
     fn enter(&self, _phase: &'static str) {}
 
-    /// Returns after all ranks have called it. Collective.
-    fn barrier(&self) {
-        self.sums(&[0]);
-    }
-
     /// The sum over the ranks, modulo 2^64. Collective.
     fn sum(&self, v: u64) -> u64 {
         self.sums(&[v])[0]

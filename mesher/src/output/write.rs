@@ -79,7 +79,7 @@ impl OutDir {
         };
         let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
         let created = agree(comm, created.map_err(failed))?;
-        let is_new = u64::from(created.as_ref().is_some_and(Claim::is_new));
+        let is_new = u64::from(created.as_ref().is_some_and(|claim| claim.is_new));
         let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
