@@ -10,12 +10,9 @@ use serde::Deserialize;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-const LAYER_CELLS_MIN: u32 = 4;
-const ROOT_SCALE: f64 = 10.0;
-
 /// The keys of a case file, all but the first two of which are options as well.
-#[derive(Clone, clap::Args, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Default, clap::Args, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[command(next_help_heading = "Options for an STL file")]
 pub struct Keys {
     #[arg(skip)]
@@ -33,8 +30,7 @@ pub struct Keys {
     keep: Option<Keep>,
     /// Remove crossing leaves from the mesh
     #[arg(long = "drop-crossing", action = ArgAction::SetFalse)]
-    #[serde(default = "is_kept")]
-    keep_crossing: bool,
+    keep_crossing: Option<bool>,
     /// Edge of the root, in longest edges of the bounding box, on which it is centred [default: 10]
     #[arg(long, value_name = "X", conflicts_with = "root", allow_negative_numbers = true)]
     root_scale: Option<f64>,
@@ -43,20 +39,15 @@ pub struct Keys {
     root: Option<Root>,
     /// Extent box: minimum corner, maximum corner, spacing; may be repeated
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1,SPACING", allow_hyphen_values = true, value_parser = extent_box)]
-    #[serde(default, rename = "box")]
+    #[serde(rename = "box")]
     boxes: Vec<BoxSpec>,
     /// Point in the flow, which then consists of the components with a seed, whatever the rays say; may be repeated
     #[arg(long = "seed", value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
-    #[serde(default)]
     seeds: Vec<[f64; 3]>,
     /// Treatment of outside components that do not reach the root's boundary, such as sealed cavities and
     /// overlaps of solids [default: delete]
     #[arg(long, value_enum)]
     enclosed: Option<Enclosed>,
-}
-
-fn is_kept() -> bool {
-    true
 }
 
 fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
@@ -129,12 +120,12 @@ impl Keys {
         Some(Case {
             source,
             spacing_min: self.spacing_min?,
-            layer_cells_min: self.layer_cells_min.unwrap_or(LAYER_CELLS_MIN),
+            layer_cells_min: self.layer_cells_min.unwrap_or(4),
             keep: self.keep.unwrap_or(Keep::Outside),
-            keep_crossing: self.keep_crossing,
+            keep_crossing: self.keep_crossing.unwrap_or(true),
             root: match self.root {
                 Some(root) => RootSpec::Exact(root),
-                None => RootSpec::Scale(self.root_scale.unwrap_or(ROOT_SCALE)),
+                None => RootSpec::Scale(self.root_scale.unwrap_or(10.0)),
             },
             boxes: self.boxes,
             seeds: self.seeds,
