@@ -75,7 +75,7 @@ impl Claim {
             let created = is_new.then_some(path);
             Ok((Output { dir, names, id, others, created }, (last, is_new)))
         })?;
-        Ok(Self { unfinished, last: last.into(), is_new })
+        Ok(Self { unfinished, last, is_new })
     }
 
     /// Creates a claim, and its directory if it does not exist. Returns whether it did not.
@@ -132,7 +132,7 @@ impl Claim {
 }
 
 /// A directory, the file of a claim, and its device and inode.
-type Opened = (OwnedFd, OwnedFd, (u64, u64));
+type Opened = (OwnedFd, File, (u64, u64));
 
 fn open(path: &CStr, claim: &CStr, flags: OFlags) -> Result<Opened, Errno> {
     let dir = openat(CWD, path, OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty())?;

@@ -58,12 +58,12 @@ impl Draft {
             let (file, id) = open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL)?;
             Ok((Output { dir, names, id, others: Vec::new(), created: None }, file))
         })?;
-        Ok(Self { file: file.into(), place: Place::Beside(unfinished) })
+        Ok(Self { file, place: Place::Beside(unfinished) })
     }
 
     /// A file of a claimed directory with a temporary and a final name.
     pub(crate) fn claimed(dir: OwnedFd, names: [CString; 2]) -> io::Result<Self> {
-        let file = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?.0.into();
+        let file = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?.0;
         Ok(Self { file, place: Place::Claimed { dir, names } })
     }
 
@@ -134,9 +134,8 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
 /// The file that is written through at this path; none if it is a regular file, or does not exist.
 fn special(path: &Path) -> io::Result<Option<File>> {
     let found = match fs::metadata(path) {
-        Ok(found) => found,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(e),
+        found => found?,
     };
     let stream = standard_stream(&found);
     if found.is_dir() {

@@ -11,8 +11,9 @@ use rustix::fs::{AtFlags, CWD, Mode, OFlags, RenameFlags, fstat, openat, statat,
 use rustix::fs::{renameat, renameat_with};
 use rustix::io::Errno;
 use std::ffi::{CStr, CString};
+use std::fs::File;
 use std::io;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::park;
 
@@ -155,16 +156,12 @@ impl Output {
 }
 
 /// Creates a file, or opens it without `OFlags::CREATE`. Returns its device and inode as well.
-pub fn open_file(
-    dir: impl AsFd,
-    name: &CStr,
-    flags: OFlags,
-) -> Result<(OwnedFd, (u64, u64)), Errno> {
+pub fn open_file(dir: &OwnedFd, name: &CStr, flags: OFlags) -> Result<(File, (u64, u64)), Errno> {
     let always = OFlags::WRONLY | OFlags::CLOEXEC;
     // As for any other file, the user's umask decides who may read it.
     let file = openat(dir, name, always | flags, Mode::from(0o666))?;
     let found = fstat(&file)?;
-    Ok((file, (found.st_dev, found.st_ino)))
+    Ok((file.into(), (found.st_dev, found.st_ino)))
 }
 
 /// Gives a file its final name, which no other file has: one that somebody else put there during the run stays.

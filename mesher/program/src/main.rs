@@ -14,7 +14,7 @@ use mesher::record::Recorder;
 use ranks::{Comm, STALLED, Solo, agree, first_other, launch, sim, text_of_first, uncounted};
 use std::env::args_os;
 use std::fmt::Display;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
+use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::iter::once;
 use std::path::Path;
 use std::process::exit;
@@ -300,7 +300,7 @@ const WRITABLE: &str = "a report is JSON";
 fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Error> {
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
-    let on_json = |advice: &str, write: &dyn Fn(&Path) -> std::io::Result<()>| {
+    let on_json = |advice: &str, write: &dyn Fn(&Path) -> io::Result<()>| {
         let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
         json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e)))
     };
@@ -313,13 +313,11 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         // Not before the inputs are known, which these files must not replace.
         let path = dir.join(format!("rank-{:05}.txt", comm.rank()));
         let begin = std::fs::create_dir_all(dir).and_then(|()| record.keep_status(path));
-        agree(
-            comm,
-            begin.map_err(|e| match e.kind() {
-                ErrorKind::InvalidInput => Error::input(format!("{}: {e}", dir.display())),
-                _ => Error::output(format!("{}: {e}: choose another --status", dir.display())),
-            }),
-        )?;
+        let named = |e: io::Error| match e.kind() {
+            ErrorKind::InvalidInput => Error::input(format!("{}: {e}", dir.display())),
+            _ => Error::output(format!("{}: {e}: choose another --status", dir.display())),
+        };
+        agree(comm, begin.map_err(named))?;
     }
     let options = options(args)?;
     let job = &mut Job::new(&options, comm, record);

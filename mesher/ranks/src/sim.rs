@@ -32,7 +32,7 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
     let world = World::new(size, Adversary::new(seed));
     let turns = (0..size).map(|_| Condvar::new()).collect();
     let threads = Threads { next: Mutex::new(world.next()), turns, world };
-    let results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
+    let mut results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
         let spawn = |rank| {
             let (threads, body) = (&threads, &body);
             let run = move || {
@@ -53,12 +53,10 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
         let handles: Vec<_> = (0..size).map(spawn).collect();
         handles.into_iter().map(|t| t.join().flatten()).collect()
     });
-    let is_stopped =
-        |p: &Box<dyn Any + Send>| p.downcast_ref::<&str>().is_some_and(|m| *m == STOPPED);
-    let (first, others): (Vec<_>, Vec<_>) =
-        results.into_iter().partition(|r| r.as_ref().is_err_and(|p| !is_stopped(p)));
-    let returned = |r: std::thread::Result<T>| r.unwrap_or_else(|p| resume_unwind(p));
-    first.into_iter().chain(others).map(returned).collect()
+    let is_cause = |p: &Box<dyn Any + Send>| p.downcast_ref() != Some(&STOPPED);
+    let cause = results.iter().position(|r| r.as_ref().is_err_and(is_cause));
+    results.swap(0, cause.unwrap_or(0));
+    results.into_iter().map(|r| r.unwrap_or_else(|p| resume_unwind(p))).collect()
 }
 
 const STOPPED: &str = "stopped because another simulated rank panicked";
@@ -121,7 +119,7 @@ impl Comm for Sim<'_> {
     }
 
     fn size(&self) -> usize {
-        self.world.size()
+        self.world.size
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {

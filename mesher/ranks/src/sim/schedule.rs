@@ -15,7 +15,6 @@ pub trait Schedule: Send {
 
 /// A schedule drawn from a seed. Ranks run, and messages arrive, in an order of all ranks that is drawn: at every choice, now and then, or
 /// once. So a rank may be starved, which runs only when all others wait for it, or preferred, and its messages may always arrive late.
-#[derive(Clone, Debug)]
 pub struct Adversary {
     random: u64,
     /// Determines the order of the ranks.

@@ -6,7 +6,8 @@ use std::sync::{Mutex, MutexGuard};
 
 /// The ranks of a simulated group, and their messages.
 pub struct World {
-    size: usize,
+    /// Number of ranks.
+    pub(super) size: usize,
     state: Mutex<State>,
 }
 
@@ -48,11 +49,6 @@ impl World {
         let ranks = (0..size).map(|_| Rank::Ready(None)).collect();
         let state = Mutex::new(State { ranks, schedule: Box::new(schedule), broken: false });
         Self { size, state }
-    }
-
-    /// Number of ranks.
-    pub fn size(&self) -> usize {
-        self.size
     }
 
     /// Chooses the next rank, which runs until its next call. None can go on if all have ended, one has panicked, or ranks wait for a call
