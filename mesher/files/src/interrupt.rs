@@ -135,8 +135,8 @@ fn is_ignored(signal: i32) -> bool {
 fn print(message: &str) {
     let stderr = stderr();
     let mut ready = [PollFd::new(&stderr, PollFlags::OUT)];
-    let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
-    if poll(&mut ready, Some(&at_once)).is_ok_and(|n| n == 1) {
+    // At once.
+    if poll(&mut ready, Some(&Timespec::default())).is_ok_and(|n| n == 1) {
         let _ = rustix::io::write(stderr, message.as_bytes());
     }
 }

@@ -69,11 +69,9 @@ impl Heap {
         interrupt::abandon(true);
         // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
         let mut line = Cursor::new([0; 256]);
-        let _ = writeln!(
-            line,
-            "{}: memory ran out at a request for {bytes} bytes: {}",
-            self.program, self.advice
-        );
+        let Self { program, advice, .. } = self;
+        let _ =
+            writeln!(line, "{program}: memory ran out at a request for {bytes} bytes: {advice}");
         let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
         (self.end)(OUT_OF_MEMORY)
     }

@@ -158,15 +158,13 @@ impl<'a> Problem<'a> {
         let rules = &quantised.rules;
         let face = (edge(rules.level_surface) as f64).powi(2);
         let faces = job.comm.sum((area::total(&quantised.facets) / face) as u64) as f64;
+        let around_facets = faces * area::leaves_per_surface_cell(rules) as f64;
         let before: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
         let written = job.options.out.as_ref().map_or([false; 2], |o| [o.words, o.tree]);
         let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);
         Self {
             rules,
-            rough: [
-                faces * area::leaves_per_surface_cell(rules) as f64,
-                boxed_in(&rules.boxes, 0, 0),
-            ],
+            rough: [around_facets, boxed_in(&rules.boxes, 0, 0)],
             times_s: [gather(job.comm, &[before]).iter().sum(), times.map(|(_, time)| time).sum()],
             comm: job.comm,
         }
@@ -175,9 +173,9 @@ impl<'a> Problem<'a> {
     /// The part of the tightest limit that the run takes at most, by the rough estimate.
     fn used_rough(&self) -> f64 {
         let ranks = Ranks::gather(self.comm, Amounts::default());
-        let more = self.rough.iter().sum::<f64>() * BYTES_ROUGH / ranks.count() as f64;
+        let more = self.rough.iter().sum::<f64>() * BYTES_ROUGH / self.comm.size() as f64;
         let part = |t: Tightest| t.needed_bytes as f64 / (t.left_bytes as f64).max(1.0);
-        ranks.tightest(&vec![more; ranks.count()]).map_or(0.0, part)
+        ranks.tightest(&vec![more; self.comm.size()]).map_or(0.0, part)
     }
 
     /// Refuses a run that would not fit.
@@ -230,12 +228,12 @@ impl<'a> Problem<'a> {
         let [before, written] = self.times_s;
         let plan = Plan {
             schema: "octree-mesher-plan/2",
-            ranks: ranks.count(),
+            ranks: self.comm.size(),
             pilots,
             cells: cells as u64,
             time_cpu_s: before + pilot.at(0).time_cpu_s() + written * cells,
             memory_peak_bytes: ranks.peaks(&ranks.growth(&pilot.at(0))),
-            words_bytes: (cells / ranks.count() as f64 * 8.0) as u64 + WORDS_HEADER,
+            words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + WORDS_HEADER,
             tree_bytes: (cells * TREE_BYTES_PER_CELL * thin) as u64,
             tightest,
             fits: fits(tightest),

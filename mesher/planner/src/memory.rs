@@ -51,24 +51,6 @@ pub struct Tightest {
     pub needed_bytes: u64,
 }
 
-impl Rank {
-    /// The memory and the limits of this process.
-    fn read(amounts: Amounts) -> Self {
-        let text = |path: &str| read_to_string(path).unwrap_or_default();
-        let boot = text("/proc/sys/kernel/random/boot_id");
-        let available = stated_bytes("/proc/meminfo", "MemAvailable:");
-        Self {
-            amounts,
-            resident: stated_bytes("/proc/self/status", "VmRSS:").unwrap_or(0) as f64,
-            peak: peak_rss_bytes() as f64,
-            address_space: address_space_left(),
-            control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
-            machine: available.map_or(f64::INFINITY, |bytes| bytes as f64),
-            node: BuildHasherDefault::<DefaultHasher>::new().hash_one(boot),
-        }
-    }
-}
-
 /// What the limit on its address space leaves this process, in bytes; infinity without a limit.
 pub fn address_space_left() -> f64 {
     let used = stated_bytes("/proc/self/status", "VmSize:").unwrap_or(0) as f64;
@@ -111,13 +93,19 @@ fn left(folder: &Path) -> f64 {
 impl Ranks {
     /// Gathers the amounts and limits of all ranks. Collective.
     pub fn gather(comm: &dyn Comm, amounts: Amounts) -> Self {
-        let all = gather(comm, &[Rank::read(amounts)]);
-        Self { all, in_process: comm.ranks_in_process() as f64 }
-    }
-
-    /// Number of ranks.
-    pub fn count(&self) -> usize {
-        self.all.len()
+        let text = |path: &str| read_to_string(path).unwrap_or_default();
+        let boot = text("/proc/sys/kernel/random/boot_id");
+        let available = stated_bytes("/proc/meminfo", "MemAvailable:");
+        let mine = Rank {
+            amounts,
+            resident: stated_bytes("/proc/self/status", "VmRSS:").unwrap_or(0) as f64,
+            peak: peak_rss_bytes() as f64,
+            address_space: address_space_left(),
+            control_group: control_group(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup")),
+            machine: available.map_or(f64::INFINITY, |bytes| bytes as f64),
+            node: BuildHasherDefault::<DefaultHasher>::new().hash_one(boot),
+        };
+        Self { all: gather(comm, &[mine]), in_process: comm.ranks_in_process() as f64 }
     }
 
     /// The amounts of all ranks together.
@@ -156,11 +144,8 @@ impl Ranks {
         }
         let part = |(_, left, needed): &(&str, f64, f64)| needed / left.max(1.0);
         let limited = all.into_iter().filter(|(_, left, _)| left.is_finite());
-        limited.max_by(|a, b| part(a).total_cmp(&part(b))).map(|(limit, left, needed)| Tightest {
-            limit,
-            left_bytes: left as u64,
-            needed_bytes: needed as u64,
-        })
+        let (limit, left, needed) = limited.max_by(|a, b| part(a).total_cmp(&part(b)))?;
+        Some(Tightest { limit, left_bytes: left as u64, needed_bytes: needed as u64 })
     }
 }
 
@@ -217,7 +202,7 @@ mod tests {
                 bytemuck::cast(array::from_fn::<f64, { crate::pilot::AMOUNTS }, _>(part))
             };
             let ranks = Ranks::gather(comm, amounts(comm.rank()));
-            assert_eq!((ranks.count(), ranks.in_process), (3, 3.0));
+            assert_eq!((ranks.all.len(), ranks.in_process), (3, 3.0));
             let found: Vec<Amounts> = ranks.all.iter().map(|rank| rank.amounts).collect();
             assert_eq!(found, [0, 1, 2].map(amounts));
             assert_eq!(ranks.total().cells_boxed_deleted, 303.0);
@@ -274,7 +259,8 @@ mod tests {
         let found = |file: &Path| stated_bytes(file.to_str().unwrap(), "MemAvailable:");
         assert_eq!((found(file.path()), found(Path::new("missing"))), (Some(7168), None));
         if cfg!(target_os = "linux") {
-            assert!(Rank::read(Amounts::default()).machine.is_finite());
+            let ranks = Ranks::gather(&ranks::Solo, Amounts::default());
+            assert!(ranks.all[0].machine.is_finite());
         }
     }
 }

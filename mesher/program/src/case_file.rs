@@ -51,11 +51,9 @@ pub struct Keys {
 }
 
 fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
-    let values: Result<Vec<f64>, _> = s.split(',').map(|w| w.trim().parse()).collect();
-    values
-        .ok()
-        .and_then(|v| v.try_into().ok())
-        .ok_or_else(|| format!("give {N} numbers with commas between them"))
+    let values: Option<Vec<f64>> = s.split(',').map(|w| w.trim().parse().ok()).collect();
+    let values = values.and_then(|v| v.try_into().ok());
+    values.ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
 fn root(s: &str) -> Result<Root, String> {

@@ -164,10 +164,8 @@ pub fn parse<W: Into<OsString> + Clone>(words: impl IntoIterator<Item = W>) -> R
         }
         let text = e.to_string();
         let lines = text.lines().map(str::trim).filter(|l| !l.is_empty());
-        let sentence: Vec<&str> = lines
-            .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
-            .collect();
-        let sentence = sentence.join(" ");
+        let is_said = |l: &&str| !l.starts_with("Usage:") && !l.starts_with("For more information");
+        let sentence = lines.take_while(is_said).collect::<Vec<_>>().join(" ");
         let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
         Error::input(format!("{sentence}; see --help"))
     })

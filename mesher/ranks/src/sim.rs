@@ -80,13 +80,10 @@ impl Threads {
     }
 
     fn wait(&self, rank: usize) {
-        let mut next = self.lock();
-        while *next != Some(rank) {
-            if next.is_none() {
-                drop(next);
-                panic_any(STOPPED);
-            }
-            next = self.turns[rank].wait(next).unwrap_or_else(|p| p.into_inner());
+        let is_for_others = |next: &mut Option<usize>| next.is_some_and(|next| next != rank);
+        let next = self.turns[rank].wait_while(self.lock(), is_for_others);
+        if next.unwrap_or_else(|p| p.into_inner()).is_none() {
+            panic_any(STOPPED);
         }
     }
 
