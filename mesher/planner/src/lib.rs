@@ -203,7 +203,7 @@ impl<'a> Problem<'a> {
             let ranks = Ranks::gather(self.comm, run(shift)?);
             let amounts = ranks.total();
             pilots.push(PilotEntry {
-                spacing_factor: factor(shift),
+                spacing_factor: 2f64.powi(shift as i32),
                 cells: amounts.cells as u64,
                 time_cpu_s: amounts.time_cpu_s(),
             });
@@ -223,7 +223,7 @@ impl<'a> Problem<'a> {
         let fits = |t: Option<Tightest>| t.is_none_or(|t| t.needed_bytes <= t.left_bytes);
         let Amounts { cells, .. } = pilot.at(0);
         let tightest = tightest_at(0);
-        let fitting = || (1..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
+        let fitting = (0..=self.rules.level_deepest()).find(|&s| fits(tightest_at(s)));
         let thin = f64::max(4.0 / f64::from(self.rules.layer_cells_min), 1.0);
         let [before, written] = self.times_s;
         let plan = Plan {
@@ -236,17 +236,12 @@ impl<'a> Problem<'a> {
             words_bytes: (cells / self.comm.size() as f64 * 8.0) as u64 + WORDS_HEADER,
             tree_bytes: (cells * TREE_BYTES_PER_CELL * thin) as u64,
             tightest,
-            fits: fits(tightest),
-            spacing_factor_fits: if fits(tightest) { None } else { fitting().map(factor) },
+            fits: fitting == Some(0),
+            spacing_factor_fits: fitting.filter(|s| *s > 0).map(|s| 2f64.powi(s as i32)),
         };
         plan.check_invariants();
         plan
     }
-}
-
-/// The factor between spacings that are some levels apart.
-fn factor(shift: Level) -> f64 {
-    2f64.powi(shift as i32)
 }
 
 impl Plan {

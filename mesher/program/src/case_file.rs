@@ -115,16 +115,14 @@ pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
 impl Keys {
     /// The case with this geometry; none without a spacing.
     pub fn case_of(self, source: Source) -> Option<Case> {
+        let scale = RootSpec::Scale(self.root_scale.unwrap_or(10.0));
         Some(Case {
             source,
             spacing_min: self.spacing_min?,
             layer_cells_min: self.layer_cells_min.unwrap_or(4),
             keep: self.keep.unwrap_or(Keep::Outside),
             keep_crossing: self.keep_crossing.unwrap_or(true),
-            root: match self.root {
-                Some(root) => RootSpec::Exact(root),
-                None => RootSpec::Scale(self.root_scale.unwrap_or(10.0)),
-            },
+            root: self.root.map_or(scale, RootSpec::Exact),
             boxes: self.boxes,
             seeds: self.seeds,
             enclosed: self.enclosed.unwrap_or_default(),
