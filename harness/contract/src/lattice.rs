@@ -33,6 +33,12 @@ pub fn normal(&[a, b, c]: &FacetLattice) -> [i64; 3] {
     cross(difference(b, a), difference(c, a))
 }
 
+/// Minimum and maximum corner of the facet's bounding box.
+pub fn bounds(&[a, b, c]: &FacetLattice) -> [[i64; 3]; 2] {
+    let pick = |f: fn(i64, i64) -> i64| std::array::from_fn(|i| f(f(a[i], b[i]), c[i]));
+    [pick(i64::min), pick(i64::max)]
+}
+
 /// The root cube, in the user's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

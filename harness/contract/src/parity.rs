@@ -5,7 +5,7 @@
 //! the projection. An edge is crossed iff its half-open range contains the point's second coordinate, which is
 //! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
-use crate::lattice::{FacetLattice, difference, dot, normal};
+use crate::lattice::{FacetLattice, bounds, difference, dot, normal};
 use rustc_hash::FxHashMap;
 
 /// Facets, binned into one grid per axis.
@@ -84,15 +84,16 @@ fn edge_is_right(a: [i64; 2], b: [i64; 2], point: [i64; 2]) -> bool {
 
 impl Grid {
     fn new(facets: &[FacetLattice], axis: usize) -> Self {
-        let boxes: Vec<_> = facets.iter().map(|facet| bounds(facet, axis)).collect();
+        let projected = |facet| bounds(facet).map(|corner| project(corner, axis));
+        let boxes: Vec<[[i64; 2]; 2]> = facets.iter().map(projected).collect();
         let cells = (facets.len() as f64).sqrt().clamp(1.0, 1024.0) as i64;
         let width = std::array::from_fn(|a| {
-            let low = boxes.iter().map(|(from, _)| from[a]).min().unwrap_or(0);
-            let high = boxes.iter().map(|(_, to)| to[a]).max().unwrap_or(0);
+            let low = boxes.iter().map(|[from, _]| from[a]).min().unwrap_or(0);
+            let high = boxes.iter().map(|[_, to]| to[a]).max().unwrap_or(0);
             (high - low) / cells + 1
         });
         let mut grid = Self { width, lists: FxHashMap::default() };
-        for (index, (from, to)) in (0..).zip(boxes) {
+        for (index, [from, to]) in (0..).zip(boxes) {
             let ([left, low], [right, high]) = (grid.cell(from), grid.cell(to));
             for cell in (low..=high).flat_map(|j| (left..=right).map(move |i| [i, j])) {
                 grid.lists.entry(cell).or_default().push(index);
@@ -108,15 +109,6 @@ impl Grid {
     fn candidates(&self, point: [i64; 2]) -> &[u32] {
         self.lists.get(&self.cell(point)).map_or(&[], Vec::as_slice)
     }
-}
-
-/// Bounding box of a facet's projection.
-fn bounds(facet: &FacetLattice, axis: usize) -> ([i64; 2], [i64; 2]) {
-    let corners = facet.map(|v| project(v, axis));
-    let pick = |f: fn(i64, i64) -> i64| {
-        std::array::from_fn(|a| corners.iter().map(|c| c[a]).reduce(f).expect("three"))
-    };
-    (pick(i64::min), pick(i64::max))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! of its plane with the box, so any point of that intersection decides. The test takes the point on the box
 //! diagonal that is most nearly parallel to the normal.
 
-use crate::lattice::{FacetLattice, cross, difference, dot, normal};
+use crate::lattice::{FacetLattice, bounds, cross, difference, dot, normal};
 
 /// A facet with precomputed bounds, normal and height.
 #[derive(Clone, Debug)]
@@ -22,12 +22,10 @@ pub struct Triangle {
 impl Triangle {
     /// Precomputes bounds, normal and height.
     pub fn new(corners: &FacetLattice) -> Self {
-        let pick = |f: fn(i64, i64) -> i64| -> [i64; 3] {
-            std::array::from_fn(|a| f(f(corners[0][a], corners[1][a]), corners[2][a]))
-        };
+        let [low, high] = bounds(corners);
         let normal = normal(corners);
         let height = dot(normal, corners[0]);
-        Self { corners: *corners, low: pick(i64::min), high: pick(i64::max), normal, height }
+        Self { corners: *corners, low, high, normal, height }
     }
 
     /// Whether the triangle shares a point with the closed box.

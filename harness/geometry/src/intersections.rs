@@ -4,7 +4,7 @@
 //! of finitely many planes does: with the normal of a triangle, or normal to an edge of each; in a common plane,
 //! normal to an edge of either.
 
-use contract::lattice::{FacetLattice, cross, difference, dot, normal};
+use contract::lattice::{FacetLattice, bounds, cross, difference, dot, normal};
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -93,12 +93,9 @@ fn range(facet: &FacetLattice, from: [i64; 3], axis: [i64; 3]) -> (i128, i128) {
 
 /// The centre of the common part of the bounding boxes.
 fn place(input: &Input, f: u32, g: u32) -> Place {
-    let (a, b) = (&input.facets_lattice[f as usize], &input.facets_lattice[g as usize]);
-    let middle = std::array::from_fn(|x| {
-        let low = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MAX, i64::min);
-        let high = |t: &FacetLattice| t.iter().map(|v| v[x]).fold(i64::MIN, i64::max);
-        (low(a).max(low(b)) + high(a).min(high(b))) / 2
-    });
+    let [[low, high], [its_low, its_high]] =
+        [f, g].map(|facet| bounds(&input.facets_lattice[facet as usize]));
+    let middle = std::array::from_fn(|a| (low[a].max(its_low[a]) + high[a].min(its_high[a])) / 2);
     Place::new(vec![f, g], input.root.to_user(middle))
 }
 
