@@ -16,7 +16,7 @@ use super::{Check, CheckResult, Subject, some_leaves};
 use crate::oracle::is_watertight;
 use contract::case::Case;
 use contract::manifest::{Ambiguous, Keep, Leak, Manifest, Sides};
-use contract::octant::{LEVEL_MAX, Octant};
+use contract::octant::LEVEL_MAX;
 use contract::tree::{HOLES, Tree};
 use contract::word::{self, Side};
 
@@ -113,8 +113,7 @@ fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak>
     let mut cut = Manifest { level_surface: level, ..terms.clone() };
     cut.boxes.iter_mut().for_each(|b| b.level = b.level.min(level));
     let make = |terms: &Manifest| {
-        let coarse = Truth::new(truth.facets.clone(), &case.facets_lattice, terms);
-        coarse.expect("T0 that is cut has no more leaves than T0")
+        Truth::of(case, terms).expect("T0 that is cut has no more leaves than T0")
     };
     let mut coarse = make(&cut);
     let seeded = components::seeded_leaves(&coarse.words, terms);
@@ -123,16 +122,15 @@ fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak>
     if seeded.iter().any(is_crossing) {
         coarse = make(&Manifest { seeds: Vec::new(), ..cut });
     }
-    let edge = |level: u8| terms.root.edge / f64::from(1u32 << level);
+    let root = &terms.root;
     let leak = |component: &Component| {
-        let octants =
-            component.leaves.iter().map(|&leaf| word::octant(coarse.words[leaf as usize]));
-        let units: u64 = octants.map(|octant: Octant| 1 << (3 * (LEVEL_MAX - octant.level))).sum();
+        let levels = component.leaves.iter().map(|&i| word::level(coarse.words[i as usize]));
+        let cells: u64 = levels.map(word::span).sum();
         Leak {
-            spacing_coarse: edge(level),
-            spacing_fine: edge(terms.level_surface),
-            volume: units as f64 * edge(LEVEL_MAX).powi(3),
-            point: terms.root.to_user(component.first.centre()),
+            spacing_coarse: root.edge_of(level),
+            spacing_fine: root.edge_of(terms.level_surface),
+            volume: cells as f64 * root.edge_of(LEVEL_MAX).powi(3),
+            point: root.to_user(component.first.centre()),
         }
     };
     let has_leaked = |component: &&Component| {

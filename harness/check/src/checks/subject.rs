@@ -3,13 +3,13 @@
 use std::cell::OnceCell;
 use std::rc::Rc;
 
-use super::truth::Truth;
+use super::truth::{Found, Truth};
 use super::{CheckResult, Pass};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
-use contract::tree::{Builder, DELETED, Kind as LeafKind, Tree};
+use contract::tree::{Builder, DELETED, HOLES, Kind as LeafKind, Tree};
 use contract::word::{self, Side};
 
 /// Name of the check that the tree of the mesh and T0 fit their limits.
@@ -116,12 +116,12 @@ impl<'a> Subject<'a> {
             let crossing = Side::Crossing as LeafKind;
             let deleted = if self.terms.has_box_finer_than_surface() { DELETED } else { crossing };
             let mut builder = Builder::default();
-            truth.leaves(self.tree(), &mut |octant, kind, base| {
-                let kind = match kind {
-                    Some(kind) if !unknown => kind,
-                    Some(_) => base.map_or(Side::Outside, Truth::side) as LeafKind,
-                    None if base == Some(crossing) && !self.terms.keep_crossing => deleted,
-                    None => return,
+            truth.leaves(self.tree(), &mut |Found { octant, kinds, base }| {
+                let kind = match kinds {
+                    HOLES if base == Some(crossing) && !self.terms.keep_crossing => deleted,
+                    HOLES => return,
+                    _ if unknown => base.map_or(Side::Outside, Truth::side) as LeafKind,
+                    kind => kind.trailing_zeros() as LeafKind,
                 };
                 let pushed = builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
                 pushed.expect("the leaves of a tree are in order and do not overlap");

@@ -7,12 +7,10 @@
 use super::components::{self, Component};
 use super::facets::Facets;
 use contract::case::Case;
-use contract::lattice::FacetLattice;
 use contract::manifest::Manifest;
 use contract::octant::Octant;
-use contract::tree::{Builder, HOLES, Handle, Kind, Kinds, Tree};
+use contract::tree::{Builder, Handle, Kind, Kinds, Tree};
 use contract::word::{self, Leaf, Side};
-use std::rc::Rc;
 
 /// The kind, in T0's tree, of an outside leaf that is deleted because its component is enclosed.
 const ENCLOSED: Kind = 3;
@@ -21,7 +19,7 @@ const ENCLOSED: Kind = 3;
 #[derive(Debug)]
 pub struct Truth {
     /// The facets of the case.
-    pub facets: Rc<Facets>,
+    pub facets: Facets,
     /// Its leaf words.
     pub words: Vec<u64>,
     /// The components of the leaves that no facet crosses.
@@ -49,12 +47,7 @@ impl Truth {
 
     /// T0 of a case with these inputs; `None` if it has more than [`Truth::LEAVES_MAX`] leaves.
     pub fn of(case: &Case, terms: &Manifest) -> Option<Self> {
-        Self::new(Rc::new(Facets::new(&case.facets_lattice)), &case.facets_lattice, terms)
-    }
-
-    /// The same, with the facets prepared.
-    pub fn new(facets: Rc<Facets>, lattice: &[FacetLattice], terms: &Manifest) -> Option<Self> {
-        let mut words = Vec::new();
+        let (facets, mut words) = (Facets::new(&case.facets_lattice), Vec::new());
         facets.walk(0, &mut |octant, near| {
             let by_surface = !near.is_empty() && octant.level < terms.level_surface;
             let splits = by_surface || terms.box_that_splits(&octant).is_some();
@@ -67,7 +60,7 @@ impl Truth {
         if words.len() > Self::LEAVES_MAX {
             return None;
         }
-        let components = components::find(&words, terms, lattice);
+        let components = components::find(&words, terms, &case.facets_lattice);
         let mut component_of = vec![None; words.len()];
         let mut kinds: Vec<Kind> = words.iter().map(|&w| (w & word::SIDE_BITS) as Kind).collect();
         for (index, Component { leaves, side, enclosed, .. }) in (0..).zip(&components) {
@@ -111,12 +104,9 @@ impl Truth {
         self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, false, visit);
     }
 
-    /// Visits every leaf and every hole of a mesh with the kind of T0, in Morton order. A leaf that T0 splits has none.
-    pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Octant, Option<Kind>, Option<Kind>)) {
-        let single = |kinds: Kinds| (kinds != HOLES).then(|| kinds.trailing_zeros() as Kind);
-        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, true, &mut |found| {
-            visit(found.octant, single(found.kinds), found.base);
-        });
+    /// Visits every leaf and every hole of a mesh, in Morton order.
+    pub fn leaves(&self, mesh: &Tree, visit: &mut dyn FnMut(Found)) {
+        self.descend(mesh, [mesh.root(), self.tree.root()], Octant::ROOT, true, visit);
     }
 
     fn descend(
