@@ -12,6 +12,7 @@ use serde::Deserialize;
 
 use crate::lattice::{FacetLattice, Root};
 use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
+use crate::number::point;
 use crate::stl::{self, Body, Solid};
 
 pub use geometries::Facet;
@@ -161,7 +162,7 @@ impl Case {
                 return Err(format!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
                      from the surface",
-                    shown(*at)
+                    point(*at)
                 ));
             }
         }
@@ -216,15 +217,10 @@ fn on_lattice(root: &Root, facets: &[Facet]) -> Result<Vec<FacetLattice>, String
     Ok(vertices.collect::<Result<Vec<_>, String>>()?.as_chunks().0.to_vec())
 }
 
-/// A point as text.
-fn shown([x, y, z]: [f64; 3]) -> String {
-    format!("({x}, {y}, {z})")
-}
-
 fn seeds_on_lattice(root: &Root, seeds: &[[f64; 3]]) -> Result<Vec<[i64; 3]>, String> {
     let on_lattice = |(i, &seed): (usize, &[f64; 3])| {
         let outside = || {
-            let at = shown(seed);
+            let at = point(seed);
             format!("seed {i} at {at} lies outside the root, {root}; move it into the flow")
         };
         root.quantise_seed(seed).ok_or_else(outside)

@@ -1,4 +1,4 @@
-//! Numbers for readers.
+//! Numbers for readers, and from files of the kernel.
 
 /// A length with three significant digits.
 pub fn number(x: f64) -> String {
@@ -11,6 +11,17 @@ pub fn number(x: f64) -> String {
     } else {
         format!("{x:.2e}")
     }
+}
+
+/// A point.
+pub fn point([x, y, z]: [f64; 3]) -> String {
+    format!("({x}, {y}, {z})")
+}
+
+/// The number in a line of a file of `/proc`, by its label.
+pub fn labelled(text: &str, label: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(label))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]

@@ -3,9 +3,8 @@
 use std::fmt;
 
 use super::finding::{Finding, Kind, Place};
-use super::leak::report::point;
 use super::report::Diagnosis;
-use contract::number::number;
+use contract::number::{number, point};
 use contract::stl::Solid;
 
 impl fmt::Display for Diagnosis {

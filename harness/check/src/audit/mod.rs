@@ -23,6 +23,7 @@ use contract::digest::Digest;
 use contract::files::write_atomically;
 use contract::manifest::Manifest;
 use contract::mesh::{Mesh, NODES_MAX};
+use contract::number::labelled;
 use contract::octant::LEVEL_MAX;
 use contract::tree::Tree;
 use cpu_time::ProcessTime;
@@ -77,8 +78,7 @@ impl AuditReport {
         record["time_cpu_s"] = ProcessTime::now().as_duration().as_secs_f64().into();
         // 0 if the system does not report it.
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-        record["peak_rss_bytes"] =
-            (1024 * checks::kilobytes(&status, "VmHWM:").unwrap_or(0)).into();
+        record["peak_rss_bytes"] = (1024 * labelled(&status, "VmHWM:").unwrap_or(0)).into();
         write_atomically(path, |out| Ok(serde_json::to_writer_pretty(out, &record)?))
     }
 

@@ -31,7 +31,7 @@ pub use subject::{CAPACITY, Subject};
 use serde::Serialize;
 
 pub(crate) use pass::Pass;
-pub(crate) use splits::{NAME as SPLITS, kilobytes};
+pub(crate) use splits::NAME as SPLITS;
 
 /// Why what needs sides is not checked.
 const UNKNOWN_SIDES: &str = "the sides of the leaves are unknown";

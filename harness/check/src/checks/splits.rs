@@ -9,6 +9,7 @@ use std::fs;
 
 use super::{Check, CheckResult, NO_GEOMETRY, Subject};
 use crate::why::Mesh;
+use contract::number::labelled;
 
 pub(crate) const NAME: &str = "splits";
 
@@ -41,7 +42,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 /// Refuses a mesh that needs more memory than is available according to `/proc/meminfo`; without that file none.
 fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
     let available =
-        kilobytes(meminfo, "MemAvailable:").map_or(u64::MAX, |kilobytes| 1024 * kilobytes);
+        labelled(meminfo, "MemAvailable:").map_or(u64::MAX, |kilobytes| 1024 * kilobytes);
     let needed = leaves.saturating_mul(BYTES_PER_LEAF);
     if needed <= available {
         return Ok(());
@@ -51,12 +52,6 @@ fn refuse_too_large(leaves: u64, meminfo: &str) -> Result<(), String> {
         "the check of splits needs about {needed:.1} GB of memory for {leaves} leaves, and {available:.1} GB are available: audit a \
          coarser mesh of the same case, or use a machine with more memory"
     ))
-}
-
-/// A number of kilobytes in a file of `/proc`, by its label.
-pub(crate) fn kilobytes(text: &str, label: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(label))?;
-    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
@@ -72,6 +67,6 @@ mod tests {
         assert!(refuse_too_large(u64::MAX, meminfo).is_err());
         assert_eq!(refuse_too_large(u64::MAX, ""), Ok(()));
         let status = "Name:\tharness\nVmPeak:\t   99 kB\nVmHWM:\t     3 kB\nVmRSS:\t     2 kB\n";
-        assert_eq!(["VmHWM:", "VmSwap:"].map(|label| kilobytes(status, label)), [Some(3), None]);
+        assert_eq!(["VmHWM:", "VmSwap:"].map(|label| labelled(status, label)), [Some(3), None]);
     }
 }

@@ -4,7 +4,7 @@
 
 use super::ends::Target;
 use contract::lattice::Root;
-use contract::number::number;
+use contract::number::{number, point};
 use serde::Serialize;
 use std::fmt;
 
@@ -189,11 +189,6 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 /// A spacing with all its digits: a case with this one has the same level.
 fn spacing(Spacing { level, spacing }: &Spacing) -> String {
     format!("{spacing} (level {level})")
-}
-
-/// A point as it is printed.
-pub(crate) fn point([x, y, z]: [f64; 3]) -> String {
-    format!("({x}, {y}, {z})")
 }
 
 #[cfg(test)]

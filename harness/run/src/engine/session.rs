@@ -4,6 +4,7 @@
 //! Invariant: when a [`Session`] was dropped or [`end_all`] has returned, no process of it is left.
 
 use super::failure::End;
+use contract::number::labelled;
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, setsid, waitpid};
 use std::collections::BTreeMap;
 use std::fs;
@@ -204,12 +205,8 @@ struct Status {
 
 impl Status {
     fn parse(text: &str) -> Option<Self> {
-        let number = |name| {
-            let value = text.lines().find_map(|line| line.strip_prefix(name))?;
-            value.split_whitespace().next()?.parse::<u64>().ok()
-        };
-        let (parent, space_kb) = (number("PPid:")?, number("VmPeak:")?);
-        Some(Self { parent, space_kb, peak_bytes: number("VmHWM:")? * 1024 })
+        let (parent, space_kb) = (labelled(text, "PPid:")?, labelled(text, "VmPeak:")?);
+        Some(Self { parent, space_kb, peak_bytes: labelled(text, "VmHWM:")? * 1024 })
     }
 }
 
