@@ -40,7 +40,10 @@ pub struct Selected {
 
 /// The catalogue. Its file is read by a look-up that needs it: a user's own case file can be selected without a catalogue.
 #[derive(Clone, Debug)]
-pub struct Catalogue(PathBuf);
+pub struct Catalogue {
+    /// Its file.
+    pub path: PathBuf,
+}
 
 #[derive(Debug, Deserialize)]
 struct CatalogueFile {
@@ -48,16 +51,6 @@ struct CatalogueFile {
 }
 
 impl Catalogue {
-    /// The catalogue in this file, which is not opened yet.
-    pub fn new(path: PathBuf) -> Self {
-        Self(path)
-    }
-
-    /// The catalogue's file.
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-
     /// The selected cases, in the order of `arguments`, which are names or paths of case files. Without
     /// arguments, all cases of the catalogue that have one of these sizes.
     ///
@@ -113,7 +106,7 @@ impl Catalogue {
             let near = near.map_or(String::new(), |near| format!("; the most similar name there is {}", near.name));
             format!(
                 "{name}: no such file or directory exists, nor a case of this name in {}{near}",
-                self.0.display()
+                self.path.display()
             )
         })
     }
@@ -130,9 +123,9 @@ impl Catalogue {
     }
 
     fn cases(&self) -> Result<Vec<Selected>, String> {
-        let wrong = |why: String| format!("{}: {why}", self.0.display());
+        let wrong = |why: String| format!("{}: {why}", self.path.display());
         let missing = "the catalogue of cases is missing: give the path of a case file, or set HARNESS_ROOT to the repository";
-        let text = files::read_text(&self.0).map_err(|error| match error.kind() {
+        let text = files::read_text(&self.path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => wrong(missing.to_owned()),
             _ => wrong(error.to_string()),
         })?;
@@ -141,7 +134,7 @@ impl Catalogue {
         let mut cases = file.case;
         for case in &mut cases {
             case.argument.clone_from(&case.name);
-            case.path = self.0.with_file_name(&case.path);
+            case.path = self.path.with_file_name(&case.path);
             case.absent = missing_geometry(&case.path);
             case.size.ok_or_else(|| wrong(format!("the case {} has no size", case.name)))?;
         }
@@ -184,7 +177,7 @@ mod tests {
         let here = place.path().to_string_lossy();
         let arguments: Vec<String> =
             arguments.iter().map(|argument| argument.replace("HERE", &here)).collect();
-        let catalogue = Catalogue::new(place.path().join("catalogue.toml"));
+        let catalogue = Catalogue { path: place.path().join("catalogue.toml") };
         let selected = catalogue.select(&arguments, sizes)?;
         Ok(selected.into_iter().map(|case| (case.name, case.absent.is_some())).collect())
     }
@@ -240,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_path_needs_no_catalogue_and_a_name_does() {
-        let catalogue = Catalogue::new("nowhere/catalogue.toml".into());
+        let catalogue = Catalogue { path: "nowhere/catalogue.toml".into() };
         let path = catalogue.case_file("case.toml", Path::new("there"));
         assert_eq!(path, Ok(PathBuf::from("there/case.toml")));
         assert!(catalogue.named("cube").unwrap_err().starts_with("nowhere/catalogue.toml: "));

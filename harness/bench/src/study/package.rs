@@ -100,7 +100,7 @@ mod tests {
     use contract::catalogue::Catalogue;
 
     fn paths(place: &Path) -> Paths {
-        Paths { catalogue: Catalogue::new(place.join("none.toml")), ..Paths::find() }
+        Paths { catalogue: Catalogue { path: place.join("none.toml") }, ..Paths::find() }
     }
 
     #[test]

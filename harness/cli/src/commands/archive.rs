@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     fs::create_dir(&of_study).map_err(|error| Failure::at(&of_study, error))?;
     let paths = Paths::find();
     package(study, &paths, &of_study)?;
-    let sources = paths.catalogue.path().with_file_name("SOURCES.md");
+    let sources = paths.catalogue.path.with_file_name("SOURCES.md");
     if sources.is_file() {
         copy(&sources, &of_study.join("SOURCES.md"))?;
     }

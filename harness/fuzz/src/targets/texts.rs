@@ -36,7 +36,7 @@ pub(super) fn targets(scratch: &mut Scratch, bytes: &[u8]) -> bool {
 /// A catalogue of cases.
 pub(super) fn catalogue(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     let path = scratch.file("catalogue.toml", bytes).to_owned();
-    Catalogue::new(path).select(&[], &[Size::Small, Size::Medium, Size::Large]).is_ok()
+    Catalogue { path }.select(&[], &[Size::Small, Size::Medium, Size::Large]).is_ok()
 }
 
 /// A record of `harness bench`.

@@ -89,7 +89,7 @@ impl Paths {
             }),
             p4est: from_env("HARNESS_P4EST").unwrap_or_else(|| built("engines/p4est-balance")),
             proven_checker: from_env("HARNESS_PROVEN").unwrap_or_else(|| built("proof/check")),
-            catalogue: Catalogue::new(root.join("geometries/catalogue.toml")),
+            catalogue: Catalogue { path: root.join("geometries/catalogue.toml") },
             root,
             harness,
         }

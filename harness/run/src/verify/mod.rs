@@ -40,7 +40,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
     }
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
     if selected.is_empty() {
-        let why = format!("no case in {} has this size", programs.paths.catalogue.path().display());
+        let why = format!("no case in {} has this size", programs.paths.catalogue.path.display());
         return Err(Failure::input(why));
     }
     let verification = Verification {
