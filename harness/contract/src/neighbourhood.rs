@@ -1,6 +1,6 @@
 //! An octant together with its 26 neighbours of the same level, and the search for the coarsest leaf near it.
 
-use crate::octant::{CELLS_PER_EDGE, Octant};
+use crate::octant::{Octant, edge_of};
 use crate::tree::{Handle, NO_LEAF, Tree};
 use std::array;
 use std::sync::LazyLock;
@@ -164,7 +164,7 @@ fn search(
     found: &mut Coarsest,
 ) {
     let coarsest = tree.coarsest_level(handle, level);
-    let edge = i64::from(CELLS_PER_EDGE >> level);
+    let edge = edge_of(level);
     if coarsest >= found.level || !region.meets(corner, edge) {
         return;
     }

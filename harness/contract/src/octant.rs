@@ -13,6 +13,11 @@ pub const CELLS_PER_EDGE: u32 = 1 << LEVEL_MAX;
 /// Lattice units along an edge of a level-19 cell.
 pub const UNITS_PER_CELL: i64 = 256;
 
+/// Edge length of the octants of a level, in level-19 cells.
+pub fn edge_of(level: u8) -> i64 {
+    i64::from(CELLS_PER_EDGE >> level)
+}
+
 /// One cell of the oct-tree, leaf or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Octant {
@@ -57,6 +62,11 @@ impl Octant {
         let corner = [0, 1, 2].map(|a| i64::from(self.corner[a]) + i64::from(offset[a]) * edge);
         let is_inside = corner.iter().all(|c| (0..i64::from(CELLS_PER_EDGE)).contains(c));
         is_inside.then(|| Self { corner: corner.map(|c| c as u32), level: self.level })
+    }
+
+    /// Whether a face lies on the boundary of the root.
+    pub fn is_at_boundary(&self) -> bool {
+        self.corner.iter().any(|&c| c == 0 || c + self.edge() == CELLS_PER_EDGE)
     }
 
     /// Whether `other` is this octant or one of its descendants.

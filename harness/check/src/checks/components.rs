@@ -3,7 +3,7 @@
 
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
 use contract::manifest::Manifest;
-use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
+use contract::octant::{Octant, UNITS_PER_CELL};
 use contract::parity::Parity;
 use contract::sets::Sets;
 use contract::word::{self, Side};
@@ -106,10 +106,7 @@ pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
 
 /// Whether any of these leaves has a face on the root's boundary.
 pub fn touches_boundary(words: &[u64], leaves: &[u32]) -> bool {
-    leaves.iter().any(|&i| {
-        let octant = word::octant(words[i as usize]);
-        octant.corner.iter().any(|&c| c == 0 || c + octant.edge() == CELLS_PER_EDGE)
-    })
+    leaves.iter().any(|&i| word::octant(words[i as usize]).is_at_boundary())
 }
 
 /// The index of the leaf whose half-open octant contains a lattice point; `None` for a point outside the root.

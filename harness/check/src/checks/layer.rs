@@ -12,7 +12,7 @@ use super::clearance::{ALL_AXES, Clearance, Required, check_gap};
 use super::spacing::Crossed;
 use super::{Check, CheckResult, Subject, UNKNOWN_INPUTS, contact, several_levels, some_leaves};
 use contract::manifest::{Keep, Manifest, Tree as MeshKind};
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::{Octant, edge_of};
 use contract::tree::{DELETED, Handle, Kind, Kinds, Tree};
 use contract::word::Side;
 
@@ -48,18 +48,13 @@ fn check_tree(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let n = i64::from(terms.layer_cells_min);
     let margin = |level: u8| {
         let required = terms.keep == Keep::All || level < terms.level_surface;
-        required.then(|| n * cell(level))
+        required.then(|| n * edge_of(level))
     };
     if n > 1 {
         let what = &format!("a layer is thinner than {n} cells");
         check_gap(tree, (&terms.root, what), margin, &ALL_AXES, 1, result);
     }
     check_surface_layer(tree, terms, result);
-}
-
-/// Edge of a cell of this level, in level-19 cells.
-fn cell(level: u8) -> i64 {
-    i64::from(CELLS_PER_EDGE >> level)
 }
 
 /// Minimum distance between a crossing or deleted leaf of this level and any leaf coarser than the surface level,
@@ -74,7 +69,7 @@ fn surface_margin(terms: &Manifest, kind: Kind, level: u8) -> i64 {
         _ if level == terms.level_surface => layer.max(extra),
         _ => extra,
     };
-    cells * cell(level)
+    cells * edge_of(level)
 }
 
 const CROSSING_OR_DELETED: Kinds = 1 << Side::Crossing as u8 | 1 << DELETED;
@@ -96,7 +91,7 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
     };
     let report = |[leaf, _, coarse]: [Octant; 3], result: &mut CheckResult| {
         let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
-        let cells = surface_margin(terms, kind, leaf.level) / cell(leaf.level);
+        let cells = surface_margin(terms, kind, leaf.level) / edge_of(leaf.level);
         let (what, [leaf, coarse]) =
             (contact::name(1 << kind), [leaf, coarse].map(|octant| terms.root.place(octant)));
         result.report(format_args!(
@@ -137,11 +132,11 @@ mod tests {
                 let distance = fine.distance(coarse);
                 let levels = coarse.level + 1..fine.level;
                 let required = |l: &u8| n > 1 && (all || *l < terms.level_surface);
-                let layer = levels.filter(required).any(|l| distance < n * cell(l));
+                let layer = levels.filter(required).any(|l| distance < n * edge_of(l));
                 let surface = terms.level_surface;
                 let at_surface = *side == Side::Crossing && fine.level == surface;
-                let surface_layer = distance < (n - 1) * cell(surface)
-                    || !terms.keep_crossing && distance < cell(surface);
+                let surface_layer = distance < (n - 1) * edge_of(surface)
+                    || !terms.keep_crossing && distance < edge_of(surface);
                 layer || at_surface && coarse.level < surface && surface_layer
             })
         })
@@ -193,7 +188,7 @@ mod tests {
         let of_surface = |level| {
             surface_margin(&terms(5, level, Keep::Outside, true), Side::Crossing as Kind, 3)
         };
-        assert_eq!([of_surface(2), of_surface(3)], [0, 4 * cell(3)]);
+        assert_eq!([of_surface(2), of_surface(3)], [0, 4 * edge_of(3)]);
     }
 
     proptest! {

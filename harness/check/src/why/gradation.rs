@@ -23,7 +23,7 @@
 use super::Mesh;
 use crate::checks::truth::Truth;
 use contract::neighbourhood::OFFSETS;
-use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
+use contract::octant::{LEVEL_MAX, Octant, edge_of};
 use contract::tree::Handle;
 use contract::word;
 use contract::word::Side;
@@ -38,11 +38,6 @@ pub enum Rule {
     Layer,
     /// The octant touches the leaf, which is at least two levels finer.
     Balance,
-}
-
-/// Edge of a cell of a level, in level-19 cells.
-fn edge(level: u8) -> i64 {
-    i64::from(CELLS_PER_EDGE >> level)
 }
 
 /// The parent of an octant other than the root.
@@ -60,7 +55,7 @@ enum Question {
 impl Mesh<'_> {
     /// Distance from a source of this level within which its layer reaches, in level-19 cells.
     pub(super) fn layer_reach(&self, level: u8) -> i64 {
-        i64::from(self.inputs.layer_cells_min - 1) * edge(level)
+        i64::from(self.inputs.layer_cells_min - 1) * edge_of(level)
     }
 
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
@@ -123,7 +118,7 @@ impl Mesh<'_> {
         }
         let (first, last) = (*levels.start(), *levels.end());
         let mut start = octant.level;
-        while start > 0 && edge(start) < self.layer_reach(first) {
+        while start > 0 && edge_of(start) < self.layer_reach(first) {
             start -= 1;
         }
         let mut search = Search { mesh: self, octant, first, last, visit };

@@ -54,12 +54,6 @@ pub fn leaf_at(words: &[u64], at: Point) -> u64 {
     words[after - 1]
 }
 
-/// Whether a leaf has a face on the root's boundary.
-pub fn is_at_boundary(leaf: u64) -> bool {
-    let (low, high) = word::octant(leaf).bounds();
-    low.contains(&0) || high.contains(&UNITS_PER_EDGE)
-}
-
 /// Whether no facet touches a leaf.
 pub fn is_free(leaf: u64) -> bool {
     word::side(leaf) != Side::Crossing

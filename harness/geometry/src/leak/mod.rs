@@ -128,8 +128,9 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
             self.make_tree(level)?;
             let words = &self.trees[&level];
             if word::side(ends::leaf_at(words, start)) == Side::Inside {
-                let is_far = |w: u64| word::side(w) == Side::Outside && ends::is_at_boundary(w);
-                return Ok(words.iter().any(|&w| is_far(w)).then_some(level));
+                let is_far =
+                    |&w: &u64| word::side(w) == Side::Outside && word::octant(w).is_at_boundary();
+                return Ok(words.iter().any(is_far).then_some(level));
             }
         }
         Ok(None)
