@@ -226,8 +226,11 @@ pub(crate) fn complete(
                 engine.name
             ));
         }
-        let (case, limit) = (read_case()?, options.limit);
-        let mut imported = imported(engine, format, &written, &case, label, limit)?;
+        let case = read_case()?;
+        let (sides, position) = (engine.run.sides.clone(), engine.run.position);
+        let request = Request { sides, position, root: Some(case.root), ..Request::default() };
+        let read = import(&written, Some(format), &request, Some(&case), label, options.limit);
+        let mut imported = read.map_err(not_imported)?;
         imported.manifest().tree = tree;
         imported.create(mesh, true).map_err(|error| unreadable(&error))?;
     } else if !is_complete && description::is_own(&engine.name) {
@@ -252,26 +255,14 @@ pub(crate) fn complete(
     Mesh::open(mesh).map_err(|error| unreadable(&error))
 }
 
-/// The mesh that a run has written in a format of another program.
-fn imported(
-    engine: &Description,
-    format: Format,
-    written: &Path,
-    case: &Case,
-    label: String,
-    limit: Duration,
-) -> Result<Imported, End> {
-    let (sides, position) = (engine.run.sides.clone(), engine.run.position);
-    let request = Request { sides, position, root: Some(case.root), ..Request::default() };
-    let read = import(written, Some(format), &request, Some(case), label, limit);
-    read.map_err(|failure| {
-        let why = format!("wrote a mesh that cannot be imported: {failure}");
-        match failure.code {
-            EXIT_INTERRUPTED => End::Interrupted,
-            EXIT_MISSING => End::Missing(why),
-            _ => End::Unusable(why),
-        }
-    })
+/// The end of a run whose mesh, in a format of another program, could not be imported.
+fn not_imported(failure: Failure) -> End {
+    let why = format!("wrote a mesh that cannot be imported: {failure}");
+    match failure.code {
+        EXIT_INTERRUPTED => End::Interrupted,
+        EXIT_MISSING => End::Missing(why),
+        _ => End::Unusable(why),
+    }
 }
 
 #[cfg(test)]
