@@ -110,34 +110,25 @@ pub struct RunOptions<'a> {
     pub mesh: Option<&'a Path>,
     /// Write a run report. Without one, cells and digest are read from the mesh.
     pub report: bool,
-    /// Keep the ranks' activity on disk, to report it if the run hangs.
-    pub status: bool,
     /// Stop at the base tree.
     pub ungraded: bool,
-    /// Where runs on MPI use the engine's service, if it has one.
+    /// Where runs on MPI use the engine's service, if it has one. Any such run keeps the ranks' activity on disk, to report it if it hangs.
     pub services: Option<&'a Services>,
 }
 
 impl<'a> RunOptions<'a> {
     /// A run that writes a run report and nothing else.
     pub fn new(place: &'a Path, limit: Duration) -> Self {
-        Self {
-            place,
-            limit,
-            mesh: None,
-            report: true,
-            status: false,
-            ungraded: false,
-            services: None,
-        }
+        Self { place, limit, mesh: None, report: true, ungraded: false, services: None }
     }
 
     pub(super) fn report_path(&self) -> PathBuf {
         self.place.join("run.json")
     }
 
-    pub(super) fn status_path(&self) -> PathBuf {
-        self.place.join("status")
+    /// Where the ranks' activity is kept, if it is.
+    pub(super) fn status_path(&self) -> Option<PathBuf> {
+        self.services.map(|_| self.place.join("status"))
     }
 }
 

@@ -295,12 +295,10 @@ impl Engine {
         options: &RunOptions,
     ) -> Result<Finished, Failure> {
         let status = options.status_path();
-        if options.status {
-            fs::create_dir_all(&status)?;
-        }
+        status.iter().try_for_each(fs::create_dir_all)?;
         let label = self.label();
         let watch = Watch {
-            status: options.status.then_some(&status),
+            status: status.as_deref(),
             sample_memory: !self.description.reports_memory,
             ..Watch::new(&label, options.limit, options.place)
         };
@@ -434,7 +432,7 @@ mod tests {
         let files = RunOptions {
             mesh: Some(Path::new("mesh")),
             report: false,
-            status: true,
+            services: Some(&Services::default()),
             ungraded: true,
             ..plain
         };

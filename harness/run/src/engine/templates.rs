@@ -169,7 +169,7 @@ impl Templates {
         let chosen = [
             out,
             options.report.then(|| text(options.report_path())),
-            options.status.then(|| text(options.status_path())),
+            options.status_path().map(text),
             options.ungraded.then(String::new),
             layout.partitioner.clone(),
             layout.level_base.clone(),

@@ -26,6 +26,11 @@ const CELLS_MAX: u64 = 100_000_000;
 /// Most cells of a mesh that the reference makes, too.
 const REFERENCE_CELLS_MAX: usize = 3_000_000;
 
+/// What remains unknown about the ranks of an engine that does not report their number.
+const DOUBT: &str = "it is unknown whether the ranks communicate: no run report states `ranks`";
+/// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
+const HANGS_MAX: usize = 3;
+
 /// A run that ended well, and its mesh.
 #[derive(Debug)]
 pub(super) struct Meshed {
@@ -72,7 +77,6 @@ impl CaseRun<'_> {
         let mesh = tree.map(|_| place.join("mesh"));
         let options = RunOptions {
             mesh: mesh.as_deref(),
-            status: true,
             ungraded: tree == Some(Tree::Base),
             services: Some(&self.all.needs.services),
             ..RunOptions::new(&place, self.all.options.timeout)
@@ -98,9 +102,7 @@ impl CaseRun<'_> {
             _ => &self.all.programs.engine,
         }
     }
-}
 
-impl CaseRun<'_> {
     /// Makes the serial mesh, which later steps use, and checks it; of an engine that promises the definition, also its base tree. `None`
     /// if the mesher made none, or they are too large to check.
     pub(super) fn verify_serial(&mut self, case: &Case) -> Option<(Meshed, Option<Meshed>)> {
@@ -224,15 +226,7 @@ impl CaseRun<'_> {
             Err(failure) => self.add_failure("serial", None, &failure),
         }
     }
-}
 
-/// What remains unknown about the ranks of an engine that does not report their number.
-const DOUBT: &str = "it is unknown whether the ranks communicate: no run report states `ranks`";
-
-/// Hangs after which the remaining layouts of a case are left out: each hang costs the whole time limit.
-const HANGS_MAX: usize = 3;
-
-impl CaseRun<'_> {
     /// Runs every layout on MPI and checks its mesh.
     pub(super) fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
         match self.all.needs.lacks(Need::Mpi) {
