@@ -4,11 +4,8 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-use crate::foam;
-use crate::front;
-use crate::htg;
 use crate::options::{Export, Summary, Write};
-use crate::{p8est, vtu};
+use crate::{foam, front, htg, p8est, vtu};
 use contract::failure::Failure;
 use contract::files::{Staging, fill_atomically};
 
