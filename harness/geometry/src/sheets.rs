@@ -101,13 +101,8 @@ fn hits(
             if let Some(other) = first.into_iter().find(faces).filter(|_| width > TOUCHING) {
                 let area = triangle.area() / starts.len() as f64;
                 let middle = ray.point_at(width / 2.0);
-                hits.push(Hit {
-                    width,
-                    area,
-                    from: facet,
-                    facets: [facet.min(other), facet.max(other)],
-                    middle,
-                });
+                let facets = [facet.min(other), facet.max(other)];
+                hits.push(Hit { width, area, from: facet, facets, middle });
             }
         }
     }

@@ -164,15 +164,14 @@ impl fmt::Display for Report {
 
 /// What is printed of a widest path.
 fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    let Narrowest { at, facets, is_end, .. } = &passage.narrowest;
     let n = &passage.narrowest;
     let [width, min, max, cells] = [n.width, n.width_min, n.width_max, n.width_cells].map(number);
-    let (closing, end) = match is_end {
+    let (closing, end) = match n.is_end {
         true => (String::new(), END),
         false => (format!("          Spacings above {max} {CLOSE}\n"), ""),
     };
-    let listed: Vec<String> = facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
-    let more = match facets.len().saturating_sub(FACETS_MAX) {
+    let listed: Vec<String> = n.facets.iter().take(FACETS_MAX).map(ToString::to_string).collect();
+    let more = match n.facets.len().saturating_sub(FACETS_MAX) {
         0 => String::new(),
         more => format!(" and {more} more (--json)"),
     };
@@ -181,7 +180,7 @@ fn describe(passage: &Passage, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         "\nThe narrowest place of the widest path\n\
          width     {width} ({cells} cells of the case's spacing): diameter of the largest ball that passes, {min} to {max}\n\
          {closing}at        {}\nfacets    {}{more}\n{end}",
-        point(*at),
+        point(n.at),
         listed.join(", ")
     )
 }
