@@ -20,14 +20,11 @@ impl Facets {
         (0..u32::try_from(self.0.len()).expect("fewer than 2^32 facets")).collect()
     }
 
-    /// Those of some facets that share a point with a closed box.
-    pub fn meeting(&self, candidates: &[u32], low: [i64; 3], high: [i64; 3]) -> Vec<u32> {
-        candidates.iter().copied().filter(|&i| self.0[i as usize].meets(low, high)).collect()
-    }
-
-    /// The first of some facets that shares a point with a closed box.
-    pub fn first_meeting(&self, candidates: &[u32], low: [i64; 3], high: [i64; 3]) -> Option<u32> {
-        candidates.iter().copied().find(|&i| self.0[i as usize].meets(low, high))
+    /// Those of some facets that share a point with a closed octant that is enlarged by `margin` lattice units on all sides.
+    pub fn meeting(&self, of: &[u32], octant: &Octant, margin: i64) -> impl Iterator<Item = u32> {
+        let (low, high) = octant.bounds();
+        let (low, high) = (low.map(|c| c - margin), high.map(|c| c + margin));
+        of.iter().copied().filter(move |&i| self.0[i as usize].meets(low, high))
     }
 
     /// Visits octants in Morton order, parents first, each with the facets that meet it if it is enlarged by `margin` lattice units on all
@@ -54,8 +51,7 @@ impl Facets {
         margin: i64,
         enter: &mut dyn FnMut(Octant, &[u32]) -> bool,
     ) {
-        let (low, high) = octant.bounds();
-        let near = self.meeting(candidates, low.map(|c| c - margin), high.map(|c| c + margin));
+        let near: Vec<u32> = self.meeting(candidates, &octant, margin).collect();
         if enter(octant, &near) {
             (0..8).for_each(|digit| self.walk_below(octant.child(digit), &near, margin, enter));
         }

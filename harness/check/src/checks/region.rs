@@ -150,8 +150,7 @@ impl<'a> Survey<'a> {
             }
             let is_whole = kind.is_some() || handle == Handle::HOLE && octant.level >= surface;
             if is_whole {
-                let (low, high) = octant.bounds();
-                let crossed = self.truth.facets.first_meeting(near, low, high).is_some();
+                let crossed = self.truth.facets.meeting(near, &octant, 0).next().is_some();
                 let may_be_coarse = !crossed && octant.level < surface;
                 let beyond = may_be_coarse.then(|| self.beyond_band(octant, near)).flatten();
                 visit(octant, kind, beyond.unwrap_or(Position::Near { crossed }));
@@ -167,9 +166,7 @@ impl<'a> Survey<'a> {
 
     /// The position of a part beyond the band of an octant that no facet crosses. All of it lies on one side.
     fn beyond_band(&self, octant: Octant, candidates: &[u32]) -> Option<Position> {
-        let ((low, high), band) = (octant.bounds(), self.band());
-        let near =
-            self.truth.facets.meeting(candidates, low.map(|c| c - band), high.map(|c| c + band));
+        let near: Vec<u32> = self.truth.facets.meeting(candidates, &octant, self.band()).collect();
         if near.is_empty() {
             return Some(self.position(octant));
         }

@@ -106,10 +106,9 @@ impl<'a> Crossed<'a> {
 
     /// The first of some facets that reaches into an octant deeper than the tolerance.
     fn reaching(&self, octant: &Octant, near: &[u32]) -> Option<u32> {
-        let (low, high) = octant.bounds();
-        let [low, high] = [low.map(|c| c + self.tolerance), high.map(|c| c - self.tolerance)];
         // A leaf far below the surface level may be smaller than the tolerance.
-        (low[0] <= high[0]).then(|| self.facets.first_meeting(near, low, high)).flatten()
+        let has_core = 2 * self.tolerance <= UNITS_PER_EDGE >> octant.level;
+        has_core.then(|| self.facets.meeting(near, octant, -self.tolerance).next()).flatten()
     }
 
     fn check(&self, tree: &Tree, result: &mut CheckResult) {

@@ -151,9 +151,8 @@ impl Mesh<'_> {
 
     /// The facets that cross an octant, ascending; empty if facets are not known.
     pub(super) fn facets_of(&self, octant: &Octant) -> Vec<u32> {
-        let (low, high) = octant.bounds();
-        let meeting = |Truth { facets, .. }: &Truth| facets.meeting(&facets.all(), low, high);
-        self.body.map_or(Vec::new(), meeting)
+        let Some(Truth { facets, .. }) = self.body else { return Vec::new() };
+        facets.meeting(&facets.all(), octant, 0).collect()
     }
 
     /// The leaf of T0 that is or contains an octant; `None` if T0 splits the octant.

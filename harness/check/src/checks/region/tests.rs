@@ -90,9 +90,7 @@ fn places_within_the_band_are_not_judged() {
         // A cell has edge 1.
         let band = (band_cells * (UNITS_PER_EDGE / 8) as f64) as i64;
         let is_beyond = |word: &&u64| {
-            let (low, high) = word::octant(**word).bounds();
-            let (low, high) = (low.map(|c| c - band), high.map(|c| c + band));
-            facets.meeting(&facets.all(), low, high).is_empty()
+            facets.meeting(&facets.all(), &word::octant(**word), band).next().is_none()
         };
         // Without a band, crossed leaves are judged, too.
         let judged = |word: &&u64| band_cells == 0.0 || is_beyond(word);
@@ -116,11 +114,8 @@ fn a_leaf_coarser_than_the_surface_level_is_judged_by_its_parts_beyond_the_band(
     let (geometry, none) = (Geometry::of(&case), Tree::default());
     let facets = &geometry.truth.facets;
     let survey = geometry.survey(&none, 1.0);
-    let meets = |octant: &Octant, by: i64| {
-        let (low, high) = octant.bounds();
-        let (low, high) = (low.map(|c| c - by), high.map(|c| c + by));
-        facets.first_meeting(&facets.all(), low, high).is_some()
-    };
+    let meets =
+        |octant: &Octant, by: i64| facets.meeting(&facets.all(), octant, by).next().is_some();
     let band = UNITS_PER_EDGE / 32;
     let words = contract::testing::words_of(|o| o.level < 3);
     let octants = words.iter().map(|&w| word::octant(w));
@@ -156,9 +151,8 @@ fn a_leaf_with_another_side_than_its_component_is_a_finding_and_undecided_ones_a
         let position = |w: &u64| {
             let around = (0..=3).map(|level| word::octant(*w).ancestor(level));
             let is_free = |octant: &Octant| {
-                let (low, high) = octant.bounds();
                 let facets = &geometry.truth.facets;
-                facets.meeting(&facets.all(), low, high).is_empty()
+                facets.meeting(&facets.all(), octant, 0).next().is_none()
             };
             around.into_iter().find(is_free).map_or(CROSSED, |o| space.position(o))
         };
