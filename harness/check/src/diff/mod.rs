@@ -96,7 +96,10 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
         ..DiffReport::default()
     };
     if let Some(octant) = report.octants.first() {
-        let (x, y) = first_difference(&a, &b, octant, mask)?;
+        let (of_a, of_b) = (a.octant(octant)?, b.octant(octant)?);
+        let masked = |of: &Vec<u64>, at: usize| of.get(at).map(|word| word & mask);
+        let mut pairs = (0..).map(|at| [masked(&of_a, at), masked(&of_b, at)]);
+        let [x, y] = pairs.find(|[x, y]| x != y).expect("the digests of the octant differ");
         let root = a.manifest.root;
         let text = |word: Option<u64>| match word {
             None => "no more leaves".to_owned(),
@@ -104,7 +107,7 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
             Some(word) => root.place(word::octant(word)).to_string(),
         };
         report.leaf = Some(format!("first difference:\n  A has {}\n  B has {}", text(x), text(y)));
-        report.rule = without_sides.is_none().then(|| rule(&a, &b, case, (x, y)));
+        report.rule = without_sides.is_none().then(|| rule(&a, &b, case, [x, y]));
     }
     Ok(report)
 }
@@ -114,19 +117,8 @@ fn level_3(index: u64) -> Octant {
     Octant { corner: word::corner_of(index << 48), level: 3 }
 }
 
-/// The first words of two meshes that differ; `None` for a mesh that has no more leaves.
-type Differing = (Option<u64>, Option<u64>);
-
-/// The first words that differ in an octant, in the bits of `mask`.
-fn first_difference(a: &Mesh, b: &Mesh, octant: &Octant, mask: u64) -> Result<Differing, Failure> {
-    let (a, b) = (a.octant(octant)?, b.octant(octant)?);
-    let mut masked = (0..).map(|at| [&a, &b].map(|words| words.get(at).map(|word| word & mask)));
-    let [x, y] = masked.find(|[x, y]| x != y).expect("the digests of the octant differ");
-    Ok((x, y))
-}
-
-/// The rule that decides which mesh is right, or why none does.
-fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, (x, y): Differing) -> String {
+/// The rule that decides which mesh is right, or why none does, from the first words that differ; `None` for a mesh that has no more leaves.
+fn rule(a: &Mesh, b: &Mesh, case: Option<&Case>, [x, y]: [Option<u64>; 2]) -> String {
     if !differing_inputs(("A", &a.manifest), ("B", &b.manifest)).is_empty() {
         return "none: the inputs differ as listed above, so both meshes may be right".to_owned();
     }
