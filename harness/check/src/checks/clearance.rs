@@ -6,7 +6,7 @@
 
 use super::CheckResult;
 use contract::lattice::Root;
-use contract::neighbourhood::{Coarsest, Neighbourhood, Region};
+use contract::neighbourhood::{Neighbourhood, Region};
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Tree};
 
@@ -51,10 +51,15 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
         });
         let present = || (0..).zip(&children).filter_map(|(digit, of)| Some((digit, of.as_ref()?)));
         let Some(margin) = present().map(|(_, of)| of.margin).max() else { return };
-        let bound = present().filter_map(|(_, of)| of.own.or(of.below)).max();
+        let bound = present().filter_map(|(_, of)| of.own.or(of.below)).max().unwrap_or(0);
         let around = |(digit, _)| Region::along(&octant.child(digit), [margin; 3]);
         let region = || present().map(around).reduce(Region::hull).expect("a child is present");
-        let nearby = trail.coarsest_nearby(self.tree, margin, bound.unwrap_or(0), region);
+        // The level of the coarsest leaf in the region, if it is less than `bound`; otherwise any from `bound` up to that level.
+        let (wide, coarsest) = trail.wide(margin);
+        let nearby = match *coarsest {
+            coarsest if coarsest >= bound => coarsest,
+            _ => wide.coarsest_within(self.tree, &region(), bound).level,
+        };
         for (digit, &Required { margin, own, below }) in present() {
             let (own, is_deep) = (own.filter(|&own| own > nearby), below > Some(nearby));
             if own.is_none() && !is_deep {
@@ -80,7 +85,8 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
             if found.is_none() && is_solid {
                 found = self.directions.iter().find_map(|axes| {
                     let region = Region::along(&part, axes.map(|axis| axis * margin));
-                    let coarse = trail.search(self.tree, margin, &region, bound).leaf(self.tree)?;
+                    let (wide, _) = trail.wide(margin);
+                    let coarse = wide.coarsest_within(self.tree, &region, bound).leaf(self.tree)?;
                     Some((part, coarse))
                 });
             }
@@ -159,25 +165,5 @@ impl Trail {
     pub fn all_nearby(&self, margin: i64, predicate: impl Fn(Handle, u8) -> bool) -> bool {
         let (wide, _) = self.wide(margin);
         wide.handles.iter().all(|&handle| predicate(handle, wide.octant.level))
-    }
-
-    /// Level of the coarsest leaf in a region within `margin` of the current octant, if it is coarser than
-    /// `bound`; otherwise a level that is at least `bound` and at most that of the coarsest leaf.
-    fn coarsest_nearby(
-        &self,
-        tree: &Tree,
-        margin: i64,
-        bound: u8,
-        region: impl Fn() -> Region,
-    ) -> u8 {
-        match self.wide(margin).1 {
-            coarsest if coarsest >= bound => coarsest,
-            _ => self.search(tree, margin, &region(), bound).level,
-        }
-    }
-
-    /// The coarsest leaf in a region within `margin` of the current octant, if it is coarser than `bound`.
-    pub fn search(&self, tree: &Tree, margin: i64, region: &Region, bound: u8) -> Coarsest {
-        self.wide(margin).0.coarsest_within(tree, region, bound)
     }
 }

@@ -9,7 +9,6 @@ mod alone;
 
 use super::components::Component;
 use super::manifest::{COMPONENTS, components};
-use super::truth::Truth;
 use super::{Check, CheckResult, Subject, some_leaves};
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides};
 use contract::tree::Handle;
@@ -19,17 +18,13 @@ pub(super) const CHECK: Check =
     Check { name: "kept", wanted: |subject| subject.promises.definition, run };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    match subject.truth() {
-        Some(truth) => with_truth(subject, truth, result),
-        None if subject.terms.sides == Sides::Unknown => result.lacks(super::UNKNOWN_SIDES),
-        None => {
-            alone::check(subject.tree(), &subject.inputs, subject.manifest, result);
-            result.requires(some_leaves(subject));
+    let Some(truth) = subject.truth() else {
+        if subject.terms.sides == Sides::Unknown {
+            return result.lacks(super::UNKNOWN_SIDES);
         }
-    }
-}
-
-fn with_truth(subject: &Subject, truth: &Truth, result: &mut CheckResult) {
+        alone::check(subject.tree(), &subject.inputs, subject.manifest, result);
+        return result.requires(some_leaves(subject));
+    };
     result.examined = subject.examined_with(truth);
     let terms = &subject.terms;
     // A component has leaves in the mesh iff it is kept.

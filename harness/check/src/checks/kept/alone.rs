@@ -11,7 +11,7 @@ mod tests;
 
 use crate::checks::components::{self, Component};
 use crate::checks::{CheckResult, contact, json};
-use contract::manifest::{Components, EnclosedComponents, Manifest, Tree as Kind};
+use contract::manifest::{EnclosedComponents, Manifest, Tree as Kind};
 use contract::octant::{Octant, UNITS_PER_CELL};
 use contract::tree::Tree;
 use contract::word::{self, Leaf, Side};
@@ -19,9 +19,7 @@ use contract::word::{self, Leaf, Side};
 /// Checks a tree, final or T0, by itself.
 pub(super) fn check(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut CheckResult) {
     seeds_in_flow(tree, terms, result);
-    if let Some(counted) = &manifest.components {
-        possible(tree, counted, manifest.tree, terms, result);
-    }
+    possible(tree, terms, manifest, result);
     let is_base = manifest.tree == Kind::Base;
     let counts = manifest.components.as_ref().map(|counted| {
         let deleted = if is_base { 0 } else { counted.enclosed.count };
@@ -117,13 +115,8 @@ fn seeds_in_flow(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 }
 
 /// Whether the counts in a manifest can be right, and the example lies in a leaf that is deleted.
-fn possible(
-    tree: &Tree,
-    counted: &Components,
-    kind: Kind,
-    terms: &Manifest,
-    result: &mut CheckResult,
-) {
+fn possible(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut CheckResult) {
+    let Some(counted) = &manifest.components else { return };
     let EnclosedComponents { count, leaves, example } = counted.enclosed;
     let none = count == 0 && leaves == 0 && example.is_none();
     // The far field is another outside component.
@@ -131,7 +124,7 @@ fn possible(
         && 0 < count
         && count < counted.outside
         && count <= leaves
-        && example.is_some_and(|at| deleted_at(tree, at, kind, terms));
+        && example.is_some_and(|at| deleted_at(tree, at, manifest.tree, terms));
     if !none && !some {
         let (outside, at) = (counted.outside, json(&example));
         result.report(format_args!(

@@ -1,5 +1,5 @@
 use super::*;
-use contract::manifest::{Enclosed, Keep};
+use contract::manifest::{Components, Enclosed, Keep};
 use contract::testing::{leaf_set, words_with_sides};
 
 /// 8^3 cells of edge 1: a cavity of 2^3 outside leaves in the middle, within a wall of crossing leaves.
