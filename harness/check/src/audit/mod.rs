@@ -114,11 +114,6 @@ impl fmt::Display for AuditReport {
 /// Name of the check that the tree has the leaves of the parts.
 pub const TREE: &str = "tree file";
 
-/// Audits a mesh by itself.
-pub fn audit(dir: &Path) -> AuditReport {
-    audit_against(dir, None, &Promises::of_definition())
-}
-
 /// Audits a mesh of which these promises are made, against its case if it is known. A mesh that cannot be read is a finding.
 pub fn audit_against(dir: &Path, case: Option<&Case>, promises: &Promises) -> AuditReport {
     audit_within(NODES_MAX, dir, case, promises)

@@ -174,8 +174,8 @@ fn examine(correct: &SelftestCase, mutation: &Mutation, dir: &Path) -> std::io::
             checks::all(&subject.with_reference(correct.set(mutation.tree)))
         }
     };
-    let audit = audit::audit(dir).checks;
     let definition = Promises::of_definition();
+    let audit = audit::audit_against(dir, None, &definition).checks;
     let whole = audit::audit_against(dir, Some(&correct.case), &definition).checks;
     fs::remove_dir_all(dir)?;
     Ok([checks, audit, whole])

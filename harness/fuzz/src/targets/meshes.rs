@@ -2,9 +2,9 @@
 //! damage reaches what they protect, and undamaged files of nodes that need not be those of a tree.
 
 use crate::Scratch;
-use check::audit::audit;
+use check::audit::audit_against;
 use check::checks::CheckResult;
-use check::promises::Touching;
+use check::promises::{Promises, Touching};
 use contract::htg::TreeFile;
 use contract::import::Request;
 use contract::import::htg::ImportedTree;
@@ -51,7 +51,7 @@ pub(super) fn manifest(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     scratch.file("mesh/leaves-00000.npy", &part);
     let Ok(set) = leafset::read(&mesh) else { return false };
     assert_eq!(set.words.len() % (words.len() / 8).max(1), 0);
-    audit(&mesh);
+    audit_against(&mesh, None, &Promises::of_definition());
     true
 }
 
