@@ -16,14 +16,11 @@ mod tests;
 use crate::audit::AuditReport;
 use crate::checks::{CheckResult, NO_LEAVES};
 use crate::promises::Touching;
-use contract::import::forest::{Forest, Quadrant};
+use contract::import::forest::{Forest, LENGTHS, Quadrant};
 use isometry::LENGTH;
 use std::cmp::Ordering;
 use std::time::Instant;
 use topology::Topology;
-
-/// Lengths of a tree in the versions of p4est.
-const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
 
 /// A leaf in units of [`LENGTH`].
 #[derive(Clone, Copy, Debug)]
@@ -37,11 +34,6 @@ struct Leaf {
 impl Leaf {
     fn size(&self) -> i64 {
         LENGTH >> self.level
-    }
-
-    /// The Morton code after its last one.
-    fn end(&self, dimension: usize) -> u128 {
-        self.key + (1 << (dimension * self.size().trailing_zeros() as usize))
     }
 }
 
@@ -73,11 +65,8 @@ fn leaf(dimension: usize, length: i64, quadrant: &Quadrant) -> Option<Leaf> {
 }
 
 /// A quadrant as findings name it.
-fn named(
-    tree: usize,
-    index: usize,
-    Quadrant { corner: [x, y, z], level, .. }: &Quadrant,
-) -> String {
+fn named(tree: usize, index: usize, quadrant: &Quadrant) -> String {
+    let Quadrant { corner: [x, y, z], level, .. } = quadrant;
     format!("tree {tree}, quadrant {index} (level {level} at {x}, {y}, {z})")
 }
 
@@ -108,7 +97,7 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
                 }
                 Ordering::Equal => {}
             }
-            next = leaf.end(dimension);
+            next = leaf.key + (1 << (dimension * leaf.size().trailing_zeros() as usize));
             leaves.push(leaf);
         }
         if next != 1 << (dimension * LENGTH.trailing_zeros() as usize) {

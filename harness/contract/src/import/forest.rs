@@ -17,6 +17,8 @@ use std::path::Path;
 const FORMATS: [(usize, u64); 2] = [(2, 0x0200_0009), (3, FORMAT)];
 /// `P8EST_ONDISK_FORMAT`.
 pub const FORMAT: u64 = 0x0300_0009;
+/// Lengths of a tree in integer coordinates, in the versions of p4est.
+pub const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
 /// Header and quadrants begin at multiples of this number of bytes.
 pub const ALIGNMENT: usize = 32;
 
@@ -102,7 +104,19 @@ pub fn read(path: &Path) -> Result<Forest, Failure> {
         return Ok(forest);
     }
     input.align()?;
-    let (ends, data_bytes) = forest_header(&mut input, forest.connectivity.trees, format)?;
+    let [own_format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
+    if own_format != format || coordinate_bytes != 4 {
+        return Err(damaged("the header of the forest has another format than the connectivity"));
+    }
+    // Numbers of quadrants up to the end of each rank's part, and of each tree.
+    let of_ranks: Vec<u64> = input.numbers(ranks, 1)?;
+    let ends: Vec<u64> = input.numbers(forest.connectivity.trees as u64, 1)?;
+    if data_bytes > bytes.len() as u64 {
+        return Err(damaged(&format!("it states {data_bytes} bytes of data per quadrant")));
+    }
+    if of_ranks.last() != ends.last() {
+        return Err(damaged("ranks and trees have different numbers of quadrants"));
+    }
     input.align()?;
     forest.data_bytes = data_bytes;
     let (dimension, mut begin) = (forest.connectivity.dimension, 0);
@@ -219,25 +233,4 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
         attributes,
     };
     Ok((connectivity, format))
-}
-
-/// Number of quadrants up to the end of each tree, and bytes of user data per quadrant.
-fn forest_header(
-    input: &mut Input,
-    trees: usize,
-    expected: u64,
-) -> Result<(Vec<u64>, u64), Failure> {
-    let [format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
-    if format != expected || coordinate_bytes != 4 {
-        return Err(damaged("the header of the forest has another format than the connectivity"));
-    }
-    let of_ranks: Vec<u64> = input.numbers(ranks, 1)?;
-    let of_trees = input.numbers(trees as u64, 1)?;
-    if data_bytes > input.bytes.len() as u64 {
-        return Err(damaged(&format!("it states {data_bytes} bytes of data per quadrant")));
-    }
-    if of_ranks.last() != of_trees.last() {
-        return Err(damaged("ranks and trees have different numbers of quadrants"));
-    }
-    Ok((of_trees, data_bytes))
 }

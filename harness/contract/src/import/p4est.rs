@@ -7,7 +7,7 @@
 //! attribute of its only tree, if it has one, is the edge of the root to the last bit.
 
 use super::cells::Cells;
-use super::forest::{self, Connectivity, Quadrant, damaged};
+use super::forest::{self, Connectivity, LENGTHS, Quadrant, damaged};
 use super::{Request, side};
 use crate::failure::Failure;
 use crate::lattice::Root;
@@ -110,9 +110,6 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
     }
     Ok(trees)
 }
-
-/// Lengths of a tree in integer coordinates, in the versions of p4est.
-const LENGTHS: [i64; 3] = [1 << 19, 1 << 29, 1 << 30];
 
 /// Adds the quadrants of a tree, which are complete: each begins where the one before it ends, on the Morton curve.
 fn add_tree(quadrants: &[Quadrant], tree: &Root, cells: &mut Cells) -> Result<(), Failure> {
