@@ -150,15 +150,9 @@ impl Case {
         };
         let (facets_lattice, seeds) = (on_lattice(&root, &facets)?, file.seeds.clone());
         let case = Self { name, solids: Vec::new(), facets, facets_lattice, seeds, rules };
-        case.refuse_crossing_seeds()?;
-        Ok(case)
-    }
-
-    /// Refuses a seed in a crossing leaf of T0.
-    fn refuse_crossing_seeds(&self) -> Result<(), String> {
-        for (i, (&seed, at)) in self.rules.seeds.iter().zip(&self.seeds).enumerate() {
-            if let (leaf, Some(facet)) = self.base_leaf_at(seed, &self.facets_lattice) {
-                let leaf = self.root.place(leaf);
+        for (i, (&seed, at)) in case.rules.seeds.iter().zip(&case.seeds).enumerate() {
+            if let (leaf, Some(facet)) = case.base_leaf_at(seed, &case.facets_lattice) {
+                let leaf = root.place(leaf);
                 return Err(format!(
                     "seed {i} at {} lies in the crossing leaf {leaf}, which facet {facet} crosses; move it away \
                      from the surface",
@@ -166,7 +160,7 @@ impl Case {
                 ));
             }
         }
-        Ok(())
+        Ok(case)
     }
 
     /// The manifest of a mesh of this case, without leaves.
@@ -188,13 +182,9 @@ fn root(file: &CaseFile, facets: &[Facet]) -> Result<Root, String> {
     }
     let scale = file.root_scale.unwrap_or(ROOT_SCALE_DEFAULT);
     positive("root_scale", scale)?;
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for vertex in facets.as_flattened() {
-        for a in 0..3 {
-            low[a] = low[a].min(f64::from(vertex[a]));
-            high[a] = high[a].max(f64::from(vertex[a]));
-        }
-    }
+    let along = |a: usize| facets.as_flattened().iter().map(move |vertex| f64::from(vertex[a]));
+    let low = [0, 1, 2].map(|a| along(a).fold(f64::INFINITY, f64::min));
+    let high = [0, 1, 2].map(|a| along(a).fold(f64::NEG_INFINITY, f64::max));
     let longest = (0..3).map(|a| high[a] - low[a]).fold(f64::NEG_INFINITY, f64::max);
     if longest <= 0.0 {
         return Err("the body has no extent from which to compute a root; give a [root]".to_owned());

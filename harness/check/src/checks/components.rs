@@ -90,15 +90,14 @@ fn decided(
 /// level and then by key. The words are sorted leaves that do not overlap.
 pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(words.len());
-    for (i, &w) in words.iter().enumerate().filter(|(_, w)| !crossing(**w)) {
+    let free = || (0..).zip(words).filter(|(_, w)| !crossing(**w));
+    for (i, &w) in free() {
         for j in coarse_neighbours(words, &word::octant(w)).filter(|&j| !crossing(words[j])) {
-            sets.union(i as u32, j as u32);
+            sets.union(i, j as u32);
         }
     }
-    let mut members: Vec<(u32, u8, u32)> = Vec::new();
-    for (i, &w) in words.iter().enumerate().filter(|(_, w)| !crossing(**w)) {
-        members.push((sets.root(i as u32), word::level(w), i as u32));
-    }
+    let mut members: Vec<(u32, u8, u32)> =
+        free().map(|(i, &w)| (sets.root(i), word::level(w), i)).collect();
     members.sort_unstable();
     let groups = members.chunk_by(|a, b| a.0 == b.0);
     groups.map(|group| group.iter().map(|&(_, _, i)| i).collect()).collect()
