@@ -154,7 +154,6 @@ pub struct MeshArguments {
 }
 
 /// A leaf-set directory. One that was made is deleted with this value.
-#[derive(Debug)]
 pub struct Meshed {
     /// The directory.
     pub dir: PathBuf,

@@ -9,14 +9,12 @@ use crate::lattice::{FacetLattice, bounds, difference, dot, normal};
 use rustc_hash::FxHashMap;
 
 /// Facets, binned into one grid per axis.
-#[derive(Debug)]
 pub struct Parity {
     facets: Vec<FacetLattice>,
     grids: [Grid; 3],
 }
 
 /// Facets binned by their projection along one axis: a cell lists every facet whose projected bounding box meets it.
-#[derive(Debug)]
 struct Grid {
     /// Width of a cell, at least 1.
     width: [i64; 2],

@@ -1,7 +1,6 @@
 //! Disjoint sets of the numbers from 0 on. Each is represented by its least member.
 
 /// The sets.
-#[derive(Debug)]
 pub struct Sets(Vec<u32>);
 
 impl Sets {

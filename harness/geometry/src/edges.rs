@@ -40,7 +40,6 @@ pub struct EdgeCounts {
 }
 
 /// Vertices by number, and the facets at every edge.
-#[derive(Debug)]
 pub struct Edges {
     /// Vertex numbers of every facet, in ascending order of coordinate bits.
     pub corners: Vec<[u32; 3]>,

@@ -45,7 +45,6 @@ impl Shell {
 }
 
 /// The shells of a geometry.
-#[derive(Debug)]
 pub struct Shells {
     /// All shells, in the order of their first facets.
     pub all: Vec<Shell>,

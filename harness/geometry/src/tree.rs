@@ -12,7 +12,6 @@ use parry3d_f64::shape::{Segment, Triangle};
 use std::cell::RefCell;
 
 /// The facets. Those without area count too: they cross leaves like all others.
-#[derive(Debug)]
 pub struct FacetTree {
     triangles: Vec<Triangle>,
     boxes: Bvh,

@@ -27,7 +27,6 @@ use std::process::Command;
 use std::time::Duration;
 
 /// A mesh that was read.
-#[derive(Debug)]
 pub enum Imported {
     /// Its leaves are in memory.
     Words {

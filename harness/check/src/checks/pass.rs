@@ -15,7 +15,6 @@ use contract::tree::{Builder, Tree};
 use contract::word;
 
 /// What the pass found.
-#[derive(Debug)]
 pub(crate) struct Pass {
     /// The manifest's entries about leaves, as they should be; it has no others.
     pub(crate) tally: Manifest,

@@ -14,7 +14,6 @@ use contract::sets::Sets;
 type Place = (usize, usize);
 
 /// How the trees are glued.
-#[derive(Debug)]
 pub struct Topology {
     /// 2 or 3.
     pub dimension: usize,
@@ -131,10 +130,8 @@ impl Topology {
     /// p4est asks for lists of the edges and corners at which trees meet that are no neighbours there across a face, or at a corner across
     /// a face or an edge. Where one is missing, p4est neither balances over it nor, sometimes, over the faces beside it. An edge that meets itself
     /// in the opposite direction is a mistake in most connectivities.
-    fn remarks(
-        &self,
-        &Connectivity { trees, ref edges, ref corners, .. }: &Connectivity,
-    ) -> String {
+    fn remarks(&self, connectivity: &Connectivity) -> String {
+        let &Connectivity { trees, ref edges, ref corners, .. } = connectivity;
         let is_in = |lists: &Lists, at: usize| lists.of_tree.get(at).is_some_and(|&list| list >= 0);
         let is_unlisted_edge = |&(tree, edge): &Place| {
             let mut near: Vec<Place> = self.edges_across((tree, edge)).collect();

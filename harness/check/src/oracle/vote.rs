@@ -15,7 +15,6 @@ pub struct Answer {
 }
 
 /// All answers about the points.
-#[derive(Debug)]
 pub struct Ballot<'a> {
     /// Whether each point lies inside by the mesh.
     pub mesh: &'a [bool],

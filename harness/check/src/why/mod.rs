@@ -45,7 +45,6 @@ pub fn body(case: &Case, of_mesh: &Manifest) -> Result<Truth, String> {
 }
 
 /// A mesh with the inputs that explain it.
-#[derive(Debug)]
 pub struct Mesh<'a> {
     tree: &'a Tree,
     pub(crate) inputs: Manifest,

@@ -19,7 +19,6 @@ use std::path::Path;
 const TREE: &str = "mesh.vtkhdf";
 
 /// A tree, and the manifest of its leaves.
-#[derive(Debug)]
 pub struct ImportedTree {
     tree: TreeFile,
     /// The manifest, without parts.

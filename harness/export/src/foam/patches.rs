@@ -16,7 +16,6 @@ const BODY: &str = "body";
 pub const CUT: &str = "cut";
 
 /// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
-#[derive(Debug)]
 pub struct Patches {
     /// The names, unique.
     pub names: Vec<String>,

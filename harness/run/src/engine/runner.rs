@@ -35,7 +35,6 @@ pub struct Engine {
 }
 
 /// A completed run.
-#[derive(Debug)]
 pub struct Completed {
     /// Its report; values that are missing from it were measured from outside.
     pub report: RunReport,

@@ -17,7 +17,6 @@ use contract::watch::Watch;
 use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.
-#[derive(Debug)]
 pub(super) struct CaseRun<'a> {
     pub all: &'a Verification<'a>,
     pub selected: &'a Selected,

@@ -32,7 +32,6 @@ const DOUBT: &str = "it is unknown whether the ranks communicate: no run report 
 const HANGS_MAX: usize = 3;
 
 /// A run that ended well, and its mesh.
-#[derive(Debug)]
 pub(super) struct Meshed {
     /// Its measurements.
     pub run: Run,

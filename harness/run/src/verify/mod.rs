@@ -82,7 +82,6 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
 }
 
 /// What the verifications of all cases share.
-#[derive(Debug)]
 struct Verification<'a> {
     options: &'a Options,
     programs: &'a Programs,
@@ -127,7 +126,6 @@ fn leave(place: &Path, keep: bool) {
 const MARKER: &str = "made-by-harness-verify";
 
 /// The directory of all cases.
-#[derive(Debug)]
 struct Workplace {
     root: PathBuf,
     temporary: Option<TempDir>,
