@@ -60,7 +60,7 @@ fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Opti
     let tree = Tree::of_words(&s.mesh.words);
     let fit = |&w: &u64| {
         word::level(w) < LEVEL_MAX
-            && predicate(coarser_neighbours(&mutant::neighbourhood(&tree, w)))
+            && predicate(coarser_neighbours(&Neighbourhood::of(&tree, word::octant(w))))
     };
     Some(split(&s.mesh.words, s.mesh.words.iter().position(fit)?))
 }

@@ -4,6 +4,7 @@ use super::mutant::{
     self, AUDITED, INFORMED, Mutant, changed, has_side, middle, sets, sibling_groups, split, words,
 };
 use contract::manifest::Keep;
+use contract::neighbourhood::Neighbourhood;
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 use contract::tree::{HOLES, Tree};
 use contract::word::{self, Side};
@@ -65,7 +66,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let tree = Tree::of_words(&s.mesh.words);
         let near_surface = HOLES | 1 << Side::Crossing as u8;
         let away = |w: u64| {
-            let around = mutant::neighbourhood(&tree, w);
+            let around = Neighbourhood::of(&tree, word::octant(w));
             word::level(w) < s.case.level_surface
                 && around.handles.iter().all(|&h| tree.kinds(h) & near_surface == 0)
         };

@@ -7,9 +7,7 @@ use std::path::Path;
 use super::SelftestCase;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree as Kind};
-use contract::neighbourhood::Neighbourhood;
 use contract::octant::CELLS_PER_EDGE;
-use contract::tree::Tree;
 use contract::word::{self, Leaf, Side};
 
 /// A way to corrupt a correct mesh.
@@ -217,11 +215,6 @@ pub(super) fn mirrored(words: &[u64]) -> Vec<u64> {
     let mut all: Vec<u64> = words.iter().map(mirror).collect();
     all.sort_unstable();
     all
-}
-
-/// The neighbourhood of a leaf in a mesh.
-pub(super) fn neighbourhood(tree: &Tree, word: u64) -> Neighbourhood {
-    Neighbourhood::of(tree, word::octant(word))
 }
 
 #[cfg(test)]

@@ -5,10 +5,11 @@
 
 use super::SelftestCase;
 use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, Mutation, changed, has_side, sets, with_side, words,
+    AUDITED, INFORMED, Mutant, Mutation, changed, has_side, sets, with_side, words,
 };
 use crate::checks::components;
 use contract::manifest::{Components, Keep};
+use contract::neighbourhood::Neighbourhood;
 use contract::tree::Tree;
 use contract::word::{self, Side};
 
@@ -29,7 +30,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         let outside = 1 << Side::Outside as u8;
         // Leaves of the same component surround it.
         let deep = |w: u64| {
-            let around = mutant::neighbourhood(&tree, w);
+            let around = Neighbourhood::of(&tree, word::octant(w));
             has_side(w, Side::Outside)
                 && around.handles.iter().all(|&h| tree.kinds(h) & !outside == 0)
         };
