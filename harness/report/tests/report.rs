@@ -179,7 +179,7 @@ fn every_figure_has_its_values_and_its_axis_for_latex() {
         std::fs::read_to_string(place.path().join("figures").join(format!("{name}.csv"))).unwrap()
     };
     let balance = bars("balance-uav-4M-64");
-    assert!(balance.contains(",2,morton former,mesher: cells,measured\n"), "{balance}");
+    assert!(balance.contains(",2,morton former,cells,measured\n"), "{balance}");
     let load = std::fs::read_to_string(place.path().join("figures/per-rank-uav-64.csv")).unwrap();
     assert!(has_row(&load, "63", ",useful time,projected"), "{load}");
 }
@@ -214,8 +214,8 @@ fn two_programs_are_never_in_one_series() {
         }
     }
     assert!(has_row(&read("speedup-other-uav-50M"), "64", "other; projected,projected"));
-    assert!(has_row(&read("efficiency-weak-other-uav"), "64", "other: global,projected"));
-    assert!(read("phases-weak-other-uav").contains(",64,other: grade,projected\n"));
+    assert!(has_row(&read("efficiency-weak-other-uav"), "64", "global,projected"));
+    assert!(read("phases-weak-other-uav").contains(",64,grade,projected\n"));
     let page = std::fs::read_to_string(&written.page).unwrap();
     assert!(page.contains("Speedup: uav by other") && page.contains("uav by mesher"), "{page}");
     assert!(page.contains("other does not provide: MPI"), "{page}");
