@@ -103,7 +103,7 @@ pub fn tex(numbers: &[Number]) -> String {
 
 /// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths.
 const NOT_READ: [&str; 3] = [
-    r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
+    r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
     r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
 ];
@@ -267,7 +267,7 @@ mod tests {
         let findings = |text: &str| check(text, &record).findings;
         let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\%\n\
-                     \\defresult{a/time}{1.234}{1.10--1.30}{s}";
+                     \\pgfplotsset{compat=1.16} \\defresult{a/time}{1.234}{1.10--1.30}{s}";
         assert_eq!(check(right, &record), Checked { compared: 7, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),

@@ -266,13 +266,13 @@ fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
         }
         false => "Their depth is automatic, so that no partition here is the paper's.",
     };
-    let (millions, cells) = (cells as f64 / 1e6, grouped(cells));
+    let (label, cells) = (cells_label(cells), grouped(cells));
     let caption = format!(
         "Load imbalance λ = max/mean of the number of cells per rank: {subject}, {cells} cells on {ranks} simulated ranks, by the partitioner of the base \
          tree and the weights of its leaves. {baseline} The counts repeat exactly."
     );
     let names = of.iter().map(|g| g.setup.division()).collect();
-    let id = format!("balance-{}-{millions:.0}M-{ranks}", subject.file());
+    let id = format!("balance-{}-{label}-{ranks}", subject.file());
     let title = format!(
         "Load imbalance of cells by weights and partitioner: {subject}, {cells} cells, {ranks} ranks"
     );

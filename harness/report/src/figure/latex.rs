@@ -71,7 +71,7 @@ pub fn tex(figure: &Figure) -> String {
     let kind = if figure.y.names.is_empty() { "" } else { "xbar stacked, bar width=8pt, " };
     let columns = if longest(figure.series.iter().map(|s| &s.name)) > NAME_MAX { 1 } else { 2 };
     // Of the width, pgfplots keeps 45 pt for labels of four digits.
-    let beyond = (4.2 * longest(&figure.y.names) as f64 - 14.0).max(4.0);
+    let beyond = (4.2 * longest(y.ticks.iter().map(|tick| &tick.1)) as f64 - 14.0).max(4.0);
     let _ = writeln!(
         out,
         "\\begin{{axis}}[\n  width=\\linewidth-{beyond:.0}pt, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
