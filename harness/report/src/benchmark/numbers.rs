@@ -266,8 +266,8 @@ mod tests {
         let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
         let findings = |text: &str| check(text, &record).findings;
         let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
-                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\%\n\
-                     \\pgfplotsset{compat=1.16} \\defresult{a/time}{1.234}{1.10--1.30}{s}";
+                     \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\
+                     \\defresult{a/time}{1.234}{1.10--1.30}{s}";
         assert_eq!(check(right, &record), Checked { compared: 7, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
