@@ -170,15 +170,17 @@ impl Quantity {
         GateFinding::noted(case, &self.metric, verdict, note).of_values(self.times())
     }
 
-    /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), and of the same
-    /// sign in both measurements. "Unchanged" requires that an effect of `effect_wanted` would have been detected, lies outside the
+    /// A change is significant, larger than both the noise floor and the effects of code alignment (`effect_min`), of the same
+    /// sign in both measurements, and the interval of the second is beyond 0. "Unchanged" requires that an effect of `effect_wanted` would have been detected, lies outside the
     /// interval, and that no significant effect was seen.
     fn verdict(&self, rules: &TimeRules) -> Verdict {
         let found = &self.found;
         let (least, wanted) = (rules.effect_min / 100.0, rules.effect_wanted / 100.0);
         let level = if self.first.is_some() { rules.alpha } else { rules.alpha.sqrt() };
         let is_significant = found.p <= level && size(found.effect) > least;
-        let is_confirmed = self.first.is_none_or(|first| (first > 0.0) == (found.effect > 0.0));
+        let is_sure = found.low > 0.0 || found.high < 0.0;
+        let is_confirmed =
+            self.first.is_none_or(|first| is_sure && (first > 0.0) == (found.effect > 0.0));
         if is_significant && size(found.effect) > found.floor && is_confirmed {
             return if found.effect > 0.0 { Verdict::Regression } else { Verdict::Improvement };
         }
@@ -226,6 +228,7 @@ mod tests {
         assert_eq!(twice(Comparison { effect: 0.0, p: 1.0, ..found }), Verdict::Unchanged);
         assert_eq!(twice(Comparison { effect: -0.08, ..found }), Verdict::Inconclusive);
         assert_eq!(twice(Comparison { floor: 0.09, ..found }), Verdict::Inconclusive);
+        assert_eq!(twice(Comparison { low: -0.006, ..found }), Verdict::Inconclusive);
     }
 
     proptest! {
