@@ -246,9 +246,12 @@ fn bars(name: &str, how: Provenance, style: usize, lengths: impl Iterator<Item =
     Series::new(name, how, style, points).drawn_as(Kind::Bars)
 }
 
-/// Load imbalance of cells of one mesh for weights and partitioners; `None` if some run did not count them.
+/// Load imbalance of cells of one mesh for weights and partitioners; `None` on one rank, or if some run did not count them.
 fn balance(subject: Subject, of: &[&Group]) -> Option<Figure> {
     let (cells, ranks) = (of[0].cells(), of[0].setup.ranks);
+    if ranks == 1 {
+        return None;
+    }
     let lambda = |g: &&Group| Some(g.typical.counters.get("leaves")?.lambda(ranks));
     let lambdas: Vec<f64> = of.iter().map(lambda).collect::<Option<_>>()?;
     let ends = (-0.5, of.len() as f64 - 0.5);
