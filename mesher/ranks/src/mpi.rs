@@ -8,7 +8,6 @@
 
 mod stall;
 
-use crate::launch::launcher;
 use crate::{Comm, Gathered, MessageBuffer, Metered};
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
@@ -52,27 +51,6 @@ pub fn join() -> Box<dyn Comm> {
         odd: Cell::new(false),
         _universe: universe,
     }))
-}
-
-/// Refuses a communicator that is not the whole job: with another MPI's launcher, every process would be a job of its own.
-///
-/// # Errors
-/// If the launcher has started another number of ranks than the MPI library sees, in a sentence.
-pub fn check_size(comm: &dyn Comm) -> Result<(), String> {
-    let library = mpi::environment::library_version();
-    check(launcher(), comm.size(), library.as_deref().unwrap_or("of unknown version"))
-}
-
-fn check(launcher: Option<(&str, usize)>, size: usize, library: &str) -> Result<(), String> {
-    // Some libraries go on for pages.
-    let first = library.split(['\n', ',']).next().unwrap_or_default();
-    let library = first.split_whitespace().collect::<Vec<_>>().join(" ");
-    match launcher {
-        Some((name, ranks)) if ranks != size => Err(format!(
-            "{name} has started {ranks} ranks, but the MPI library of this mesher, {library}, sees {size}: use the mpirun of that library"
-        )),
-        _ => Ok(()),
-    }
 }
 
 /// Ends all ranks of the job at once.
@@ -216,20 +194,5 @@ fn complete<'a, D: ?Sized, S: Scope<'a>>(watch: &Watch, mut request: Request<'a,
     while let Err(pending) = request.test() {
         watch.poll();
         request = pending;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_communicator_of_another_size_than_the_job_is_refused_with_both_names() {
-        let library = "MPICH Version:\t4.0.2\nMPICH Release date";
-        let message = check(Some(("Open MPI's mpirun", 3)), 1, library).unwrap_err();
-        let expected = "Open MPI's mpirun has started 3 ranks, but the MPI library of this mesher, MPICH Version: 4.0.2, sees 1: \
-                        use the mpirun of that library";
-        assert_eq!(message, expected);
-        assert!(check(Some(("srun", 3)), 3, library).is_ok() && check(None, 1, library).is_ok());
     }
 }
