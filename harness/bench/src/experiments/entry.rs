@@ -146,6 +146,13 @@ pub struct Network {
     pub measured: bool,
 }
 
+impl Network {
+    /// Returns the time of a rank's messages, in seconds.
+    pub(crate) fn time_s(&self, messages: f64, bytes: f64) -> f64 {
+        messages * self.latency_s + bytes / self.bandwidth_bytes_per_s
+    }
+}
+
 /// How the ranks of a run communicate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -9,6 +9,7 @@ pub mod entry;
 pub mod execute;
 pub mod group;
 pub mod machine;
+pub mod model;
 pub mod network;
 pub mod number;
 pub mod pop;

@@ -79,7 +79,7 @@ const ROUNDING_S: f64 = 1e-6;
 
 /// Returns the modelled time of a phase's messages on one rank, in seconds.
 fn messages_s(phase: &Phase, network: &Network) -> f64 {
-    phase.messages.max * network.latency_s + phase.message_bytes.max / network.bandwidth_bytes_per_s
+    network.time_s(phase.messages.max, phase.message_bytes.max)
 }
 
 /// Returns the time of a phase on its slowest rank in seconds: measured, or projected with its messages for simulated ranks.

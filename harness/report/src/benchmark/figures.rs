@@ -1,7 +1,7 @@
 //! Figures over cells: run time (counterparts of the paper's Figures 17 and 18), rate and memory. All numbers of the paper are those of `reports/paper.md`.
 
 use super::groups::{OWN, Subject, cited, is_counterpart, point, provenance, repetitions};
-use super::scaling;
+use super::{models, scaling};
 use crate::figure::{Axis, Figure, Provenance, Series};
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
@@ -21,6 +21,7 @@ pub fn figures(groups: &Groups) -> Vec<Figure> {
     let mut all: Vec<Figure> = of("spacing").iter().map(|(of, all)| by_spacing(of, all)).collect();
     all.extend(of("layers").iter().map(|(of, all)| by_layers(of, all)));
     all.extend(scaling::figures(groups));
+    all.extend(models::figures(groups));
     // Wall times are meaningful with at most one rank per core.
     let is_compared = |g: &Group| match g.setup.experiment.as_str() {
         "spacing" => provenance(g) == Provenance::Measured,

@@ -2,6 +2,7 @@
 
 mod figures;
 mod groups;
+mod models;
 pub mod numbers;
 mod page;
 mod scaling;
@@ -56,6 +57,9 @@ pub fn report(directory: &Path, lines: &[Line]) -> io::Result<Written> {
     write(&directory.join("figures.tex"), latex::fragment(&figures))?;
     let numbers = numbers(&groups);
     write(&directory.join("numbers.tex"), numbers::tex(&numbers))?;
+    let models: String = models::tables(&groups).iter().map(latex::table).collect();
+    write(&directory.join("models.tex"), models)?;
+    write(&directory.join("models.csv"), models::csv(&groups))?;
     Ok(Written { page, figures: figures.len(), notes: groups.notes, broken, numbers })
 }
 

@@ -1,6 +1,7 @@
 //! The tables of a record, for the page of a report and as text.
 
 use super::groups::Subject;
+use super::models;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
@@ -8,13 +9,14 @@ use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, above_one, phase_s};
 use bench::order::{by_key, distinct};
 
-/// All tables: experiments, projections, phases, programs.
+/// All tables: experiments, projections, phases, models, programs.
 pub fn tables(groups: &Groups) -> Vec<Table> {
     let experiments = distinct(groups.all.iter().map(|group| group.setup.experiment.as_str()));
     let mut all: Vec<Table> =
         experiments.into_iter().map(|name| experiment(groups, name)).collect();
     all.push(projections(groups));
     all.extend(largest(groups).into_iter().map(phases));
+    all.extend(models::tables(groups));
     all.extend(groups.comparisons().iter().map(programs));
     all.retain(|table| !table.rows.is_empty());
     all

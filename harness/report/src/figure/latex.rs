@@ -4,6 +4,7 @@ use super::axes::{SUPERSCRIPTS, Scale};
 use super::canvas::COLOURS;
 use super::svg::MARKERS;
 use super::{Axis, Figure, Kind, Point, Provenance, Series};
+use crate::table::Table;
 use std::fmt::Write;
 
 /// What a document needs before it can include figures.
@@ -82,17 +83,28 @@ pub fn tex(figure: &Figure) -> String {
     );
     let plot = |(plot, s): (usize, &Series)| {
         let (style, id, name) = (s.style % COLOURS.len(), &figure.id, escape(&s.name));
-        let errors = if s.points.iter().all(|p| p.low == p.high) { "" } else { ERRORS };
+        let has_bars =
+            s.provenance != Provenance::Modelled && s.points.iter().any(|p| p.low < p.high);
+        let errors = if has_bars { ERRORS } else { "" };
         match (s.kind, &s.points[..]) {
             (Kind::Line, [Point { x, .. }, ..]) => format!(
                 "\\draw[style{style}] ({{axis cs:{x},0}}|-{{rel axis cs:0,0}}) -- ({{axis cs:{x},0}}|-{{rel axis cs:0,1}});\n\
                  \\addlegendimage{{legend image code/.code={{\\draw[style{style}] (0pt,0pt) -- (15pt,0pt);}}}}\n\\addlegendentry{{{name}}}\n"
             ),
-            _ => format!(
-                "\\addplot[{}] table[col sep=comma, comment chars={{\\#}}, restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, \
-                 x=x, y=y{errors}] {{\\figures/{id}.csv}};\n\\addlegendentry{{{name}}}\n",
-                plot_options(s)
-            ),
+            _ => {
+                let drawn = |options: &str, y: &str, errors: &str| {
+                    format!(
+                        "\\addplot[{options}] table[col sep=comma, comment chars={{\\#}}, \
+                         restrict expr to domain={{\\thisrow{{plot}}}}{{{plot}:{plot}}}, x=x, y={y}{errors}] {{\\figures/{id}.csv}};\n"
+                    )
+                };
+                let edge = format!("style{style}, densely dotted, no marks, forget plot");
+                let values = match s.provenance {
+                    Provenance::Modelled => ["low", "high"].map(|y| drawn(&edge, y, "")).concat(),
+                    _ => String::new(),
+                } + &drawn(&plot_options(s), "y", errors);
+                format!("{values}\\addlegendentry{{{name}}}\n")
+            }
         }
     };
     out.extend(figure.series.iter().enumerate().map(plot));
@@ -113,6 +125,7 @@ fn plot_options(s: &Series) -> String {
             format!("fill=style{style}{tint}, draw=style{style}")
         }
         (_, Provenance::Bound) => "black, densely dotted, no marks".to_owned(),
+        (_, Provenance::Modelled) => format!("style{style}, solid, no marks"),
         _ => format!(
             "style{style}, {line}, mark={mark}, error bars/.cd, y dir=both, y explicit, error bar style={{solid}}"
         ),
@@ -152,6 +165,20 @@ pub fn fragment(figures: &[Figure]) -> String {
     )
 }
 
+/// A table with its title and remarks, for `\\input` in a document. It may be longer than a page.
+pub fn table(table: &Table) -> String {
+    let row = |fields: Vec<String>| fields.join(" & ") + " \\\\\n";
+    let head = row(table.columns.iter().map(|title| escape(&title.replace('\n', " "))).collect());
+    let rows = table.rows.iter().map(|fields| row(fields.iter().map(|f| escape(f)).collect()));
+    let columns = "p{0.2\\linewidth}".repeat(table.columns.len());
+    format!(
+        "\n\\subsection*{{{}}}\n{{\\footnotesize\\raggedright\n\\begin{{tabular}}{{{columns}}}\n\\hline\n{head}\\hline\n{}\\hline\n\\end{{tabular}}\\par\n{}}}\n",
+        escape(&table.title),
+        rows.collect::<String>(),
+        table.notes.iter().map(|note| escape(note) + "\\par\n").collect::<String>()
+    )
+}
+
 /// The text with what is special to LaTeX escaped.
 fn escape(text: &str) -> String {
     let escaped = |c: char| match c {
@@ -168,6 +195,8 @@ fn escape(text: &str) -> String {
         'µ' => "$\\mu$".to_owned(),
         '×' => "$\\times$".to_owned(),
         '⁻' => "$^-$".to_owned(),
+        '√' => "$\\surd$".to_owned(),
+        '₂' => "$_2$".to_owned(),
         _ => match SUPERSCRIPTS.iter().position(|s| *s == c) {
             Some(digit) => format!("$^{digit}$"),
             None => c.to_string(),

@@ -67,12 +67,14 @@ pub enum Provenance {
     Cited,
     /// A theoretical bound, or a mean: a line without markers.
     Bound,
+    /// Of a model: a line without markers, whose intervals are an area around it.
+    Modelled,
 }
 
 impl Provenance {
     /// The word for legends and tables.
     pub fn word(self) -> &'static str {
-        ["measured", "oversubscribed", "projected", "cited", "bound"][self as usize]
+        ["measured", "oversubscribed", "projected", "cited", "bound", "modelled"][self as usize]
     }
 }
 

@@ -172,6 +172,17 @@ fn chart(
             continue;
         }
         chart.draw_series([path(points.clone(), s)]).expect(DRAWN);
+        if s.provenance == Provenance::Modelled {
+            let low = s.points.iter().map(|p| at(p.x, p.low));
+            let around = low.chain(s.points.iter().rev().map(|p| at(p.x, p.high))).collect();
+            chart
+                .draw_series([Polygon::<Place>::new::<Vec<Place>, _>(
+                    around,
+                    colour(s.style).mix(0.2),
+                )])
+                .expect(DRAWN);
+            continue;
+        }
         for p in s.points.iter().filter(|p| p.low < p.high) {
             let ends = [p.low, p.high].map(|value| at(p.x, value));
             chart.draw_series([PathElement::new(ends.to_vec(), line(s.style))]).expect(DRAWN);
@@ -220,7 +231,7 @@ fn path<'a, C: Clone + 'static>(
     s: &Series,
 ) -> DynElement<'static, SVGBackend<'a>, C> {
     let (style, dashes) = match (s.kind, s.provenance) {
-        (Kind::Line, _) | (_, Provenance::Measured) => (line(s.style), None),
+        (Kind::Line, _) | (_, Provenance::Measured | Provenance::Modelled) => (line(s.style), None),
         (_, Provenance::Bound) => (BLACK.stroke_width(3), Some((14, 10))),
         _ => (line(s.style), Some((22, 15))),
     };
@@ -231,12 +242,12 @@ fn path<'a, C: Clone + 'static>(
     }
 }
 
-/// Draws the marker of a series, filled or hollow; bounds have none.
+/// Draws the marker of a series, filled or hollow; bounds and models have none.
 fn marker(page: &Page, at: (i32, i32), s: &Series) {
     let (ink, is_filled) = (colour(s.style), s.provenance == Provenance::Measured);
     let corners = MARKERS[s.style % MARKERS.len()].iter().map(|c| (at.0 + c.0, at.1 + c.1));
     let mut corners: Vec<(i32, i32)> = corners.collect();
-    if s.provenance == Provenance::Bound {
+    if matches!(s.provenance, Provenance::Bound | Provenance::Modelled) {
         return;
     }
     if corners.is_empty() {

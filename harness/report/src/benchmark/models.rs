@@ -1,0 +1,152 @@
+//! Models of strong scaling on simulated ranks: their formulas, what they predicted of runs that they had not seen, and figures with bands.
+
+use super::groups::{Subject, by_subject, cells_label, range};
+use crate::figure::{Axis, Figure, Point, Provenance, Series};
+use crate::table::Table;
+use bench::experiments::entry::Comm;
+use bench::experiments::group::{Group, Groups};
+use bench::experiments::model::{At, Compared, Key, Kind, Tested};
+use bench::experiments::number::grouped;
+use bench::order::{by_key, distinct};
+
+/// Points of a model's line.
+const POINTS: usize = 40;
+/// Of the prediction beyond all runs.
+const FAR: At = At { cells: 1e12, ranks: 1e5, facets: 0.0 };
+
+/// Every model of a record, with its subject and its runs on several simulated ranks.
+fn models(groups: &Groups) -> Vec<(Subject<'_>, Vec<&Group>, Tested)> {
+    let mut models = Vec::new();
+    for (subject, all) in by_subject(groups, "strong") {
+        let sims = all.into_iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1);
+        for (_, of) in by_key(sims, |g| (g.setup.layer_cells_min, g.setup.division())) {
+            models.extend(Tested::of(&of).map(|model| (subject, of, model)));
+        }
+    }
+    models
+}
+
+/// A table of every model.
+pub fn tables(groups: &Groups) -> Vec<Table> {
+    models(groups).iter().map(|(subject, all, model)| table(*subject, all, model)).collect()
+}
+
+/// Formulas, and errors of what was held out.
+fn table(subject: Subject, all: &[&Group], model: &Tested) -> Table {
+    let errors = |key: &Key| {
+        let error = |c: &Compared| format!("{:+.0}", 100.0 * c.error());
+        let of: Vec<String> = model.held_out().filter(|c| c.key == *key).map(error).collect();
+        if of.is_empty() { "–".to_owned() } else { of.join(", ") }
+    };
+    let name = |key: &Key| match key.0 {
+        Kind::Phase => format!("seconds of {}", key.1),
+        _ => key.1.clone(),
+    };
+    let mut formulas = model.formulas();
+    formulas
+        .push(((Kind::Run, "run".into()), ["sum of phases and messages", "–"].map(str::to_owned)));
+    let table = Table::of(
+        format!("model of {subject}, n = {}", all[0].setup.layer_cells_min),
+        &formulas,
+        &[
+            ("quantity", &|(key, _)| name(key)),
+            ("mean of the ranks", &|(_, [mean, _])| mean.clone()),
+            ("max / mean", &|(_, [_, imbalance])| imbalance.clone()),
+            ("errors of\nheld-out\nmaxima / %", &|(key, _)| errors(key)),
+        ],
+    );
+    let fitted = model.fitted;
+    let runs = distinct(model.held_out().map(|c| (c.at.ranks as u64, c.at.cells as u64)));
+    let runs: Vec<String> =
+        runs.iter().map(|(p, n)| format!("{p} ranks ({} cells)", cells_label(*n))).collect();
+    let mut notes = vec![format!(
+        "N cells, F facets, p ranks. Fitted are runs on 2 to {fitted} simulated ranks; held out: {}.",
+        runs.join(", ")
+    )];
+    for (kind, what) in [
+        (Kind::Counter, "counters"),
+        (Kind::Phase, "times of phases"),
+        (Kind::Run, "times of runs"),
+    ] {
+        let (error, held, count) = model.summary(kind);
+        notes.push(format!(
+            "Held-out {what}: {:.1} % off in the median; {held} of {count} are in their bands of 90 %.",
+            100.0 * error
+        ));
+    }
+    let facets = all[0].typical.facets as f64;
+    let [low, value, high] = model.run_s(&At { facets, ..FAR }).map(|s| format!("{s:.2}"));
+    let parts = || all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
+    if parts().any(|cells| cells > FAR.cells / FAR.ranks) {
+        notes.push(format!(
+            "A prediction: {:.0e} cells on {} ranks take {value} s (band of 90 %: {low} to {high} s).",
+            FAR.cells,
+            grouped(FAR.ranks as u64)
+        ));
+    }
+    Table { notes, ..table }
+}
+
+/// All quantities of all runs that were modelled, one per line.
+pub fn csv(groups: &Groups) -> String {
+    let mut out =
+        "case,engine,kind,quantity,cells,ranks,held out,predicted,low,high,measured\n".to_owned();
+    for (subject, _, model) in models(groups) {
+        for Compared { key: (kind, name), at, predicted, measured } in &model.compared {
+            let width = model.width(*kind, at.ranks);
+            let (low, high) = (predicted / width, predicted * width);
+            let (Subject { case, engine, .. }, At { cells, ranks, .. }) = (subject, at);
+            let held_out = if *ranks > model.fitted { "yes" } else { "no" };
+            out += &format!(
+                "{case},{engine},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e}\n"
+            );
+        }
+    }
+    out
+}
+
+/// A figure of every model and mesh: run time over ranks.
+pub fn figures(groups: &Groups) -> Vec<Figure> {
+    let of_model = |(subject, all, model): &(Subject, Vec<&Group>, Tested)| {
+        let mut meshes = by_key(all.iter().copied(), |group| group.cells());
+        meshes.sort_by_key(|(cells, _)| *cells);
+        let figure = |(cells, of): &(u64, Vec<&Group>)| figure(*subject, *cells, of, model);
+        meshes.iter().map(figure).collect::<Vec<_>>()
+    };
+    models(groups).iter().flat_map(of_model).collect()
+}
+
+fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure {
+    let ends = [0, of.len() - 1].map(|i| (of[i].setup.ranks as f64).ln());
+    let modelled = |i: usize| {
+        let ranks = (ends[0] + (ends[1] - ends[0]) * i as f64 / (POINTS - 1) as f64).exp();
+        let at = At { cells: cells as f64, ranks, facets: of[0].typical.facets as f64 };
+        let [low, y, high] = model.run_s(&at);
+        Point { x: ranks, y, low, high }
+    };
+    let line = (0..POINTS).map(modelled).collect();
+    let fitted = model.fitted;
+    let (seen, held_out): (Vec<_>, Vec<_>) =
+        of.iter().partition(|group| group.setup.ranks as f64 <= fitted);
+    let points = |of: Vec<&&Group>| {
+        of.iter().map(|g| Point::exact(g.setup.ranks as f64, g.time_s.value)).collect()
+    };
+    let series = vec![
+        Series::new("model, band of 90 %", Provenance::Modelled, 0, line),
+        Series::new("fitted runs", Provenance::Projected, 0, points(seen))
+            .drawn_as(crate::figure::Kind::Scattered),
+        Series::new("held-out runs", Provenance::Projected, 1, points(held_out))
+            .drawn_as(crate::figure::Kind::Scattered),
+    ];
+    let caption = format!(
+        "Run time of {subject}, {} cells, n = {}, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: exact counters as laws \
+         of cells and ranks, and costs of the counters fitted by phase. Its band holds 90 % of such predictions in retrospect.",
+        grouped(cells),
+        of[0].setup.layer_cells_min,
+        range(of, |g| g.setup.ranks as u64)
+    );
+    let id = format!("model-{}-{}", subject.file(), cells_label(cells));
+    let title = format!("Model of the run time: {subject}, {} cells", grouped(cells));
+    let x = Axis { ticks: distinct(of.iter().map(|g| g.setup.ranks as f64)), ..Axis::log("ranks") };
+    Figure { id, title, caption, x, y: Axis::log("run time / s"), series, ..Figure::default() }
+}
