@@ -1,7 +1,7 @@
 (** Counts: the numbers of a manifest are those of the leaves. *)
 From Coq Require Import ZArith List Bool Lia Permutation.
 Import ListNotations.
-From Proof Require Import Statement Checker Octants Sizes Reading.
+From Proof Require Import Statement Checker Octants Reading.
 Open Scope Z_scope.
 
 Lemma number_app f l m : number f (l ++ m) = number f l + number f m.

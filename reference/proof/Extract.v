@@ -1,7 +1,7 @@
 (** The program as OCaml. These directives are trusted: that the functions of Coq on the left are those of OCaml on the right, for
     integers of 63 bits. [add], [sub] and [mul] wrap in both languages. What must not be extracted, because it is exact in Coq,
     is an assertion that fails. *)
-From Proof Require Import Statement Checker Causes Check.
+From Proof Require Import Statement Checker Check.
 From Coq Require Import Extraction ExtrOcamlBasic ZArith Bool.
 Extract Inductive positive => int
   [ "(fun p -> 1 + 2 * p)" "(fun p -> 2 * p)" "1" ]

@@ -1,7 +1,7 @@
 (** Flood: a leaf that is [Reached] is connected to where the flood started. *)
 From Coq Require Import ZArith List Bool Lia.
 Import ListNotations.
-From Proof Require Import Statement Checker Octants Sizes Faces.
+From Proof Require Import Statement Checker Octants Pairs.
 Open Scope Z_scope.
 
 Lemma same_eq k k' : same k k' = true <-> k = k'.

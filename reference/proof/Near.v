@@ -1,7 +1,7 @@
 (** Searches among subtrees that are near: what is found is a leaf of the tree at the distance that was asked for. *)
 From Coq Require Import ZArith List Bool Lia.
 Import ListNotations.
-From Proof Require Import Statement Checker Causes Octants Sizes Pairs Nested.
+From Proof Require Import Statement Checker Check Octants Pairs Unique.
 Open Scope Z_scope.
 
 Definition cube (x y z : Z) (h : nat) : leaf := Leaf x y z (19 - Z.of_nat h) Outside.

@@ -1,7 +1,7 @@
 (** Reading: a tree has exactly the leaves of the files from which it was made. *)
 From Coq Require Import ZArith List Bool Lia Permutation.
 Import ListNotations.
-From Proof Require Import Statement Checker Octants Sizes.
+From Proof Require Import Statement Checker Octants.
 Open Scope Z_scope.
 
 (** * Keys *)

@@ -1,7 +1,7 @@
 (** The theorem: what the program accepts is as Statement.v says. *)
 From Coq Require Import ZArith List Bool Lia Permutation Relations.
 Import ListNotations.
-From Proof Require Import Statement Checker Causes Check Octants Sizes Reading Pairs Faces Flood Counts Region Base Nested Unique Gradation.
+From Proof Require Import Statement Checker Check Octants Reading Pairs Flood Counts Base Unique Least.
 Open Scope Z_scope.
 Strategy expand [check check_inputs check_full check_base check_crossing check_graded].
 Strategy opaque [mark_sources served faces face flood rounds sweeps walk spot mark every overlay fine_tree rim wet look flat deep].
