@@ -1,13 +1,12 @@
-//! The shapes, one module each, with their dimensions and minimum numbers of facets.
+//! The shapes, with their dimensions and minimum numbers of facets.
 
 use crate::{Generator, GeneratorError, Mesh, Shape};
 
 mod aircraft;
 mod assembly;
+mod basic;
 mod implicit;
 mod pipe;
-mod round;
-mod slab;
 mod solids;
 
 /// The keys of the dimensions of a shape.
@@ -47,11 +46,11 @@ pub(crate) fn facets_least(shape: Shape) -> usize {
 /// fewer.
 pub(crate) fn draw(of: &Generator) -> Result<Mesh, GeneratorError> {
     match of.shape {
-        Shape::Cube => slab::cube(of),
-        Shape::Plate => slab::plate(of),
-        Shape::Sphere => round::sphere(of),
-        Shape::NestedSpheres => round::nested_spheres(of),
-        Shape::Torus => round::torus(of),
+        Shape::Cube => basic::cube(of),
+        Shape::Plate => basic::plate(of),
+        Shape::Sphere => basic::sphere(of),
+        Shape::NestedSpheres => basic::nested_spheres(of),
+        Shape::Torus => basic::torus(of),
         Shape::Pipe => pipe::pipe(of),
         Shape::Uav => implicit::draw::<aircraft::Uav>(of),
         Shape::Fighter => implicit::draw::<aircraft::Fighter>(of),

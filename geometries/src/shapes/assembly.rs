@@ -2,8 +2,7 @@
 //!
 //! Facets are distributed over the parts by surface area.
 
-use super::round::geodesic;
-use super::slab::slab;
+use super::basic::{geodesic, slab};
 use crate::{Generator, GeneratorError, Mesh};
 
 /// One closed surface of an assembly.

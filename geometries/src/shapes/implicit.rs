@@ -1,11 +1,16 @@
-//! Surfaces of solids that a distance function defines. The grid spacing is fitted to the number of
-//! facets.
+//! Surfaces of solids that a distance function defines: a closed surface of triangles from the function and a grid (marching
+//! tetrahedra), whose spacing is fitted to the number of facets.
+//!
+//! Each cube of the grid is divided into six tetrahedra around its diagonal. Every edge of a
+//! tetrahedron whose ends lie on different sides of the surface has one vertex, at the zero of the
+//! distance function along the edge, and each tetrahedron joins its vertices to triangles.
+//! Tetrahedra have no ambiguous cases, so the result is a closed manifold for every function: each
+//! edge of a triangle lies in a face shared by two tetrahedra.
 
 use super::solids::Vec3;
+use crate::mesh::EdgeHasher;
 use crate::{Generator, GeneratorError, Mesh};
-use grid::Drawing;
-
-mod grid;
+use std::collections::HashMap;
 
 /// A solid that can be drawn at any grid spacing.
 pub(super) trait Body {
@@ -69,6 +74,211 @@ fn fit<B: Body>(facets: usize) -> Mesh {
     unreachable!("a coarse enough grid has few enough facets")
 }
 
+/// Minimum radius of a part, in cells. A part thinner than the diagonal of a cell could lie between
+/// grid points.
+const RADIUS_LEAST: f64 = 0.95;
+
+/// Cells of the grid on every side of the bounds.
+const ROOM: f64 = 3.0;
+
+/// Minimum distance of a vertex from the ends of its edge, as a fraction of the edge, so that no
+/// triangle degenerates.
+const MARGIN: f64 = 0.05;
+
+/// Cells along the edge of a block, the unit of sampling.
+const BLOCK: usize = 4;
+
+/// A surface under construction.
+struct Drawing<B> {
+    body: B,
+    low: Vec3,
+    spacing: f64,
+    mesh: Mesh,
+    /// Vertex indices by grid edge: its lower end, 20 bits per coordinate, and its direction, 3
+    /// bits.
+    indices: HashMap<u64, u32, EdgeHasher>,
+}
+
+/// The integer coordinates of a grid point.
+type GridPoint = [usize; 3];
+
+impl<B: Body> Drawing<B> {
+    /// The surface on a grid with this spacing.
+    fn of(spacing: f64) -> Mesh {
+        // A thickened part may extend one radius beyond the bounds.
+        let room = ROOM * spacing;
+        let [low, high] = B::BOUNDS;
+        let widest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max) + 2.0 * room;
+        let mut cells = BLOCK;
+        while (cells as f64) * spacing < widest {
+            cells *= 2;
+        }
+        assert!(cells < 1 << 20, "grid coordinates have 20 bits");
+        let body = B::new(spacing * RADIUS_LEAST);
+        let mut drawing = Self {
+            body,
+            low: low.map(|x| x - room),
+            spacing,
+            mesh: Mesh::default(),
+            indices: HashMap::default(),
+        };
+        drawing.visit([0; 3], cells);
+        drawing.mesh
+    }
+
+    fn position(&self, point: GridPoint) -> Vec3 {
+        std::array::from_fn(|a| self.low[a] + point[a] as f64 * self.spacing)
+    }
+
+    /// Samples the blocks within a cube of the grid that may contain surface. A cube contains none
+    /// if the distance at its centre exceeds half its diagonal.
+    fn visit(&mut self, origin: GridPoint, cells: usize) {
+        let half = cells as f64 * 0.5 * self.spacing;
+        let centre = self.position(origin).map(|x| x + half);
+        let reach = half * 1.7321;
+        if self.body.distance(centre).abs() > reach {
+            return;
+        }
+        if cells == BLOCK {
+            return self.block(origin);
+        }
+        for octant in 0..8 {
+            let half = cells / 2;
+            self.visit(std::array::from_fn(|a| origin[a] + half * (octant >> a & 1)), half);
+        }
+    }
+
+    fn block(&mut self, origin: GridPoint) {
+        const POINTS: usize = BLOCK + 1;
+        let mut values = [0.0; POINTS * POINTS * POINTS];
+        let index = |[x, y, z]: GridPoint| (z * POINTS + y) * POINTS + x;
+        for z in 0..POINTS {
+            for y in 0..POINTS {
+                for x in 0..POINTS {
+                    let sample = [origin[0] + x, origin[1] + y, origin[2] + z];
+                    values[index([x, y, z])] = self.body.distance(self.position(sample));
+                }
+            }
+        }
+        for z in 0..BLOCK {
+            for y in 0..BLOCK {
+                for x in 0..BLOCK {
+                    let corners: [f64; 8] = std::array::from_fn(|mask| {
+                        values[index([x + (mask & 1), y + (mask >> 1 & 1), z + (mask >> 2)])]
+                    });
+                    let inside = corners.iter().filter(|&&value| value < 0.0).count();
+                    if inside % 8 != 0 {
+                        self.cube([origin[0] + x, origin[1] + y, origin[2] + z], &corners);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Draws the six tetrahedra of a cube. The bits of a corner's index are its offset along the
+    /// axes. A tetrahedron is a path from corner 0 to corner 7 that sets one bit at a time.
+    fn cube(&mut self, origin: GridPoint, corners: &[f64; 8]) {
+        for (first, second, is_even) in
+            [(1, 2, true), (2, 4, true), (4, 1, true), (2, 1, false), (4, 2, false), (1, 4, false)]
+        {
+            self.tetrahedron(origin, corners, [0, first, first | second, 7], is_even);
+        }
+    }
+
+    /// Draws one tetrahedron. `is_even` is whether its four corners, in this order, are positively
+    /// oriented.
+    fn tetrahedron(
+        &mut self,
+        origin: GridPoint,
+        values: &[f64; 8],
+        masks: [usize; 4],
+        is_even: bool,
+    ) {
+        let inside = masks.map(|mask| values[mask] < 0.0);
+        // The permutation is even, so it preserves the orientation.
+        let Some((order, count)) = inside_first(inside) else {
+            return;
+        };
+        let [a, b, c, d] = order.map(|i| masks[i]);
+        let mut vertex = |from: usize, to: usize| self.vertex(origin, values, from, to);
+        let corners = match count {
+            1 => [vertex(a, b), vertex(a, c), vertex(a, d), 0],
+            2 => [vertex(a, c), vertex(a, d), vertex(b, d), vertex(b, c)],
+            _ => [vertex(a, d), vertex(b, d), vertex(c, d), 0],
+        };
+        let [p, q, r, s] = corners;
+        let mut triangle = |p, q, r| {
+            self.mesh.triangles.push(if is_even { [p, q, r] } else { [p, r, q] });
+        };
+        triangle(p, q, r);
+        if count == 2 {
+            triangle(p, r, s);
+        }
+    }
+
+    /// The vertex on the edge between two corners of a cube. The bits of one corner contain those
+    /// of the other.
+    fn vertex(&mut self, origin: GridPoint, values: &[f64; 8], from: usize, to: usize) -> u32 {
+        let (low, high) = (from & to, from | to);
+        let start: GridPoint = std::array::from_fn(|a| origin[a] + (low >> a & 1));
+        let direction = high ^ low;
+        let key = (start[2] as u64) << 43 | (start[1] as u64) << 23 | (start[0] as u64) << 3;
+        let key = key | direction as u64;
+        if let Some(&index) = self.indices.get(&key) {
+            return index;
+        }
+        let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
+        let (p, q) = (self.position(start), self.position(end));
+        let t = self.zero(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
+        let index = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
+        self.indices.insert(key, index);
+        index
+    }
+
+    /// The parameter in [0, 1] at which the distance is zero between two points on different sides,
+    /// by the Illinois variant of the false position method.
+    fn zero(&self, p: Vec3, q: Vec3, value_p: f64, value_q: f64) -> f64 {
+        let (mut low, mut high) = ((0.0, value_p), (1.0, value_q));
+        let mut t = 0.5;
+        for _ in 0..3 {
+            t = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+            let value = self.body.distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
+            if (value < 0.0) == (low.1 < 0.0) {
+                low = (t, value);
+                high.1 *= 0.5;
+            } else {
+                high = (t, value);
+                low.1 *= 0.5;
+            }
+        }
+        t
+    }
+}
+
+/// An even permutation of the four corners that puts those inside first, and the number of these, 1
+/// to 3. `None` if all corners are on one side.
+fn inside_first(inside: [bool; 4]) -> Option<([usize; 4], usize)> {
+    let mask = inside.iter().enumerate().fold(0, |mask, (i, &is)| mask | usize::from(is) << i);
+    let order = match mask {
+        0b0001 => [0, 1, 2, 3],
+        0b0010 => [1, 2, 0, 3],
+        0b0100 => [2, 0, 1, 3],
+        0b1000 => [3, 0, 2, 1],
+        0b0011 => [0, 1, 2, 3],
+        0b0101 => [0, 2, 3, 1],
+        0b1001 => [0, 3, 1, 2],
+        0b0110 => [1, 2, 0, 3],
+        0b1010 => [1, 3, 2, 0],
+        0b1100 => [2, 3, 0, 1],
+        0b0111 => [0, 1, 2, 3],
+        0b1011 => [0, 3, 1, 2],
+        0b1101 => [0, 2, 3, 1],
+        0b1110 => [1, 3, 2, 0],
+        _ => return None,
+    };
+    Some((order, mask.count_ones() as usize))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +306,27 @@ mod tests {
         assert!((mesh.volume() - 4.18879).abs() < 0.01);
         let euler = mesh.vertices.len() as i64 - mesh.triangles.len() as i64 / 2;
         assert_eq!(euler, 2);
+    }
+
+    #[test]
+    fn inside_corners_come_first_by_an_even_permutation() {
+        for mask in 1..15_usize {
+            let inside: [bool; 4] = std::array::from_fn(|i| mask >> i & 1 == 1);
+            let (order, count) = inside_first(inside).unwrap();
+            assert_eq!(count, mask.count_ones() as usize);
+            for (position, &corner) in order.iter().enumerate() {
+                assert_eq!(inside[corner], position < count, "mask {mask:04b}");
+            }
+            let mut seen = order;
+            seen.sort_unstable();
+            assert_eq!(seen, [0, 1, 2, 3]);
+            let inversions = (0..4)
+                .flat_map(|i| (i + 1..4).map(move |j| (i, j)))
+                .filter(|&(i, j)| order[i] > order[j])
+                .count();
+            assert_eq!(inversions % 2, 0, "mask {mask:04b}");
+        }
+        assert_eq!(inside_first([false; 4]), None);
+        assert_eq!(inside_first([true; 4]), None);
     }
 }
