@@ -1,5 +1,5 @@
 //! Quantisation of a case to the integer lattice, on which every geometric decision is exact.
-use crate::case::{Case, Enclosed, Keep, Root};
+use crate::case_file::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
 use crate::octant::{Extent, LEVEL_MAX, ROOT_EDGE};
 

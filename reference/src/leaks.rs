@@ -1,10 +1,10 @@
 //! Leaks between spacings: regions that are closed at a coarser spacing and open at that of the mesh.
 use crate::base;
-use crate::case::Keep;
+use crate::case_file::Keep;
 use crate::lattice::{Facet, Input, LatticeBox, location};
 use crate::octant::{LEVEL_MAX, Side};
-use crate::seeds::leaf_at;
 use crate::sides::Component;
+use crate::sides::leaf_at;
 use crate::tree::{Index, Tree};
 use serde::Serialize;
 use std::collections::HashSet;

@@ -2,38 +2,34 @@
 //! workspace.
 //!
 //! The root is refined wherever a facet crosses it or an extent box requires it ([`tree`],
-//! [`crossing`]). A flood fill and either rays or seeds determine which leaves are inside
-//! ([`sides`], [`ray`], [`seeds`]). Coarser base trees show what leaks ([`leaks`]). Leaves outside the kept region are deleted ([`kept`]). For each level from the finest to the coarsest,
+//! [`crossing`]). A flood fill and either rays or seeds determine which leaves are inside, and so which of them are kept
+//! ([`sides`], [`ray`]). Coarser base trees show what leaks ([`leaks`]). Leaves outside the kept region are deleted. For each level from the finest to the coarsest,
 //! every cell refines two enlarged extent boxes, one for its layer and one for balance
 //! ([`gradation`]). The remaining leaves are written as leaf words ([`leaves`], [`mod@write`]). Nothing
 //! here is fast: each step is the shortest implementation of the corresponding section of
 //! `DEFINITION.md`.
 #![deny(missing_docs)]
 
-pub mod case;
 pub mod case_file;
 pub mod crossing;
 pub mod error;
 pub mod gradation;
-pub mod kept;
 pub mod lattice;
 pub mod leaks;
 pub mod leaves;
 pub mod octant;
 pub mod ray;
-pub mod seeds;
 pub mod sides;
 pub mod stl;
 pub mod tree;
 pub mod write;
 
-pub use case::{BoxSpec, Case, Enclosed, Keep, Root};
+pub use case_file::{BoxSpec, Case, Enclosed, Keep, Root};
 pub use error::Error;
-pub use kept::Components;
 pub use leaks::Leak;
 pub use leaves::{Geometry, digest, mix};
 pub use octant::Side;
-pub use sides::Ambiguous;
+pub use sides::{Ambiguous, Components};
 
 use lattice::{Input, LatticeBox, Seed};
 use sides::Component;
@@ -68,7 +64,7 @@ pub fn mesh(case: &Case) -> Result<Mesh, Error> {
     let input = Input::new(case)?;
     let (mut tree, components) = base(&input)?;
     let leaks = leaks::find(&tree, &input);
-    kept::delete_the_rest(&mut tree, &input, &components);
+    sides::delete_the_rest(&mut tree, &input, &components);
     gradation::grade(&mut tree, &input);
     debug_check(&tree);
     let words = tree.words(|side| case.keep_crossing || side != Side::Crossing);

@@ -1,11 +1,14 @@
-//! Sides: a flood fill over faces finds the components, and either rays or seeds decide the side of
-//! each.
-use crate::case::Keep;
+//! Sides: a flood fill over faces finds the components, and either rays or seeds, points in the flow that the user gives, decide the side
+//! of each. With them the kept region is known: the leaves that gradation refines.
+
+use crate::case_file::{Enclosed, Keep};
 use crate::error::Error;
-use crate::lattice::{Facet, Input, location};
-use crate::octant::{Extent, Octant, Side};
+use crate::lattice::{Facet, Input, Seed, location};
+use crate::octant::{Extent, Octant, ROOT_EDGE, Side};
+use crate::ray;
 use crate::tree::{Index, Tree};
-use crate::{ray, seeds};
+use serde::Serialize;
+use std::collections::HashSet;
 
 /// Maximum number of leaves of a component whose rays are cast.
 const CANDIDATES_MAX: usize = 32;
@@ -46,9 +49,9 @@ impl Ambiguous {
 /// components.
 ///
 /// # Errors
-/// Those of [`seeds::leaves`].
+/// A seed lies outside the root or in a crossing leaf.
 pub fn assign(tree: &mut Tree, input: &Input) -> Result<Vec<Component>, Error> {
-    let seeded = seeds::leaves(tree, input)?;
+    let seeded = seeded_leaves(tree, input)?;
     let mut assigned = Vec::new();
     for mut leaves in components(tree) {
         leaves.sort_by_cached_key(|&leaf| tree.octant(leaf).coarsest_first());
@@ -153,4 +156,114 @@ fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
     }
     let side = if 2 * rays_odd > rays { Side::Inside } else { Side::Outside };
     Verdict { side, unanimous: false }
+}
+
+/// The leaf that contains each seed, in the order of the seeds.
+///
+/// # Errors
+/// A seed lies outside the root or in a crossing leaf.
+fn seeded_leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
+    let mut leaves = Vec::new();
+    for (index, seed) in input.seeds.iter().enumerate() {
+        let nearest = || nearest_centroid(tree, input, seed);
+        match leaf_at(tree, seed.point) {
+            Some(leaf) if tree.side(leaf) != Side::Crossing => leaves.push(leaf),
+            Some(_) => {
+                let nearest = nearest();
+                return Err(Error::SeedCrossing { index, seed: seed.given, nearest });
+            }
+            None => {
+                let nearest = nearest();
+                return Err(Error::SeedOutside { index, seed: seed.given, nearest });
+            }
+        }
+    }
+    Ok(leaves)
+}
+
+/// The leaf whose half-open cube contains a lattice point; `None` outside the root. Corners are
+/// integers, so the unit cube at the point lies in one leaf.
+pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
+    let cube = Extent { min: point, max: point.map(|x| x + 1) };
+    tree.leaves_meeting(&cube).first().copied()
+}
+
+/// The centroid, in the user's unit, of the leaf that no facet crosses and whose centroid is
+/// nearest to the seed, clamped to the root. Of several, the coarsest leaf, then the first by key.
+/// `None` if facets cross every leaf.
+fn nearest_centroid(tree: &Tree, input: &Input, seed: &Seed) -> Option<[f64; 3]> {
+    let point = seed.point.map(|x| x.clamp(0, ROOT_EDGE));
+    let free = tree.leaves().into_iter().filter(|&leaf| tree.side(leaf) != Side::Crossing);
+    let nearest = free.map(|leaf| tree.octant(leaf)).min_by_key(|octant| {
+        let centroid = octant.centroid();
+        let square: i64 = (0..3).map(|a| (centroid[a] - point[a]).pow(2)).sum();
+        (square, octant.coarsest_first())
+    })?;
+    Some(location(&input.root, nearest.centroid()))
+}
+
+/// The numbers of components of T0, as the manifest contains them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Components {
+    /// Outside components, including the enclosed ones.
+    pub outside: u64,
+    /// Inside components.
+    pub inside: u64,
+    /// Outside components that were deleted because they do not reach the boundary of the root.
+    pub enclosed: EnclosedComponents,
+}
+
+/// Summary of the enclosed components.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EnclosedComponents {
+    /// Number of components.
+    pub count: u64,
+    /// Number of their leaves.
+    pub leaves: u64,
+    /// Centroid of their coarsest leaf, the first by key among leaves of the same level, in the
+    /// user's unit; `None` without enclosed components.
+    pub example: Option<[f64; 3]>,
+}
+
+impl Components {
+    /// The numbers of these components.
+    #[must_use]
+    pub fn of(tree: &Tree, input: &Input, components: &[Component]) -> Self {
+        let of_side = |side| components.iter().filter(|c| c.side == side).count() as u64;
+        let enclosed = enclosed(tree, input, components);
+        Self {
+            outside: of_side(Side::Outside),
+            inside: of_side(Side::Inside),
+            enclosed: EnclosedComponents {
+                count: enclosed.len() as u64,
+                leaves: enclosed.iter().map(|component| component.leaves.len() as u64).sum(),
+                example: example(tree, input, &enclosed),
+            },
+        }
+    }
+}
+
+/// Deletes every leaf that is not in the kept region.
+pub fn delete_the_rest(tree: &mut Tree, input: &Input, components: &[Component]) {
+    let enclosed = enclosed(tree, input, components);
+    let enclosed: HashSet<Index> = enclosed.iter().flat_map(|c| c.leaves.clone()).collect();
+    tree.delete(|leaf, side| !input.keep.keeps(side) || enclosed.contains(&leaf));
+}
+
+/// The outside components that are deleted because they do not reach the boundary of the root. If no
+/// outside component reaches it, there is no far field, and nothing is enclosed.
+fn enclosed<'a>(tree: &Tree, input: &Input, components: &'a [Component]) -> Vec<&'a Component> {
+    let applies =
+        input.keep == Keep::Outside && input.seeds.is_empty() && input.enclosed == Enclosed::Delete;
+    let outside = components.iter().filter(|component| component.side == Side::Outside);
+    let (far_field, enclosed): (Vec<_>, Vec<_>) = outside.partition(|component| {
+        component.leaves.iter().any(|&leaf| is_at_boundary(&tree.octant(leaf)))
+    });
+    if applies && !far_field.is_empty() { enclosed } else { Vec::new() }
+}
+
+/// Whether the octant has a face on the boundary of the root.
+fn is_at_boundary(octant: &Octant) -> bool {
+    let extent = octant.extent();
+    extent.min.contains(&0) || extent.max.contains(&ROOT_EDGE)
 }

@@ -1,11 +1,11 @@
 //! Writer of leaf-set directories: one file of leaf words and the manifest. A reader never sees an
 //! incomplete file.
 use crate::Mesh;
-use crate::case::{Case, Enclosed, Keep, Root};
+use crate::case_file::{Case, Enclosed, Keep, Root};
 use crate::error::Error;
-use crate::kept::Components;
 use crate::leaks::Leak;
 use crate::leaves::{Geometry, Tally, hex};
+use crate::sides::Components;
 use files::{Claim, write_atomically};
 use serde::Serialize;
 use std::fs;

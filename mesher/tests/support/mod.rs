@@ -105,7 +105,7 @@ impl Small {
             example: Some(a.example),
         });
         let reference::Components { outside, inside, enclosed } = mesh.components;
-        let reference::kept::EnclosedComponents { count, leaves, example } = enclosed;
+        let reference::sides::EnclosedComponents { count, leaves, example } = enclosed;
         let enclosed = EnclosedComponents { count, leaves, example };
         // All inside leaves are kept, and those made by gradation tile the same places.
         let reaches_boundary =

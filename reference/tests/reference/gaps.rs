@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use support::dense::{CROSSING, INSIDE};
 use support::leaves;
-use support::random::{Facet, cases, for_all};
+use support::{Facet, cases, for_all};
 use support::{ROOT_EDGE, case, crosses_by_axes};
 
 const LEVEL: u32 = 5;

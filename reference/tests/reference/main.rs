@@ -4,10 +4,9 @@
 mod cli;
 mod gaps;
 mod input;
+mod meshes;
 mod octants;
-mod properties;
 mod seeds;
 mod sides;
 mod support;
-mod tiny;
 mod vectors;

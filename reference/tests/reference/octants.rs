@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use reference::crossing::crosses;
 use reference::octant::{Extent, LEVEL_MAX, Octant, Side};
 use std::cell::Cell;
-use support::random::{Facet, facet, for_all};
+use support::{Facet, facet, for_all};
 use support::{ROOT_EDGE, crosses_by_axes};
 
 /// All octants down to level 3.

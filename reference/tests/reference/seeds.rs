@@ -9,8 +9,8 @@ use reference::{Case, Enclosed, Error, Keep, base_tree, mesh};
 use std::cell::Cell;
 use support::dense::{self, CROSSING, Dense, INSIDE};
 use support::leaves;
-use support::random::{RandomCase, cases, for_all};
 use support::{ROOT_EDGE, UNIT, block_of_units, case, sides};
+use support::{RandomCase, cases, for_all};
 
 const FINEST: u32 = 4;
 

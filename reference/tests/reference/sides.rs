@@ -9,11 +9,11 @@ use reference::{Case, Enclosed, Keep, base_tree, mesh};
 use std::cell::Cell;
 use support::dense::{CROSSING, INSIDE};
 use support::leaves;
-use support::random::{RandomCase, cases_with_a_cavity, facet, for_all};
 use support::{
     ROOT_EDGE, UNIT, block, block_of_units, box_of_level, case, crosses_by_axes, dense, levels,
     parities_by_areas, sides, units,
 };
+use support::{RandomCase, cases_with_a_cavity, facet, for_all};
 
 /// With few different coordinates, most rays pass through edges and vertices.
 #[test]

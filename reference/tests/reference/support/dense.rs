@@ -1,7 +1,7 @@
 //! A second implementation of the whole algorithm, on a dense grid of the finest cells: crossing by
 //! separating axes, flood fill cell by cell, refinement cell by cell.
 use super::{ROOT_EDGE, crosses_by_axes, parities_by_areas, spacing};
-use reference::kept::{Components, EnclosedComponents};
+use reference::sides::{Components, EnclosedComponents};
 use reference::{BoxSpec, Case, Enclosed, Keep};
 
 pub const OUTSIDE: u64 = 0;
