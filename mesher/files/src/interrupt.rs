@@ -1,6 +1,8 @@
-//! The end of a program on a signal: at once, in whatever it does, and without unfinished files.
+//! The end of a program in whatever it does, and without unfinished files: at once on a signal, or when it gets no more memory, with one
+//! sentence and exit code 71.
 //!
 //! Signals wake a thread of their own, which removes what is unfinished. In a signal handler, that would have to do without locks.
+//! Without memory, the standard library ends a process with SIGABRT, and its hook for that is not stable. A global allocator is.
 
 use crate::unfinished::complete;
 use crate::uses::forget;
@@ -8,12 +10,13 @@ use libc::{SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGPWR, SIGQUIT, SIGSTKFLT};
 use libc::{SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Signal, getpid, kill_process};
-use rustix::stdio::stderr;
 use signal_hook::low_level::{pipe, register};
-use std::io::{self, Read, Write};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::{self, Cursor, Read, Write, stderr};
 use std::mem::MaybeUninit;
 use std::os::unix::net::UnixStream;
 use std::ptr::null;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Barrier, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
@@ -133,10 +136,78 @@ fn is_ignored(signal: i32) -> bool {
 
 /// Prints on the standard error, unless that would wait for a reader.
 fn print(message: &str) {
-    let stderr = stderr();
+    let stderr = rustix::stdio::stderr();
     let mut ready = [PollFd::new(&stderr, PollFlags::OUT)];
     // At once.
     if poll(&mut ready, Some(&Timespec::default())).is_ok_and(|n| n == 1) {
         let _ = rustix::io::write(stderr, message.as_bytes());
+    }
+}
+
+/// Exit code of a program that ran out of memory, or whose work does not fit into it.
+pub const OUT_OF_MEMORY: i32 = 71;
+
+/// The system's allocator, as the global one of a program. It ends the program when the system has no more memory.
+pub struct Heap {
+    /// The program's name.
+    pub program: &'static str,
+    /// What the user can do.
+    pub advice: &'static str,
+    /// Ends the program with an exit code.
+    pub end: fn(i32) -> !,
+}
+
+// SAFETY: all calls go to the system's allocator with the caller's arguments, and so do its results, except that null ends the process.
+unsafe impl GlobalAlloc for Heap {
+    #[inline]
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's promises are those that the system's allocator asks for.
+        self.obtained(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    #[inline]
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above.
+        self.obtained(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    #[inline]
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: as above.
+        self.obtained(unsafe { System.realloc(block, layout, size) }, size)
+    }
+
+    #[inline]
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+impl Heap {
+    #[inline]
+    fn obtained(&self, block: *mut u8, bytes: usize) -> *mut u8 {
+        if block.is_null() {
+            self.end(bytes);
+        }
+        block
+    }
+
+    /// Ends the program. Nothing in here allocates, unless a library does.
+    #[cold]
+    fn end(&self, bytes: usize) -> ! {
+        static IS_ENDING: AtomicBool = AtomicBool::new(false);
+        while IS_ENDING.swap(true, Ordering::AcqRel) {
+            // The thread that came first ends the process.
+            sleep(Duration::from_secs(1));
+        }
+        abandon(true);
+        // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
+        let mut line = Cursor::new([0; 256]);
+        let Self { program, advice, .. } = self;
+        let _ =
+            writeln!(line, "{program}: memory ran out at a request for {bytes} bytes: {advice}");
+        let _ = stderr().write_all(&line.get_ref()[..line.position() as usize]);
+        (self.end)(OUT_OF_MEMORY)
     }
 }

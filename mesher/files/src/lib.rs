@@ -9,16 +9,13 @@
 
 #![deny(missing_docs)]
 
-mod claim;
-mod draft;
 pub mod interrupt;
-mod memory;
+mod outputs;
 mod unfinished;
 mod uses;
 
-pub use claim::Claim;
-pub use draft::{Draft, check_writable, write_atomically};
-pub use memory::{Heap, OUT_OF_MEMORY};
+pub use interrupt::{Heap, OUT_OF_MEMORY};
+pub use outputs::{Claim, Draft, check_writable, write_atomically};
 pub use uses::{
     append_log, clash, name_output, open, read, read_log, read_text, register_input,
     register_output,

@@ -8,19 +8,20 @@
 
 #![deny(missing_docs)]
 
-mod agree;
+mod collectives;
 pub mod launch;
 mod message_buffer;
 mod metered;
 #[cfg(feature = "mpi")]
 mod mpi;
-mod reduced;
 pub mod sim;
 
-pub use agree::{agree, first_other, pack_bytes, text_of_first, unpack_bytes};
+pub use collectives::{
+    Entry, agree, all_gather_from_reducers, all_gather_reduced, combine, first_other, pack_bytes,
+    split_by_reducer, text_of_first, unpack_bytes,
+};
 pub use message_buffer::MessageBuffer;
 pub use metered::{Metered, Traffic};
-pub use reduced::{Entry, all_gather_from_reducers, all_gather_reduced, combine, split_by_reducer};
 
 use bytemuck::Pod;
 use std::sync::Arc;
