@@ -9,10 +9,8 @@ mod bad_input;
 mod bad_output;
 mod balance;
 mod command_line;
-mod htg;
 mod interrupts;
 mod leaf_set;
-mod leaks;
 mod memory;
 #[path = "../support/process.rs"]
 mod process;

@@ -1,7 +1,12 @@
 //! Jobs on real MPI ranks: the mesh is the serial one, and an error ends all ranks and is printed once. Without
-//! the feature `mpi` these tests are ignored; with it, a missing `mpirun` fails them.
+//! the feature `mpi` these tests are ignored; with it, a missing `mpirun` fails them. A program of its own, which `ci/mpich` builds for
+//! another MPI.
+#![allow(missing_docs)]
 
-use crate::process::{Finished, Workspace, run};
+#[path = "support/process.rs"]
+mod process;
+
+use process::{Finished, Workspace, run};
 use std::process::Command;
 
 const CASE: &str = "spacing_min = 0.05\nroot_scale = 2.0\nkeep = \"all\"\n
