@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Every drawing is a section through the tree just beside the plane y = 0, made from the mesher's own leaf words on four
-//! simulated ranks. `tests/library/walkthrough.rs` fails when a committed drawing differs from what this program draws.
+//! simulated ranks. The tests at the end fail when a committed drawing, or a number on the page, differs from what this program makes.
 
 use bricks::octant::{LEVEL_MAX, Side};
 use mesher::Options;
@@ -17,8 +17,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use words::words;
 
-// The test of this example has the file, too.
-#[allow(clippy::duplicate_mod)]
 #[path = "../tests/support/words.rs"]
 mod words;
 
@@ -48,12 +46,12 @@ fn case() -> Case {
 }
 
 /// Where the case is, and the drawings.
-pub fn directory() -> PathBuf {
+fn directory() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("walkthrough")
 }
 
 /// The leaf words of each rank after refinement (`ungraded`) or after gradation, partitioned by `weights`.
-pub fn leaves_by_rank(ungraded: bool, weights: Weights) -> Vec<Vec<u64>> {
+fn leaves_by_rank(ungraded: bool, weights: Weights) -> Vec<Vec<u64>> {
     let division = Division { partitioner: Partitioner::Morton, weights, level_base: None };
     let options = Options { division, ungraded, check: true, ..Options::default() };
     sim::run(RANKS, 1, |comm| {
@@ -162,7 +160,7 @@ fn crossing_only(leaf: &CutLeaf) -> &'static str {
 }
 
 /// Every drawing with its file name.
-pub fn drawings() -> Vec<(&'static str, String)> {
+fn drawings() -> Vec<(&'static str, String)> {
     let base_tree = section(true, Weights::Area);
     let repartitioned = section(true, Weights::Rebalance);
     let graded = section(false, Weights::Area);
@@ -188,10 +186,49 @@ pub fn drawings() -> Vec<(&'static str, String)> {
     ]
 }
 
-#[allow(dead_code, reason = "the test of the drawings includes this file as a module")]
 fn main() -> std::io::Result<()> {
     for (name, svg) in drawings() {
         std::fs::write(directory().join(name), svg)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn committed_drawings_are_those_of_this_mesher() {
+        for (name, drawn) in drawings() {
+            let path = directory().join(name);
+            let committed = std::fs::read_to_string(&path).unwrap_or_default();
+            assert!(
+                committed == drawn,
+                "{} is out of date: run cargo run -p mesher-library --example walkthrough, and look at the drawing",
+                path.display()
+            );
+        }
+    }
+
+    #[test]
+    fn leaf_counts_on_the_page_are_those_of_this_mesher() {
+        let page = std::fs::read_to_string(directory().join("README.md")).expect("the page");
+        let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+        for (ungraded, weights) in
+            [(true, Weights::Area), (true, Weights::Rebalance), (false, Weights::Rebalance)]
+        {
+            let leaves: Vec<String> = leaves_by_rank(ungraded, weights)
+                .iter()
+                .map(|words| thousands(words.len()))
+                .collect();
+            let [a, b, c, d] = &leaves[..] else { panic!("the walk-through has four ranks") };
+            let counts = format!("{a}, {b}, {c} and {d}");
+            assert!(page.contains(&counts), "the page lacks the leaf counts {counts}");
+        }
+    }
+
+    /// A number below a million with its digits in groups of three.
+    fn thousands(n: usize) -> String {
+        if n < 1000 { n.to_string() } else { format!("{},{:03}", n / 1000, n % 1000) }
+    }
 }

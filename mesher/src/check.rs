@@ -2,19 +2,18 @@
 //!
 //! [`Job::check`](crate::Job::check) runs them in debug builds, and in release builds with `--check`. Invariants of sets and trees are checked next
 //! to their definitions; those that need other ranks, or the sets of several modules, are here. What a phase computes is compared with
-//! its definition, literally: the lattice, T0 ([`base`]), sides ([`sides`](mod@sides)) and gradation ([`graded`](mod@graded)). A check takes
+//! its definition, literally: the lattice, T0 and gradation ([`splits`]) and sides ([`sides`](mod@sides)). A check takes
 //! memory proportional to the sets that it checks and to all facets. All functions are collective, and panic if an
 //! invariant is violated. Messages of checks are not counted.
 
-pub mod base;
-pub mod graded;
 pub mod sides;
+pub mod splits;
 
+use crate::Mesh;
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
 use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
-use crate::mesh::Mesh;
 use crate::output::stream::{Counts, total};
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::record::Options;
@@ -112,7 +111,7 @@ pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised) 
 pub fn base_tree(base: &Base) {
     base.tree.check_structure();
     replicas(&[&base.tree.split, &base.tree.crossing], base.ownership, base.comm);
-    base::tree(base);
+    splits::tree(base);
 }
 
 /// Inside and deleted leaves are leaves of T0 that do not cross, as `keep` and seeds ask for them; results are the same on all ranks.

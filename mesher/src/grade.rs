@@ -50,9 +50,8 @@ use crate::record::Counters;
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::dilate::{Reach, Tile};
-use bricks::kept::Kept;
 use bricks::octant::Level;
-use bricks::tree::{PerLevel, Tree};
+use bricks::tree::{Kept, PerLevel, Tree};
 use ranks::Comm;
 
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by

@@ -1,26 +1,57 @@
-//! Phases 3 to 8: from facets and rules on the lattice to the tree.
+//! Phases 3 to 8: from facets and rules on the lattice to the tree, and the mesh as one rank holds it after them.
 
 use crate::check;
 use crate::error::Error;
 use crate::grade;
 use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
-use crate::mesh::Mesh;
 use crate::output::warnings;
 use crate::partition::initial::{self, Estimate, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner, metis, repartition};
 use crate::record::{Job, Options, Recorder};
-use crate::refine;
-use crate::refine::voxelise::{self, BinnedFacets};
-use crate::sides::{self, Base, Decided, leaks, openness};
+use crate::refine::{self, BinnedFacets};
+use crate::sides::leaks::{self, Leaks};
+use crate::sides::{self, Base, Decided, Sides, openness};
 use bricks::facet::Facet;
-use bricks::kept::Kept;
 use bricks::octant::{Level, Side};
-use bricks::tree::Tree;
+use bricks::tree::{Kept, PerLevel, Tree};
 use ranks::{Comm, Solo, agree, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
+
+/// A mesh as one rank holds it, after phase 8.
+pub struct Mesh {
+    /// The facets of all ranks, in numbers.
+    pub facets: FacetCounts,
+    /// The rules on the lattice.
+    pub rules: Rules,
+    /// The ranks that own and hold bricks.
+    pub ownership: Ownership,
+    /// Level of the base leaves, or of the octants between which partition boundaries lie.
+    pub level_base: Level,
+    /// The partitioner that was used; none for a single rank.
+    pub partitioner: Option<Partitioner>,
+    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
+    pub split: PerLevel,
+    /// Crossing leaves of T0.
+    pub crossing: PerLevel,
+    /// Sides of the leaves of T0.
+    pub sides: Sides,
+    /// What is closed at a coarser spacing, and open at that of the mesh.
+    pub leaks: Leaks,
+    /// Whether the facets are an open body, and bound nothing although the outside is kept.
+    pub bounds_nothing: bool,
+    /// Whether the tree is T0, of which all leaves are in the mesh.
+    pub is_base: bool,
+}
+
+impl Mesh {
+    /// Whether crossing leaves of the base tree are no leaves of the mesh.
+    pub fn drops_crossing(&self) -> bool {
+        !self.is_base && !self.rules.keep_crossing
+    }
+}
 
 /// Phases 3 to 8: from the facets and the rules on the lattice to the tree. Collective.
 ///
@@ -50,7 +81,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     let routed = is_parallel
         .then(|| job.phase("route", |comm| refine::route(facets.borrow(), &ownership, comm)));
     if let Some(routed) = &routed {
-        job.check(|_| check::base::routed(routed, &all_facets, &ownership));
+        job.check(|_| check::splits::routed(routed, &all_facets, &ownership));
     }
     let (mut tree, work) = job.phase("refine", |_| {
         let binned = BinnedFacets::new(routed.as_deref().unwrap_or(facets.borrow()));
@@ -58,7 +89,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         if options.checks() {
             binned.check_invariants();
         }
-        voxelise::refine(&binned, &rules, &ownership.intervals().collect::<Vec<_>>())
+        refine::refine(&binned, &rules, &ownership.intervals().collect::<Vec<_>>())
     });
     job.counters = work;
 
@@ -140,7 +171,7 @@ pub fn grow<F: Borrow<[Facet]>>(
     job.check(|comm| {
         check::graded(&mesh, comm);
         if let Some(base) = &base {
-            check::graded::gradation(&mesh, base, comm);
+            check::splits::gradation(&mesh, base, comm);
         }
         fingerprint = check::fingerprint(&mesh, comm);
     });

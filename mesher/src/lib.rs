@@ -20,12 +20,10 @@ pub mod input {
     pub mod quantise;
     pub mod stl;
 }
-mod mesh;
 /// Phases 9 and 10: the leaves in order, files, manifest and report.
 pub mod output {
     pub mod htg;
     pub mod leaves;
-    pub mod manifest;
     pub mod report;
     pub mod stream;
     pub(crate) mod warnings;
@@ -39,8 +37,7 @@ pub mod sides;
 #[path = "../bricks/src/values.rs"]
 mod values;
 
-pub use grow::grow;
-pub use mesh::Mesh;
+pub use grow::{Mesh, grow};
 pub use record::{Job, Options};
 
 use error::Error;

@@ -11,7 +11,6 @@
 //! - after [`synchronise_replicas`](ownership::Ownership::synchronise_replicas) all replicas of a brick are equal.
 
 pub mod area;
-pub(crate) mod cost;
 pub mod curve;
 pub mod initial;
 pub(crate) mod metis;

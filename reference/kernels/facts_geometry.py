@@ -1,7 +1,7 @@
 """Facts about facets, rays, the lattice, sorted keys and the digest."""
 import z3
 from kernels import (
-    AXES, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANTS, RAYS, ROOT, VERTEX, VOTE, VOXELISE, bit, fact, has, i64, maximum,
+    AXES, CHECK_SPLITS, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANTS, RAYS, ROOT, VERTEX, VERDICT, REFINE, bit, fact, has, i64, maximum,
     minimum, no, octant, u32, usize, word)
 from rust import coerced, Number, plain, Struct, term
 
@@ -198,11 +198,11 @@ def rays_checked(k):
     yield k.largest() < 1 << 122
 
 
-@fact(CHECK_BASE, ("axis.iter().map(|c| (sign * c).max(0))", "axis.iter().map(|c| (sign * c * c).max(0))"))
+@fact(CHECK_SPLITS, ("axis.iter().map(|c| (sign * c).max(0))", "axis.iter().map(|c| (sign * c * c).max(0))"))
 def facets_checked(k):
     """The second test of facets against octants, `touches`: its terms are below 2^93 and fit i128, for all facets and octants."""
     f, corner, h = k.facet(k.integer), [k.integer("i64", 0, ROOT) for _ in AXES], k.integer("i64", 1, ROOT)
-    k.paths("touches", f, corner, h, file=CHECK_BASE)
+    k.paths("touches", f, corner, h, file=CHECK_SPLITS)
     yield k.largest() < 1 << 93
 
 
@@ -237,7 +237,7 @@ def nearness(k):
 # Keys of sorted lists
 
 
-@fact(VOXELISE, ("let first = ((lo - 1) >> SHIFT).max(0);", "let first = (lo >> SHIFT).max(0);"), ("u64::from(LEVEL_MAX - drop)", "u64::from(LEVEL_MAX + 1 - drop)"),
+@fact(REFINE, ("let first = ((lo - 1) >> SHIFT).max(0);", "let first = (lo >> SHIFT).max(0);"), ("u64::from(LEVEL_MAX - drop)", "u64::from(LEVEL_MAX + 1 - drop)"),
       ("(hi >> SHIFT).min((1 << LEVEL_MAX) - 1)", "(hi >> SHIFT).min((1 << LEVEL_MAX) - 2)"))
 def containing(k):
     """`ContainingOctant::of` a facet in the root is the smallest octant that contains every closed level-19 cell that the extent meets; its
@@ -245,9 +245,9 @@ def containing(k):
     extent = [[k.signed("i64", *VERTEX), k.signed("i64", *VERTEX)] for _ in AXES]
     k.given.append(z3.And([low.x <= high.x for low, high in extent]))
     replaced = {"range": lambda run, f, axis: extent[axis], "crossed": lambda run, *_: k.bits("u64")}
-    some, octant = k.option("of", Struct(), file=VOXELISE, replaced=replaced)
+    some, octant = k.option("of", Struct(), file=REFINE, replaced=replaced)
     in_root = z3.And([z3.And(low.x >= 0, high.x <= ROOT) for low, high in extent])
-    level, start = (k(part, octant, file=VOXELISE) for part in ("level", "start"))
+    level, start = (k(part, octant, file=REFINE) for part in ("level", "start"))
     corner = k("position", start)
     edge = z3.BitVecVal(1, 64) << z3.ZeroExt(32, 19 - level.x)
     def contained(c, cell): c = z3.ZeroExt(32, c.x); return z3.And(c <= cell, cell < c + edge)
@@ -258,14 +258,14 @@ def containing(k):
     yield z3.Implies(z3.And(some, z3.Not(in_root)), z3.And(level.x == 0, start.x == 0))
 
 
-@fact(VOTE, ("Self(u64::from(l) << 57 | code)", "Self(u64::from(l) << 56 | code)"), ("self.0 & ((1 << 57) - 1)", "self.0 & ((1 << 56) - 1)"))
+@fact(VERDICT, ("Self(u64::from(l) << 57 | code)", "Self(u64::from(l) << 56 | code)"), ("self.0 & ((1 << 57) - 1)", "self.0 & ((1 << 56) - 1)"))
 def candidates(k):
     """A `Candidate` holds level and code of any leaf, and sorts by level and then by code."""
     def leaf():
         l, code = octant(k, 20)
-        return l, code, k("new", l, code, file=VOTE)
+        return l, code, k("new", l, code, file=VERDICT)
     (l, a, v), (m, b, w) = leaf(), leaf()
-    level, code = k("leaf", v, file=VOTE)
+    level, code = k("leaf", v, file=VERDICT)
     yield z3.And(level.x == l.x, code.x == a.x)
     yield z3.ULT(v["0"].x, w["0"].x) == z3.Or(z3.ULT(l.x, m.x), z3.And(l.x == m.x, z3.ULT(a.x, b.x)))
 

@@ -9,9 +9,9 @@ from rust import WIDTHS, Number, Run, Struct, known, limits, plain, term
 
 OCTANT, BRICK, FACET = "bricks/src/octant.rs", "bricks/src/brick.rs", "bricks/src/facet.rs"
 DILATE, TILE = "bricks/src/dilate.rs", "bricks/src/dilate/tile.rs"
-DIGEST, LATTICE, VOXELISE = "bricks/src/digest.rs", "src/input/lattice.rs", "src/refine/voxelise.rs"
-RAYS, VOTE, CHECK_BASE, CHECK_SIDES = "src/sides/rays.rs", "src/sides/vote.rs", "src/check/base.rs", "src/check/sides.rs"
-FILES = [OCTANT, BRICK, DILATE, TILE, FACET, DIGEST, LATTICE, VOXELISE, RAYS, VOTE, CHECK_BASE, CHECK_SIDES]
+DIGEST, LATTICE, REFINE = "bricks/src/digest.rs", "src/input/lattice.rs", "src/refine.rs"
+RAYS, VERDICT, CHECK_SPLITS, CHECK_SIDES = "src/sides/rays.rs", "src/sides/verdict.rs", "src/check/splits.rs", "src/check/sides.rs"
+FILES = [OCTANT, BRICK, DILATE, TILE, FACET, DIGEST, LATTICE, REFINE, RAYS, VERDICT, CHECK_SPLITS, CHECK_SIDES]
 
 # What DEFINITION.md states, not what the sources do.
 ROOT = 1 << 27

@@ -6,7 +6,7 @@ is `None`.
 import random
 
 from facts_geometry import AVX512
-from kernels import (BRICK, CHECK_BASE, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANT, RAYS, ROOT, TILE, VERTEX, VOTE, VOXELISE, i64, u32,
+from kernels import (BRICK, CHECK_SPLITS, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANT, RAYS, ROOT, TILE, VERTEX, VERDICT, REFINE, i64, u32,
                      usize)
 from rust import Number, Run, Struct
 
@@ -119,11 +119,11 @@ INPUTS = {
     (LATTICE, "box_mask"): box_and_brick,
     (LATTICE, "rounded"): lambda r: [Number("f64", coordinate(r) / 4), Number("f64", float(r.randint(-8, 8))), Number("f64", 2.0)],
     (LATTICE, "off_centre"): lambda r: [Number("f64", float(coordinate(r)))],
-    (VOXELISE, "of"): lambda r: [facet(r, *r.choice([VERTEX, (0, ROOT), (0, ROOT)]))],
+    (REFINE, "of"): lambda r: [facet(r, *r.choice([VERTEX, (0, ROOT), (0, ROOT)]))],
     (RAYS, "meets"): ray,
-    (VOTE, "new"): octant,
-    (VOTE, "leaf"): lambda r: [Struct({"0": Number("u64", bits(r, 62))})],
-    (CHECK_BASE, "touches"): lambda r: facet_and_brick(r, lambda l: i64(4 * ROOT >> l.x)),
+    (VERDICT, "new"): octant,
+    (VERDICT, "leaf"): lambda r: [Struct({"0": Number("u64", bits(r, 62))})],
+    (CHECK_SPLITS, "touches"): lambda r: facet_and_brick(r, lambda l: i64(4 * ROOT >> l.x)),
     (CHECK_SIDES, "ray_that_meets"): ray,
 }
 

@@ -7,7 +7,6 @@ pub mod brickset;
 pub mod digest;
 pub mod dilate;
 pub mod facet;
-pub mod kept;
 pub mod octant;
 pub mod tree;
 #[cfg(test)]

@@ -70,7 +70,7 @@ fn check_sides(mesh: Mesh, comm: &dyn Comm) {
 
 fn check_graded(mesh: Mesh, comm: &dyn Comm) {
     graded(&mesh, comm);
-    graded::gradation(&mesh, &base_split(comm), comm);
+    splits::gradation(&mesh, &base_split(comm), comm);
 }
 
 /// The splits of T0, with the partition of the graded tree.
@@ -147,7 +147,7 @@ fn check_facets(corrupt: impl Fn(&mut Vec<Facet>) + Sync) {
         if comm.rank() == 1 {
             corrupt(&mut routed);
         }
-        base::routed(&routed, &ranks::gather(comm, &local), &mesh.ownership);
+        splits::routed(&routed, &ranks::gather(comm, &local), &mesh.ownership);
     });
 }
 
@@ -208,7 +208,7 @@ fn a_crossing_leaf_that_no_facet_crosses_is_found() {
         let tree = Tree { split: m.split, crossing: m.crossing };
         tree.check_structure();
         let (tree, ownership, rules) = (&tree, &m.ownership, &m.rules);
-        base::tree(&Base { tree, ownership, facets: &facets, rules, comm });
+        splits::tree(&Base { tree, ownership, facets: &facets, rules, comm });
     };
     run(true, corrupt, check);
 }
@@ -223,7 +223,7 @@ fn an_octant_that_an_extent_box_does_not_split_is_found() {
     let rules = Rules { boxes: vec![extent], ..mesh.rules };
     let tree = Tree { split: mesh.split, crossing: mesh.crossing };
     let (tree, ownership, rules) = (&tree, &mesh.ownership, &rules);
-    base::tree(&Base { tree, ownership, facets: &facets, rules, comm: &Solo });
+    splits::tree(&Base { tree, ownership, facets: &facets, rules, comm: &Solo });
 }
 
 #[test]
@@ -323,7 +323,7 @@ fn check_gradation(layer_cells_min: u32, choose: impl Fn(&Mesh, &PerLevel) -> (u
     mesh.rules.layer_cells_min = layer_cells_min;
     let (l, code) = choose(&mesh, &base);
     toggle(&mut mesh.split[l], code);
-    graded::gradation(&mesh, &base, &Solo);
+    splits::gradation(&mesh, &base, &Solo);
 }
 
 fn toggle(set: &mut BrickSet, code: u64) {
@@ -370,7 +370,7 @@ fn a_leaf_deeper_than_all_rules_is_found() {
 #[test]
 fn every_corruption_of_one_graded_octant_is_found() {
     let (mut mesh, base) = (mesh(false, &Solo), base_split(&Solo));
-    graded::gradation(&mesh, &base, &Solo);
+    splits::gradation(&mesh, &base, &Solo);
     let mut corrupted = 0;
     for l in 1..=deepest(&mesh.split) {
         let leaves = BrickSet::from_unsorted(Tree::exists(&mesh.split, l as Level).collect());
@@ -378,7 +378,7 @@ fn every_corruption_of_one_graded_octant_is_found() {
         let fresh = mesh.split[l].clone().without(&base[l]);
         for code in kept.codes().step_by(997).chain(fresh.codes().step_by(97)) {
             toggle(&mut mesh.split[l], code);
-            let check = || graded::gradation(&mesh, &base, &Solo);
+            let check = || splits::gradation(&mesh, &base, &Solo);
             let check = std::panic::AssertUnwindSafe(check);
             assert!(std::panic::catch_unwind(check).is_err(), "octant {code} of level {l}");
             toggle(&mut mesh.split[l], code);
@@ -402,7 +402,7 @@ fn a_graded_octant_without_a_parent_is_found() {
 #[test]
 #[should_panic(expected = "must be split for a layer or balance")]
 fn a_tree_without_gradation_is_not_balanced() {
-    let check = |m: Mesh, comm: &dyn Comm| graded::gradation(&m, &m.split, comm);
+    let check = |m: Mesh, comm: &dyn Comm| splits::gradation(&m, &m.split, comm);
     run(true, |m| m.rules.layer_cells_min = 1, check);
 }
 

@@ -5,8 +5,8 @@
 //! compressed chunks to rank 0, the only one that writes. In one round each of up to `WINDOWS_MAX` ranks
 //! compresses one window, so memory does not grow with the mesh, and the file does not depend on the number of ranks.
 
+use crate::Mesh;
 use crate::error::Error;
-use crate::mesh::Mesh;
 use crate::output::stream::{LevelCursors, Octants};
 use crate::output::write::{OutDir, TREE};
 use crate::partition::ownership::Ownership;

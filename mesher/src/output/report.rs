@@ -6,8 +6,8 @@
 //!   if and only if there are any;
 //! - times are finite and not negative.
 
-use crate::mesh::Mesh;
-use crate::output::manifest::{MeshEntry, SIDES};
+use crate::Mesh;
+use crate::output::leaves::{MeshEntry, SIDES};
 use crate::output::warnings;
 use crate::partition::Partitioner;
 use crate::record::{Job, Phase, peak_rss_bytes};

@@ -1,7 +1,7 @@
 //! Warnings: meshes that follow the rules and are probably not what the user wants.
 
+use crate::Mesh;
 use crate::input::lattice::{ExtentBox, Keep, Rules};
-use crate::mesh::Mesh;
 use crate::sides::Summary;
 use crate::sides::leaks::Leak;
 use bricks::octant::ROOT_EDGE;

@@ -1,4 +1,4 @@
-//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the [manifest](crate::output::manifest).
+//! Mesh output: one `.npy` file of leaf words per rank, the tree in a file for VTK, and the [manifest](crate::output::leaves).
 //!
 //! Invariants of the output directory:
 //! - one run alone writes to it ([`Claim`]);

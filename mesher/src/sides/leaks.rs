@@ -13,8 +13,8 @@
 //! - the leaks of one k do not overlap: together they are no larger than the root.
 
 use super::global::Label;
-use super::vote::{self, Candidate};
-use super::{Base, Components, flow};
+use super::verdict::{self, Candidate};
+use super::{Base, Components};
 use crate::input::lattice::{Keep, Rules};
 use bricks::brick::Brick;
 use bricks::octant::{LEVEL_MAX, Level};
@@ -148,13 +148,13 @@ fn crossing_leaves(base: &Base) -> u64 {
 /// The components of T0/k, cut at `level`, that have leaked into the region that `is_inside` or not.
 fn of_tree(base: &Base, level: Level, is_inside: bool) -> Vec<Leak> {
     let components = Components::new(base);
-    let found = flow::find(base, &components);
+    let found = verdict::find_seeds(base, &components);
     let seeded: HashSet<Label> = found.values().copied().collect();
     // The component of a seed in a crossing leaf is not known, so rays have to agree that a region is closed.
     let verdict = if found.is_empty() || found.len() < base.rules.seeds.len() {
-        vote::decide(&components.all, &components.candidates, base)
+        verdict::by_vote(&components.all, &components.candidates, base)
     } else {
-        flow::decide(&components.all, seeded.clone(), base.rules.keep)
+        verdict::by_seeds(&components.all, seeded.clone(), base.rules.keep)
     };
     let has_leaked =
         |label: &Label| verdict.inside.contains(label) != is_inside && !seeded.contains(label);

@@ -4,8 +4,8 @@
 //! Non-crossing leaves that share part of a face belong to one component, and a component has one side.
 //! Within a brick, local components are flood fills by shifts. Across bricks a union-find merges them
 //! in a walk of the tree ([`components`]). Across ranks they receive common labels, by messages about
-//! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`],
-//! [`vote`]) or, if the case has seeds, decided by them ([`flow`], which also finds the outside components that the far field
+//! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`])
+//! or, if the case has seeds, decided by them ([`verdict`], which also finds the outside components that the far field
 //! does not reach). What is closed at a coarser spacing only is found last ([`leaks`]).
 //!
 //! Invariants of [`Sides`]:
@@ -14,13 +14,12 @@
 //! - leaves that share part of a face are on the same side, and all kept or all deleted.
 
 pub mod components;
-pub mod flow;
 pub mod global;
 pub mod leaks;
 pub mod nodes;
 pub mod openness;
 pub mod rays;
-pub mod vote;
+pub mod verdict;
 
 use crate::error::Error;
 use crate::input::lattice::{Keep, Rules};
@@ -37,7 +36,7 @@ use nodes::{Component, Nodes};
 use ranks::Comm;
 use serde::Serialize;
 use std::collections::HashSet;
-use vote::{FirstLeaf, FirstLeaves};
+use verdict::{FirstLeaf, FirstLeaves};
 
 /// The base tree as one rank holds it, and what its sides depend on.
 #[derive(Clone, Copy)]
@@ -144,8 +143,8 @@ impl Components {
         let LocalMerge { merged, faces, at_boundary } = components::merge(&nodes, base.ownership);
         let merged = merged.numbered();
         let labels = global::labels(base, &nodes, faces, &merged);
-        let candidates = vote::candidates(base, &nodes, &merged, &labels);
-        let all = vote::all_components(&candidates, base.comm);
+        let candidates = verdict::candidates(base, &nodes, &merged, &labels);
+        let all = verdict::all_components(&candidates, base.comm);
         Self { nodes, merged, labels, candidates, all, at_boundary }
     }
 
@@ -195,10 +194,10 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
         components.nodes.check_invariants();
     }
     let mut verdict = if rules.seeds.is_empty() {
-        vote::decide(&components.all, &components.candidates, base)
+        verdict::by_vote(&components.all, &components.candidates, base)
     } else {
-        let flow = flow::of_seeds(&flow::find(base, &components), base)?;
-        flow::decide(&components.all, flow, rules.keep)
+        let flow = verdict::flow_of_seeds(&verdict::find_seeds(base, &components), base)?;
+        verdict::by_seeds(&components.all, flow, rules.keep)
     };
     let bytes = components.bytes(base.tree);
     components.nodes.drop_links();

@@ -5,15 +5,11 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-mod candidates;
 mod digest_vectors;
 mod equals_reference;
-mod leaks;
 mod metamorphic;
 mod orders;
 mod schedules;
 mod stl_files;
 #[path = "../support/stl_inputs.rs"]
 mod stl_inputs;
-mod stl_readers;
-mod walkthrough;

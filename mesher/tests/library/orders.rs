@@ -14,9 +14,7 @@
 //! What remains is one permutation of the messages for each receiver of each sparse all-to-all. All combinations of these
 //! permutations are run, not only each by itself. `ORDERS` is the number of drawn cases; `ci/schedules` runs more of them.
 
-use crate::support::fibres;
-use crate::support::orders::{Orders, Turns, permute};
-use crate::support::schedules::{Serial, cases, drawn};
+use crate::support::schedules::{Orders, Serial, Turns, cases, drawn, permute, run_fibres};
 use crate::support::{Run, Small, cuboid, run};
 use bricks::octant::position;
 use cpu_time::ProcessTime;
@@ -216,7 +214,7 @@ fn the_walk_visits_every_combination_of_orders_once() {
     let mut runs = 0;
     loop {
         // All send to all, then ranks 0 and 1 to rank 2: three permutations of three messages, and one of two.
-        let received = fibres::run(3, orders.clone(), |c: &Sim| {
+        let received = run_fibres(3, orders.clone(), |c: &Sim| {
             let senders = |m: MessageBuffer| m.messages().map(|m| m.0).collect::<Vec<_>>();
             let all = c.sparse_all_to_all((0..3).map(|r| (r, [1])).collect());
             let to_last = (c.rank() < 2).then_some((2, [1]));

@@ -14,10 +14,7 @@ use ranks::sim::Adversary;
 use std::rc::Rc;
 
 pub mod draw;
-pub mod fibres;
-pub mod orders;
 pub mod schedules;
-pub mod symmetry;
 pub mod words;
 
 // Each test uses some of these.

@@ -1,9 +1,13 @@
 //! Small cases drawn from a number, the same mesh on simulated ranks and on one rank, and the command that repeats a schedule.
+//!
+//! Simulated ranks run as coroutines: many schedules of small cases in a short time. Beside drawn schedules, every order in which
+//! messages can arrive is enumerated, and orders of ranks.
 #![allow(dead_code, missing_docs)]
 
 use super::draw::{leaky_on_rays, soup, thin};
-use super::fibres;
 use super::{Outcome, Run, Small, options, small, words};
+use corosensei::stack::DefaultStack;
+use corosensei::{Coroutine, CoroutineResult, Yielder};
 use mesher::error::Error;
 use mesher::input::case::Case;
 use mesher::record::Recorder;
@@ -13,10 +17,12 @@ use mesher::{Job, Options, mesh};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-use ranks::sim::{Adversary, Schedule, Sim};
+use ranks::sim::{Adversary, Arrival, Schedule, Sim, World};
 use ranks::{Comm, Solo};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// What must not depend on the schedule.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,7 +91,7 @@ pub fn on_ranks(
     whole: bool,
     wrap: impl Fn(&Sim, &mut dyn FnMut(&dyn Comm)) + 'static,
 ) -> Result<Meshed, Error> {
-    merge(fibres::run(ranks, schedule, move |sim: &Sim| {
+    merge(run_fibres(ranks, schedule, move |sim: &Sim| {
         let mut result = None;
         let mut work = |comm: &dyn Comm| result = Some(part(&case, &options, whole, comm));
         // Counting messages needs the clocks, which take longer than passing the token on.
@@ -203,4 +209,132 @@ pub fn run_words(run: &Run) -> String {
         lower(format!("{:?}", run.division.partitioner)),
         lower(format!("{:?}", run.division.weights)),
     )
+}
+
+/// Bytes of a coroutine's stack; only pages that are used take memory.
+const STACK: usize = 4 << 20;
+
+thread_local! {
+    /// Kept, because mapping and releasing them takes longer than a small mesh.
+    static STACKS: RefCell<Vec<DefaultStack>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Runs `body` on `size` ranks; returns what each rank returned.
+///
+/// # Panics
+/// With the panic of the first rank that panics. The other ranks are unwound.
+pub fn run_fibres<T: 'static>(
+    size: usize,
+    schedule: impl Schedule + 'static,
+    body: impl Fn(&Sim) -> T + 'static,
+) -> Vec<T> {
+    let world = Rc::new(World::new(size, schedule));
+    let body = Rc::new(body);
+    let mut ranks: Vec<_> = (0..size)
+        .map(|rank| {
+            let (world, body) = (world.clone(), body.clone());
+            let kept = STACKS.with_borrow_mut(Vec::pop);
+            let stack = kept.unwrap_or_else(|| DefaultStack::new(STACK).expect("address space"));
+            Coroutine::with_stack(stack, move |yielder: &Yielder<(), ()>, ()| {
+                body(&Sim::new(rank, &world, &|| yielder.suspend(())))
+            })
+        })
+        .collect();
+    let mut results: Vec<Option<T>> = (0..size).map(|_| None).collect();
+    while let Some(rank) = world.next() {
+        if let CoroutineResult::Return(result) = ranks[rank].resume(()) {
+            results[rank] = Some(result);
+            world.end(rank, false);
+        }
+    }
+    let is_done = ranks.iter().all(Coroutine::done);
+    assert!(is_done, "ranks wait for a call that another rank does not make");
+    STACKS.with_borrow_mut(|s| s.extend(ranks.into_iter().map(Coroutine::into_stack)));
+    results.into_iter().map(|r| r.expect("every rank has ended")).collect()
+}
+
+/// A depth-first walk over the orders of arrival: the choices of one run, in the order in which they are made.
+#[derive(Clone, Default)]
+pub struct Orders(Arc<Mutex<Walk>>);
+
+#[derive(Default)]
+struct Walk {
+    /// For each choice, the number of the permutation and the number of permutations.
+    choices: Vec<(usize, usize)>,
+    /// Choices made in the current run.
+    made: usize,
+}
+
+impl Orders {
+    /// Goes to the next order; returns false after the last one.
+    pub fn advance(&self) -> bool {
+        let walk = &mut *self.lock();
+        // A run whose choices depend on the order of earlier messages may make fewer of them.
+        walk.choices.truncate(walk.made);
+        walk.made = 0;
+        while let Some((choice, of)) = walk.choices.pop() {
+            if choice + 1 < of {
+                walk.choices.push((choice + 1, of));
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The product of the numbers of permutations in the last run: the number of orders, if the choices are the same in all of them.
+    pub fn product(&self) -> f64 {
+        self.lock().choices.iter().map(|c| c.1 as f64).product()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Walk> {
+        self.0.lock().unwrap_or_else(|p| p.into_inner())
+    }
+}
+
+impl Schedule for Orders {
+    fn next(&mut self, _: &[usize]) -> usize {
+        0
+    }
+
+    fn arrange(&mut self, _: usize, messages: &mut [Arrival]) {
+        if messages.len() < 2 {
+            return;
+        }
+        let walk = &mut *self.lock();
+        if walk.made == walk.choices.len() {
+            walk.choices.push((0, (2..=messages.len()).product()));
+        }
+        permute(messages, walk.choices[walk.made].0);
+        walk.made += 1;
+    }
+}
+
+/// Puts items into their permutation of this number; number 0 leaves them as they are.
+pub fn permute<T>(items: &mut [T], mut number: usize) {
+    for first in 0..items.len() {
+        let rest = items.len() - first;
+        items[first..][..=number % rest].rotate_right(1);
+        number /= rest;
+    }
+}
+
+/// All ranks run in ascending order, but in another order before one call.
+#[derive(Clone, Debug)]
+pub struct Turns {
+    /// The order, and the number of the call.
+    pub order: Vec<usize>,
+    pub call: usize,
+    /// Turns so far.
+    pub turns: usize,
+}
+
+impl Schedule for Turns {
+    fn next(&mut self, ready: &[usize]) -> usize {
+        let (call, turn) = (self.turns / self.order.len(), self.turns % self.order.len());
+        self.turns += 1;
+        let wanted = if call == self.call { self.order[turn] } else { turn };
+        ready.binary_search(&wanted).expect("every rank runs once between two calls")
+    }
+
+    fn arrange(&mut self, _: usize, _: &mut [Arrival]) {}
 }

@@ -128,3 +128,12 @@ fn an_empty_run_is_found() {
     s.runs[1].start = 0;
     s.check_invariants();
 }
+
+#[test]
+fn leading_elements_are_counted_for_every_length() {
+    let all: Vec<u32> = (0..40).collect();
+    for (length, end) in (0..40).flat_map(|length| (0..42).map(move |end| (length, end))) {
+        let found = leading(&all[..length], |low| low < end);
+        assert_eq!(found, length.min(end as usize), "{length}, {end}");
+    }
+}

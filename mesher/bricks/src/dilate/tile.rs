@@ -1,7 +1,6 @@
 //! One tile: 32 x 32 x 32 octants and a margin, one word per row.
 
-use super::gathered::Gathered;
-use super::{MARGIN, TILE, TILE_BRICKS_LOG2, Words};
+use super::{Gathered, MARGIN, TILE, TILE_BRICKS_LOG2, Words};
 use crate::brick::{self, Brick};
 use crate::brickset::ones;
 use crate::octant::position;
@@ -39,7 +38,7 @@ fn span(bits: u32) -> Range<usize> {
 
 impl Tile {
     /// Adds the octants within `radius` of a source to `out`, or their parents if `to_parents`, tile by tile. Returns the work done.
-    pub fn pass(
+    pub(super) fn pass(
         &mut self,
         sources: impl Iterator<Item = Brick>,
         radius: u32,

@@ -1,4 +1,5 @@
-//! Whole meshes on one rank, nothing written: cells per second.
+//! Times of the mesher's kernels one by one, and of whole meshes on one rank, nothing written, in cells per second:
+//! `cargo bench -p mesher-library --bench times [-- NAME]`, where a NAME is `kernels`, `mesh` or a part of one of theirs.
 #![allow(missing_docs)]
 
 mod support;
@@ -8,6 +9,16 @@ use mesher::record::Recorder;
 use mesher::{Job, mesh};
 use ranks::Solo;
 use std::time::Duration;
+
+fn kernels(c: &mut Criterion) {
+    let mut group = c.benchmark_group("kernels");
+    group.sample_size(20);
+    for mut kernel in support::kernels() {
+        group.throughput(Throughput::Elements(kernel.elements));
+        group.bench_function(kernel.name, |b| b.iter(&mut kernel.run));
+    }
+    group.finish();
+}
 
 fn meshes(c: &mut Criterion) {
     let mut group = c.benchmark_group("mesh");
@@ -31,5 +42,5 @@ fn meshes(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, meshes);
+criterion_group!(benches, kernels, meshes);
 criterion_main!(benches);
