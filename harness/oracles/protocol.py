@@ -1,6 +1,6 @@
 """The protocol of all oracles.
 
-    python <oracle>.py
+    python sides.py ORACLE
 
 An oracle stays, because its packages take seconds to import. Each line of its standard input is a question, a JSON array of three
 paths: POINTS contains three float64 coordinates for each of N points, and BODY.stl is a binary STL file. The oracle writes N bytes to

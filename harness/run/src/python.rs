@@ -108,7 +108,9 @@ pub fn start(oracle: &str, services: &Services, paths: &Paths) -> Result<(), Fai
 }
 
 fn oracle_command(oracle: &str, paths: &Paths) -> Result<Command, Failure> {
-    script_command(oracle, &format!("{oracle}_sides.py"), paths)
+    let mut command = script_command(oracle, "sides.py", paths)?;
+    command.arg(oracle);
+    Ok(command)
 }
 
 fn read_sides(path: &Path, count: usize) -> Result<Vec<bool>, String> {
