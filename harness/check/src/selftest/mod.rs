@@ -5,7 +5,7 @@
 //! because the next corruption may be in the domain of that check only. A finding on an uncorrupted mesh is a
 //! false alarm and fails the self test, too. The audit of the mesh with its case must report every corruption of the mesh.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt;
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,6 @@ use contract::case::Case;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::Tree;
 
-mod base;
 mod files;
 mod grading;
 mod leaves;
@@ -27,18 +26,15 @@ mod sides;
 pub use mutant::{Mutant, Mutation};
 
 /// The built-in cases, by name, as case files: every corruption applies to at least one of them.
-pub const CASES: [(&str, &str); 6] = [
-    ("outside", include_str!("../../../selftest-cases/outside.toml")),
-    ("inside", include_str!("../../../selftest-cases/inside.toml")),
-    ("all", include_str!("../../../selftest-cases/all.toml")),
-    ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
-    ("enclosed", include_str!("../../../selftest-cases/enclosed.toml")),
-    ("seeds", include_str!("../../../selftest-cases/seeds.toml")),
-];
+pub fn cases() -> BTreeMap<String, String> {
+    let text = |case: &toml::Value| toml::to_string(case).expect("a part of a TOML file");
+    let cases: toml::Table = include_str!("cases.toml").parse().expect("a TOML file");
+    cases.iter().map(|(name, case)| (name.clone(), text(case))).collect()
+}
 
 /// All corruptions.
 pub fn catalogue() -> Vec<Mutant> {
-    [leaves::MUTANTS, sides::MUTANTS, base::MUTANTS, grading::MUTANTS, files::MUTANTS].concat()
+    [leaves::MUTANTS, sides::MUTANTS, grading::MUTANTS, files::MUTANTS].concat()
 }
 
 /// A correct mesh with its case and T0: the starting point of corruptions.

@@ -163,17 +163,10 @@ pub(super) fn split(words: &[u64], i: usize) -> Vec<u64> {
 
 /// Indices of the first of eight sibling leaves that have the same side.
 pub(super) fn sibling_groups(words: &[u64]) -> Vec<usize> {
-    let complete = |i: &usize| words[*i..].get(..8).is_some_and(is_sibling_group);
+    let are_siblings =
+        |eight: &[u64]| word::level(eight[0]) > 0 && eight == children(parent(eight[0])).as_slice();
+    let complete = |i: &usize| words[*i..].get(..8).is_some_and(are_siblings);
     (0..words.len()).filter(complete).collect()
-}
-
-fn is_sibling_group(eight: &[u64]) -> bool {
-    let (first, last) = (word::octant(eight[0]), word::octant(eight[7]));
-    let alike = eight.iter().all(|w| w & 127 == eight[0] & 127);
-    alike && first.level > 0 && first.digit() == 0 && {
-        let parent = first.ancestor(first.level - 1);
-        parent.contains(&last) && last.digit() == 7
-    }
 }
 
 /// The parent of a leaf, with the leaf's side.

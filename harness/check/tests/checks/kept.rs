@@ -53,8 +53,7 @@ proptest! {
 
 #[test]
 fn leaks_that_are_impossible_or_differ_from_those_of_the_reference_are_reported() {
-    let text = include_str!("../../../selftest-cases/enclosed.toml");
-    let correct = support::selftest_case("enclosed", text);
+    let correct = support::built_in("enclosed");
     let Root { origin, edge } = correct.mesh.manifest.root;
     let leak = Leak { spacing_coarse: 0.2, spacing_fine: 0.1, volume: 0.01 * edge, point: origin };
     let with = |leaks: Option<Vec<Leak>>| -> LeafSet {
@@ -85,8 +84,7 @@ fn leaks_that_are_impossible_or_differ_from_those_of_the_reference_are_reported(
 
 #[test]
 fn counts_of_components_that_differ_from_those_of_the_reference_are_reported() {
-    let text = include_str!("../../../selftest-cases/enclosed.toml");
-    let correct = support::selftest_case("enclosed", text);
+    let correct = support::built_in("enclosed");
     let found = |change: fn(&mut Manifest)| {
         let mut mesh = correct.mesh.clone();
         change(&mut mesh.manifest);

@@ -4,7 +4,7 @@
 use crate::support;
 use check::audit::audit_against;
 use check::promises::Promises;
-use check::selftest::{self, CASES, Kill, Mutant, Mutation, SelftestCase, SelftestReport};
+use check::selftest::{self, Kill, Mutant, Mutation, SelftestCase, SelftestReport};
 use contract::case::Case;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
@@ -27,23 +27,18 @@ const EXTREMES: [(&str, &str); 2] = [
     ),
 ];
 
-fn case(index: usize) -> SelftestCase {
-    let (name, text) = CASES[index];
-    support::selftest_case(name, text)
-}
-
 /// Every corruption that applies to a case is reported, by the checks and with the findings of the expected table, and the correct
 /// mesh is not.
-fn assert_reported(index: usize) {
+fn assert_reported(name: &str) {
     let scratch = tempfile::tempdir().unwrap();
-    let mut report = selftest::run(&[case(index)], scratch.path()).unwrap();
+    let mut report = selftest::run(&[support::built_in(name)], scratch.path()).unwrap();
     for finding in report.kills.iter_mut().filter_map(|kill| kill.finding.as_mut()) {
         *finding = finding.replace(&*scratch.path().to_string_lossy(), "SCRATCH");
     }
     let text = table(&report);
     println!("{report}");
     assert!(report.alarms.is_empty() && report.kills.iter().all(Kill::killed));
-    assert_text(&text, &format!("tests/checks/expected/{}.txt", CASES[index].0));
+    assert_text(&text, &format!("tests/checks/expected/{name}.txt"));
 }
 
 /// The trials, with the checks that reported each and the first finding of the expected one, and the report.
@@ -86,39 +81,41 @@ fn one_line(finding: &str) -> String {
 
 #[test]
 fn every_corruption_of_an_outer_flow_is_reported() {
-    assert_reported(0);
+    assert_reported("outside");
 }
 
 #[test]
 fn every_corruption_of_an_inner_flow_is_reported() {
-    assert_reported(1);
+    assert_reported("inside");
 }
 
 #[test]
 fn every_corruption_of_a_mesh_of_both_sides_is_reported() {
-    assert_reported(2);
+    assert_reported("all");
 }
 
 #[test]
 fn every_corruption_of_a_mesh_with_boxes_is_reported() {
-    assert_reported(3);
+    assert_reported("boxes");
 }
 
 #[test]
 fn every_corruption_of_a_mesh_with_enclosed_components_is_reported() {
-    assert_reported(4);
+    assert_reported("enclosed");
 }
 
 #[test]
 fn every_corruption_of_a_mesh_with_seeds_is_reported() {
-    assert_reported(5);
+    assert_reported("seeds");
 }
 
 /// Otherwise a corruption could lose its effect, or change so much that any check reports it.
 #[test]
 fn every_corruption_changes_the_leaves_and_files_that_are_listed() {
     let mut lines = Vec::new();
-    let texts = CASES.iter().chain(&EXTREMES);
+    let built_in = selftest::cases();
+    let built_in = built_in.iter().map(|(name, text)| (&name[..], &text[..]));
+    let texts = built_in.chain(EXTREMES);
     let cases: Vec<SelftestCase> =
         texts.map(|(name, text)| in_parts(support::selftest_case(name, text))).collect();
     for mutant in selftest::catalogue() {

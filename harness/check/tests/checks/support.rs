@@ -2,10 +2,15 @@
 
 use std::path::Path;
 
-use check::selftest::SelftestCase;
+use check::selftest::{self, SelftestCase};
 use contract::case::Case;
 use contract::leafset;
 use reference::write::{self, Which};
+
+/// Final mesh and T0 of a built-in case.
+pub fn built_in(name: &str) -> SelftestCase {
+    selftest_case(name, &selftest::cases()[name])
+}
 
 /// Final mesh and T0 of a case file with this text, which includes the geometry.
 pub fn selftest_case(name: &str, text: &str) -> SelftestCase {

@@ -101,7 +101,7 @@ proptest! {
             let word = correct.base.words.iter().find(|&&w| word::octant(w) == base);
             prop_assert!(word.is_some(), "{answer}");
             let side = word::side(*word.unwrap());
-            prop_assert_eq!(Some(side), answer.side_decided_by.as_ref().map(|reason| reason.side), "{}", answer);
+            prop_assert_eq!(Some(side), answer.side_decided_by.as_ref().map(|(side, _)| *side), "{}", answer);
             if let Some(rule) = &answer.deleted_by {
                 // The enclosed parts are not deleted by every version of the reference.
                 prop_assert!(!rule.contains("lost"), "{answer}");
@@ -164,8 +164,7 @@ fn an_answer_that_contradicts_itself_is_a_bug() {
 /// Without the case, the surface is known from the crossing leaves, and the chains are the same.
 #[test]
 fn a_directory_alone_explains_the_same_sizes() {
-    let text = include_str!("../../../selftest-cases/outside.toml");
-    let correct = support::selftest_case("outside", text);
+    let correct = support::built_in("outside");
     let centres: Vec<[f64; 3]> = correct
         .mesh
         .words
@@ -195,8 +194,7 @@ fn a_directory_alone_explains_the_same_sizes() {
 
 #[test]
 fn a_point_outside_the_root_and_another_case_are_refused() {
-    let text = include_str!("../../../selftest-cases/all.toml");
-    let mut correct = support::selftest_case("all", text);
+    let mut correct = support::built_in("all");
     let why = with_mesh(&correct.mesh, None, |mesh| mesh.at([99.0, 0.0, 0.0]).unwrap_err());
     assert!(why.contains("outside the root"), "{why}");
     let mut other = correct.case.clone();

@@ -1,7 +1,7 @@
 //! A correct mesh has no needless and no missing split, and every planted one is found.
 
 use super::*;
-use check::why::least::NEEDLESS;
+use check::why::NEEDLESS;
 use contract::octant::{LEVEL_MAX, Octant};
 use contract::testing::octants_of;
 use contract::word::{self, Leaf};
@@ -106,14 +106,8 @@ proptest! {
 /// The places at which needless refinement is likely: the far field, the surroundings of a box, and of deleted leaves.
 #[test]
 fn a_needless_split_is_found_wherever_it_is() {
-    let cases = [
-        ("outside", include_str!("../../../selftest-cases/outside.toml")),
-        ("inside", include_str!("../../../selftest-cases/inside.toml")),
-        ("all", include_str!("../../../selftest-cases/all.toml")),
-        ("boxes", include_str!("../../../selftest-cases/boxes.toml")),
-    ];
-    for (name, text) in cases {
-        let correct = support::selftest_case(name, text);
+    for name in ["outside", "inside", "all", "boxes"] {
+        let correct = support::built_in(name);
         let (case, words) = (Some(&correct.case), &correct.mesh.words);
         let count = |set: &LeafSet| audited(set, case);
         for set in [&correct.mesh, &correct.base] {
@@ -192,8 +186,7 @@ fn needless_splits_of_all_leaves_are_counted_and_no_other() {
 
 #[test]
 fn a_needless_split_below_the_deepest_level_has_no_cause() {
-    let (name, text) = ("outside", include_str!("../../../selftest-cases/outside.toml"));
-    let correct = support::selftest_case(name, text);
+    let correct = support::built_in("outside");
     let mut words = correct.mesh.words.clone();
     let deepest = words.iter().map(|&w| word::level(w)).max().unwrap();
     let at = words.iter().position(|&w| word::level(w) == deepest).unwrap();

@@ -2,7 +2,7 @@
 
 use super::*;
 use check::checks::components;
-use check::why::answer::{Answer, SideReason};
+use check::why::answer::Answer;
 use contract::octant::Octant;
 use contract::word::{self, Side};
 
@@ -49,11 +49,11 @@ fn seeds_decide_the_side_of_their_component_and_of_all_others() {
     let correct = with_seeds(&[[0.01, 0.01, 0.01], [1.9, 1.9, 1.9]]);
     let mut seeds = Vec::new();
     for answer in explain(&correct) {
-        let reason = answer.side_decided_by.unwrap();
-        assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(reason.side));
-        if reason.side != Side::Crossing {
-            assert_eq!(reason.decision.starts_with("seed "), reason.side == Side::Outside);
-            seeds.push(reason.decision);
+        let (side, decision) = answer.side_decided_by.unwrap();
+        assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(side));
+        if side != Side::Crossing {
+            assert_eq!(decision.starts_with("seed "), side == Side::Outside);
+            seeds.push(decision);
         }
     }
     for decision in ["no seed lies", "seed 0 lies", "seed 1 lies"] {
@@ -68,18 +68,18 @@ fn the_candidate_is_the_first_leaf_of_its_component_and_its_rays_agree() {
     let found = components::find(&correct.base.words, &terms, &correct.case.facets_lattice);
     let mut sides = Vec::new();
     for answer in explain(&correct) {
-        let reason = answer.side_decided_by.as_ref().unwrap();
-        if reason.side != Side::Crossing {
+        let (side, decision) = answer.side_decided_by.as_ref().unwrap();
+        if *side != Side::Crossing {
             let begins = |octant: &Octant| {
                 let text =
                     format!("each of the six rays of the candidate octant {} ", octant.path());
-                reason.decision.starts_with(&text)
+                decision.starts_with(&text)
             };
-            assert!(found.iter().any(|c| begins(&c.first) && c.side == reason.side), "{answer}");
-            let parity = if reason.side == Side::Inside { "an odd" } else { "an even" };
-            assert!(reason.decision.contains(parity), "{answer}");
-            assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(reason.side));
-            sides.push(reason.side);
+            assert!(found.iter().any(|c| begins(&c.first) && c.side == *side), "{answer}");
+            let parity = if *side == Side::Inside { "an odd" } else { "an even" };
+            assert!(decision.contains(parity), "{answer}");
+            assert_eq!(answer.leaf.map(|leaf| leaf.side), Some(*side));
+            sides.push(*side);
         }
     }
     assert!(sides.contains(&Side::Inside) && sides.contains(&Side::Outside));
@@ -138,7 +138,7 @@ fn the_majority_decides_the_side_where_no_candidate_has_rays_that_agree() {
         let correct = made(&text, &body);
         let answer =
             with_mesh(&correct.mesh, Some(&correct.case), |m| m.at([0.5, 0.6, 0.7]).unwrap());
-        let SideReason { side, decision } = answer.side_decided_by.unwrap();
+        let (side, decision) = answer.side_decided_by.unwrap();
         let expected = if twice < 3 { Side::Inside } else { Side::Outside };
         assert_eq!((side, answer.leaf.unwrap().side), (expected, expected), "{twice}: {decision}");
         if (1..6).contains(&twice) {

@@ -30,7 +30,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let programs = Programs::find("mesher", &arguments.programs)?;
     programs.reference.require()?;
     let scratch = tempfile::tempdir()?;
-    let meshed = selftest::CASES.into_iter().map(|(name, text)| {
+    let meshed = selftest::cases().into_iter().map(|(name, text)| {
         let directory = scratch.path().join(name);
         let path = directory.with_extension("toml");
         fs::write(&path, text)?;
