@@ -4,6 +4,7 @@
 //! that they have, and no ray counts them.
 
 use contract::case::Facet;
+use contract::lattice::{self, sorted};
 use serde::Serialize;
 
 use super::finding::{Finding, Kind, Place};
@@ -58,9 +59,8 @@ impl Edges {
             if a == b || b == c || c == a {
                 continue;
             }
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                let ends = [from.min(to), from.max(to)];
-                uses.push(Use { ends, facet, is_down: from > to });
+            for ends in lattice::edges(&[a, b, c]) {
+                uses.push(Use { ends: sorted(ends), facet, is_down: ends[0] > ends[1] });
             }
         }
         uses.sort_unstable();
@@ -128,12 +128,7 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
 
 /// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.
 pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let sorted = |corners: &[u32; 3]| {
-        let mut sorted = *corners;
-        sorted.sort_unstable();
-        sorted
-    };
-    let all = edges.corners.iter().map(sorted).zip(0u32..);
+    let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
     let mut facets: Vec<_> = all.filter(|([a, b, c], _)| a != b && b != c).collect();
     facets.sort_unstable();
     let mut pairs: Vec<(u32, u32)> = Vec::new();

@@ -135,7 +135,7 @@ impl Kind {
 pub fn meaning(finding: &Finding, input: &Input) -> String {
     let (_, meaning) = finding.kind.row();
     let width = finding.places.first().and_then(|place| place.width).unwrap_or(0.0);
-    let finest = input.root.edge / f64::from(CELLS_PER_EDGE);
+    let finest = input.case.root.edge / f64::from(CELLS_PER_EDGE);
     match finding.kind {
         Kind::Openings => openings(finding, input, (width, finest)),
         Kind::Intersections if finding.count_changing == 0 => {

@@ -1,14 +1,16 @@
-//! A geometry with its root and the cell's edge length, from an STL file or from a case.
+//! A geometry with its root and the cell's edge length, from an STL file or from a case, and its position in the root.
 
-use std::ops::Deref;
 use std::path::Path;
 
 use contract::case::{Case, Facet};
 use contract::failure::Failure;
-use contract::lattice::Root;
+use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Keep;
 use contract::stl;
 use serde::Serialize;
+
+use super::finding::{Finding, Kind, Place};
+use super::tree::{Aabb, Point, bounds};
 
 /// What a case file would have, in the user's units. It takes precedence over that of a case.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -23,21 +25,24 @@ pub struct Requested {
     pub keep: Keep,
 }
 
+/// The bounding box and its distances from the root's faces.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Extent {
+    /// Least coordinates, in the user's units.
+    pub low: [f64; 3],
+    /// Greatest coordinates, in the user's units.
+    pub high: [f64; 3],
+    /// Least distance to a face of the root, negative if the body extends beyond it, in the user's units.
+    pub margin: f64,
+}
+
 /// A geometry, ready for diagnosis.
 #[derive(Clone, Debug)]
 pub struct Input {
     /// A case of at least one and at most 2^31 / 3 facets, without boxes and seeds.
-    case: Case,
+    pub case: Case,
     /// Edge length of the cells at the surface, in the user's units; none if no spacing was given.
     pub cell: Option<f64>,
-}
-
-impl Deref for Input {
-    type Target = Case;
-
-    fn deref(&self) -> &Case {
-        &self.case
-    }
 }
 
 impl Input {
@@ -87,8 +92,32 @@ impl Input {
 
     /// The centroid of a facet, in the user's units.
     pub fn centroid(&self, facet: u32) -> [f64; 3] {
-        let corners = self.facets[facet as usize].map(|v| v.map(f64::from));
+        let corners = self.case.facets[facet as usize].map(|v| v.map(f64::from));
         std::array::from_fn(|a| (corners[0][a] + corners[1][a] + corners[2][a]) / 3.0)
+    }
+
+    /// The extent of the facets.
+    pub fn extent(&self) -> Extent {
+        let Aabb { mins, maxs } = bounds(&self.case.facets);
+        let origin = Point::from(self.case.root.origin);
+        let margin =
+            (mins - origin).min(origin + Point::splat(self.case.root.edge) - maxs).min_element();
+        Extent { low: mins.to_array(), high: maxs.to_array(), margin }
+    }
+
+    /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.
+    pub fn findings(&self, first: usize) -> [Finding; 2] {
+        let mut findings = [Kind::OutsideRoot, Kind::TouchingRoot].map(Finding::new);
+        for (facet, corners) in (0..).zip(&self.case.facets_lattice) {
+            let margins = corners.as_flattened().iter().map(|&c| c.min(UNITS_PER_EDGE - c));
+            let at = match margins.fold(i64::MAX, i64::min) {
+                ..0 => 0,
+                0 => 1,
+                1.. => continue,
+            };
+            findings[at].add(first, || Place::new(vec![facet], self.centroid(facet)));
+        }
+        findings
     }
 }
 
@@ -106,7 +135,7 @@ mod tests {
         let requested =
             Requested { spacing_min: Some(0.3), root_scale: Some(2.0), ..Requested::default() };
         let input = Input::new(vec![FACET], requested).unwrap();
-        assert_eq!(input.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
+        assert_eq!(input.case.root, Root { origin: [-1.0, -1.5, -2.0], edge: 4.0 });
         assert_eq!(input.cell, Some(0.25));
         assert_eq!(Input::new(vec![FACET], Requested::default()).unwrap().cell, None);
     }
@@ -124,8 +153,8 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let read = |requested| {
             let input = Input::read(&path, requested).unwrap();
-            assert_eq!((input.keep, input.facets.len()), (Keep::Inside, 12));
-            (input.root, input.cell)
+            assert_eq!((input.case.keep, input.case.facets.len()), (Keep::Inside, 12));
+            (input.case.root, input.cell)
         };
         assert_eq!(read(Requested::default()), (own, Some(0.5)));
         let spacing_min = Some(0.125);

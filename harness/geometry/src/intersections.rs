@@ -19,11 +19,12 @@ const PAIRS_MAX: usize = 1 << 22;
 
 /// Pairs of facets whose interiors intersect. Degenerate facets and pairs of facets with the same vertices are left out.
 pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
-    let facet = |f: u32| &input.facets_lattice[f as usize];
+    let facet = |f: u32| &input.case.facets_lattice[f as usize];
+    let has_area = |f: &u32| normal(facet(*f)) != [0; 3];
     let are_same = |a: &FacetLattice, b: &FacetLattice| a.iter().all(|v| b.contains(v));
     let mut pairs: Vec<(u32, u32)> = Vec::new();
-    for f in (0..input.facets_lattice.len() as u32).filter(|&f| !is_degenerate(facet(f))) {
-        for g in tree.overlapping(f).into_iter().filter(|&g| f < g && !is_degenerate(facet(g))) {
+    for f in (0..input.case.facets_lattice.len() as u32).filter(has_area) {
+        for g in tree.overlapping(f).into_iter().filter(|g| f < *g && has_area(g)) {
             let is_pair = !are_same(facet(f), facet(g)) && intersect(facet(f), facet(g));
             pairs.extend(is_pair.then_some((f, g)));
         }
@@ -40,11 +41,6 @@ pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
         places: pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect(),
         ..Finding::new(Kind::Intersections)
     }
-}
-
-/// Whether a facet is a segment or a point.
-fn is_degenerate(facet: &FacetLattice) -> bool {
-    normal(facet) == [0; 3]
 }
 
 /// Whether the interiors of two triangles with area, as sets of their planes, have a common point.
@@ -94,9 +90,9 @@ fn range(facet: &FacetLattice, from: [i64; 3], axis: [i64; 3]) -> (i128, i128) {
 /// The centre of the common part of the bounding boxes.
 fn place(input: &Input, f: u32, g: u32) -> Place {
     let [[low, high], [its_low, its_high]] =
-        [f, g].map(|facet| bounds(&input.facets_lattice[facet as usize]));
+        [f, g].map(|facet| bounds(&input.case.facets_lattice[facet as usize]));
     let middle = std::array::from_fn(|a| (low[a].max(its_low[a]) + high[a].min(its_high[a])) / 2);
-    Place::new(vec![f, g], input.root.to_user(middle))
+    Place::new(vec![f, g], input.case.root.to_user(middle))
 }
 
 #[cfg(test)]

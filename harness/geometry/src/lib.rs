@@ -1,16 +1,14 @@
 //! Geometries: their diagnosis before they are meshed, and [`leak`]s through their openings.
 //!
-//! - [`input`]: the file, its root and the cell's edge length;
-//! - [`edges`]: facets that share vertices and edges; [`shells`], [`openings`] and [`width`] build on it;
-//! - [`extent`]: the body's position in the root;
+//! - [`input`]: the file, its root, the body's position there, and the cell's edge length;
+//! - [`edges`]: facets that share vertices and edges; [`shells`] and [`openings`] build on it;
 //! - [`tree`]: facets in a tree of boxes, for [`intersections`], [`sheets`] and leaks;
-//! - [`finding`] and [`report`]: the result as data; [`text`]: the result for a terminal.
+//! - [`finding`] and [`report`]: the result as data and for a terminal.
 //!
 //! Two vertices are the same if their f32 coordinates are equal (-0 equals 0). Decisions that
 //! affect the mesh are made exactly, on the lattice of the definition; widths and gaps are f64.
 
 mod edges;
-mod extent;
 pub mod finding;
 pub mod input;
 mod intersections;
@@ -19,12 +17,9 @@ mod openings;
 pub mod report;
 mod sheets;
 mod shells;
-mod text;
 pub mod tree;
-mod width;
 
 use edges::Edges;
-use finding::Finding;
 use input::Input;
 use report::{Diagnosis, SCHEMA};
 use shells::Shells;
@@ -32,21 +27,20 @@ use tree::FacetTree;
 
 /// Diagnoses a geometry and lists the first places of each finding. The counts do not depend on the order of the facets or of a facet's vertices.
 pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
-    let edges = Edges::new(&input.facets);
-    let shells = Shells::new(&edges, &input.facets_lattice);
-    let mut findings: Vec<Finding> = Vec::new();
-    findings.push(openings::openings(input, &edges, first));
+    let edges = Edges::new(&input.case.facets);
+    let shells = Shells::new(&edges, &input.case.facets_lattice);
+    let mut findings = vec![openings::openings(input, &edges, first)];
     findings.extend(edges::findings(&edges, first));
     findings.extend(shells.findings(input, first));
     findings.push(edges::duplicates(input, &edges, first));
-    let tree = FacetTree::new(&input.facets_lattice);
+    let tree = FacetTree::new(&input.case.facets_lattice);
     findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
     }
-    findings.extend(extent::findings(input, first));
+    findings.extend(input.findings(first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
-        if finding.kind.changes_region(input.keep) {
+        if finding.kind.changes_region(input.case.keep) {
             finding.count_changing = finding.count;
         }
         finding.meaning = finding::meaning(finding, input);
@@ -55,14 +49,14 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let of_shells = shells.all.iter().map(|shell| u64::from(shell.facets)).sum();
     let diagnosis = Diagnosis {
         schema: SCHEMA,
-        facets: input.facets.len() as u64,
+        facets: input.case.facets.len() as u64,
         vertices: edges.points.len() as u64,
         edges: edges.counts(),
-        solids: input.solids.clone(),
+        solids: input.case.solids.clone(),
         shells: report::Shells { count: shells.all.len() as u64, closed, facets: of_shells },
-        root: input.root,
+        root: input.case.root,
         cell: input.cell,
-        extent: extent::extent(input),
+        extent: input.extent(),
         changes_region: findings.iter().any(|finding| finding.count_changing > 0),
         findings,
     };

@@ -50,7 +50,7 @@ pub fn sheets(
     (edges, shells): (&Edges, &Shells),
     cell: f64,
 ) -> [Finding; 2] {
-    let unit = input.root.edge / UNITS_PER_EDGE as f64;
+    let unit = input.case.root.edge / UNITS_PER_EDGE as f64;
     [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
         let may_be = |a: u32, b: u32| {
             let [p, q] = [a, b].map(|facet| shells.of[facet as usize]);
@@ -64,7 +64,7 @@ pub fn sheets(
         of_sheets.dedup();
         let place = |hit: &Hit| {
             let middle = hit.middle.round().to_array().map(|c| c as i64);
-            let place = Place::new(hit.facets.into(), input.root.to_user(middle));
+            let place = Place::new(hit.facets.into(), input.case.root.to_user(middle));
             Place { width: Some(hit.width * unit), ..place }
         };
         let places = quantile(&hits).map(place).into_iter().collect();

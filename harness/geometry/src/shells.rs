@@ -109,10 +109,10 @@ impl Shells {
             let around: Vec<usize> =
                 closed().filter(|(_, other)| shell.may_be_in(other)).map(|(i, _)| i).collect();
             let facet = shell.facet_first;
-            let corner = input.facets_lattice[facet as usize][0];
+            let corner = input.case.facets_lattice[facet as usize][0];
             let mut contains = |other: &&usize| {
                 let interior = interiors.entry(**other).or_insert_with(|| {
-                    let facets = input.facets_lattice.iter().zip(&self.of);
+                    let facets = input.case.facets_lattice.iter().zip(&self.of);
                     let own = facets.filter(|(_, of)| **of as usize == **other);
                     Parity::new(&own.map(|(facet, _)| *facet).collect::<Vec<_>>())
                 });
@@ -122,7 +122,7 @@ impl Shells {
             let at = match is_wound_inward {
                 true => usize::from(!around.is_empty()),
                 false if around.iter().filter(&mut contains).count() % 2 == 1 => {
-                    findings[1].count_changing += u64::from(input.keep != Keep::Outside);
+                    findings[1].count_changing += u64::from(input.case.keep != Keep::Outside);
                     1
                 }
                 false => continue,

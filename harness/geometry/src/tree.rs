@@ -49,14 +49,14 @@ impl FacetTree {
         })
     }
 
-    /// The facets no farther than `radius`, each with its distance, nearest first.
-    pub fn within(&self, at: Point, radius: f64) -> Vec<(u32, f64)> {
+    /// The facets no farther than `radius`, nearest first.
+    pub fn within(&self, at: Point, radius: f64) -> Vec<u32> {
         let around = Aabb::from_half_extents(at, Point::splat(radius));
         let candidates = self.boxes.intersect_aabb(&around);
         let distances = candidates.map(|facet| (facet, from_point(at, self.triangle(facet))));
         let mut found: Vec<(u32, f64)> = distances.filter(|(_, d)| *d <= radius).collect();
         found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        found
+        found.into_iter().map(|(facet, _)| facet).collect()
     }
 
     /// The facets whose bounding boxes meet that of a facet, itself included.
@@ -174,7 +174,7 @@ mod tests {
             prop_assert_eq!(facets.is_empty(), found.is_infinite());
             let within = tree.within(at, found * 1.5);
             let by_hand = facets.iter().filter(|f| from_point(at, &triangle(f)) <= found * 1.5).count();
-            prop_assert!(facets.is_empty() || (within.len() == by_hand && within[0].1 == found));
+            prop_assert!(facets.is_empty() || (within.len() == by_hand && from_point(at, tree.triangle(within[0])) == found));
         }
 
         #[test]

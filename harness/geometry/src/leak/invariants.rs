@@ -8,8 +8,8 @@
 //! - The narrowest place is a point of the path; its width lies between its bounds, is no more than that of any point that counts, and is
 //!   twice the distance to the nearest facet, which is one of the rim.
 
-use super::ends::{Target, is_free, leaf_at};
 use super::report::{Passage, Point as Stop};
+use super::{Target, leaf_at};
 use crate::tree::{Point, from_edges, from_point, met, triangle};
 use contract::case::Case;
 use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
@@ -63,7 +63,7 @@ impl Passage {
     fn check_legs(&self, case: &Case, words: &[u64], points: &[Point], least: f64) {
         let leg = |(i, ends): (usize, &[Point])| {
             let is_inner = (self.inner.0..self.inner.1).contains(&i);
-            let is_free = is_free(leaf_at(words, ends[0].midpoint(ends[1])));
+            let is_free = !word::is_crossing(leaf_at(words, ends[0].midpoint(ends[1])));
             assert!(is_inner || is_free, "leg {i} leads through a leaf that facets cross");
             let leg = Segment::new(ends[0], ends[1]);
             let clearance = if is_inner { least } else { 0.0 };
@@ -114,8 +114,8 @@ mod tests {
     use super::super::Leaks;
     use super::*;
     use contract::failure::Failure;
+    use contract::failure::Watch;
     use contract::testing::base_tree;
-    use contract::watch::Watch;
     use geometries::{Generator, Shape};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 

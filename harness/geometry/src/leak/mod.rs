@@ -1,15 +1,13 @@
 //! Leaks: does a path of free leaves of the base tree join two places, how wide is it, and at which spacing does it
-//! close?
+//! close? Ends of paths are points of the user in free leaves, places in the regions that leaked, or seeds.
 //!
 //! - [`space`]: the cells of a base tree and the widest path through them; [`passage`]: its width, to 5 %;
-//! - [`ends`]: where paths start and end;
 //! - [`report`]: the answer as data and for a terminal; [`invariants`]: what it satisfies.
 //!
 //! A leaf is free if no facet touches it; two free leaves are joined if they share part of a face. A ball as wide as the
 //! narrower of the two passes from one to the other, so an opening that joins leaves of edge e is at least e wide. An
 //! opening wider than 2 sqrt(3) e always joins leaves of edge e: the leaf that contains the centre of the ball is free.
 
-pub mod ends;
 mod invariants;
 mod passage;
 pub mod report;
@@ -19,12 +17,25 @@ use std::collections::BTreeMap;
 
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::Failure;
-use contract::watch::Watch;
+use contract::failure::{Failure, Watch};
+use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::manifest::Leak;
+use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word::{self, Side};
-use ends::Target;
 use report::{Answers, Closes, Report, SCHEMA, Spacing};
+use serde::Serialize;
 use space::Space;
+
+/// Where a path ends, in the user's units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Target {
+    /// The far field: any leaf at the root's boundary.
+    Far,
+    /// The leaf that contains a point.
+    #[serde(untagged)]
+    Point([f64; 3]),
+}
 
 /// The ends of a path on the lattice; the second is `None` for the far field.
 type Ends = (Point, Option<Point>);
@@ -46,9 +57,8 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     /// # Errors
     /// If the case has no facets.
     pub fn new(case: &'a Case, make: F, watch: &'a dyn Watch) -> Result<Self, Failure> {
-        if case.facets.is_empty() {
-            return Err(Failure::input("the case has no facets, so nothing separates places"));
-        }
+        let why = "the case has no facets, so nothing separates places";
+        Failure::unless(!case.facets.is_empty(), why)?;
         let facets = FacetTree::new(&case.facets_lattice);
         Ok(Self { case, facets, make, trees: BTreeMap::new(), watch })
     }
@@ -67,19 +77,19 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
 
     fn answer(&mut self, from: [f64; 3], to: Target) -> Result<Report, Failure> {
         let (root, level) = (&self.case.root, self.case.level_surface);
-        let start = ends::on_lattice("--from", from, root)?;
+        let start = on_lattice("--from", from, root)?;
         let end = match to {
             Target::Far => None,
-            Target::Point(at) => Some(ends::on_lattice("--to", at, root)?),
+            Target::Point(at) => Some(on_lattice("--to", at, root)?),
         };
         let ends = (start, end);
         self.make_tree(level)?;
         if let Some((what, at)) = self.crossed(level, ends) {
-            return Err(Failure::input(ends::crossed(what, at, &self.trees[&level], root)));
+            return Err(Failure::input(why_crossed(what, at, &self.trees[&level], root)));
         }
         let spacing = Spacing::of(level, root);
         let is_joined = self.search(level, ends, None)?;
-        let is_outside = word::side(ends::leaf_at(&self.trees[&level], start)) == Side::Outside;
+        let is_outside = word::side(leaf_at(&self.trees[&level], start)) == Side::Outside;
         let by_rays = self.case.seeds.is_empty();
         let is_enclosed = !is_joined && end.is_none() && is_outside && by_rays;
         let outside = if is_joined && end.is_none() { self.closed(start)? } else { None };
@@ -116,8 +126,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
     /// An end of which facets cross the leaf in a base tree.
     fn crossed(&self, level: u8, (from, to): Ends) -> Option<(&'static str, Point)> {
         let ends = [Some(("--from", from)), to.map(|to| ("--to", to))];
-        let is_crossed =
-            |end: &(_, Point)| !ends::is_free(ends::leaf_at(&self.trees[&level], end.1));
+        let is_crossed = |end: &(_, Point)| word::is_crossing(leaf_at(&self.trees[&level], end.1));
         ends.into_iter().flatten().find(is_crossed)
     }
 
@@ -127,7 +136,7 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
         for level in (0..self.case.level_surface).rev() {
             self.make_tree(level)?;
             let words = &self.trees[&level];
-            if word::side(ends::leaf_at(words, start)) == Side::Inside {
+            if word::side(leaf_at(words, start)) == Side::Inside {
                 let is_far =
                     |&w: &u64| word::side(w) == Side::Outside && word::octant(w).is_at_boundary();
                 return Ok(words.iter().any(is_far).then_some(level));
@@ -157,5 +166,122 @@ impl<'a, F: FnMut(u8) -> Result<Vec<u64>, Failure>> Leaks<'a, F> {
             }
         }
         Ok(None)
+    }
+
+    /// A point of each region that leaked. One that is closed at several coarser spacings is listed once, with the finest of them.
+    ///
+    /// # Errors
+    /// If a base tree cannot be made.
+    pub fn regions(&mut self, leaks: &[Leak]) -> Result<Vec<[f64; 3]>, Failure> {
+        let edge = self.case.root.edge;
+        let level = |leak: &Leak| (edge / leak.spacing_coarse).log2().round() as u8;
+        let Some(finest) = leaks.iter().map(level).max() else { return Ok(Vec::new()) };
+        let (of_finest, others): (Vec<&Leak>, Vec<&Leak>) =
+            leaks.iter().partition(|leak| level(leak) == finest);
+        let mut points: Vec<_> = of_finest.iter().map(|leak| leak.point).collect();
+        for leak in others {
+            if self.joined(finest, leak.point, &points[..of_finest.len()])?.is_none() {
+                points.push(leak.point);
+            }
+        }
+        Ok(points)
+    }
+
+    /// The first seed that is joined to an end at the case's spacing, or else the first one; `None` without seeds.
+    ///
+    /// # Errors
+    /// If the end is outside the root, or a base tree cannot be made.
+    pub fn seed(&mut self, end: Target) -> Result<Option<[f64; 3]>, Failure> {
+        let seeds = &self.case.seeds;
+        let joined = match end {
+            Target::Point(at) if seeds.len() > 1 => {
+                self.joined(self.case.level_surface, at, seeds)?
+            }
+            _ => None,
+        };
+        Ok(joined.or_else(|| seeds.first().copied()))
+    }
+
+    /// The first of some places that free leaves of the base tree of a level join to an end.
+    fn joined(
+        &mut self,
+        level: u8,
+        end: [f64; 3],
+        places: &[[f64; 3]],
+    ) -> Result<Option<[f64; 3]>, Failure> {
+        let root = self.case.root;
+        let end = on_lattice("--to", end, &root)?;
+        self.make_tree(level)?;
+        for &place in places {
+            let Ok(at) = on_lattice("--from", place, &root) else { continue };
+            let ends = (end, Some(at));
+            if self.crossed(level, ends).is_none() && self.search(level, ends, None)? {
+                return Ok(Some(place));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A point on the lattice.
+///
+/// # Errors
+/// One sentence, if the point is outside the root.
+fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<Point, String> {
+    let inside = |q: &[i64; 3]| q.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
+    let found = root.quantise(at).filter(inside);
+    found.map(|q| Point::from_array(q.map(|c| c as f64))).ok_or_else(|| {
+        let far = root.rounded(root.to_user([UNITS_PER_EDGE; 3]));
+        format!(
+            "{what} {at:?} is outside the root, which extends from {:?} to {far:?}",
+            root.rounded(root.origin)
+        )
+    })
+}
+
+/// A point of the lattice in the user's units.
+fn to_user(root: &Root, at: Point) -> [f64; 3] {
+    let unit = root.edge / UNITS_PER_EDGE as f64;
+    let [at, low] = [(Point::from(root.origin) + at * unit).to_array(), root.origin];
+    let rounded = root.rounded(at);
+    // Rounding may lead out of the root.
+    std::array::from_fn(|a| rounded[a].clamp(low[a], low[a] + root.edge))
+}
+
+/// The leaf that contains a point of the root, among the sorted words of a tree that fills it.
+fn leaf_at(words: &[u64], at: Point) -> u64 {
+    let last = i64::from(CELLS_PER_EDGE) - 1;
+    let cell = at.to_array().map(|c| (c as i64 / UNITS_PER_CELL).clamp(0, last) as u32);
+    let after = words.partition_point(|&w| word::key(w) <= word::key_of(cell));
+    words[after - 1]
+}
+
+/// The sentence about an end in a leaf that facets cross, with the nearest centre of a free one.
+fn why_crossed(what: &str, at: Point, words: &[u64], root: &Root) -> String {
+    let free = words.iter().filter(|&&w| !word::is_crossing(w)).map(|&w| word::octant(w).centre());
+    let distance = |centre: &[i64; 3]| Point::from_array(centre.map(|c| c as f64)).distance(at);
+    let nearest = free.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let place = format!("{what} {:?} is in a leaf that facets cross", to_user(root, at));
+    match nearest {
+        Some(near) => format!(
+            "{place}; the nearest centre of a free leaf is {:?}",
+            root.rounded(root.to_user(near))
+        ),
+        None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_of_the_root_is_printed_within_the_root() {
+        let (low, edge) = (-1.4997306168079376, 2.9994612336158752);
+        let root = Root { origin: [low; 3], edge };
+        for at in [0, UNITS_PER_EDGE] {
+            let printed = to_user(&root, Point::splat(at as f64));
+            assert!(printed.iter().all(|x| (low..=low + edge).contains(x)), "{printed:?}");
+        }
     }
 }

@@ -12,15 +12,13 @@
 //! An end near a facet is not an opening. So the path first leads away from the facets, until no place near it is farther from them, and
 //! the width counts from there.
 
-use super::Ends;
-use super::ends::to_user;
 use super::report::{Narrowest, Passage, Point as Stop, Spacing};
 use super::space::Space;
+use super::{Ends, to_user};
 use crate::tree::{FacetTree, Point};
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::lattice::UNITS_PER_EDGE;
-use contract::watch::Watch;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
 
@@ -241,7 +239,6 @@ fn described(
     let inner = (first, first + way.points.len() - 1);
     // A path to the far field counts to its end.
     let last = if after.is_empty() { 0 } else { way.points.len() - 1 };
-    let rim = facets.within(at, RIM * clearance);
     let stop = |at| Stop { at: to_user(&case.root, at), width: 2.0 * unit * facets.distance(at) };
     let inside = way.points.iter().map(|place| place.at);
     let points =
@@ -255,7 +252,7 @@ fn described(
             width_min: 2.0 * unit * way.passing(),
             width_max: 2.0 * unit * way.bound,
             width_cells: width / case.root.edge_of(case.level_surface),
-            facets: rim.into_iter().map(|(facet, _)| facet).collect(),
+            facets: facets.within(at, RIM * clearance),
             index: first + narrowest,
             is_end: [0, last].iter().any(|&end| way.points[end].clearance <= PRECISION * clearance),
         },

@@ -2,7 +2,7 @@
 //!
 //! Its invariants are in [`super::invariants`].
 
-use super::ends::Target;
+use super::Target;
 use contract::lattice::Root;
 use contract::number::{number, point};
 use serde::Serialize;

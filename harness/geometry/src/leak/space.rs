@@ -6,13 +6,11 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::Ends;
-use super::ends::{is_free, leaf_at};
+use super::{Ends, leaf_at};
 use crate::tree::{FacetTree, Point};
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::octant::UNITS_PER_CELL;
-use contract::watch::Watch;
 use contract::word::{self, KEY_END, Order, Side};
 
 /// A cell; lengths are in lattice units.
@@ -77,7 +75,7 @@ impl<'a> Space<'a> {
         let cell = |&word: &u64| {
             let (low, high) = word::octant(word).bounds();
             let (low, edge) = (low.map(|c| c as u32), (high[0] - low[0]) as u32);
-            let is_free = is_free(word);
+            let is_free = !word::is_crossing(word);
             Cell { low, edge, is_free, is_open: is_free, clearance: f32::NAN }
         };
         let cells: Vec<Cell> = words.iter().map(cell).collect();

@@ -3,12 +3,11 @@
 mod openings;
 
 use contract::case::{Case, Facet};
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::lattice::Root;
 use contract::testing::{assert_text, base_tree};
-use contract::watch::Watch;
 use geometry::leak::Leaks;
-use geometry::leak::ends::Target;
+use geometry::leak::Target;
 use geometry::leak::report::{Answers, Report};
 use openings::{
     Body, ROTATIONS, bodies, crack, hole, missing_facet, pipe, slit, torn_sphere, two_holes,
