@@ -248,18 +248,14 @@ pub struct Square {
 }
 
 impl Square {
-    /// Edge length in level-19 cells.
-    pub fn edge(&self) -> u32 {
-        CELLS_PER_EDGE >> self.level
-    }
-
     /// The corners, counterclockwise around the positive axis or the negative one, the minimum corner first.
     pub fn corners(&self, is_positive: bool) -> [Point; 4] {
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let edge = CELLS_PER_EDGE >> self.level;
         let mut corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
             let mut corner = self.corner;
-            corner[u] += i * self.edge();
-            corner[v] += j * self.edge();
+            corner[u] += i * edge;
+            corner[v] += j * edge;
             corner
         });
         if !is_positive {

@@ -5,8 +5,6 @@
 //! - [`vtu`]: cells for VTK; [`front`]: the surface towards a near-body mesh;
 //! - [`foam`]: meshes for OpenFOAM; CGNS and MFEM are made of other formats by scripts;
 
-#![deny(missing_docs)]
-
 pub mod foam;
 pub mod format;
 pub mod front;

@@ -10,10 +10,9 @@ use std::fs;
 use std::path::Path;
 
 use contract::case::Case;
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::mesh::{Leaf, Mesh};
 use contract::octant::Octant;
-use contract::watch::Watch;
 use contract::word::{self, KEY_END};
 
 use crate::selection::Selection;
@@ -53,10 +52,8 @@ impl Export<'_> {
 
     /// Refuses an export without leaves.
     pub(crate) fn require_some(&self, leaves: u64) -> Result<u64, Failure> {
-        match leaves {
-            0 => Err(Failure::input("no leaf satisfies all conditions, or the mesh has none")),
-            _ => Ok(leaves),
-        }
+        Failure::unless(leaves > 0, "no leaf satisfies all conditions, or the mesh has none")?;
+        Ok(leaves)
     }
 
     /// Whether no leaf of the mesh is left out by a condition.
@@ -126,11 +123,8 @@ impl Options<'_> {
 /// If it exists.
 pub(crate) fn require_new(path: &Path) -> Result<(), Failure> {
     let has_content = fs::read_dir(path).map_or(path.exists(), |mut dir| dir.next().is_some());
-    if has_content {
-        let why = format!("{} exists: remove it, or choose another name", path.display());
-        return Err(Failure::input(why));
-    }
-    Ok(())
+    let why = format!("{} exists: remove it, or choose another name", path.display());
+    Failure::unless(!has_content, why)
 }
 
 /// Writes to a path. After an error, nothing exists under a final name.

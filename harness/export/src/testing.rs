@@ -2,12 +2,11 @@
 
 use crate::options::{Export, Label, Options, Regions};
 use crate::selection::Selection;
-use contract::failure::Failure;
+use contract::failure::{Failure, Watch};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Tree};
 use contract::mesh::Mesh;
-use contract::watch::Watch;
 use std::path::Path;
 use tempfile::TempDir;
 

@@ -2,7 +2,7 @@
 //! any content is read or refused, without a panic.
 #![allow(missing_docs)]
 
-use contract::failure::{EXIT_INPUT, Failure};
+use contract::failure::{EXIT_INPUT, Failure, Watch};
 use contract::htg::{TreeError, TreeFile};
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
@@ -10,7 +10,6 @@ use contract::manifest::{Manifest, Tree};
 use contract::mesh::Leaf;
 use contract::mesh::Mesh;
 use contract::testing::random_words;
-use contract::watch::Watch;
 use contract::word::{self, Leaf as WordLeaf};
 use export::options::{Export, Label, Options, Regions};
 use export::selection::{Selection, Slice};

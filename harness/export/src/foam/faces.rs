@@ -9,7 +9,7 @@
 use contract::octant::CELLS_PER_EDGE;
 use contract::word;
 
-use super::patches::Patches;
+use super::Patches;
 use crate::leaves::Leaves;
 use crate::options::Options;
 use crate::points::Points;

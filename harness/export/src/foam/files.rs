@@ -24,11 +24,9 @@ impl Mesh {
         let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
         let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
-        if options.label == Label::Bits32 && vertices.max(points) > i32::MAX as u64 {
-            return Err(Failure::input(
-                "the mesh has more faces than 32-bit labels can number: choose --label 64",
-            ));
-        }
+        let fits = options.label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
+        let why = "the mesh has more faces than 32-bit labels can number: choose --label 64";
+        Failure::unless(fits, why)?;
         let (count, internal) = (faces.count(), faces.neighbour.len());
         let note =
             format!("nPoints:{points} nCells:{cells} nFaces:{count} nInternalFaces:{internal}");

@@ -7,28 +7,30 @@
 //! All is held in arrays, with 200 bytes per cell at most: less than a third of what OpenFOAM needs to read the mesh.
 //!
 //! - [`leaves`](crate::leaves): the cells, a walk over them, and their squares; [`faces`](mod@faces): all faces, and the invariants;
-//! - [`patches`]; [`files`](mod@files): OpenFOAM's syntax.
+//! - [`Patches`]: the root's sides, the body or its solids, and the cut; [`files`](mod@files): OpenFOAM's syntax.
 
 mod faces;
 mod files;
-mod patches;
 #[cfg(test)]
 mod tests;
 
 use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
+use contract::case::Case;
 use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
+use contract::octant::UNITS_PER_CELL;
 use contract::sets::Sets;
 use contract::word::{self, Side};
+use geometry::tree::{FacetTree, Point};
 
-use crate::leaves::Leaves;
+use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Options, Regions, Summary, require_new};
 use crate::points::Points;
 use faces::Faces;
-use patches::{Patches, SIDES};
 
 /// A mesh for OpenFOAM.
 pub struct Mesh {
@@ -163,7 +165,7 @@ impl Mesh {
             self.patches.names.iter().zip(faces).partition(|(_, faces)| *faces > 0);
         let with: Vec<_> = with.iter().map(|(name, faces)| format!("{name} {faces}")).collect();
         let mut notes = vec![format!("faces of each patch: {}", with.join(", "))];
-        let is_solid = |name: &&str| !SIDES.contains(name) && *name != patches::CUT;
+        let is_solid = |name: &&str| !SIDES.contains(name) && *name != CUT;
         let without = without.iter().map(|(name, _)| name.as_str()).filter(is_solid);
         let without = without.collect::<Vec<_>>().join(", ");
         if !without.is_empty() {
@@ -179,5 +181,90 @@ impl Mesh {
             notes.push(format!("{} regions that no face connects: {outcome}", self.regions));
         }
         notes
+    }
+}
+
+/// Patches of the root's sides.
+const SIDES: [&str; 6] = ["xMin", "xMax", "yMin", "yMax", "zMin", "zMax"];
+/// Patch of the faces beyond which there is no leaf, of a body without named solids.
+const BODY: &str = "body";
+/// Patch of the faces beyond which there is a leaf that is not exported.
+const CUT: &str = "cut";
+
+/// The patches: [`SIDES`], the solids of the body, and, if leaves were left out, the cut.
+pub struct Patches {
+    /// The names, unique.
+    pub names: Vec<String>,
+    has_cut: bool,
+    /// Patch of each facet, if there are several.
+    of_facet: Vec<usize>,
+    facets: Option<FacetTree>,
+}
+
+impl Patches {
+    /// The patches of a mesh. Without a case, its body is one patch.
+    pub fn new(case: Option<&Case>, has_cut: bool) -> Self {
+        let mut names = SIDES.map(str::to_owned).to_vec();
+        let (mut of_facet, mut patch_of) = (Vec::new(), HashMap::new());
+        let solids = case.iter().flat_map(|case| &case.solids);
+        for solid in solids.filter(|solid| solid.facets > 0) {
+            let patch = *patch_of.entry(&solid.name).or_insert_with(|| {
+                let name = patch_name(solid.name.as_deref().unwrap_or_default());
+                let numbered = (2..).map(|number| format!("{name}_{number}"));
+                let mut choices = std::iter::once(name.clone()).chain(numbered);
+                names.extend(choices.find(|name| !names.contains(name)));
+                names.len() - 1
+            });
+            of_facet.extend(std::iter::repeat_n(patch, solid.facets));
+        }
+        let several = case.filter(|_| names.len() > SIDES.len() + 1);
+        let facets = several.map(|case| FacetTree::new(&case.facets_lattice));
+        if names.len() == SIDES.len() {
+            names.push(BODY.to_owned());
+        }
+        names.extend(has_cut.then(|| CUT.to_owned()));
+        Self { names, has_cut, of_facet, facets }
+    }
+
+    /// The type of a patch.
+    pub fn type_of(&self, patch: usize) -> &'static str {
+        let is_body = patch >= SIDES.len() && !(self.has_cut && patch + 1 == self.names.len());
+        if is_body { "wall" } else { "patch" }
+    }
+
+    /// The patch of a face that no cell is across.
+    pub fn of(&self, square: &Square) -> usize {
+        match square.across {
+            Content::Outside => 2 * square.axis + usize::from(square.is_high),
+            Content::Cut => self.names.len() - 1,
+            _ => self.nearest(square),
+        }
+    }
+
+    /// The patch of the solid with the facet nearest to the centre of a face.
+    fn nearest(&self, square: &Square) -> usize {
+        let Some(facets) = &self.facets else { return SIDES.len() };
+        let [low, _, high, _] = square.corners(true);
+        let units = UNITS_PER_CELL as f64 / 2.0;
+        let centre = [0, 1, 2].map(|a| (f64::from(low[a]) + f64::from(high[a])) * units);
+        let centre = Point::from(centre);
+        // Half a lattice unit more, for rounding.
+        let nearest = facets.within(centre, facets.distance(centre) + 0.5);
+        self.of_facet[nearest[0] as usize]
+    }
+}
+
+/// The name of a solid as a patch: characters that OpenFOAM's words may not have become underscores. Another solid whose name becomes the
+/// same has a number at its end.
+fn patch_name(solid: &str) -> String {
+    let allowed = |c: char| c.is_alphanumeric() || "_-.+:".contains(c);
+    let name: String = solid.chars().map(|c| if allowed(c) { c } else { '_' }).collect();
+    let is_taken = SIDES.contains(&&*name) || name == CUT || name.starts_with("procBoundary");
+    match name.as_str() {
+        "" => BODY.to_owned(),
+        _ if is_taken || !name.starts_with(|c: char| c.is_alphabetic() || c == '_') => {
+            format!("{BODY}_{name}")
+        }
+        _ => name,
     }
 }

@@ -6,15 +6,16 @@
 //! a face is exposed. A face that is exposed in part is divided into quarters, and these again, until each is exposed or
 //! not; so no two squares of the front overlap, and a whole face is one square whatever the crossing leaves are like.
 //!
-//! [`Polygons`] are the same squares with hanging nodes, so that they fit together.
+//! [`Polygons`] are the same squares, so that they fit together: where a large square borders smaller ones, their corners on its edges become
+//! corners of its polygon, as in a mesh of polyhedra. Then every edge belongs to an even number of polygons, except where the front ends at the
+//! root's boundary or at the limits of a selection.
 //!
 //! The *gap* of a face is the least distance of any of its points from a facet of the case. Distances are those of the facets on the lattice, on which
 //! the mesh was made; a vertex is at most half a lattice unit along each axis from where the user put it.
 //!
-//! Invariants, which are executed before a file has its name: those of [`Polygons::check_invariants`]; a gap is that of a face that no facet enters,
-//! and not greater than the distance of the face's centre.
+//! Invariants, which are executed before a file has its name: every polygon is the square of its face with points on its edges, and faces the
+//! leaf; the areas of a closed front cancel; a gap is that of a face that no facet enters, and not greater than the distance of the face's centre.
 
-mod polygons;
 #[cfg(test)]
 mod tests;
 
@@ -26,7 +27,7 @@ use contract::failure::Failure;
 use contract::files::fill_atomically;
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::number::number;
-use contract::octant::UNITS_PER_CELL;
+use contract::octant::{UNITS_PER_CELL, edge_of};
 use contract::word::{self, Side};
 use geometries::{Facet, write_stl_binary};
 use geometry::tree::{FacetTree, Point};
@@ -34,8 +35,8 @@ use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Options, Summary, require_new};
+use crate::points::Points;
 use crate::polydata::{self, array};
-use polygons::Polygons;
 
 /// A square of the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,11 +122,8 @@ fn write(
 ) -> Result<Summary, Failure> {
     export.mesh.require_sides()?;
     let faces = front(export)?;
-    if faces.is_empty() {
-        return Err(Failure::input(
-            "no selected cell borders a crossing cell, deleted or not, so there is no surface",
-        ));
-    }
+    let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface";
+    Failure::unless(!faces.is_empty(), why)?;
     let (root, polygons) = (export.mesh.manifest.root, Polygons::new(&faces));
     let open = polygons.edges_open();
     polygons.check_invariants(&faces, export.is_of_all() && open == 0);
@@ -160,7 +158,7 @@ fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
             continue;
         }
         // A fan from a corner could have triangles without area.
-        let half = i64::from(face.square.edge()) * UNITS_PER_CELL / 2;
+        let half = edge_of(face.square.level) * UNITS_PER_CELL / 2;
         let middle = std::array::from_fn(|a| {
             let along = if a == face.square.axis { 0 } else { half };
             i64::from(face.square.corner[a]) * UNITS_PER_CELL + along
@@ -194,4 +192,66 @@ fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, 
         Ok(gap * unit)
     };
     (0..).zip(faces).map(gap).collect()
+}
+
+/// The polygons of a front.
+#[derive(Debug, Default)]
+pub struct Polygons {
+    /// The corners of all squares.
+    pub points: Points,
+    /// The corners of all polygons, one polygon after the other, counterclockwise as seen from the leaf.
+    pub corners: Vec<u32>,
+    /// One past the last corner of each polygon, in the order of the faces.
+    pub ends: Vec<u64>,
+}
+
+impl Polygons {
+    /// The polygons of some faces.
+    pub fn new(faces: &[Face]) -> Self {
+        let mut polygons = Self::default();
+        for corner in faces.iter().flat_map(Face::corners) {
+            polygons.points.add(corner);
+        }
+        for face in faces {
+            polygons.points.polygon(face.corners(), &mut polygons.corners);
+            polygons.ends.push(polygons.corners.len() as u64);
+        }
+        polygons
+    }
+
+    /// The corners of each polygon.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let begins = std::iter::once(&0).chain(&self.ends);
+        begins.zip(&self.ends).map(|(&begin, &end)| &self.corners[begin as usize..end as usize])
+    }
+
+    /// Number of edges that belong to an odd number of polygons: 0 if the front is closed.
+    pub fn edges_open(&self) -> u64 {
+        let mut edges = Vec::with_capacity(self.corners.len());
+        for corners in self.iter() {
+            let next = corners.iter().cycle().skip(1);
+            edges.extend(corners.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b))));
+        }
+        edges.sort_unstable();
+        edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1).count() as u64
+    }
+
+    /// Asserts the invariants of the polygons of these faces.
+    ///
+    /// # Panics
+    /// If one is violated.
+    pub fn check_invariants(&self, faces: &[Face], is_closed: bool) {
+        assert_eq!(self.ends.len(), faces.len(), "a polygon for every face");
+        let mut sum = [0i64; 3];
+        for (face, corners) in faces.iter().zip(self.iter()) {
+            let area = self.points.area(corners);
+            let edge = edge_of(face.square.level);
+            let mut expected = [0; 3];
+            expected[face.square.axis] =
+                if face.square.is_high { -2 * edge * edge } else { 2 * edge * edge };
+            assert_eq!(area, expected, "twice the area of {face:?}");
+            (0..3).for_each(|a| sum[a] += area[a]);
+        }
+        assert!(!is_closed || sum == [0; 3], "a closed front of areas that add up to {sum:?}");
+    }
 }

@@ -138,7 +138,7 @@ proptest! {
             let (u, v) = ((face.square.axis + 1) % 3, (face.square.axis + 2) % 3);
             let leaf = leaf_of(face).unwrap();
             prop_assert_eq!(leaf, (face.leaf, !face.square.is_high));
-            let edge = face.square.edge() / scale;
+            let edge = edge_of(face.square.level) as u32 / scale;
             for i in 0..edge * edge {
                 let mut at = face.square.corner.map(|c| c / scale);
                 at[u] += i % edge;

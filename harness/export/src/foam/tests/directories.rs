@@ -1,7 +1,6 @@
 //! The directory: patches, regions, and what is refused.
 
 use super::*;
-use crate::foam::patches::Patches;
 
 /// The patches in `boundary`: name, number of faces, first face.
 fn boundary_in(dir: &Path) -> Vec<(String, usize, usize)> {
@@ -215,4 +214,20 @@ fn crossing_cells_and_solids_without_faces_produce_warnings() {
     }
     assert!(all[1].ends_with(": body"), "{}", all[1]);
     assert_eq!(notes(Side::Outside, Selection::default()).len(), 2);
+}
+
+#[test]
+fn names_of_solids_become_words() {
+    for (solid, patch) in [
+        ("wing", "wing"),
+        ("", "body"),
+        ("left wing (v2)", "left_wing__v2_"),
+        ("a;b\"c{d}", "a_b_c_d_"),
+        ("xMin", "body_xMin"),
+        ("cut", "body_cut"),
+        ("procBoundary0to1", "body_procBoundary0to1"),
+        ("2nd", "body_2nd"),
+    ] {
+        assert_eq!(patch_name(solid), patch);
+    }
 }

@@ -1,8 +1,6 @@
 //! Tests of exported meshes as complexes of polyhedra, in memory and as files.
 
-mod cells;
 mod directories;
-mod whole;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -215,5 +213,123 @@ proptest! {
         let summary = write(&whole(&mesh, &options), &target).unwrap();
         let size: u64 = fs::read_dir(&target).unwrap().map(|f| f.unwrap().metadata().unwrap().len()).sum();
         prop_assert_eq!(summary.bytes, size);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn cells_of_any_tree_are_closed_and_joined_where_they_touch(words in random_words(3)) {
+        prop_assume!(!words.is_empty());
+        let (dir, mesh) = on_disk(&leaf_set(vec![words.clone()]));
+        let target = dir.path().join("case/constant/polyMesh");
+        let summary = write(&whole(&mesh, &options()), &target).unwrap();
+        let complex = complex_in(&target);
+        complex.assert_ordered();
+        complex.assert_closed(words.len());
+        let octants: Vec<_> = words.iter().map(|&w| word::octant(w)).collect();
+        complex.assert_adjacent(&octants, mesh.manifest.root.edge / f64::from(CELLS_PER_EDGE));
+        prop_assert_eq!(summary.leaves, words.len() as u64);
+    }
+
+    #[test]
+    fn cells_that_differ_by_many_levels_are_closed(words in random_words(5)) {
+        complex_of(&words).assert_closed(words.len());
+    }
+}
+
+/// At both ends of the root's diagonal.
+#[test]
+fn cells_of_the_finest_level_are_closed() {
+    let is_at_end = |o: &Octant| [0, CELLS_PER_EDGE - o.edge()].iter().any(|&c| o.corner == [c; 3]);
+    let words = contract::testing::words_of(|o| o.level < LEVEL_MAX && is_at_end(o));
+    complex_of(&words).assert_closed(words.len());
+}
+
+/// Every octant of level 1 is a hole, a leaf, or eight leaves: 6,560 trees.
+#[test]
+fn cells_of_every_tree_of_two_levels_are_closed() {
+    for tree in 1..3u32.pow(8) {
+        let content = |digit: u8| tree / 3u32.pow(u32::from(digit)) % 3;
+        let words = words_with_sides(
+            |o| o.level == 0 || o.level == 1 && content(o.digit()) == 2,
+            |o| (content(o.ancestor(1).digit()) > 0).then_some(Side::Outside),
+        );
+        let complex = complex_of(&words);
+        complex.assert_closed(words.len());
+        // The pairs of cells are compared for some: there are many in each tree.
+        if tree % 13 == 0 {
+            let octants: Vec<_> = words.iter().map(|&w| word::octant(w)).collect();
+            complex.assert_adjacent(&octants, 1.0);
+        }
+    }
+}
+
+/// The point in the middle of an edge belongs to all faces at that edge, also those of cells that touch finer cells nowhere else.
+#[test]
+fn a_hanging_node_belongs_to_all_faces_at_its_edge() {
+    let words = contract::testing::words_of(|o| o.level == 0 || o.level == 1 && o.corner == [0; 3]);
+    let complex = complex_of(&words);
+    let half = f64::from(CELLS_PER_EDGE) / 2.0;
+    // On the edge along x between the fine octant and the one that touches it in this edge only.
+    let node = complex.points.iter().position(|&p| p == [half / 2.0, half, half]).unwrap();
+    let faces = complex.faces.iter().filter(|vertices| vertices.contains(&node));
+    // Two fine cells at each of two coarse ones and between themselves, and the two faces among coarse cells.
+    assert_eq!(faces.count(), 7);
+}
+
+/// A cut that leaves out about a quarter of the leaves.
+fn is_cut(word: u64) -> bool {
+    contract::digest::mix(word) % 4 < 1
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn points_are_the_corners_of_cells_and_of_the_squares_at_missing_cells(words in random_words(5), has_cut in any::<bool>()) {
+        let options = options();
+        let mesh = mesh_of(&words, |word| has_cut && is_cut(word), &options);
+        let mut expected: BTreeSet<Point> = BTreeSet::new();
+        mesh.leaves.visit_all(&options, |_, octant, squares| {
+            let edge = octant.edge();
+            let corner = |digit: u32| std::array::from_fn(|a| octant.corner[a] + edge * (digit >> a & 1));
+            expected.extend((0..8).map(corner));
+            expected.extend(squares.iter().flat_map(|square| square.corners(true)));
+        });
+        let points = mesh.points.all;
+        prop_assert_eq!(points.len(), expected.len());
+        prop_assert_eq!(points.into_iter().collect::<BTreeSet<_>>(), expected);
+    }
+
+    #[test]
+    fn regions_are_the_cells_that_faces_connect(words in random_words(4), one_in in 1u64..5) {
+        let mut options = options();
+        let holes = words.iter().copied().filter(|&w| contract::digest::mix(w) % 5 < u128::from(one_in));
+        let words: Vec<u64> = holes.collect();
+        let leaves = leaves_of(&words, is_cut);
+        let cells = leaves.count() as usize;
+        let (mut sets, mut volumes): (Vec<usize>, _) = ((0..cells).collect(), vec![0; cells]);
+        leaves.visit_all(&options, |cell, octant, squares| {
+            volumes[cell as usize] = word::span(octant.level);
+            for across in squares.iter().filter_map(|square| square.across.as_cell()) {
+                let (a, b) = (sets[cell as usize], sets[across as usize]);
+                sets.iter_mut().filter(|set| **set == a).for_each(|set| *set = b);
+            }
+        });
+        let mut expected: BTreeMap<usize, u64> = BTreeMap::new();
+        (0..cells).for_each(|cell| *expected.entry(sets[cell]).or_default() += volumes[cell]);
+        let Some(largest) = expected.values().max() else { return Ok(()) };
+        // The one that has the first cell, of several that are as large.
+        let region = sets[(0..cells).find(|&cell| expected[&sets[cell]] == *largest).unwrap()];
+        let kept: Vec<usize> = (0..cells).filter(|&cell| sets[cell] == region).collect();
+        options.regions = Regions::Largest;
+        let ranks = Some((0..cells as u32).map(|cell| cell % 7).collect());
+        let mesh = Mesh::new(leaves, ranks, Patches::new(None, true), &options).unwrap();
+        prop_assert_eq!(mesh.regions, expected.len());
+        // Its cells keep their ranks.
+        let ranks: Vec<u32> = kept.iter().map(|&cell| cell as u32 % 7).collect();
+        prop_assert_eq!((mesh.leaves.count() as usize, mesh.ranks.unwrap()), (kept.len(), ranks));
     }
 }
