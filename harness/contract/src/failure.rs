@@ -1,4 +1,5 @@
-//! Why a command has no result: the exit code and the one sentence that `harness` prints.
+//! Why a command has no result: the exit code and the one sentence that `harness` prints; and what it reports meanwhile to the user, who may
+//! interrupt it.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
@@ -54,6 +55,14 @@ impl Failure {
         Self::input(format!("{}: {why}", path.display()))
     }
 
+    /// Invalid input for this reason, unless a condition holds.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn unless(holds: bool, why: impl Display) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Self::input(why)) }
+    }
+
     /// An input that cannot be read.
     pub fn unreadable(error: io::Error) -> Self {
         Self::input(format!("cannot be read: {error}"))
@@ -97,6 +106,18 @@ impl From<io::Error> for Failure {
             _ => Self::input(error),
         }
     }
+}
+
+/// A user who watches a long computation.
+pub trait Watch: Sync {
+    /// A step begins.
+    fn step(&self, _what: &str) {}
+
+    /// `done` of `total` leaves are written.
+    fn progress(&self, _done: u64, _total: u64) {}
+
+    /// Whether the user has interrupted it.
+    fn is_interrupted(&self) -> bool;
 }
 
 #[cfg(test)]

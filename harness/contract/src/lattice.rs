@@ -33,6 +33,17 @@ pub fn normal(&[a, b, c]: &FacetLattice) -> [i64; 3] {
     cross(difference(b, a), difference(c, a))
 }
 
+/// The edges of a facet, each from one corner to the next.
+pub fn edges<T: Copy>(&[a, b, c]: &[T; 3]) -> [[T; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// The corners of a facet, or others, in order.
+pub fn sorted<T: Ord, const N: usize>(mut corners: [T; N]) -> [T; N] {
+    corners.sort_unstable();
+    corners
+}
+
 /// Minimum and maximum corner of the facet's bounding box.
 pub fn bounds(&[a, b, c]: &FacetLattice) -> [[i64; 3]; 2] {
     let pick = |f: fn(i64, i64) -> i64| std::array::from_fn(|i| f(f(a[i], b[i]), c[i]));
@@ -56,6 +67,9 @@ impl fmt::Display for Root {
 }
 
 impl Root {
+    /// The unit cube.
+    pub const UNIT: Self = Self { origin: [0.0; 3], edge: 1.0 };
+
     /// A vertex on the lattice; `None` if it is not finite or lies more than one root edge outside the root.
     pub fn quantise(&self, at: [f64; 3]) -> Option<[i64; 3]> {
         let near = -(UNITS_PER_EDGE as f64)..=2.0 * UNITS_PER_EDGE as f64;

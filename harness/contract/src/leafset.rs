@@ -28,13 +28,12 @@ pub struct LeafSet {
 /// If the directory is not a leaf set.
 pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
     let mesh = Mesh::open(dir)?;
-    let mut parts: Vec<Vec<u64>> =
-        mesh.parts.iter().map(PartFile::read_all).collect::<Result<_, _>>()?;
-    if mesh.tree_file.is_some() {
-        let mut words = Vec::new();
-        mesh.visit(&mut |run| words.extend_from_slice(run))?;
-        parts.push(words);
-    }
+    // A tree is one part.
+    let mut parts = vec![Vec::new(); mesh.parts.len() + usize::from(mesh.tree_file.is_some())];
+    mesh.stream(&mut |part, run| {
+        parts[part].extend_from_slice(run);
+        true
+    })?;
     Ok(LeafSet::new(mesh.manifest, parts))
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - files: [`case`], [`plain`] (a case that every program can read), [`catalogue`], [`stl`], [`manifest`], [`npy`],
 //!   [`leafset`], [`mesh`] (the reader of meshes of any size), [`htg`] (the tree in a file of VTK), [`import`] (meshes of other programs), [`files`] (atomic writes);
-//! - [`failure`]: why a command has no result, with its exit code; [`watch`]: what it reports meanwhile;
+//! - [`failure`]: why a command has no result, with its exit code, and what it reports meanwhile;
 //! - [`paper`]: the numbers that we cite;
 //! - numbers: [`lattice`], [`octant`], [`word`], [`digest`], [`number`] (for readers);
 //! - foundations of the checks: [`tree`] (leaves as a tree that stores equal subtrees once), [`neighbourhood`], [`parity`] (rays),
@@ -33,5 +33,4 @@ pub mod stl;
 pub mod testing;
 pub mod tree;
 pub mod triangle;
-pub mod watch;
 pub mod word;

@@ -175,7 +175,7 @@ impl Mesh {
         let why = format!(
             "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
         );
-        if digest == stated { Ok(()) } else { Err(Failure::input(why)) }
+        Failure::unless(digest == stated, why)
     }
 
     /// All leaves as a tree.
@@ -236,10 +236,7 @@ impl Mesh {
     /// If they are not.
     pub fn require_sides(&self) -> Result<(), Failure> {
         let why = "the sides of this mesh are unknown, and this needs them: hyper-tree grids and surfaces cannot be written without";
-        match self.manifest.sides {
-            Sides::Known => Ok(()),
-            Sides::Unknown => Err(Failure::input(why)),
-        }
+        Failure::unless(self.manifest.sides == Sides::Known, why)
     }
 
     /// Makes sure that the rank of each leaf is known: words have a file for each rank, and a tree has none.
@@ -248,7 +245,7 @@ impl Mesh {
     /// If they are not.
     pub fn require_ranks(&self) -> Result<(), Failure> {
         let why = "the ranks of a mesh that has only a tree are unknown: mesh with --write words";
-        if self.tree_file.is_none() { Ok(()) } else { Err(Failure::input(why)) }
+        Failure::unless(self.tree_file.is_none(), why)
     }
 }
 

@@ -95,14 +95,14 @@ impl Neighbourhood {
     /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves
     /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
     /// of the root.
-    pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Coarsest {
-        let mut found = Coarsest { level: bound, cell: None };
+    pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Option<Octant> {
+        let (level, mut found) = (self.octant.level, None);
         let edge = i64::from(self.octant.edge());
         for (&handle, offset) in self.handles.iter().zip(OFFSETS.iter()) {
             let corner: [i64; 3] = std::array::from_fn(|a| {
                 i64::from(self.octant.corner[a]) + i64::from(offset[a]) * edge
             });
-            search(tree, handle, corner, self.octant.level, region, &mut found);
+            found = search(tree, handle, (corner, level), region, level_or(found, bound)).or(found);
         }
         found
     }
@@ -137,43 +137,31 @@ impl Region {
     }
 }
 
-/// Result of a search for the coarsest leaf.
-#[derive(Clone, Copy, Debug)]
-pub struct Coarsest {
-    /// Level of the leaf, or the bound of the search if there is no coarser leaf.
-    pub level: u8,
-    /// A level-19 cell of the leaf.
-    cell: Option<[i64; 3]>,
+/// The level of the leaf that was found, or the bound of the search.
+fn level_or(found: Option<Octant>, bound: u8) -> u8 {
+    found.map_or(bound, |leaf| leaf.level)
 }
 
-impl Coarsest {
-    /// The leaf; `None` if no leaf is coarser than the bound of the search.
-    pub fn leaf(&self, tree: &Tree) -> Option<Octant> {
-        let cell = self.cell?.map(|c| u32::try_from(c).expect("a leaf lies in the root"));
-        tree.locate(cell).map(|(octant, _)| octant)
-    }
-}
-
-/// Searches an octant for a leaf that is coarser than the one found so far.
+/// The coarsest leaf in an octant that is coarser than level `bound` and meets the region.
 fn search(
     tree: &Tree,
     handle: Handle,
-    corner: [i64; 3],
-    level: u8,
+    (corner, level): ([i64; 3], u8),
     region: &Region,
-    found: &mut Coarsest,
-) {
+    bound: u8,
+) -> Option<Octant> {
     let coarsest = tree.coarsest_level(handle, level);
     let edge = edge_of(level);
-    if coarsest >= found.level || !region.meets(corner, edge) {
-        return;
+    if coarsest >= bound || !region.meets(corner, edge) {
+        return None;
     }
     if !handle.is_node() {
-        *found = Coarsest { level: coarsest, cell: Some(corner) };
-        return;
+        // A leaf lies in the root.
+        return Some(Octant { corner: corner.map(|c| c as u32), level }.ancestor(coarsest));
     }
-    for digit in 0..8u8 {
+    (0..8u8).fold(None, |found, digit| {
         let corner = std::array::from_fn(|a| corner[a] + edge / 2 * i64::from(digit >> a & 1));
-        search(tree, tree.child(handle, digit, level), corner, level + 1, region, found);
-    }
+        let child = tree.child(handle, digit, level);
+        search(tree, child, (corner, level + 1), region, level_or(found, bound)).or(found)
+    })
 }

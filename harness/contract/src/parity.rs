@@ -5,7 +5,7 @@
 //! the projection. An edge is crossed iff its half-open range contains the point's second coordinate, which is
 //! equivalent to an infinitesimal perturbation of the point. All arithmetic is in integers.
 
-use crate::lattice::{FacetLattice, bounds, difference, dot, normal};
+use crate::lattice::{FacetLattice, bounds, difference, dot, edges, normal};
 use rustc_hash::FxHashMap;
 
 /// Facets, binned into one grid per axis.
@@ -54,9 +54,8 @@ fn project(point: [i64; 3], axis: usize) -> [i64; 2] {
 fn crosses(facet: &FacetLattice, point: [i64; 3], axis: usize) -> Option<bool> {
     let projected = project(point, axis);
     let corners = facet.map(|v| project(v, axis));
-    let edges = [(0, 1), (1, 2), (2, 0)];
-    let crossed = |&&(a, b): &&(usize, usize)| edge_is_right(corners[a], corners[b], projected);
-    if edges.iter().filter(crossed).count() != 1 {
+    let crossed = |[from, to]: &[[i64; 2]; 2]| edge_is_right(*from, *to, projected);
+    if edges(&corners).iter().filter(|edge| crossed(edge)).count() != 1 {
         return None;
     }
     let normal = normal(facet);

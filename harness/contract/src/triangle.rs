@@ -5,7 +5,7 @@
 //! of its plane with the box, so any point of that intersection decides. The test takes the point on the box
 //! diagonal that is most nearly parallel to the normal.
 
-use crate::lattice::{FacetLattice, bounds, cross, difference, dot, normal};
+use crate::lattice::{FacetLattice, bounds, cross, difference, dot, edges, normal};
 
 /// A facet with precomputed bounds, normal and height.
 #[derive(Clone, Debug)]
@@ -45,8 +45,7 @@ impl Triangle {
         if above(near) > 0 || above(far) < 0 {
             return false;
         }
-        let [a, b, c] = self.corners;
-        [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| segment_meets(from, to, low, high))
+        edges(&self.corners).into_iter().any(|[from, to]| segment_meets(from, to, low, high))
             || self.pierced(near, far)
     }
 

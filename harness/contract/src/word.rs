@@ -153,6 +153,11 @@ pub fn octant(word: u64) -> Octant {
     Octant { corner: corner_of(key(word)), level: level(word) }
 }
 
+/// Whether the surface crosses the leaf of a word.
+pub fn is_crossing(word: u64) -> bool {
+    word & SIDE_BITS == Side::Crossing as u64
+}
+
 /// The side of a valid word.
 pub fn side(word: u64) -> Side {
     Side::ALL[(word & SIDE_BITS) as usize]

@@ -1,7 +1,7 @@
 //! A line of progress on standard error, only if that is a terminal.
 
 use crate::engine::interrupt;
-use contract::watch::Watch;
+use contract::failure::Watch;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,14 +1,21 @@
-//! Imported cells as a leaf set with its manifest.
+//! Imported cells as a leaf set with its manifest; and hyper-tree grids as this repository writes them, of any size, whose leaves are never in
+//! memory all at once. VTK reads other hyper-tree grids.
 
 use super::TOLERANCE;
 use super::cells::Cells;
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::failure::Failure;
+use crate::htg::{SIDE, TreeError, TreeFile};
 use crate::lattice::Root;
-use crate::leafset::LeafSet;
-use crate::manifest::{Manifest, Sides, Tree};
+use crate::leafset::{self, LeafSet};
+use crate::manifest::{self, Manifest, Part, Sides, Tree};
+use crate::npy;
 use crate::word::{self, Order};
+use std::fs;
+use std::io;
+use std::os::unix::fs::symlink;
+use std::path::Path;
 
 /// The mesh of these cells in one part, with the root `given` or that of the case, of the file, or of the cells.
 ///
@@ -29,18 +36,17 @@ pub fn leaf_set(
     }
     let words = cells.words(&root)?;
     let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);
-    if !cells.digest.is_none_or(is_of_digest) {
-        return Err(Failure::input("has other leaves than its digest states: it is damaged"));
-    }
+    let is_whole = cells.digest.is_none_or(is_of_digest);
+    Failure::unless(is_whole, "has other leaves than its digest states: it is damaged")?;
     let sides = if cells.sides.is_some() { Sides::Known } else { Sides::Unknown };
-    let manifest = Manifest { sides, ..manifest(root, case, program) };
+    let manifest = Manifest { sides, ..manifest_of(root, case, program) };
     let set = LeafSet::new(manifest, Vec::new()).with_parts(vec![words]);
     check_invariants(cells, &set);
     Ok(set)
 }
 
 /// The manifest of a mesh in a root, without leaves.
-pub(super) fn manifest(root: Root, case: Option<&Case>, program: String) -> Manifest {
+fn manifest_of(root: Root, case: Option<&Case>, program: String) -> Manifest {
     match case {
         Some(case) => Manifest { root, ..case.manifest(Tree::Final, program) },
         None => {
@@ -63,6 +69,83 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
         (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells,
         "cells fill {of_cells} of the root, and their leaves {of_leaves}"
     );
+}
+
+/// Name of the tree in a directory.
+const TREE: &str = "mesh.vtkhdf";
+
+/// A tree, and the manifest of its leaves.
+pub struct ImportedTree {
+    tree: TreeFile,
+    /// The manifest, without parts.
+    pub manifest: Manifest,
+}
+
+impl ImportedTree {
+    /// Opens a file and counts its leaves; `None` if VTK has to read it, or if its root is not the one that is given. Sides are
+    /// the cell data that `sides` names, otherwise `side` if it has that. The manifest is that of [`leaf_set`].
+    ///
+    /// # Errors
+    /// If the file is damaged or has no such cell data.
+    pub fn open(
+        path: &Path,
+        sides: Option<&str>,
+        root: Option<Root>,
+        case: Option<&Case>,
+        program: String,
+    ) -> Result<Option<Self>, Failure> {
+        // Another array is VTK's to find.
+        if sides.is_some_and(|sides| sides != SIDE) {
+            return Ok(None);
+        }
+        let tree = match TreeFile::open(path) {
+            Ok(tree) if root.is_none_or(|root| root == tree.root) => tree,
+            Ok(_) | Err(TreeError::Unknown(_)) => return Ok(None),
+            Err(error) => return Err(Failure::input(error)),
+        };
+        let mut manifest = manifest_of(tree.root, case, program);
+        tree.words(&mut |run| {
+            run.iter().for_each(|&word| manifest.add(word));
+            true
+        })
+        .map_err(Failure::input)?;
+        manifest.finish();
+        assert_eq!(manifest.leaves, tree.leaves, "leaves of the walk, and of the bits of nodes");
+        Ok(Some(Self { tree, manifest }))
+    }
+
+    /// Writes the leaf words as a new directory, or into one that is empty, in one part.
+    ///
+    /// # Errors
+    /// If the directory is not empty or a file cannot be written; the message names it.
+    pub fn create(&self, dir: &Path) -> io::Result<()> {
+        let Manifest { leaves, digest, .. } = self.manifest;
+        let parts = vec![Part { file: manifest::part_name(0), leaves, digest }];
+        leafset::create(dir, &Manifest { parts, ..self.manifest.clone() }, |_, out| {
+            out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
+            let (mut found, mut written) = (Digest::default(), Ok(()));
+            let read = self.tree.words(&mut |run| {
+                run.iter().for_each(|&word| found.add(word));
+                written = out.write_all(bytemuck::cast_slice(run));
+                written.is_ok()
+            });
+            written?;
+            match read {
+                Ok(()) if found == digest => Ok(()),
+                Ok(()) => Err(io::Error::other("the file changed while it was read")),
+                Err(error) => Err(io::Error::other(error)),
+            }
+        })
+    }
+
+    /// Makes an empty directory a leaf set that has the tree alone, by a link to its file.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn link(&self, dir: &Path) -> io::Result<()> {
+        symlink(fs::canonicalize(&self.tree.path)?, dir.join(TREE))?;
+        Manifest { hyper_tree_grid: Some(TREE.to_owned()), ..self.manifest.clone() }.write(dir)
+    }
 }
 
 #[cfg(test)]

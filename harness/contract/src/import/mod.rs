@@ -2,15 +2,13 @@
 //!
 //! - [`words`](mod@words), [`p4est`]: the formats that are read here, as cubes; [`forest`]: the files of p4est as they are. VTK, tables, discretize and OpenFOAM are read in Python,
 //!   which the crate `run` starts;
-//! - [`htg`]: the trees that this repository writes in VTKHDF, of any size;
 //! - [`cells`]: cubes as leaf words, verified cell by cell, and the root, if the file states none;
-//! - [`leaf_set()`]: the mesh with its manifest.
+//! - [`leaf_set()`]: the mesh with its manifest; [`ImportedTree`]: that of a tree that this repository wrote in VTKHDF, of any size.
 //!
 //! No reader allocates memory for a count before the file has been seen to be long enough for it.
 
 pub mod cells;
 pub mod forest;
-pub mod htg;
 mod leaf_set;
 pub mod p4est;
 pub mod words;
@@ -24,7 +22,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-pub use leaf_set::leaf_set;
+pub use leaf_set::{ImportedTree, leaf_set};
 
 /// Greatest distance of a corner from its place in the oct-tree, and greatest difference of an edge, in edges of the
 /// cell. Coordinates in single precision need more than rounding errors of double precision.
@@ -85,11 +83,9 @@ pub fn guess(path: &Path) -> Result<Format, Failure> {
     refuse_leaf_set(path)?;
     let unknown = "its format was not recognised: choose one with --format (see --help)";
     let format = if is_directory {
-        if path.join(manifest::part_name(0)).is_file() {
-            let why = "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
-                 --format leaf-words";
-            return Err(Failure::input(why));
-        }
+        let why = "has parts and no mesh.json, so the program that wrote them may not have finished: if it writes none, choose \
+             --format leaf-words";
+        Failure::unless(!path.join(manifest::part_name(0)).is_file(), why)?;
         poly_mesh(path).map(|_| Format::Openfoam)
     } else if path.ends_with(manifest::FILE) {
         return Err(Failure::input("is the manifest of a leaf set: give its directory"));
@@ -107,10 +103,7 @@ pub fn guess(path: &Path) -> Result<Format, Failure> {
 /// Refuses a directory that is a leaf set already.
 fn refuse_leaf_set(path: &Path) -> Result<(), Failure> {
     let why = "has a manifest mesh.json, so it needs no import: `harness audit` shows whether it is complete";
-    match path.join(manifest::FILE).exists() {
-        true => Err(Failure::input(why)),
-        false => Ok(()),
-    }
+    Failure::unless(!path.join(manifest::FILE).exists(), why)
 }
 
 fn of_content(head: &[u8]) -> Option<Format> {

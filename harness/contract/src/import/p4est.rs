@@ -16,9 +16,6 @@ use crate::word;
 
 use std::path::Path;
 
-/// The root of most forests, whatever the size of the body.
-const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
-
 /// Value of `--sides` that takes the sides from the data of the quadrants.
 const SIDES: &str = "data";
 /// The data of a quadrant that is not a leaf of the mesh: p4est's trees have no holes, so a hole is filled with such quadrants.
@@ -30,10 +27,8 @@ pub const FILLER: u8 = 3;
 /// If the file cannot be read, is damaged, or has trees that are not cubes along the axes.
 pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     let forest = forest::read(path)?;
-    if forest.connectivity.dimension == 2 {
-        let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
-        return Err(Failure::input(why));
-    }
+    let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
+    Failure::unless(forest.connectivity.dimension == 3, why)?;
     if forest.leaves.is_empty() {
         return Err(damaged("it is a connectivity without leaves"));
     }
@@ -56,7 +51,8 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     let units = 1e-9 * placed.edge;
     let ends = |root: &Root| [root.origin[0], root.origin[1], root.origin[2], root.edge];
     let is_there = ends(&stated).iter().zip(ends(&placed)).all(|(a, b)| (a - b).abs() <= units);
-    if request.is_root_of_case && stated != UNIT && !is_there {
+    // The root of most forests is the unit cube, whatever the size of the body.
+    if request.is_root_of_case && stated != Root::UNIT && !is_there {
         return Err(Failure::input(format!(
             "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
         )));

@@ -13,9 +13,6 @@ use std::path::Path;
 /// that does not know the sides writes some code too.
 pub const SIDES: &str = "side";
 
-/// The root in which words are placed if none is given.
-const UNIT: Root = Root { origin: [0.0; 3], edge: 1.0 };
-
 /// Reads leaf words.
 ///
 /// # Errors
@@ -31,7 +28,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
         true => read_parts(path)?,
         false => vec![(String::new(), PartFile::open(path)?.read_all()?)],
     };
-    let (with_sides, root) = (request.sides.is_some(), request.root.unwrap_or(UNIT));
+    let (with_sides, root) = (request.sides.is_some(), request.root.unwrap_or(Root::UNIT));
     let mut cells =
         Cells { root: Some(root), sides: with_sides.then(Vec::new), ..Cells::default() };
     for (part, words) in parts {

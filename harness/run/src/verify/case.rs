@@ -13,7 +13,7 @@ use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
 use contract::catalogue::Selected;
-use contract::watch::Watch;
+use contract::failure::Watch;
 use std::path::{Path, PathBuf, absolute};
 
 /// A case being verified.
