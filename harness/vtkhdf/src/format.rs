@@ -32,8 +32,6 @@ pub(crate) const LAYOUT_CHUNKED: u8 = 2;
 pub(crate) const INDEX_FIXED_ARRAY: u8 = 3;
 /// Base-2 logarithm of the entries from which on the table would have pages: more than any file of ours has.
 pub(crate) const PAGE_BITS: u8 = 24;
-/// The filter zlib.
-pub(crate) const FILTER_DEFLATE: u16 = 1;
 
 /// Fill value messages: the value is zero, and space is allocated early, or chunk by chunk.
 pub(crate) const ALLOCATED_EARLY: [u8; 2] = [3, 0b1001];

@@ -5,8 +5,6 @@
 //! - [`tree`]: the layout of a hyper-tree grid of one oct-tree, and its arrays, window by window;
 //! - [`read`]: the reader of such files. Those of other programs are refused.
 
-#![deny(missing_docs)]
-
 pub mod format;
 pub mod read;
 pub mod tree;

@@ -1,9 +1,9 @@
 //! Metadata of HDF5 files: tables of chunks, object headers and the superblock.
 
 use crate::format::{
-    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, FILTER_DEFLATE, INDEX_FIXED_ARRAY,
-    LAYOUT_CHUNKED, LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES,
-    UNDEFINED, datatype, lookup3, message,
+    ALLOCATED_BY_CHUNK, ALLOCATED_EARLY, Chunked, INDEX_FIXED_ARRAY, LAYOUT_CHUNKED,
+    LAYOUT_COMPACT, LAYOUT_VERSION, PAGE_BITS, SIGNATURE, TABLE_HEAD_BYTES, UNDEFINED, datatype,
+    lookup3, message,
 };
 use flate2::{Compress, Compression, FlushCompress, Status};
 
@@ -130,9 +130,8 @@ impl Metadata {
         layout.extend([INDEX_FIXED_ARRAY, PAGE_BITS]);
         layout.extend(table.to_le_bytes());
         add_message(&mut header, message::LAYOUT, &layout);
-        let [low, high] = FILTER_DEFLATE.to_le_bytes();
-        // One filter, not optional, with one parameter.
-        let filter = [2, 1, low, high, 0, 0, 1, 0, LEVEL as u8, 0, 0, 0];
+        // One filter, zlib (1), not optional, with one parameter.
+        let filter = [2, 1, 1, 0, 0, 0, 1, 0, LEVEL as u8, 0, 0, 0];
         add_message(&mut header, message::FILTERS, &filter);
         self.header(&header)
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::checks::CAPACITY;
 use crate::promises::Touching;
-use contract::import::htg::ImportedTree;
+use contract::import::ImportedTree;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{Keep, Sides};
 use contract::testing::{leaf_set, random_words, words_of};

@@ -58,7 +58,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
         let (wide, coarsest) = trail.wide(margin);
         let nearby = match *coarsest {
             coarsest if coarsest >= bound => coarsest,
-            _ => wide.coarsest_within(self.tree, &region(), bound).level,
+            _ => wide.coarsest_within(self.tree, &region(), bound).map_or(bound, |leaf| leaf.level),
         };
         for (digit, &Required { margin, own, below }) in present() {
             let (own, is_deep) = (own.filter(|&own| own > nearby), below > Some(nearby));
@@ -86,7 +86,7 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
                 found = self.directions.iter().find_map(|axes| {
                     let region = Region::along(&part, axes.map(|axis| axis * margin));
                     let (wide, _) = trail.wide(margin);
-                    let coarse = wide.coarsest_within(self.tree, &region, bound).leaf(self.tree)?;
+                    let coarse = wide.coarsest_within(self.tree, &region, bound)?;
                     Some((part, coarse))
                 });
             }

@@ -90,9 +90,11 @@ fn decided(
 /// level and then by key. The words are sorted leaves that do not overlap.
 pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(words.len());
-    let free = || (0..).zip(words).filter(|(_, w)| !crossing(**w));
+    let free = || (0..).zip(words).filter(|(_, w)| !word::is_crossing(**w));
     for (i, &w) in free() {
-        for j in coarse_neighbours(words, &word::octant(w)).filter(|&j| !crossing(words[j])) {
+        for j in
+            coarse_neighbours(words, &word::octant(w)).filter(|&j| !word::is_crossing(words[j]))
+        {
             sets.union(i, j as u32);
         }
     }
@@ -137,10 +139,6 @@ pub fn seeded_leaves(words: &[u64], terms: &Manifest) -> Vec<(u32, usize)> {
 pub fn seed_in(leaves: &[u32], seeded: &[(u32, usize)]) -> Option<usize> {
     let seed = |leaf: &u32| seeded.binary_search_by_key(leaf, |(seeded, _)| *seeded).ok();
     leaves.iter().filter_map(seed).map(|at| seeded[at].1).min()
-}
-
-fn crossing(word: u64) -> bool {
-    word & 3 == Side::Crossing as u64
 }
 
 /// The leaves across a face that are at least as coarse. Finer neighbours find this leaf themselves, and so do siblings that

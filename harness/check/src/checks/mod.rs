@@ -11,7 +11,6 @@ pub mod complete;
 pub mod components;
 pub mod contact;
 pub mod crossing;
-pub mod facets;
 pub mod identical;
 pub mod kept;
 pub mod layer;

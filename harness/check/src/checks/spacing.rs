@@ -9,7 +9,7 @@
 //! surface level is a finding if a facet reaches deeper into it than a tolerance. The check cannot detect a crossed leaf that is
 //! missing from the mesh; `complete` does, if `crossing` is promised or the band of `sides` has no width.
 
-use super::facets::Facets;
+use super::truth::Facets;
 use super::{Check, CheckResult, NO_GEOMETRY, Subject, UNKNOWN_INPUTS, some_leaves};
 use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Manifest;

@@ -1,7 +1,7 @@
 //! An octant is split if and only if a facet, a box, a layer or the balance requires it.
 //!
 //! Section 6 of reference/DEFINITION.md: refinement is least. Together with the other checks this establishes that the mesh is
-//! the one of the definition, without another mesh to compare it with ([`crate::why::least`]). `layer` and `balance` check what a reader
+//! the one of the definition, without another mesh to compare it with ([`crate::why::Mesh::audit`]). `layer` and `balance` check what a reader
 //! may rely on, which is less: layers around leaves that balance made are required, too, and meshes that lack them pass both. The check
 //! needs the facets and, for a final mesh, memory in proportion to the leaves.
 

@@ -4,9 +4,6 @@
 //! All leaves are read once, to count and digest them, with memory for one buffer, from the parts or the tree; then the first octant of level 3 that
 //! differs. Words that are not a linear oct-tree are refused.
 
-#[cfg(test)]
-mod tests;
-
 mod rule;
 
 use std::fmt;
@@ -92,7 +89,7 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
         without_sides,
         leaves: a.manifest.leaves,
         fields: fields(("A", &a.manifest), ("B", &b.manifest)),
-        octants: differing.map(|(index, _)| level_3(index)).collect(),
+        octants: differing.map(|(index, _)| word::octant(index << 55 | 3 << 2)).collect(),
         ..DiffReport::default()
     };
     if let Some(octant) = report.octants.first() {
@@ -110,11 +107,6 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
         report.rule = without_sides.is_none().then(|| rule(&a, &b, case, [x, y]));
     }
     Ok(report)
-}
-
-/// The level-3 octant with this index.
-fn level_3(index: u64) -> Octant {
-    Octant { corner: word::corner_of(index << 48), level: 3 }
 }
 
 /// The rule that decides which mesh is right, or why none does, from the first words that differ; `None` for a mesh that has no more leaves.
@@ -144,4 +136,223 @@ fn fields(a: (&str, &Manifest), b: (&str, &Manifest)) -> Vec<String> {
     let mut fields = differing_inputs(a, b);
     fields.extend(differing(&counts, a, b));
     fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::import::ImportedTree;
+    use contract::leafset;
+    use contract::manifest::{Manifest, octant_index};
+    use contract::testing::{leaf_set, random_words, words_of};
+    use proptest::prelude::*;
+
+    /// The level-3 octant with this index.
+    fn level_3(index: u64) -> Octant {
+        Octant { corner: word::corner_of(index << 48), level: 3 }
+    }
+
+    fn written(words: Vec<u64>) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        leaf_set(vec![words]).write(dir.path()).unwrap();
+        dir
+    }
+
+    #[test]
+    fn what_a_manifest_does_not_state_is_named_as_such() {
+        let [a, b] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let mut set = leaf_set(vec![words_of(|o| o.level < 1)]);
+        set.manifest.components = Some(Default::default());
+        set.write(a.path()).unwrap();
+        set.manifest.components = None;
+        set.write(b.path()).unwrap();
+        let fields = diff(a.path(), b.path(), None).unwrap().fields;
+        assert!(fields.iter().any(|f| f.ends_with("in A; not stated in B")), "{fields:?}");
+    }
+
+    #[test]
+    fn without_the_sides_of_one_mesh_the_cells_are_compared() {
+        let words = words_of(|o| o.level < 2);
+        let with_sides = words.iter().map(|word| word | 1).collect();
+        let (a, b) = (written(with_sides), written(words.clone()));
+        let compare = || diff(a.path(), b.path(), None).unwrap();
+        assert!(!compare().same_leaves());
+        let unknown = |mut set: contract::leafset::LeafSet| {
+            set.manifest.sides = Sides::Unknown;
+            set.write(b.path()).unwrap();
+        };
+        unknown(leaf_set(vec![words.clone()]));
+        let same = compare();
+        assert!(same.same_leaves(), "{same}");
+        assert!(same.to_string().starts_with("the sides of B are unknown"), "{same}");
+        unknown(leaf_set(vec![words[1..].to_vec()]));
+        let other = compare();
+        assert!(!other.same_leaves() && other.rule.is_none(), "{other}");
+        let leaf = other.leaf.expect("the first difference");
+        assert!(!leaf.contains("outside") && !leaf.contains("inside"), "{leaf}");
+    }
+
+    #[test]
+    fn the_first_difference_is_found_in_any_octant_and_part() {
+        let words = words_of(|o| o.level < 3);
+        for index in [0, 100, 511] {
+            let mut changed = words.clone();
+            changed[index] |= 1;
+            // Three parts, which interleave.
+            let mut parts = vec![Vec::new(); 3];
+            changed.iter().enumerate().for_each(|(i, &word)| parts[i % 3].push(word));
+            let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+            leaf_set(parts).write(b.path()).unwrap();
+            let found = diff(a.path(), b.path(), None).unwrap();
+            assert_eq!((found.octants, found.leaves), (vec![level_3(index as u64)], 512));
+            let octant = word::octant(words[index]);
+            let leaf = leaf_set(vec![]).manifest.root.place(octant).to_string();
+            let text = format!(
+                "first difference:\n  A has outside leaf: {leaf}\n  B has inside leaf: {leaf}"
+            );
+            assert_eq!(found.leaf, Some(text));
+            assert_eq!(
+                found.rule.unwrap(),
+                "section 4 (side): give the case file (--case) to decide it"
+            );
+        }
+        // A mesh that ends early.
+        let (a, b) = (written(words.clone()), written(words[..511].to_vec()));
+        let found = diff(a.path(), b.path(), None).unwrap();
+        assert!(found.leaf.unwrap().ends_with("\n  B has no more leaves"));
+    }
+
+    #[test]
+    fn meshes_of_other_inputs_or_trees_are_not_judged() {
+        let words = words_of(|o| o.level < 1);
+        let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+        let rules = |change: fn(&mut Manifest)| {
+            let mut set = leaf_set(vec![words.iter().map(|word| word | 1).collect()]);
+            change(&mut set.manifest);
+            set.write(b.path()).unwrap();
+            diff(a.path(), b.path(), None).unwrap().rule.unwrap()
+        };
+        assert!(rules(|_| ()).starts_with("section 4"));
+        assert!(
+            rules(|m| m.tree = contract::manifest::Tree::Base)
+                .starts_with("none: the inputs differ")
+        );
+        assert!(rules(|m| m.layer_cells_min = 2).starts_with("none: the inputs differ"));
+    }
+
+    #[test]
+    fn a_leaf_that_its_manifest_does_not_show_is_found() {
+        let words = words_of(|o| o.level < 2);
+        let (a, b) = (written(words.clone()), written(words.clone()));
+        let compare = || diff(a.path(), b.path(), None).unwrap();
+        assert_eq!(compare().to_string(), "the leaves are the same (64 compared)");
+
+        let manifest = std::fs::read(b.path().join("mesh.json")).unwrap();
+        let mut changed = words;
+        changed[9] |= 1;
+        leaf_set(vec![changed]).write(b.path()).unwrap();
+        std::fs::write(b.path().join("mesh.json"), manifest).unwrap();
+        let found = compare();
+        assert!(!found.same_leaves() && found.leaf.is_some());
+    }
+
+    #[test]
+    fn a_tree_is_compared_with_parts_like_other_parts() {
+        let sample = Path::new("../contract/tests/samples/sphere.vtkhdf");
+        let open = ImportedTree::open(sample, None, None, None, "test".to_owned());
+        let imported = open.unwrap().expect("a tree");
+        let place = tempfile::tempdir().unwrap();
+        let [tree, parts] = ["tree", "parts"].map(|name| place.path().join(name));
+        std::fs::create_dir(&tree).unwrap();
+        imported.link(&tree).unwrap();
+        imported.create(&parts).unwrap();
+        let compared = |a: &Path, b: &Path| diff(a, b, None).unwrap();
+        let same = compared(&tree, &parts);
+        assert!(same.same_leaves() && same.leaves == 9056, "{same}");
+        let set = leafset::read(&parts).unwrap();
+        for at in [0, 5000, 9055] {
+            let mut words = set.words.clone();
+            words[at] = (words[at] & !3) | (((words[at] & 3) + 1) % 3);
+            let changed = tempfile::tempdir().unwrap();
+            set.with_parts(vec![words]).write(changed.path()).unwrap();
+            for [a, b] in [[tree.as_path(), changed.path()], [changed.path(), &tree]] {
+                let found = compared(a, b);
+                assert_eq!(found.octants, [level_3(octant_index(set.words[at]) as u64)], "{found}");
+                let leaf = set.manifest.root.place(word::octant(set.words[at])).to_string();
+                let text = found.leaf.as_ref().expect("the first difference");
+                assert_eq!(text.matches(&leaf).count(), 2, "{text}");
+            }
+        }
+    }
+
+    /// The buffer has 65,536 words.
+    #[test]
+    fn a_part_larger_than_the_buffer_is_read_to_its_end() {
+        let words = words_of(|o| o.level < 5 || o.level < 6 && o.corner[2] < 1 << 17);
+        assert!(words.len() > 1 << 16, "{}", words.len());
+        let mut changed = words.clone();
+        *changed.last_mut().unwrap() |= 1;
+        let (a, b) = (written(words.clone()), written(changed));
+        let compared = |b: &Path| diff(a.path(), b, None).unwrap();
+        let same = compared(a.path());
+        assert_eq!((same.same_leaves(), same.leaves), (true, words.len() as u64));
+        let found = compared(b.path());
+        assert_eq!(found.octants, vec![level_3(511)]);
+        assert_eq!(
+            found.rule.unwrap(),
+            "section 4 (side): give the case file (--case) to decide it"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn a_drawn_change_is_found_at_its_first_leaf(words in random_words(3), at in any::<prop::sample::Index>(), way in 0..3) {
+            prop_assume!(!words.is_empty());
+            let (i, mut changed) = (at.index(words.len()), words.clone());
+            match way {
+                0 => changed[i] = changed[i] & !3 | (changed[i] + 1) & 1,
+                1 => drop(changed.remove(i)),
+                _ => {}
+            }
+            let (a, b) = (written(words.clone()), written(changed.clone()));
+            let report = diff(a.path(), b.path(), None).unwrap();
+            prop_assert_eq!(report.same_leaves(), changed == words);
+            prop_assert_eq!(report.same_mesh(), changed == words);
+            if changed != words {
+                let octant = word::octant(words[i]);
+                let leaf = report.leaf.unwrap();
+                prop_assert!(leaf.contains(&octant.path()), "{}", leaf);
+            }
+        }
+    }
+
+    #[test]
+    fn meshes_in_different_roots_differ() {
+        let words = words_of(|o| o.level < 2);
+        let (a, b) = (written(words.clone()), tempfile::tempdir().unwrap());
+        let mut moved = leaf_set(vec![words]);
+        moved.manifest.root.edge = moved.manifest.root.edge.next_up();
+        moved.write(b.path()).unwrap();
+        let report = diff(a.path(), b.path(), None).unwrap();
+        assert!(report.same_leaves() && !report.same_mesh(), "{report}");
+        assert!(
+            report.to_string().ends_with("but in other roots, so the cells differ"),
+            "{report}"
+        );
+    }
+
+    #[test]
+    fn words_that_are_no_linear_tree_are_refused() {
+        let words = words_of(|o| o.level < 2);
+        let good = written(words.clone());
+        let mut overlapping = words.clone();
+        overlapping.insert(1, words[0]);
+        for bad in [[&words[1..], &words[..1]].concat(), overlapping] {
+            let bad = written(bad);
+            for (a, b) in [(&good, &bad), (&bad, &good), (&bad, &bad)] {
+                let error = diff(a.path(), b.path(), None).unwrap_err();
+                assert!(error.to_string().contains("not a linear oct-tree"), "{error}");
+            }
+        }
+    }
 }

@@ -36,12 +36,12 @@ fn of_centre(mesh: &Mesh, octant: &Octant) -> Answer {
 /// The rule for an octant that has different sides.
 fn side(x: &Leaf, y: &Leaf, mesh: &Mesh) -> String {
     let answer = of_centre(mesh, &x.octant);
-    let Some(reason) = answer.side_decided_by else {
+    let Some((side, decision)) = answer.side_decided_by else {
         return "section 4 (side): give the case file (--case) to decide it".to_owned();
     };
-    let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == reason.side);
+    let right = [(x, "A"), (y, "B")].into_iter().find(|(leaf, _)| leaf.side == side);
     let right = right.map_or("neither", |(_, name)| name);
-    format!("section 4 ({}): it is {}, and {right} is right", reason.decision, reason.side)
+    format!("section 4 ({decision}): it is {side}, and {right} is right")
 }
 
 /// The rule for a leaf that the other mesh does not have in any form.

@@ -6,8 +6,7 @@
 
 use contract::case::Case;
 use contract::digest::mix;
-
-use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::lattice::{FacetLattice, UNITS_PER_EDGE, edges, sorted};
 use contract::word::{self, Side};
 
 pub mod vote;
@@ -60,12 +59,7 @@ fn band(case: &Case) -> f64 {
 /// If so, all rays from a point off the surface have the same parity. Degenerate facets count here, although no
 /// ray crosses them, because they close slits of zero width.
 pub fn is_watertight(facets: &[FacetLattice]) -> bool {
-    let sides = |facet: &FacetLattice| {
-        let [a, b, c] = *facet;
-        [[a, b], [b, c], [c, a]]
-    };
-    let sorted = |[a, b]: [[i64; 3]; 2]| [a.min(b), a.max(b)];
-    let mut edges: Vec<_> = facets.iter().flat_map(sides).map(sorted).collect();
+    let mut edges: Vec<_> = facets.iter().flat_map(edges).map(sorted).collect();
     edges.retain(|[a, b]| a != b);
     edges.sort_unstable();
     edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
@@ -73,12 +67,7 @@ pub fn is_watertight(facets: &[FacetLattice]) -> bool {
 
 /// Whether two facets have the same vertices. Rays cancel them; the oracles may count both.
 pub fn is_doubled(facets: &[FacetLattice]) -> bool {
-    let sorted = |facet: &FacetLattice| {
-        let mut vertices = *facet;
-        vertices.sort_unstable();
-        vertices
-    };
-    let mut all: Vec<FacetLattice> = facets.iter().map(sorted).collect();
+    let mut all: Vec<FacetLattice> = facets.iter().copied().map(sorted).collect();
     all.retain(|[a, b, c]| a != b && b != c);
     all.sort_unstable();
     all.windows(2).any(|pair| pair[0] == pair[1])

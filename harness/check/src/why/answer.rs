@@ -29,8 +29,8 @@ pub struct Answer {
     pub leaf: Option<Leaf>,
     /// The leaf of T0 at the point; none if the surface is not known.
     pub base_leaf: Option<Octant>,
-    /// What decides the side; none if the facets are not known.
-    pub side_decided_by: Option<SideReason>,
+    /// The side, and what decides it (section 4), in words; none if the facets are not known.
+    pub side_decided_by: Option<(Side, String)>,
     /// Deleted parts: the rule that deletes the leaf of T0.
     pub deleted_by: Option<String>,
     /// The split of the leaf's parent; none for the root.
@@ -63,15 +63,6 @@ pub struct Cause {
     pub is_crossed: bool,
     /// Boxes, counted from 0.
     pub boxes: Vec<usize>,
-}
-
-/// What decides the side of a leaf (section 4).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SideReason {
-    /// The side.
-    pub side: Side,
-    /// What decides it, in words.
-    pub decision: String,
 }
 
 /// The rule in place of one that deletes a leaf.
@@ -190,14 +181,13 @@ impl fmt::Display for Answer {
                 writeln!(f, "    by no rule that is known ({why})")?;
             }
         }
-        if let Some(SideReason { side, decision }) = side_decided_by {
-            writeln!(f, "side\n  {side} by section 4: {decision}")?;
+        match side_decided_by {
+            Some((side, decision)) => writeln!(f, "side\n  {side} by section 4: {decision}"),
+            None => {
+                let why = "which the mesh does not contain: give the case with --case";
+                writeln!(f, "left out: what depends on facets, {why}")
+            }
         }
-        if side_decided_by.is_none() {
-            let why = "which the mesh does not contain: give the case with --case";
-            writeln!(f, "left out: what depends on facets, {why}")?;
-        }
-        Ok(())
     }
 }
 
@@ -280,7 +270,7 @@ impl Mesh<'_> {
     }
 
     /// What decides the side of a leaf of T0, and the rule that deletes it if it was deleted.
-    fn side_of(&self, base: &Octant) -> Option<(SideReason, String)> {
+    fn side_of(&self, base: &Octant) -> Option<((Side, String), String)> {
         let (side, decision, rule) = match self.body?.component_at(base) {
             Some(component) => (component.side, self.decision(component), self.deletion(component)),
             None => {
@@ -291,7 +281,7 @@ impl Mesh<'_> {
                 (Side::Crossing, facets, format!("section 7: {rule}"))
             }
         };
-        Some((SideReason { side, decision }, rule))
+        Some(((side, decision), rule))
     }
 
     /// What decides the side of a component, as a sentence.

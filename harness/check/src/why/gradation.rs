@@ -44,13 +44,6 @@ pub(super) fn parent(octant: &Octant) -> Octant {
     octant.ancestor(octant.level - 1)
 }
 
-/// A question about an octant that is asked often.
-#[derive(Clone, Copy)]
-enum Question {
-    Deep,
-    Justified,
-}
-
 impl Mesh<'_> {
     /// Distance from a source of this level within which its layer reaches, in level-19 cells.
     pub(super) fn layer_reach(&self, level: u8) -> i64 {
@@ -59,13 +52,13 @@ impl Mesh<'_> {
 
     /// Whether T0, the extra layer or a leaf at least two levels finer forces an octant to split.
     pub(super) fn is_deep(&self, octant: &Octant) -> bool {
-        self.remembered(Question::Deep, octant, || self.is_forced(octant, octant.level + 2))
+        self.remembered(octant, true, || self.is_forced(octant, octant.level + 2))
     }
 
     /// Whether a rule requires an octant to be split.
     pub(super) fn is_justified(&self, octant: &Octant) -> bool {
         self.is_deep(octant)
-            || self.remembered(Question::Justified, octant, || {
+            || self.remembered(octant, false, || {
                 let level = octant.level + 1;
                 let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
                 level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces)
@@ -81,9 +74,9 @@ impl Mesh<'_> {
             || self.any_leaf_near(octant, first..=self.level_deepest, forces)
     }
 
-    /// The answer to a question, which is sought once.
-    fn remembered(&self, question: Question, octant: &Octant, seek: impl Fn() -> bool) -> bool {
-        let id = word::key_of(octant.corner) << 6 | u64::from(octant.level) << 1 | question as u64;
+    /// Whether an octant is deep, or justified, which is sought once.
+    fn remembered(&self, octant: &Octant, deep: bool, seek: impl Fn() -> bool) -> bool {
+        let id = word::key_of(octant.corner) << 6 | u64::from(octant.level) << 1 | u64::from(deep);
         if let Some(&known) = self.known.borrow().get(&id) {
             return known;
         }
