@@ -1,9 +1,16 @@
-//! The command line itself: version, completions and plain output.
+//! The program as a process: version, completions, plain output and exit codes; and signals, which end every command, whatever it does, with
+//! exit code 130, so that no process and no temporary file remains.
 
 use contract::leafset::LeafSet;
+use contract::testing::{leaf_set, words_of};
 use serde_json::json;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+use tempfile::TempDir;
 
 const COMMANDS: [&str; 15] = [
     "verify",
@@ -80,7 +87,7 @@ fn a_fault_of_the_harness_has_an_exit_code_and_one_message() {
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(code), "{fault}: {stderr}");
         assert!(words.iter().all(|word| stderr.matches(word).count() == 1), "{stderr}");
-        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0, "{fault}");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0, "{fault}");
     }
 }
 
@@ -97,7 +104,7 @@ fn write_mesh(words: Vec<u64>, to: &Path) {
         "digest": digests[0], "octant_digests": digests, "parts": [],
     });
     let empty = LeafSet::new(serde_json::from_value(manifest).unwrap(), vec![]);
-    std::fs::create_dir(to).unwrap();
+    fs::create_dir(to).unwrap();
     empty.with_parts(vec![words]).write(to).unwrap();
 }
 
@@ -128,7 +135,7 @@ fn a_closed_pipe_ends_the_printing_and_not_the_command() {
 
 #[test]
 fn output_that_cannot_be_written_is_an_exit_code() {
-    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
     let ended = command.args(["completions", "bash"]).stdout(full()).output().unwrap();
     assert_eq!(ended.status.code(), Some(4));
@@ -143,7 +150,7 @@ fn output_that_cannot_be_written_is_an_exit_code() {
 fn what_cannot_be_meant_is_invalid_input() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("f.json");
-    std::fs::write(&file, "no record").unwrap();
+    fs::write(&file, "no record").unwrap();
     let file = file.to_str().unwrap();
     for (arguments, why) in [
         (&["track", "missing.jsonl"][..], "missing.jsonl is missing"),
@@ -167,8 +174,8 @@ fn programs_of_one_name_are_not_compared() {
     let place = tempfile::tempdir().unwrap();
     let file = |directory: &str| {
         let path = place.path().join(directory).join("mine.toml");
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(&path, "[run]\nserial = ['mine', '{case}', '{out}']\n").unwrap();
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "[run]\nserial = ['mine', '{case}', '{out}']\n").unwrap();
         path.to_string_lossy().into_owned()
     };
     let both = format!("{},{}", file("a"), file("b"));
@@ -180,4 +187,180 @@ fn programs_of_one_name_are_not_compared() {
     assert!(refused(&["bench", "--engine", &both]).contains("two programs of one name"));
     let replaced = refused(&["bench", "--engine", &both, "--mesher", "other"]);
     assert!(replaced.contains("name one"), "{replaced}");
+}
+
+/// Work for minutes.
+const CASE: &str =
+    "spacing_min = 0.001\nroot_scale = 2.0\n[generator]\nshape = \"sphere\"\nfacets = 8000000\n";
+/// A mesher that neither meshes nor ends, and starts another process.
+const STUBBORN: &str = "#!/bin/sh\ntrap '' TERM INT HUP\necho $$ >> \"$PLACE/ids\"\nsleep 600 &\necho $! >> \"$PLACE/ids\"\nwhile :; do sleep 1; done\n";
+
+struct Fixture(TempDir);
+
+impl Fixture {
+    fn new() -> Self {
+        let fixture = Self(tempfile::tempdir().unwrap());
+        fs::create_dir(fixture.path().join("temporary")).unwrap();
+        fs::write(fixture.path().join("case.toml"), CASE).unwrap();
+        fixture.program("mesher", STUBBORN);
+        fixture
+    }
+
+    fn program(&self, name: &str, text: &str) {
+        let path = self.path().join(name);
+        fs::write(&path, text).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn start(&self, arguments: &[&str]) -> Child {
+        self.start_until("never", arguments)
+    }
+
+    /// A command that stops itself at a point.
+    fn start_until(&self, point: &str, arguments: &[&str]) -> Child {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_harness"));
+        command.args(arguments).current_dir(self.path());
+        command.env("TMPDIR", self.path().join("temporary")).env("PLACE", self.path());
+        command.env("STOP_AT", point);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    /// The processes that the mesher noted.
+    fn ids(&self) -> Vec<String> {
+        let text = fs::read_to_string(self.path().join("ids")).unwrap_or_default();
+        text.lines().map(str::to_owned).collect()
+    }
+
+    fn interrupt(&self, mut run: Child, signals: &[&str]) {
+        for name in signals.iter().chain(&["CONT"]) {
+            let id = run.id().to_string();
+            assert!(Command::new("kill").args(["-s", name, &id]).status().unwrap().success());
+        }
+        let end = run.wait().unwrap();
+        assert_eq!(end.code(), Some(130), "{signals:?}");
+        let left: Vec<_> = fs::read_dir(self.path().join("temporary")).unwrap().collect();
+        assert!(left.is_empty(), "{signals:?}: {left:?}");
+        for id in self.ids() {
+            assert!(fs::read_link(format!("/proc/{id}/exe")).is_err(), "process {id} is left");
+        }
+    }
+}
+
+/// Before that, a signal ends a process without exit code.
+fn wait_until_signals_are_handled(run: &Child) {
+    // SIGHUP, SIGINT, SIGUSR1, SIGUSR2, SIGALRM, SIGTERM, SIGIO
+    let all =
+        [1, 2, 10, 12, 14, 15, 29].into_iter().fold(0, |all, number| all | 1_u64 << (number - 1));
+    let handled = || {
+        let status = fs::read_to_string(format!("/proc/{}/status", run.id())).unwrap();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        u64::from_str_radix(mask.trim(), 16).unwrap()
+    };
+    while handled() & all != all {
+        sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_command_that_computes_ends_at_once() {
+    for signals in [&["INT"][..], &["USR1"], &["ALRM"], &["IO"], &["INT", "INT"], &["TERM", "USR2"]]
+    {
+        let fixture = Fixture::new();
+        let run = fixture.start(&["geometry", "case.toml"]);
+        wait_until_signals_are_handled(&run);
+        fixture.interrupt(run, signals);
+    }
+}
+
+#[test]
+fn a_command_that_waits_for_a_stubborn_program_ends_with_it() {
+    for signals in [&["INT"][..], &["TERM"], &["HUP"], &["INT", "INT"], &["TERM", "HUP", "INT"]] {
+        let fixture = Fixture::new();
+        fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+        let why = ["why", "case.toml", "0,0,0", "--mesher", "./mesher"];
+        let verify = ["verify", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        let shrink = ["shrink", "case.toml", "--mesher", "./mesher", "--reference", "./mesher"];
+        for arguments in [&why[..], &verify, &shrink] {
+            let before = fixture.ids().len();
+            let mut run = fixture.start(arguments);
+            while fixture.ids().len() < before + 2 && run.try_wait().unwrap().is_none() {
+                sleep(Duration::from_millis(5));
+            }
+            if let Some(end) = run.try_wait().unwrap() {
+                panic!("{arguments:?}: {end:?}");
+            }
+            fixture.interrupt(run, signals);
+        }
+    }
+}
+
+/// A network that is assumed instead would change the projections of the record.
+#[test]
+fn an_interrupted_ping_pong_leaves_no_network_in_the_record() {
+    let fixture = Fixture::new();
+    fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+    fixture.program("pingpong", "");
+    // It is asked for its version first.
+    fixture.program("launcher", "#!/bin/sh\ntest $1 = --version || exec ./mesher\n");
+    let series = "[[series]]\nexperiment = 'strong'\ncase = 'case.toml'\nsim = [2]\n";
+    fs::write(fixture.path().join("study.toml"), series).unwrap();
+    let launcher = ["--launcher", "./launcher {ranks}", "--mesher", "./mesher"];
+    let bench = ["bench", "study.toml", "--record", "record.jsonl"];
+    let mut run = fixture.start(&[&bench[..], &launcher].concat());
+    while fixture.ids().len() < 2 {
+        assert!(run.try_wait().unwrap().is_none(), "it ended before the ping-pong");
+        sleep(Duration::from_millis(5));
+    }
+    fixture.interrupt(run, &["INT"]);
+    let record = fs::read_to_string(fixture.path().join("record.jsonl")).unwrap();
+    assert!(record.contains("session") && !record.contains("network"), "{record}");
+}
+
+#[test]
+fn interrupted_output_has_neither_its_names_nor_a_staging_directory() {
+    let fixture = Fixture::new();
+    leaf_set(vec![words_of(|o| o.level < 5)]).create(&fixture.path().join("mesh")).unwrap();
+    let out = fixture.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let arguments = ["export", "mesh", "out/case/constant/polyMesh"];
+    // A second signal ends the command before it has cleaned up by itself.
+    for signals in [&["INT"][..], &["TERM", "INT"]] {
+        let mut run = fixture.start_until("staged", &arguments);
+        let stat = format!("/proc/{}/stat", run.id());
+        while !fs::read_to_string(&stat).unwrap().contains(") T ") {
+            assert!(run.try_wait().unwrap().is_none(), "{arguments:?} ended before its interrupt");
+            sleep(Duration::from_millis(2));
+        }
+        assert!(fs::read_dir(&out).unwrap().next().is_some(), "{arguments:?}");
+        fixture.interrupt(run, signals);
+        let left: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(left.is_empty(), "{arguments:?} {signals:?}: {left:?}");
+    }
+}
+
+/// A program that starts processes in sessions of their own, loses them, and fails.
+const DETACHING: &str = "#!/bin/sh\nsetsid sh -c 'setsid sleep 600 & echo $! >> \"$PLACE/ids\"; echo $$ >> \"$PLACE/ids\"; wait' &\nuntil test -s \"$PLACE/ids\"; do sleep 0.01; done\nexit 1\n";
+
+#[test]
+fn processes_that_an_engine_detaches_are_ended() {
+    let fixture = Fixture::new();
+    fixture.program("detaching", DETACHING);
+    fs::write(fixture.path().join("case.toml"), CASE.replace("8000000", "80")).unwrap();
+    let why = ["why", "case.toml", "0,0,0", "--mesher", "./detaching"];
+    assert!(!fixture.start(&why).wait().unwrap().success());
+    for id in fixture.ids() {
+        assert!(!Path::new("/proc").join(&id).exists(), "process {id} is left");
+    }
+}
+
+#[test]
+fn a_command_that_ends_leaves_no_temporary_directory() {
+    let fixture = Fixture::new();
+    let mut run = fixture.start(&["audit", "absent"]);
+    assert_eq!(run.wait().unwrap().code(), Some(2));
+    assert_eq!(fs::read_dir(fixture.path().join("temporary")).unwrap().count(), 0);
 }

@@ -2,8 +2,8 @@
 
 use crate::place::{Ended, Files, Place, TMP};
 use crate::programs::{Leaves, Program, all, inputs};
-use crate::table::{Row, Table};
 use crate::tools::{calls_max, injector, mpi, program, skip};
+use crate::{Row, Table};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

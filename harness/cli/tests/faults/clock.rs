@@ -2,8 +2,8 @@
 
 use crate::place::{HANGS, Place};
 use crate::programs::inputs;
-use crate::table::{Row, Table};
 use crate::tools::{HARNESS, clock, mpi, mpirun, program, skip};
+use crate::{Row, Table};
 use serde_json::Value;
 use std::fs;
 use std::process::Command;

@@ -2,8 +2,8 @@
 
 use crate::place::{Files, HANGS, Place, TMP};
 use crate::programs::inputs;
-use crate::table::{Row, Table};
 use crate::tools::{HARNESS, is_full, program, skip};
+use crate::{Row, Table};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

@@ -2,8 +2,8 @@
 //! interfaces; a script in place of a remote shell starts OpenMPI's daemon in the second one.
 
 use crate::place::{HANGS, Place, in_time};
-use crate::table::{Row, Table};
 use crate::tools::{is_full, mpi, mpirun, skip};
+use crate::{Row, Table};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

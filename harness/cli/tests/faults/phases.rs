@@ -2,8 +2,8 @@
 //! call that the fault is injected into.
 
 use crate::place::{Ended, Files, HANGS, Place, in_time};
-use crate::table::{Row, Table};
 use crate::tools::{injector, is_full, mpi, mpirun, skip};
+use crate::{Row, Table};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
