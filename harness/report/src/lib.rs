@@ -4,7 +4,7 @@
 //! - [`page`](mod@page), [`table`], [`json`]: what all reports share;
 //! - [`verification`]: table, Markdown, JUnit and JSON of a verification;
 //! - [`benchmark`]: figures and page of a record of benchmarks;
-//! - [`targets`], [`gate`], [`track`]: their tables and pages;
+//! - [`gate`], [`track`]: their tables and pages;
 //! - [`picture`]: pictures of meshes.
 
 pub mod archive;
@@ -15,7 +15,6 @@ mod junit;
 pub mod page;
 pub mod picture;
 pub mod table;
-pub mod targets;
 pub mod track;
 pub mod verification;
 

@@ -10,7 +10,7 @@ use contract::failure::{
     EXIT_FAILED, EXIT_HOLDS, EXIT_INTERRUPTED, EXIT_MISSING, Failure, exit_first,
 };
 use report::benchmark::tables;
-use report::targets as page;
+use report::table::{Table, escaped};
 use run::engine::description::is_own;
 use run::engine::paths::Paths;
 use run::engine::runner::{Engine, Given, Programs};
@@ -162,16 +162,37 @@ fn publish(
     if study.row.is_empty() {
         return Ok(code);
     }
-    print!("{}", page::text(rows));
+    let table = targets(rows);
+    print!("{}", table.text());
     if let Some(directory) = report {
         let path = directory.join(PAGE);
         let session = lines.iter().rev().find_map(Line::session);
         let unknown = || "a machine that the record does not describe".to_owned();
         let machine = session.map_or_else(unknown, |session| session.machine.to_string());
-        put(&path, page::markdown(rows, &machine)).map_err(unwritten(code))?;
+        put(&path, markdown(&table, &machine)).map_err(unwritten(code))?;
         println!("table: {}", path.display());
     }
     Ok(code)
+}
+
+/// The table of targets, with the counts of the verdicts below it.
+fn targets(rows: &[Judged]) -> Table {
+    use Verdict::{Failed, ForComparison, LeftOut, Met, Missed};
+    let number = |verdict: Verdict| rows.iter().filter(|row| row.verdict() == verdict).count();
+    let [met, missed, failed, left_out, others] =
+        [Met, Missed, Failed, LeftOut, ForComparison].map(number);
+    let count = format!(
+        "{met} met, {missed} missed, {failed} failed, {left_out} left out, {others} for comparison"
+    );
+    let columns = vec!["row", "target", "measured", "how", "verdict"];
+    let rows = rows.iter().map(|row| row.fields().to_vec()).collect();
+    Table { columns, rows, notes: vec![count], ..Table::default() }
+}
+
+/// That table as a page, below a line about the machine and the counts.
+fn markdown(table: &Table, machine: &str) -> String {
+    let (machine, counts) = (escaped(machine), table.notes.concat());
+    format!("# Targets\n\n{machine}\n\n{counts}\n\n{}", table.markdown())
 }
 
 /// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.
@@ -189,4 +210,39 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     };
     eprintln!("harness: {why}");
     EXIT_MISSING
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::study::judge::unjudged;
+    use bench::testing::study as read;
+
+    #[test]
+    fn every_verdict_is_shown_with_its_reason() {
+        let study = read(
+            "mesh.a.case = \"a\"\nrun.a.mesh = \"a\"\n[[row]]\nname = \"rate|1\"\nrun = \"a\"\n\
+             measure = \"cells_per_second_per_core\"\nat_least = 100e6\nat_most = 3e8\n",
+        )
+        .unwrap();
+        let row = &study.row[0];
+        let missed =
+            Judged { measured: Some((99.5e6, "measured")), ..unjudged(row, false, String::new()) };
+        let failed = unjudged(row, true, "run a failed: <no memory>".into());
+        let table = targets(&[missed, failed]);
+        let text = table.text();
+        for part in [
+            "at least 100.00 M cells/s, at most 300.00 M cells/s",
+            "99.50 M cells/s  measured  MISSED",
+            "FAILED: run a failed: <no memory>",
+            "0 met, 1 missed, 1 failed, 0 left out, 0 for comparison",
+        ] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+        let markdown = markdown(&table, "2 cores");
+        let table: Vec<&str> = markdown.lines().filter(|l| l.starts_with('|')).collect();
+        assert_eq!(table.len(), 4);
+        assert!(table[1].starts_with("| --- | --- |"), "{markdown}");
+        assert!(table[2].starts_with("| rate\\|1 |") && markdown.contains("&lt;no memory&gt;"));
+    }
 }
