@@ -3,13 +3,10 @@
 use crate::engine::interrupt;
 use contract::failure::Watch;
 use std::io::{IsTerminal, Write, stderr};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The line, which is empty at first.
-#[derive(Debug, Default)]
-pub struct Progress {
-    percent: AtomicU64,
-}
+#[derive(Debug)]
+pub struct Progress;
 
 impl Progress {
     fn show(&self, text: &str) {
@@ -30,10 +27,7 @@ impl Watch for Progress {
     }
 
     fn progress(&self, done: u64, total: u64) {
-        let percent = 100 * done / total.max(1);
-        if self.percent.swap(percent, Ordering::Relaxed) != percent {
-            self.show(&format!("{percent} %"));
-        }
+        self.show(&format!("{} %", 100 * done / total.max(1)));
     }
 
     fn is_interrupted(&self) -> bool {

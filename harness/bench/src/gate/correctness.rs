@@ -10,9 +10,8 @@ use super::rules::GateCase;
 use check::checks::CHECKS as CHECKS_OF_MESHES;
 use contract::failure::Failure;
 use run::engine::runner::{Engine, Programs};
-use run::verify::case::RUNS;
 use run::verify::options::Options;
-use run::verify::report::{CaseReport, Check, Outcome};
+use run::verify::report::{CaseReport, Check, Outcome, RUNS};
 use run::verify::verify;
 use std::cmp::Ordering;
 

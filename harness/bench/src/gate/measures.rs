@@ -95,15 +95,6 @@ impl CaseMeasures {
             _ => &self.exact,
         }
     }
-
-    /// Adds what other runs of the same case measured.
-    pub fn add(&mut self, other: Self) {
-        self.digest = self.digest.take().or(other.digest);
-        self.geometry = self.geometry.take().or(other.geometry);
-        self.exact.extend(other.exact);
-        self.memory.extend(other.memory);
-        self.counted.extend(other.counted);
-    }
 }
 
 impl Measures {

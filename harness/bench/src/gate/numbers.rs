@@ -47,7 +47,12 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
             break;
         }
         if let Ok(new) = &new {
-            measures.case(&case.name).add(new.clone());
+            let of_case = measures.case(&case.name);
+            match name {
+                LayerName::Instructions => of_case.counted.clone_from(&new.counted),
+                // This layer and another one before that of instructions are of the same runs.
+                _ => of_case.clone_from(new),
+            }
         }
         let (verdict, why) = match (old, new) {
             (Some(Ok(old)), Ok(new)) => {

@@ -107,31 +107,26 @@ pub fn shrink(
 pub fn write(shrunk: &Shrunk, options: &[&str], directory: &Path) -> io::Result<String> {
     fs::create_dir_all(directory)?;
     let case = shrunk.trial.case.write(directory, StlForm::Any)?;
-    let minimal = if shrunk.minimal { "nothing more can be removed" } else { "the time is over" };
-    let text = format!(
-        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {}\n",
-        shrunk.fault,
-        shrunk.facets_before,
-        shrunk.trials,
-        size(&shrunk.trial),
-        repeat(shrunk, options, &case)
-    );
-    fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
-    Ok(text)
-}
-
-/// A shell command that tests whether the case still fails the check.
-fn repeat(shrunk: &Shrunk, options: &[&str], case: &Path) -> String {
     let case = case.display().to_string();
     let words = ["harness", "shrink", &case, "--test-only", "--check", &shrunk.fault.check];
     // Arguments of a process contain no NUL, the one character that a shell cannot quote.
     let line = shlex::try_join(words.into_iter().chain(options.iter().copied()));
     let line = line.expect("no argument contains NUL");
-    match shrunk.trial.ranks {
-        Ranks::Serial => line,
-        Ranks::Mpi(ranks) => format!("{line} --ranks {ranks} --mpi"),
-        Ranks::Simulated { ranks, seed } => format!("{line} --ranks {ranks} --seed {seed}"),
-    }
+    let ranks = match shrunk.trial.ranks {
+        Ranks::Serial => String::new(),
+        Ranks::Mpi(ranks) => format!(" --ranks {ranks} --mpi"),
+        Ranks::Simulated { ranks, seed } => format!(" --ranks {ranks} --seed {seed}"),
+    };
+    let minimal = if shrunk.minimal { "nothing more can be removed" } else { "the time is over" };
+    let text = format!(
+        "{}\n\nShrunk from {} facets in {} trials ({minimal}) to: {}.\n\nTo repeat the failure:\n\n    {line}{ranks}\n",
+        shrunk.fault,
+        shrunk.facets_before,
+        shrunk.trials,
+        size(&shrunk.trial)
+    );
+    fs::write(directory.join("README.md"), format!("# A case that fails\n\n{text}"))?;
+    Ok(text)
 }
 
 #[cfg(test)]

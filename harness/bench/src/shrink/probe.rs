@@ -13,7 +13,7 @@ use run::engine::description::Description;
 use run::engine::failure::{End, Failure as Ended};
 use run::engine::layout::{Layout, Ranks, RunOptions};
 use run::engine::runner::Engine;
-use run::verify::case::RUNS;
+use run::verify::report::RUNS;
 use std::fmt;
 use std::path::Path;
 use std::time::Duration;

@@ -194,12 +194,6 @@ impl Session<'_> {
         appended.map_err(|error| Failure::at(self.record, error))
     }
 
-    /// Leaves a run out, with the reason.
-    fn leave_out(&mut self, setup: Setup, why: String) -> Result<(), Failure> {
-        (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
-        self.append(Entry::LeftOut(NoResult { setup, why }))
-    }
-
     /// Returns the reason why runs on MPI are skipped; `None` if they are not.
     fn mpi_left_out(&self) -> Option<&'static str> {
         match self.options.no_mpi {
@@ -340,7 +334,8 @@ impl Session<'_> {
             match declined.or_else(too_much) {
                 Some(why) => {
                     points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
-                    self.leave_out(setup, why)?;
+                    (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
+                    self.append(Entry::LeftOut(NoResult { setup, why }))?;
                 }
                 None if self.warm.insert(mesh) => self.run(&mut points[index], None)?,
                 None => {}

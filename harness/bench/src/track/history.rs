@@ -141,11 +141,6 @@ pub fn read(path: &Path) -> Result<History, String> {
     merged(lines).map_err(wrong)
 }
 
-/// Whether a metric depends on the machine, besides the program and the case.
-fn is_of_machine(name: &str) -> bool {
-    unit(name) == "s" || [MEMORY, "instructions", "allocations"].contains(&plain(name))
-}
-
 /// Returns one record for every commit.
 fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
     let mut history = History::default();
@@ -168,7 +163,9 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         let mut of_geometry = record.geometries.clone();
         of_geometry.iter_mut().for_each(|(case, of)| *of = geometries.suffix(case, of));
         let named = |(mut name, value): (String, f64)| {
-            if is_of_machine(&name) {
+            // The others depend on the program and the case alone.
+            let of_machine = [MEMORY, "instructions", "allocations"];
+            if unit(&name) == "s" || of_machine.contains(&plain(&name)) {
                 name += &suffix;
             }
             let is_of = |case: &str| name.strip_prefix(case).is_some_and(|of| of.starts_with('/'));

@@ -4,7 +4,7 @@ use crate::options::{Input, SelectionArguments, examples, read_case};
 use clap::Args;
 use contract::failure::{EXIT_HOLDS, Failure};
 use contract::mesh::Mesh;
-use export::format::{self, FORMATS, Format};
+use export::format::{self, FORMATS};
 use export::options::{Export, Label, Options, Regions, Summary};
 use run::engine::paths::Paths;
 use run::progress::Progress;
@@ -48,18 +48,8 @@ fn after_help() -> String {
 /// # Errors
 /// If the mesh cannot be read, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let format = format::of(&arguments.file)?;
-    let Summary { leaves, bytes, notes } = write(format, arguments)?;
-    let file = arguments.file.display();
-    let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
-    let per_cell = bytes as f64 / leaves as f64;
-    println!("{file}: {leaves} {what}s, {bytes} bytes ({per_cell:.2} per {what})");
-    notes.iter().for_each(|note| println!("  {note}"));
-    Ok(EXIT_HOLDS)
-}
-
-fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let Arguments { mesh, file, case, label, regions, selection } = arguments;
+    let format = format::of(file)?;
     let given = [
         ("--case", case.is_some()),
         ("--label", label.is_some()),
@@ -73,7 +63,7 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let case = case.as_deref().map(read_case).transpose()?;
     let mesh = Mesh::open(mesh)?;
     let selection = selection.of(&mesh)?;
-    let progress = Progress::default();
+    let progress = Progress;
     let options = Options {
         watch: &progress,
         case: case.as_ref(),
@@ -84,7 +74,12 @@ fn write(format: &Format, arguments: &Arguments) -> Result<Summary, Failure> {
     let written =
         (format.write)(&Export { mesh: &mesh, selection: &selection, options: &options }, file);
     progress.finish();
-    written
+    let Summary { leaves, bytes, notes } = written?;
+    let what = if [".vtp", ".stl"].contains(&format.ending) { "face" } else { "cell" };
+    let per_cell = bytes as f64 / leaves as f64;
+    println!("{}: {leaves} {what}s, {bytes} bytes ({per_cell:.2} per {what})", file.display());
+    notes.iter().for_each(|note| println!("  {note}"));
+    Ok(EXIT_HOLDS)
 }
 
 /// Makes a file of a format of what the format is made of, in a temporary directory.

@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         fs::remove_dir_all(mesh)?;
         Ok(tree)
     };
-    let progress = Progress::default();
+    let progress = Progress;
     let of_case = Cell::new(None);
     let make = |level| match of_case.take() {
         Some(words) if level == case.level_surface => Ok(words),

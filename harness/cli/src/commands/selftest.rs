@@ -8,7 +8,6 @@ use run::engine::failure::End;
 use run::engine::layout::SERIAL;
 use run::engine::runner::{Given, Programs};
 use std::fs;
-use std::path::Path;
 use std::time::Duration;
 
 /// Time limit of every run of the reference.
@@ -34,7 +33,20 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let directory = scratch.path().join(name);
         let path = directory.with_extension("toml");
         fs::write(&path, text)?;
-        mesh_case(&programs, &path, &directory)
+        // The mesh, and the base tree T0.
+        let made = |name, ungraded| {
+            let place = (&*directory.join(name), LIMIT);
+            let meshed = programs.reference.mesh(&path, &SERIAL, ungraded, place);
+            let read = meshed.and_then(|mesh| programs.reference.read_mesh(&mesh));
+            read.map_err(|failure| match &failure.end {
+                End::Missing(_) | End::Interrupted => Failure::from(failure),
+                _ => {
+                    Failure { code: EXIT_FAILED, why: format!("{failure}, on {}", path.display()) }
+                }
+            })
+        };
+        let case = Case::read(&path)?;
+        Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
     });
     let cases = meshed.collect::<Result<Vec<SelftestCase>, Failure>>()?;
     let mutants = scratch.path().join("mutants");
@@ -42,20 +54,4 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let report = report.map_err(|error| Failure::at(&mutants, error))?;
     println!("{report}");
     Ok(if report.holds() { EXIT_HOLDS } else { EXIT_FAILED })
-}
-
-/// Meshes a case with the reference in `directory`: the mesh, and the base tree T0.
-fn mesh_case(programs: &Programs, path: &Path, directory: &Path) -> Result<SelftestCase, Failure> {
-    let case = Case::read(path)?;
-    let reference = &programs.reference;
-    let made = |name, ungraded| {
-        let place = (&*directory.join(name), LIMIT);
-        let meshed = reference.mesh(path, &SERIAL, ungraded, place);
-        let read = meshed.and_then(|mesh| reference.read_mesh(&mesh));
-        read.map_err(|failure| match &failure.end {
-            End::Missing(_) | End::Interrupted => Failure::from(failure),
-            _ => Failure { code: EXIT_FAILED, why: format!("{failure}, on {}", path.display()) },
-        })
-    };
-    Ok(SelftestCase { case, mesh: made("mesh", false)?, base: made("base", true)? })
 }

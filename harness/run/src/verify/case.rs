@@ -2,13 +2,13 @@
 
 use super::Verification;
 use super::options::{Need, TIMEOUT_S};
-pub use super::report::RUNS;
-use super::report::{CaseReport, Check, Outcome};
+use super::report::{CaseReport, Check, Outcome, RUNS};
 use crate::engine::description::Description;
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::interrupt;
 use crate::engine::layout::Layout;
 use crate::engine::runner::Engine;
+use crate::progress::Progress;
 use check::checks::CheckResult;
 use check::promises::Promises;
 use contract::case::Case;
@@ -88,7 +88,7 @@ impl<'a> CaseRun<'a> {
 
     /// Shows what begins.
     pub fn step(&self, what: &str) {
-        self.all.progress.step(&format!("{}: {what}", self.selected.name));
+        Progress.step(&format!("{}: {what}", self.selected.name));
     }
 
     /// Adds a check of a run with this layout or of serial ones, and with the first failed check the command that repeats it.

@@ -228,25 +228,12 @@ impl CaseRun<'_> {
 
     /// Runs every layout on MPI and checks its mesh.
     pub(super) fn verify_ranks(&mut self, case: &Case, serial: &LeafSet) {
-        match self.all.needs.lacks(Need::Mpi) {
-            Some(why) if self.all.options.no_mpi => self.leave_out(("ranks", RUNS), why),
-            Some(why) => self.leave_out_ranks(why),
-            None => self.verify_layouts(case, serial),
+        if let Some(why) = self.all.needs.lacks(Need::Mpi) {
+            return match self.all.options.no_mpi {
+                true => self.leave_out(("ranks", RUNS), why),
+                false => self.leave_out_ranks(why),
+            };
         }
-    }
-
-    /// Names every layout on MPI that has no check so far as left out.
-    pub(super) fn leave_out_ranks(&mut self, why: &str) {
-        for layout in self.all.options.layouts(self.engine()) {
-            let subject = layout.to_string();
-            if self.report.checks.iter().all(|check| check.subject != subject) {
-                let check = Check::new(subject, RUNS, Outcome::left_out(why));
-                self.add(check, Some(&layout));
-            }
-        }
-    }
-
-    fn verify_layouts(&mut self, case: &Case, serial: &LeafSet) {
         let mut hangs = 0;
         for layout in self.all.options.layouts(self.engine()) {
             match self.verify_layout(case, serial, &layout) {
@@ -259,6 +246,17 @@ impl CaseRun<'_> {
             }
             if hangs >= HANGS_MAX {
                 return self.leave_out_ranks(&format!("{HANGS_MAX} runs of this case have hung"));
+            }
+        }
+    }
+
+    /// Names every layout on MPI that has no check so far as left out.
+    pub(super) fn leave_out_ranks(&mut self, why: &str) {
+        for layout in self.all.options.layouts(self.engine()) {
+            let subject = layout.to_string();
+            if self.report.checks.iter().all(|check| check.subject != subject) {
+                let check = Check::new(subject, RUNS, Outcome::left_out(why));
+                self.add(check, Some(&layout));
             }
         }
     }

@@ -9,7 +9,7 @@
 pub mod case;
 mod meshes;
 pub mod options;
-mod others;
+pub mod others;
 pub mod report;
 
 use crate::engine::interrupt;
@@ -48,14 +48,13 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
         programs,
         workplace: Workplace::new(options)?,
         needs: Needs::probe(options, programs),
-        progress: Progress::default(),
     };
     let mut cases = Vec::new();
     for case in selected.iter().take_while(|_| !interrupt::requested()) {
         cases.push(verification.case(case)?);
     }
-    let Verification { needs, workplace, progress, .. } = verification;
-    progress.finish();
+    let Verification { needs, workplace, .. } = verification;
+    Progress.finish();
     let interrupted = interrupt::requested();
     workplace.close(cases.iter().any(|case| case.kept.is_some()) && (options.keep || !interrupted));
     let engine = &programs.engine.description;
@@ -87,7 +86,6 @@ struct Verification<'a> {
     programs: &'a Programs,
     needs: Needs,
     workplace: Workplace,
-    progress: Progress,
 }
 
 impl Verification<'_> {

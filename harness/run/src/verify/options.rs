@@ -1,12 +1,12 @@
 //! The options of a verification, and the prerequisites, each tried once before the first case.
 
+use super::others::lacks_checker;
 use super::report::{CaseReport, Missing};
 use crate::engine::description::Description;
 use crate::engine::failure::{End, Failure};
 use crate::engine::layout::{Layout, Ranks};
 use crate::engine::runner::Programs;
 use crate::engine::service::Services;
-use crate::proof;
 use crate::python::{ORACLES, start};
 use check::promises::Independence;
 use clap::Parser;
@@ -14,7 +14,6 @@ use clap::builder::RangedU64ValueParser;
 use contract::catalogue::Size;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -35,9 +34,10 @@ pub enum Need {
     Checks,
 }
 
-impl fmt::Display for Need {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&format!("{self:?}").to_lowercase())
+impl Need {
+    /// Its name, as on the command line.
+    fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
     }
 }
 
@@ -165,10 +165,10 @@ impl Needs {
             (Need::Mpi, options.no_mpi, None, programs.engine.lacks_mpi()),
             (Need::Oracles, options.no_oracles, unused.clone(), None),
             (Need::P4est, options.no_p4est, unused.clone(), p4est),
-            (Need::Proof, options.no_proof, unused, proof::lacks(&paths.proven_checker)),
+            (Need::Proof, options.no_proof, unused, lacks_checker(&paths.proven_checker)),
         ];
         let why = |(need, is_declined, unused, missing): (Need, bool, Option<_>, Option<_>)| {
-            let declined = is_declined.then(|| format!("--no-{need} was given"));
+            let declined = is_declined.then(|| format!("--no-{} was given", need.name()));
             Some((need, unused.or(declined).or(missing)?))
         };
         let absent = all.into_iter().filter_map(why).collect();
@@ -237,7 +237,7 @@ impl Needs {
         };
         let missing = absent.into_iter().filter_map(|(need, why)| {
             let required = if options.require.contains(&need) { true } else { required(need)? };
-            Some(Missing { what: need.to_string(), why, required })
+            Some(Missing { what: need.name(), why, required })
         });
         missing.collect()
     }

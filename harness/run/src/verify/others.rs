@@ -1,14 +1,13 @@
 //! The checks by other programs: the proven checker judges the serial mesh, the oracles classify leaves of the base tree, and p4est balances
 //! it.
 
-use super::case::{CaseRun, Step, steps};
+use super::case::{CaseRun, PROOF, Step, steps};
 use super::meshes::{MESHER, Meshed};
 use super::options::Need;
 use super::report::{Check, Outcome};
 use crate::engine::failure::{CODE_INPUT, End, Failure};
 use crate::engine::layout::{self, SERIAL};
 use crate::engine::process::{self, Watch};
-use crate::proof;
 use crate::python::{ORACLES, ask};
 use check::checks::{CheckResult, identical};
 use check::oracle::vote::{Answer, Ballot};
@@ -25,7 +24,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use toml::Value;
 
 /// On a small case the oracles classify every leaf, up to this many.
@@ -68,7 +67,7 @@ impl CaseRun<'_> {
         let options = self.all.options;
         let checker = &self.all.programs.paths.proven_checker;
         let (places, leaves) = ((&*serial.place, &*base.place), serial.mesh.words.len() as u64);
-        match proof::check(checker, places, leaves, options.timeout) {
+        match proven(checker, places, leaves, options.timeout) {
             Ok(proof) => Ok(Check::of_result(step.0, CheckResult { name: step.1, ..proof })),
             // The files of another program may lack what the proof needs.
             Err(Failure { end: End::Exited { code: CODE_INPUT, error }, .. })
@@ -117,11 +116,14 @@ impl CaseRun<'_> {
     /// Meshes the case with n = 1 and all leaves kept, balances the base tree with p4est, and compares the leaves
     /// without their sides.
     fn balance(&self, (subject, name): Step, base: &Meshed) -> Result<Check, Failure> {
-        let plain = self.mesh_plainly()?;
+        let place = self.place.join("plain-case");
+        let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
+        let written = plain(case).write(&place, StlForm::Any)?;
+        let mesh = self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh;
         match self.balance_by_p4est(&base.place) {
             Ok(words) => {
                 let root = &base.mesh.manifest.root;
-                let compared = identical::compare(&sideless(&plain), &words, root);
+                let compared = identical::compare(&sideless(&mesh.words), &words, root);
                 Ok(Check::of_result(subject, CheckResult { name, ..compared }))
             }
             Err(Failure { end: End::Exited { code: EXIT_TOO_DEEP, .. }, .. }) => {
@@ -130,14 +132,6 @@ impl CaseRun<'_> {
             }
             Err(failure) => Err(failure),
         }
-    }
-
-    /// The leaf words of the same case with n = 1 and all leaves kept.
-    fn mesh_plainly(&self) -> Result<Vec<u64>, Failure> {
-        let place = self.place.join("plain-case");
-        let case = PlainCase::read(&self.file).map_err(io::Error::other)?;
-        let written = plain(case).write(&place, StlForm::Any)?;
-        Ok(self.mesh(&written, "plain", MESHER, Tree::Final, &SERIAL)?.mesh.words)
     }
 
     fn balance_by_p4est(&self, base: &Path) -> Result<Vec<u64>, Failure> {
@@ -155,13 +149,55 @@ impl CaseRun<'_> {
     }
 }
 
+/// Returns why the proven checker of `reference/proof` cannot be used, if it cannot.
+pub fn lacks_checker(checker: &Path) -> Option<String> {
+    (!checker.is_file())
+        .then(|| format!("{} is missing: ci/prove proves and builds it", checker.display()))
+}
+
+/// What the proven checker finds of a mesh with so many leaves, given the directory of its base tree T0. The note on a mesh that is accepted
+/// says what is proven of it, and what is only tested.
+///
+/// # Errors
+/// If the checker gives no answer within the limit, or cannot read the files.
+pub fn proven(
+    checker: &Path,
+    (mesh, base): (&Path, &Path),
+    leaves: u64,
+    limit: Duration,
+) -> Result<CheckResult, Failure> {
+    let place = tempfile::tempdir()?;
+    let mut command = Command::new(checker);
+    command.arg(mesh).arg(base);
+    let mut proof = CheckResult::new(PROOF.0);
+    proof.examined = leaves;
+    match process::run(&mut command, &Watch::new("the proven checker", limit, place.path())) {
+        Ok(finished) => {
+            let answer = fs::read_to_string(finished.stdout)?;
+            // An older checker proves less.
+            let silent = "does not say what it proves: ci/prove builds the present one".to_owned();
+            let meaning = answer.lines().nth(1);
+            proof.note = meaning.ok_or(Failure::new(PROOF.0, End::Unusable(silent)))?.to_owned();
+        }
+        Err(failure) if matches!(failure.end, End::Exited { code: 1, .. }) => {
+            proof.report("the checker of reference/proof rejects the mesh");
+        }
+        Err(failure) => return Err(failure),
+    }
+    Ok(proof)
+}
+
 /// Counts the votes.
 fn count(step: Step, case: &Case, sample: &Sample, answers: &[Answer]) -> Check {
     let parity = Parity::new(&case.facets_lattice);
     let mesh: Vec<bool> =
         sample.words.iter().map(|&leaf| word::side(leaf) == Side::Inside).collect();
-    let exact: Vec<Option<bool>> =
-        sample.words.iter().map(|&leaf| unanimous(&parity, leaf)).collect();
+    // Whether a leaf's centroid is inside by all exact rays, unless they disagree.
+    let unanimous = |&leaf: &u64| {
+        let rays = parity.inside(word::octant(leaf).centre());
+        rays.iter().all(|ray| *ray == rays[0]).then_some(rays[0])
+    };
+    let exact: Vec<Option<bool>> = sample.words.iter().map(unanimous).collect();
     let ballot = Ballot {
         mesh: &mesh,
         exact: &exact,
@@ -187,12 +223,6 @@ fn count(step: Step, case: &Case, sample: &Sample, answers: &[Answer]) -> Check 
         notes.insert(0, note);
     }
     Check { notes, ..Check::new(step.0, step.1, outcome) }
-}
-
-/// Whether a leaf's centroid is inside by all exact rays; `None` if the rays disagree.
-fn unanimous(parity: &Parity, leaf: u64) -> Option<bool> {
-    let rays = parity.inside(word::octant(leaf).centre());
-    rays.iter().all(|ray| *ray == rays[0]).then_some(rays[0])
 }
 
 /// The case with n = 1 and all leaves kept.
