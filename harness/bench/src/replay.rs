@@ -6,9 +6,9 @@
 
 use crate::experiments::entry::{Line, Run};
 use crate::experiments::group::{Group, Groups};
-use crate::experiments::number::duration;
 use crate::study::judge::of_last_origin;
 use contract::failure::Failure;
+use contract::number::duration;
 use serde::Serialize;
 use statistics::Median;
 use std::collections::BTreeSet;

@@ -2,10 +2,10 @@
 
 use crate::benchmark::machines;
 use bench::experiments::entry::{Entry, Line, now_utc};
-use bench::experiments::number::duration;
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;
+use contract::number::duration;
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -11,5 +11,4 @@ pub mod group;
 pub mod machine;
 pub mod model;
 pub mod network;
-pub mod number;
 pub mod pop;

@@ -1,9 +1,9 @@
 //! The measures, each a function of the medians of the repetitions of runs. reports/README.md defines them.
 
 use crate::experiments::group::Group;
-use crate::experiments::number::grouped;
 use crate::experiments::pop;
 use Input::{Against, Alone, Phases, Series};
+use contract::number::grouped;
 use serde::de::{Deserialize, Deserializer, Error};
 
 /// A quantity. Times are wall times by the program's own clock, or projected times for simulated ranks.

@@ -3,8 +3,8 @@
 use crate::figure::{Kind, Point, Provenance, Series};
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::number::grouped;
 use bench::order::{by_key, distinct};
+use contract::number::grouped;
 use statistics::Median;
 use std::fmt;
 

@@ -6,8 +6,8 @@ use crate::table::Table;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::model::{At, Compared, Key, Kind, Tested};
-use bench::experiments::number::grouped;
 use bench::order::{by_key, distinct};
+use contract::number::grouped;
 
 /// Points of a model's line.
 const POINTS: usize = 40;

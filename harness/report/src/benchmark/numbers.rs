@@ -10,7 +10,7 @@
 
 use crate::figure::{file_name, name_apart};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::number::grouped;
+use contract::number::grouped;
 use regex::{Captures, Match, Regex};
 use statistics::Median;
 use std::fmt::Write;

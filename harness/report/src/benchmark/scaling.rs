@@ -6,9 +6,9 @@ use super::groups::{
 };
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, Factor, above_one, heaviest_base_leaf, phase_s};
 use bench::order::{by_key, distinct};
+use contract::number::grouped;
 use contract::paper::{number, speedup as speedup_of_paper};
 
 /// Rank counts of the paper's Figures 21 to 23.

@@ -5,9 +5,9 @@ use super::models;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
-use bench::experiments::number::grouped;
 use bench::experiments::pop::{Efficiency, above_one, phase_s};
 use bench::order::{by_key, distinct};
+use contract::number::grouped;
 
 /// All tables: experiments, projections, phases, models, programs.
 pub fn tables(groups: &Groups) -> Vec<Table> {
