@@ -16,6 +16,8 @@ pub struct Sum {
 
 /// A further term must reduce the error to this part.
 const GAIN: f64 = 0.7;
+/// Errors below this are none.
+const EXACT: f64 = 1e-9;
 /// Terms whose columns differ less than this, relative to their lengths, are the same.
 const INDEPENDENT: f64 = 1e-9;
 
@@ -76,7 +78,7 @@ fn of_terms(rows: &[(f64, f64, Vec<f64>)], chosen: &[usize]) -> Option<Sum> {
     let error = (left_out.sum::<f64>() / pairs.iter().map(|pair| pair.0).sum::<f64>()).sqrt();
     let terms: Vec<(usize, f64)> = chosen.iter().copied().zip(coefficients).collect();
     let is_sum = terms.iter().all(|(_, coefficient)| *coefficient > 0.0);
-    (is_sum && error.is_finite()).then_some(Sum { terms, error })
+    (is_sum && error.is_finite()).then_some(Sum { terms, error: error.max(EXACT) })
 }
 
 #[cfg(test)]

@@ -318,7 +318,7 @@ impl Tested {
         (median_of(&errors), held, of.len())
     }
 
-    /// Quantities of the model with mean and imbalance as formulas: phases, then counters.
+    /// Quantities of the model with mean and imbalance as formulas: phases, the run, then counters.
     pub fn formulas(&self) -> Vec<(Key, [String; 2])> {
         let Model { counters, phases, .. } = &self.model;
         let of_phase = |(name, law): &(String, Law)| {
@@ -328,7 +328,9 @@ impl Tested {
         };
         let terms = TERMS.map(|(name, _)| name);
         let of_counter = |(key, law): (&Key, &Law)| (key.clone(), law.formulas(&terms));
-        phases.iter().map(of_phase).chain(counters.iter().map(of_counter)).collect()
+        let run = ["sum of the phases on their slowest ranks, and messages", ""].map(str::to_owned);
+        let run = ((Kind::Run, "run".to_owned()), run);
+        phases.iter().map(of_phase).chain([run]).chain(counters.iter().map(of_counter)).collect()
     }
 }
 

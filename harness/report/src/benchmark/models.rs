@@ -26,35 +26,39 @@ fn models(groups: &Groups) -> Vec<(Subject<'_>, Vec<&Group>, Tested)> {
     models
 }
 
-/// A table of every model.
+/// Two tables of every model: its phases, and its counters.
 pub fn tables(groups: &Groups) -> Vec<Table> {
-    models(groups).iter().map(|(subject, all, model)| table(*subject, all, model)).collect()
+    let of = |(subject, all, model): &(Subject, Vec<&Group>, Tested)| {
+        let (counters, times): (Vec<_>, Vec<_>) =
+            model.formulas().into_iter().partition(|((kind, _), _)| *kind == Kind::Counter);
+        let title = format!("model of {subject}, n = {}", all[0].setup.layer_cells_min);
+        let notes = notes(all, model);
+        let times = Table { notes, ..table(format!("{title}: seconds"), &times, model) };
+        [times, table(format!("{title}: counters"), &counters, model)]
+    };
+    models(groups).iter().flat_map(of).collect()
 }
 
 /// Formulas, and errors of what was held out.
-fn table(subject: Subject, all: &[&Group], model: &Tested) -> Table {
+fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Table {
     let errors = |key: &Key| {
-        let error = |c: &Compared| format!("{:+.0}", 100.0 * c.error());
-        let of: Vec<String> = model.held_out().filter(|c| c.key == *key).map(error).collect();
-        if of.is_empty() { "–".to_owned() } else { of.join(", ") }
+        let of = model.held_out().filter(|c| c.key == *key);
+        of.map(|c| format!("{:+.0}", 100.0 * c.error())).collect::<Vec<_>>().join(", ")
     };
-    let name = |key: &Key| match key.0 {
-        Kind::Phase => format!("seconds of {}", key.1),
-        _ => key.1.clone(),
-    };
-    let mut formulas = model.formulas();
-    formulas
-        .push(((Kind::Run, "run".into()), ["sum of phases and messages", "–"].map(str::to_owned)));
-    let table = Table::of(
-        format!("model of {subject}, n = {}", all[0].setup.layer_cells_min),
-        &formulas,
+    Table::of(
+        title,
+        formulas,
         &[
-            ("quantity", &|(key, _)| name(key)),
+            ("quantity", &|(key, _)| key.1.clone()),
             ("mean of the ranks", &|(_, [mean, _])| mean.clone()),
             ("max / mean", &|(_, [_, imbalance])| imbalance.clone()),
             ("errors of\nheld-out\nmaxima / %", &|(key, _)| errors(key)),
         ],
-    );
+    )
+}
+
+/// What was fitted, how well it predicted, and what it predicts beyond.
+fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
     let fitted = model.fitted;
     let runs = distinct(model.held_out().map(|c| (c.at.ranks as u64, c.at.cells as u64)));
     let runs: Vec<String> =
@@ -84,7 +88,7 @@ fn table(subject: Subject, all: &[&Group], model: &Tested) -> Table {
             grouped(FAR.ranks as u64)
         ));
     }
-    Table { notes, ..table }
+    notes
 }
 
 /// All quantities of all runs that were modelled, one per line.

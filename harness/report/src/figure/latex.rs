@@ -165,15 +165,21 @@ pub fn fragment(figures: &[Figure]) -> String {
     )
 }
 
-/// A table with its title and remarks, for `\\input` in a document. It may be longer than a page.
+/// A table with its title and remarks, for `\input` in a document. Columns of long fields are wider, and have fields
+/// of several lines.
 pub fn table(table: &Table) -> String {
     let row = |fields: Vec<String>| fields.join(" & ") + " \\\\\n";
     let head = row(table.columns.iter().map(|title| escape(&title.replace('\n', " "))).collect());
     let rows = table.rows.iter().map(|fields| row(fields.iter().map(|f| escape(f)).collect()));
-    let columns = "p{0.2\\linewidth}".repeat(table.columns.len());
+    let length = |i: usize| (longest(table.rows.iter().map(|row| &row[i])) as f64).sqrt();
+    let lengths: Vec<f64> = (0..table.columns.len()).map(length).collect();
+    let share = |length: &f64| 0.94 * length / lengths.iter().sum::<f64>();
+    let columns = lengths.iter().map(|of| format!("p{{{:.3}\\linewidth}}", share(of)));
     format!(
-        "\n\\subsection*{{{}}}\n{{\\footnotesize\\raggedright\n\\begin{{tabular}}{{{columns}}}\n\\hline\n{head}\\hline\n{}\\hline\n\\end{{tabular}}\\par\n{}}}\n",
+        "\n\\subsection*{{{}}}\n{{\\scriptsize\\raggedright\\tabcolsep=0.007\\linewidth\n\\noindent\\begin{{tabular}}{{{}}}\n\\hline\n\
+         {head}\\hline\n{}\\hline\n\\end{{tabular}}\\par\n{}}}\n",
         escape(&table.title),
+        columns.collect::<String>(),
         rows.collect::<String>(),
         table.notes.iter().map(|note| escape(note) + "\\par\n").collect::<String>()
     )
@@ -197,6 +203,8 @@ fn escape(text: &str) -> String {
         '⁻' => "$^-$".to_owned(),
         '√' => "$\\surd$".to_owned(),
         '₂' => "$_2$".to_owned(),
+        '⌈' => "$\\lceil$".to_owned(),
+        '⌉' => "$\\rceil$".to_owned(),
         _ => match SUPERSCRIPTS.iter().position(|s| *s == c) {
             Some(digit) => format!("$^{digit}$"),
             None => c.to_string(),
