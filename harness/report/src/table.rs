@@ -83,18 +83,9 @@ impl Table {
 
 /// Text on one line in which Markdown and HTML find no markup.
 pub fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '&' => out.push_str("&amp;"),
-            '\n' => out.push_str("<br>"),
-            '|' | '*' | '_' | '`' | '[' | ']' | '\\' => out.extend(['\\', character]),
-            _ => out.push(character),
-        }
-    }
-    out
+    let is_markup = |c: char| "|*_`[]\\".contains(c);
+    let html = html! { (text) }.into_string().replace('\n', "<br>");
+    html.chars().flat_map(|c| is_markup(c).then_some('\\').into_iter().chain([c])).collect()
 }
 
 #[cfg(test)]

@@ -12,23 +12,13 @@
 
 use std::f64::consts::SQRT_2;
 
-/// The mean of a segment.
+/// The mean of a segment, with its minimum length: a single value may be an outlier, and a slope needs more values than parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mean {
     /// A level.
-    Constant,
+    Constant = 2,
     /// A level and a slope.
-    Linear,
-}
-
-impl Mean {
-    /// Minimum length of a segment: a single value may be an outlier, and a slope needs more values than parameters.
-    fn length_min(self) -> usize {
-        match self {
-            Self::Constant => 2,
-            Self::Linear => 5,
-        }
-    }
+    Linear = 5,
 }
 
 /// Sums over the whitened values 1..=i of a series: value, value squared, time, time squared, time times value.
@@ -55,14 +45,6 @@ impl Fit {
     pub fn at(&self, index: f64) -> f64 {
         self.level + self.slope * index
     }
-}
-
-/// The best division of an interval.
-struct Division {
-    from: usize,
-    until: usize,
-    at: usize,
-    gain: f64,
 }
 
 impl<'a> Series<'a> {
@@ -108,26 +90,26 @@ impl<'a> Series<'a> {
 
     /// Returns at most `count_max` boundaries, the most significant first: indices of the first value of a segment.
     pub fn boundaries(&self, mean: Mean, count_max: usize) -> Vec<usize> {
-        let intervals = intervals(self.values.len(), 2 * mean.length_min());
-        let mut divisions: Vec<Division> =
-            intervals.map(|(from, until)| self.divided(from, until, mean)).collect();
-        divisions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let intervals = intervals(self.values.len(), 2 * mean as usize);
+        let divided = |within: (usize, usize)| (within, self.divided(within, mean));
+        let mut divisions: Vec<_> = intervals.map(divided).collect();
+        divisions.sort_by(|(_, a), (_, b)| b.1.total_cmp(&a.1));
         let mut found = Vec::new();
         while found.len() < count_max && !divisions.is_empty() {
-            let at = divisions[0].at;
+            let (_, (at, _)) = divisions[0];
             found.push(at);
-            divisions.retain(|other| at <= other.from || other.until <= at);
+            divisions.retain(|((from, until), _)| at <= *from || *until <= at);
         }
         found
     }
 
-    /// Divides an interval, of at least two segments' length, where that reduces the cost most.
-    fn divided(&self, from: usize, until: usize, mean: Mean) -> Division {
+    /// Where the division of an interval, of at least two segments' length, reduces the cost most, and by how much.
+    fn divided(&self, (from, until): (usize, usize), mean: Mean) -> (usize, f64) {
         let cost = |at| self.fit(from, at, mean).cost + self.fit(at, until, mean).cost;
-        let places = from + mean.length_min()..=until - mean.length_min();
+        let places = from + mean as usize..=until - mean as usize;
         let best = places.map(|at| (cost(at), at)).min_by(|a, b| a.0.total_cmp(&b.0));
         let (cost, at) = best.expect("the interval has room for two segments");
-        Division { from, until, at, gain: self.fit(from, until, mean).cost - cost }
+        (at, self.fit(from, until, mean).cost - cost)
     }
 }
 

@@ -278,12 +278,6 @@ impl Groups {
         let networks = groups.into_iter().map(|group| group.network.to_string());
         distinct(networks).join("; in another session ")
     }
-
-    /// Returns the largest loss of efficiency of a group in one sentence.
-    pub fn cause(&self, group: &Group) -> String {
-        pop::cause(&group.typical, &self.reference(group).typical, &group.network)
-    }
-
     /// Returns simulated groups, each with that of the same mesh on equally many ranks of MPI without oversubscription.
     pub fn projections(&self) -> Vec<[&Group; 2]> {
         let measured = |sim: &Group| {

@@ -5,7 +5,7 @@ use super::models;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
-use bench::experiments::pop::{Efficiency, above_one, phase_s};
+use bench::experiments::pop::{self, Efficiency, above_one, phase_s};
 use bench::order::{by_key, distinct};
 use contract::number::grouped;
 
@@ -36,7 +36,9 @@ pub fn text(groups: &Groups) -> String {
 pub fn causes(groups: &Groups) -> Vec<String> {
     let cause = |group: &Group| {
         let (s, cells, how) = (&group.setup, grouped(group.cells()), group.how());
-        let (subject, cause) = (Subject::of(s), groups.cause(group));
+        let reference = &groups.reference(group).typical;
+        let (subject, cause) =
+            (Subject::of(s), pop::cause(&group.typical, reference, &group.network));
         format!("{subject}, {}, {cells} cells, {how}: {cause}", s.experiment)
     };
     groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
