@@ -15,6 +15,7 @@ pub mod study;
 pub mod testing;
 pub mod track;
 
+use contract::failure::Failure as Input;
 use run::engine::failure::{End, Failure};
 use run::engine::process::printed;
 use run::engine::runner::Engine;
@@ -35,6 +36,12 @@ fn refuse(reasons: &[(bool, &str)]) -> Result<(), String> {
 /// Returns what git prints in a directory; `None` if it fails.
 fn git(directory: &Path, arguments: &[&str]) -> Option<String> {
     printed(Command::new("git").arg("-C").arg(directory).args(arguments))
+}
+
+/// Reads a TOML file.
+fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Input> {
+    let text = contract::files::read_text(path).map_err(|error| Input::at(path, error))?;
+    toml::from_str(&text).map_err(|error| Input::about(path, error))
 }
 
 /// Creates an empty directory for one run of an engine.

@@ -167,31 +167,26 @@ impl<'a> Model<'a> {
         self.edges().windows(2).map(|w| series.fit(w[0], w[1], self.mean)).collect()
     }
 
-    /// Returns the probability that a term whose absence adds so much to the costs is none: an upper bound of that of the
-    /// likelihood ratio.
-    fn p_without(&self, series: &Series, cost: f64) -> f64 {
-        let n = self.values.len() as f64;
-        let variance = self.variance(series);
-        let ratio = (variance + cost.max(0.0) / n) / variance;
-        // exp(-x / 2) is the tail of the chi-squared distribution with two degrees of freedom, and above that with one.
-        (MODELS_TRIED * ratio.powf(-self.freedom() / 2.0)).clamp(P_MIN, 1.0)
-    }
-
     /// Removes the boundaries that are no steps, and returns the p-values of the others.
     fn steps(&mut self, least: f64, alpha: f64) -> Vec<f64> {
-        let series = Series::new(self.values, self.phi);
+        let (series, n) = (Series::new(self.values, self.phi), self.values.len() as f64);
         loop {
-            let (edges, fits) = (self.edges(), self.fits(&series));
+            let (edges, fits, variance) =
+                (self.edges(), self.fits(&series), self.variance(&series));
             let least = match self.mean {
                 Mean::Constant => least,
-                Mean::Linear => least.max(STEP_MIN * self.variance(&series).sqrt()),
+                Mean::Linear => least.max(STEP_MIN * variance.sqrt()),
             };
             let p_value = |i: usize| {
                 let middle = edges[i + 1] as f64 - 0.5;
                 let is_small = (fits[i + 1].at(middle) - fits[i].at(middle)).abs() <= least;
                 let one = series.fit(edges[i], edges[i + 2], self.mean).cost;
-                let p = self.p_without(&series, one - fits[i].cost - fits[i + 1].cost);
-                if is_small { 1.0 } else { (p * self.values.len() as f64).min(1.0) }
+                let more = (one - fits[i].cost - fits[i + 1].cost).max(0.0);
+                let ratio = (variance + more / n) / variance;
+                // exp(-x / 2) is the tail of the chi-squared distribution with two degrees of freedom, and above that with one. So this
+                // is an upper bound of the probability of the likelihood ratio without the boundary.
+                let p = (MODELS_TRIED * ratio.powf(-self.freedom() / 2.0)).clamp(P_MIN, 1.0);
+                if is_small { 1.0 } else { (p * n).min(1.0) }
             };
             let p_values: Vec<f64> = (0..self.boundaries.len()).map(p_value).collect();
             match (0..p_values.len()).max_by(|&a, &b| p_values[a].total_cmp(&p_values[b])) {

@@ -53,15 +53,12 @@ impl Runner<'_> {
             ..RunOptions::new(self.place, self.limit)
         };
         let completed = engine.run(case, &layout(setup), &options).map_err(Failure::from);
-        let completed = completed.and_then(|completed| {
-            if checked {
-                keeps_promises(&engine, case, &mesh)?;
-            }
-            Ok(completed)
-        });
+        let is_checked = checked && completed.is_ok();
+        let kept = is_checked.then(|| keeps_promises(&engine, case, &mesh)).transpose();
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, time_process_s, time_process_cpu_s, command } = completed?;
+        kept?;
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
             (

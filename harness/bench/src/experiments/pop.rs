@@ -90,11 +90,6 @@ pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
     }
 }
 
-/// Returns the critical path on an ideal network, in seconds. A program that reports no phases has a single one.
-fn path_s(run: &Run) -> f64 {
-    run.phases.iter().map(|p| p.useful_s.max).reduce(|a, b| a + b).unwrap_or(run.useful_s.max)
-}
-
 /// Returns the time of a run in seconds: measured, or projected for simulated ranks.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
     match run.setup.comm {
@@ -105,7 +100,9 @@ pub fn time_s(run: &Run, network: &Network) -> f64 {
 
 /// Returns the efficiencies of a run relative to a reference run, usually the one on the fewest ranks.
 pub fn efficiency(run: &Run, reference: &Run, network: &Network) -> Efficiency {
-    let (time_s, path_s) = (time_s(run, network), path_s(run));
+    // The critical path on an ideal network. A program that reports no phases has a single one.
+    let path_s = run.phases.iter().map(|p| p.useful_s.max).reduce(|a, b| a + b);
+    let (time_s, path_s) = (time_s(run, network), path_s.unwrap_or(run.useful_s.max));
     let [before, now] = [reference, run].map(|run| per_cell(&run.useful_s, run));
     let efficiency = Efficiency {
         load_balance: 1.0 / run.useful_s.lambda(run.setup.ranks),

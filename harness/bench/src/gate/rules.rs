@@ -1,7 +1,7 @@
 //! Cases and tolerances of a gate: `engines/gate.toml`, or a user's file of the same format.
 
 use super::measures::LayerName;
-use crate::refuse;
+use crate::{read_toml, refuse};
 use contract::case::Case;
 use contract::failure::Failure;
 use run::engine::layout::Ranks;
@@ -145,17 +145,14 @@ impl Rules {
     /// # Errors
     /// If the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
-        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        let mut rules: Self =
-            toml::from_str(&text).map_err(|error| wrong(error.message().replace('\n', " ")))?;
+        let mut rules: Self = read_toml(path)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         for case in rules.cases.iter_mut().filter(|case| case.name.ends_with(".toml")) {
             let file = directory.join(&case.name);
             case.name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             case.file = file;
         }
-        rules.check().map_err(wrong)?;
+        rules.check().map_err(|why| Failure::about(path, why))?;
         Ok(rules)
     }
 

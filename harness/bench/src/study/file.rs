@@ -6,7 +6,7 @@
 use super::measure::{self, Input, Measure};
 use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
-use crate::{name_of, refuse};
+use crate::{name_of, read_toml, refuse};
 use run::engine::description::{Description, is_own};
 use run::engine::report::one_or_many;
 use serde::{Deserialize, Serialize};
@@ -192,11 +192,9 @@ impl Study {
     /// # Errors
     /// One sentence with the file, the position and the error.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let wrong = |why: String| format!("{}: {why}", path.display());
-        let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
-        let mut study: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let mut study: Self = read_toml(path).map_err(|failure| failure.why)?;
         study.directory = path.parent().unwrap_or(Path::new(".")).to_owned();
-        study.check().map_err(wrong)?;
+        study.check().map_err(|why| format!("{}: {why}", path.display()))?;
         let engines = study.series.iter_mut().flat_map(|series| &mut series.engines);
         for file in engines.filter(|name| name.ends_with(".toml")) {
             *file = study.directory.join(&*file).to_string_lossy().into_owned();
@@ -329,14 +327,6 @@ const CHOICES: [Choice; 6] = [
 ];
 
 impl Series {
-    /// Returns the numbers of cells, or that of the case.
-    pub(super) fn sizes(&self) -> Vec<Option<f64>> {
-        match self.cells.is_empty() {
-            true => vec![None],
-            false => self.cells.iter().copied().map(Some).collect(),
-        }
-    }
-
     /// Returns the partitions that are compared.
     pub(super) fn choices(&self) -> &'static [Choice] {
         match self.experiment {

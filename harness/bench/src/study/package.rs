@@ -1,8 +1,9 @@
 //! A study with its cases, geometries and engines in one directory, so that it can be executed elsewhere.
 
 use super::Study;
+use crate::read_toml;
 use contract::failure::Failure;
-use contract::files::{self, read_text, write_atomically};
+use contract::files::{self, write_atomically};
 use run::engine::paths::Paths;
 use run::engine::runner::Engine;
 use std::fs;
@@ -19,7 +20,7 @@ pub const STUDY: &str = "study.toml";
 /// If the study is invalid, a file cannot be read or written, or two files have one name.
 pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
     let directory = Study::read(study)?.directory;
-    let mut table = read(study)?;
+    let mut table: Table = read_toml(study)?;
     for (key, value) in &mut table {
         let parts: Vec<&mut Value> = match (key.as_str(), value) {
             ("mesh", Value::Table(meshes)) => meshes.iter_mut().map(|(_, mesh)| mesh).collect(),
@@ -40,7 +41,7 @@ pub fn package(study: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
             let Some(Value::String(case)) = value.get_mut("case") else { continue };
             let path = paths.catalogue.case_file(case, &directory)?;
             *case = file_name(&path);
-            let mut of_case = read(&path)?;
+            let mut of_case: Table = read_toml(&path)?;
             if let Some(Value::String(geometry)) = of_case.get_mut("geometry") {
                 let body = path.with_file_name(&*geometry);
                 *geometry = file_name(&body);
@@ -68,11 +69,6 @@ fn copy_engine(path: &Path, paths: &Paths, out: &Path) -> Result<(), Failure> {
 
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-fn read(path: &Path) -> Result<Table, Failure> {
-    let text = read_text(path).map_err(|error| Failure::at(path, error))?;
-    text.parse().map_err(|error: toml::de::Error| Failure::input(error).of_file(path))
 }
 
 /// Copies a file, which must be no pipe: it would be waited for.
@@ -126,7 +122,8 @@ mod tests {
         assert_eq!(study.mesh["ball"].case, "ball.toml");
         assert_eq!(fs::read_to_string(there.join("a wing.stl")).unwrap(), "solid");
         assert!(
-            read(&there.join("a wing.toml")).unwrap()["geometry"].as_str() == Some("a wing.stl")
+            read_toml::<Table>(&there.join("a wing.toml")).unwrap()["geometry"].as_str()
+                == Some("a wing.stl")
         );
         assert!(there.join("ball.toml").is_file());
     }

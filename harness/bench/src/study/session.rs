@@ -155,7 +155,8 @@ impl Session<'_> {
         self.open()?;
         let study = self.study;
         for series in &study.series {
-            for cells in series.sizes() {
+            let unstated = series.cells.is_empty().then_some(None);
+            for cells in series.cells.iter().copied().map(Some).chain(unstated) {
                 let mut points = self.of_series(series, cells)?;
                 self.make(&mut points)?;
             }

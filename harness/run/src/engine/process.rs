@@ -204,18 +204,8 @@ pub(super) fn last_lines(text: &str) -> String {
     let last = &lines[lines.len().saturating_sub(LINES_SHOWN)..];
     match last.is_empty() {
         true => "it printed no error".to_owned(),
-        false => last.iter().map(start_of).collect::<Vec<_>>().join(" | "),
-    }
-}
-
-/// Characters of a line that a message shows.
-const CHARACTERS_SHOWN: usize = 300;
-
-/// A line, cut if it is too long for a message.
-fn start_of(line: &&str) -> String {
-    match line.char_indices().nth(CHARACTERS_SHOWN) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => (*line).to_owned(),
+        // A line is cut where it is too long for a message.
+        false => last.iter().map(|line| format!("{line:.300}")).collect::<Vec<_>>().join(" | "),
     }
 }
 
@@ -288,7 +278,7 @@ mod tests {
         let script =
             "head -c 50000000 /dev/zero | tr '\\0' x >&2; echo >&2; echo the reason >&2; exit 7";
         let End::Exited { code: 7, error } = end_of(script, 60_000) else { panic!() };
-        assert!(error.ends_with("... | the reason") && error.len() < 1000, "{}", error.len());
+        assert!(error.ends_with("x | the reason") && error.len() < 1000, "{}", error.len());
     }
 
     #[test]
