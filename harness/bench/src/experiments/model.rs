@@ -65,7 +65,6 @@ type Ends = [f64; 2];
 struct Sample {
     at: At,
     of: BTreeMap<Key, Ends>,
-    time_s: f64,
     network: Network,
 }
 
@@ -92,7 +91,8 @@ impl Sample {
         of.retain(|_, [mean, _]| *mean >= 1.0);
         let times = run.phases.iter().map(|phase| (phase.name.clone(), ends(&phase.useful_s)));
         of.extend(times.map(|(name, ends)| ((Kind::Phase, name), ends)));
-        Self { at, of, time_s: group.time_s.value, network: group.network }
+        of.insert((Kind::Run, "run".to_owned()), [group.time_s.value; 2]);
+        Self { at, of, network: group.network }
     }
 }
 
@@ -185,34 +185,29 @@ impl Model {
         Some(Self { counters, phases, network: samples.last()?.network })
     }
 
-    /// The maxima over the ranks of all quantities, and the time of a run.
-    fn predict(&self, at: &At) -> BTreeMap<Key, f64> {
+    /// All quantities, and the time of a run.
+    fn predict(&self, at: &At) -> BTreeMap<Key, Ends> {
         let terms: Vec<f64> = TERMS.iter().map(|(_, term)| term(at)).collect();
-        let counters: BTreeMap<&Key, Ends> =
-            self.counters.iter().map(|(key, law)| (key, law.at(&terms, at.ranks))).collect();
-        let mut all: BTreeMap<Key, f64> =
-            counters.iter().map(|(key, ends)| ((*key).clone(), ends[1])).collect();
+        let ends = |(key, law): (&Key, &Law)| (key.clone(), law.at(&terms, at.ranks));
+        let mut all: BTreeMap<Key, Ends> = self.counters.iter().map(ends).collect();
         let mut run_s = 0.0;
         for (name, law) in &self.phases {
             let causes = causes(name, self.counters.keys());
-            let means: Vec<f64> = causes.iter().map(|key| counters[key][0]).chain([1.0]).collect();
-            let [_, useful_s] = law.at(&means, at.ranks);
-            let [messages, bytes] = traffic(name).map(|key| all.get(&key).copied().unwrap_or(0.0));
-            run_s += useful_s + self.network.time_s(messages, bytes);
+            let means: Vec<f64> = causes.iter().map(|key| all[*key][0]).chain([1.0]).collect();
+            let useful_s = law.at(&means, at.ranks);
+            let [messages, bytes] = traffic(name).map(|key| all.get(&key).map_or(0.0, |of| of[1]));
+            run_s += useful_s[1] + self.network.time_s(messages, bytes);
             all.insert((Kind::Phase, name.clone()), useful_s);
         }
-        all.insert((Kind::Run, "run".to_owned()), run_s);
+        all.insert((Kind::Run, "run".to_owned()), [run_s; 2]);
         all
     }
 
     /// Every quantity of a run with its predicted and its measured value, if both are positive.
     fn compare(&self, sample: &Sample) -> Vec<Compared> {
-        let measured = |key: &Key| match key.0 {
-            Kind::Run => sample.time_s,
-            _ => sample.of.get(key).map_or(0.0, |ends| ends[1]),
-        };
-        let compared = |(key, predicted): (Key, f64)| {
-            let (measured, at) = (measured(&key), sample.at);
+        let compared = |(key, [_, predicted]): (Key, Ends)| {
+            let measured = sample.of.get(&key).map_or(0.0, |ends| ends[1]);
+            let at = sample.at;
             (predicted.min(measured) > 0.0).then_some(Compared { key, at, predicted, measured })
         };
         self.predict(&sample.at).into_iter().filter_map(compared).collect()
@@ -301,7 +296,7 @@ impl Tested {
     /// A run's time in seconds between the ends of its band.
     pub fn run_s(&self, at: &At) -> [f64; 3] {
         let width = self.width(Kind::Run, at.ranks);
-        let value = self.model.predict(at)[&(Kind::Run, "run".to_owned())];
+        let [value, _] = self.model.predict(at)[&(Kind::Run, "run".to_owned())];
         [value / width, value, value * width]
     }
 
