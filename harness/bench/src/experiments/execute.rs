@@ -57,7 +57,7 @@ impl Runner<'_> {
         let kept = is_checked.then(|| keeps_promises(&engine, case, &mesh)).transpose();
         // The next run needs a place without a mesh, also after a failure.
         let _ = fs::remove_dir_all(&mesh);
-        let Completed { report, time_process_s, time_process_cpu_s, command } = completed?;
+        let Completed { report, finished, command } = completed?;
         kept?;
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
@@ -71,7 +71,7 @@ impl Runner<'_> {
                  ranks or more cells",
             ),
         ])?;
-        let time_wall_s = report.time_wall_s.unwrap_or(time_process_s);
+        let time_wall_s = report.time_wall_s.unwrap_or(finished.time_wall_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
         Ok(Run {
             program: machine::digest_of(engine.files()),
@@ -83,8 +83,8 @@ impl Runner<'_> {
             geometry: report.geometry.map(|geometry| geometry.digest),
             cells: report.cells,
             time_wall_s,
-            time_launch_s: time_process_s,
-            time_cpu_s: time_process_cpu_s,
+            time_launch_s: finished.time_wall_s,
+            time_cpu_s: finished.time_cpu_s,
             peak_rss_bytes: spread(&report.peak_rss_bytes),
             useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
             phases: report.phases.iter().map(phase).collect(),

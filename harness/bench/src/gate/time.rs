@@ -93,13 +93,14 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
         };
         let place = emptied(bench.place.join("time/run"), engine).map_err(|why| (verdict, why))?;
         let options = RunOptions::new(&place, bench.options.timeout);
-        engine.run(&path, &Layout::on(ranks), &options).map_err(|why| (verdict, why))
+        let completed = engine.run(&path, &Layout::on(ranks), &options);
+        completed.map(|run| run.finished).map_err(|why| (verdict, why))
     };
     // The first run reads program and geometry from disk and is not counted.
     let (first, also) = (run(0)?, run(CANDIDATE)?);
     let rules = &bench.rules.time;
     let budget_s = bench.options.budget.map_or(rules.budget_s, |budget| budget.as_secs_f64());
-    let fit = budget_s / (2.0 * first.time_process_s + also.time_process_s).max(1e-6);
+    let fit = budget_s / (2.0 * first.time_wall_s + also.time_wall_s).max(1e-6);
     let count = (fit as usize).clamp(rules.rounds_min, rules.rounds_max);
     let seed = bench.options.seed.wrapping_add(u64::from(again));
     let mut random = Random(seed);
@@ -110,7 +111,7 @@ fn rounds(bench: &Bench, case: &GateCase, ranks: Ranks, again: bool) -> Times {
         let mut times = [(0.0, 0.0); 3];
         for index in order {
             let run = run(index)?;
-            times[index] = (run.time_process_cpu_s, run.time_process_s);
+            times[index] = (run.time_cpu_s, run.time_wall_s);
         }
         // A microsecond is the resolution of the clocks.
         cpu.push(times.map(|(cpu_s, _)| f64::max(cpu_s, 1e-6).ln()));

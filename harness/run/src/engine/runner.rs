@@ -38,10 +38,8 @@ pub struct Engine {
 pub struct Completed {
     /// Its report; values that are missing from it were measured from outside.
     pub report: RunReport,
-    /// Wall time from start to end of the process, in seconds.
-    pub time_process_s: f64,
-    /// CPU time of the whole process, including all its descendants, in seconds; seen from outside.
-    pub time_process_cpu_s: f64,
+    /// Its process, with times from outside.
+    pub finished: Finished,
     /// The command that was run.
     pub command: Command,
 }
@@ -204,8 +202,7 @@ impl Engine {
         let written = written.transpose().map_err(|end| self.failure(end))?;
         let report = self.report(written.as_ref(), options, layout.ranks.count(), &finished);
         let report = report.map_err(|why| self.unusable(why))?;
-        let (time_process_s, time_process_cpu_s) = (finished.time_wall_s, finished.time_cpu_s);
-        Ok(Completed { report, time_process_s, time_process_cpu_s, command })
+        Ok(Completed { report, finished, command })
     }
 
     /// Meshes a case in a directory without a run report; returns the leaf-set directory.

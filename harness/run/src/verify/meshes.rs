@@ -80,7 +80,7 @@ impl CaseRun<'_> {
             services: Some(&self.all.needs.services),
             ..RunOptions::new(&place, self.all.options.timeout)
         };
-        let Completed { report, time_process_s, .. } =
+        let Completed { report, finished, .. } =
             self.program(program).run(case, layout, &options)?;
         let run = Run {
             program: program.to_owned(),
@@ -88,9 +88,9 @@ impl CaseRun<'_> {
             cells: report.cells,
             peak_rss_bytes: report.peak_rss_bytes_total(),
             digest: report.digest.unwrap_or_default(),
-            time_wall_s: report.time_wall_s.unwrap_or(time_process_s),
+            time_wall_s: report.time_wall_s.unwrap_or(finished.time_wall_s),
             is_time_reported: report.time_wall_s.is_some(),
-            time_process_s,
+            time_process_s: finished.time_wall_s,
         };
         Ok((run, report.ranks))
     }
