@@ -5,9 +5,9 @@
 //! long as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
 //!
 //! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same kind in
-//! retrospect: of the runs that were fitted, from those on fewer ranks. Half its width, as a logarithm, is the 90 % quantile of their errors,
-//! each divided by its reach (1 + doublings of the ranks beyond those fitted), times the prediction's reach. This is split conformal
-//! prediction; the retrospective errors are not independent, so the share of held-out values within bands is reported beside them.
+//! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, each divided
+//! by its reach (the ratio of the ranks to the most that were fitted), times the prediction's reach. This is split conformal prediction; the
+//! retrospective errors are not independent, so the share of held-out values within bands is reported beside them.
 //!
 //! Square errors have the weight of the ranks, because runs on more ranks are nearer to what is predicted. Runs on one rank are left out: they
 //! have no messages, no halos and other phases.
@@ -242,9 +242,9 @@ impl Compared {
 /// Share of values that a band should hold.
 const HELD: f64 = 0.9;
 
-/// How far a prediction reaches beyond the ranks that were fitted: 1, and 1 more for each doubling.
+/// How far a prediction reaches beyond the ranks that were fitted: what was too rare there to be seen grows in proportion.
 fn reach(ranks: f64, fitted: f64) -> f64 {
-    1.0 + (ranks / fitted).log2().max(0.0)
+    (ranks / fitted).max(1.0)
 }
 
 /// A model and what it predicted of runs that it did not see.
@@ -255,14 +255,14 @@ pub struct Tested {
     pub fitted: f64,
     /// Every quantity of every run, fitted or held out, beside the model's prediction.
     pub compared: Vec<Compared>,
-    /// Widths of bands by [`Kind`]: logarithms per reach.
+    /// Widths of bands by [`Kind`]: relative, per reach.
     bands: [f64; 3],
 }
 
 impl Tested {
-    /// Of the groups of one program, geometry and n on simulated ranks: those on more than a sixteenth of the most ranks are held out, or more
-    /// than a quarter where that leaves too few. `None` if both do, or if fewer than nine predictions can be made in retrospect.
-    pub fn of(groups: &[&Group]) -> Option<Self> {
+    /// Of the groups of one program, geometry and n on simulated ranks, of which those on more than a `share` of the most ranks are held out.
+    /// `None` if too few are left, or if fewer than nine predictions can be made in retrospect.
+    pub fn of(groups: &[&Group], share: f64) -> Option<Self> {
         let mut sims: Vec<&&Group> =
             groups.iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1).collect();
         sims.sort_by_key(|group| group.setup.ranks);
@@ -271,10 +271,10 @@ impl Tested {
         let samples: Vec<Sample> = sims.iter().map(|group| Sample::of(group)).collect();
         let most = samples.last()?.at.ranks;
         let up_to = |ranks: f64| &samples[..samples.partition_point(|s| s.at.ranks <= ranks)];
-        let fit = |share: f64| Some((most / share, Model::fit(up_to(most / share), &phases)?));
-        let (fitted, model) = fit(16.0).or_else(|| fit(4.0))?;
+        let fitted = share * most;
+        let model = Model::fit(up_to(fitted), &phases)?;
         let in_retrospect = |cut: f64| {
-            let of = |c: Compared| (c.key.0, c.off().ln() / reach(c.at.ranks, cut));
+            let of = |c: Compared| (c.key.0, (c.off() - 1.0) / reach(c.at.ranks, cut));
             let model = Model::fit(up_to(cut), &phases)?;
             let later = &up_to(fitted)[up_to(cut).len()..];
             Some(later.iter().flat_map(|s| model.compare(s)).map(of).collect::<Vec<_>>())
@@ -290,7 +290,7 @@ impl Tested {
 
     /// The factor between a prediction and either end of its band.
     pub fn width(&self, kind: Kind, ranks: f64) -> f64 {
-        (self.bands[kind as usize] * reach(ranks, self.fitted)).exp()
+        1.0 + self.bands[kind as usize] * reach(ranks, self.fitted)
     }
 
     /// A run's time in seconds between the ends of its band.
@@ -367,7 +367,7 @@ mod tests {
     }
 
     fn tested() -> Tested {
-        Tested::of(&groups().all.iter().collect::<Vec<_>>()).unwrap()
+        Tested::of(&groups().all.iter().collect::<Vec<_>>(), 1.0 / 16.0).unwrap()
     }
 
     #[test]
@@ -398,8 +398,8 @@ mod tests {
     fn runs_on_few_numbers_of_ranks_have_no_model() {
         let all = groups().all;
         let few: Vec<&Group> = all.iter().filter(|g| g.setup.ranks <= 8).collect();
-        assert!(Tested::of(&few).is_none());
-        assert!(Tested::of(&[]).is_none());
+        assert!(Tested::of(&few, 0.25).is_none());
+        assert!(Tested::of(&[], 1.0).is_none());
     }
 
     #[test]

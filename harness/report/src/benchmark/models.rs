@@ -11,6 +11,8 @@ use contract::number::grouped;
 
 /// Points of a model's line.
 const POINTS: usize = 40;
+/// Runs on more than this share of the most ranks are held out: the first one that leaves enough.
+const HELD_OUT: [f64; 2] = [1.0 / 16.0, 0.25];
 /// Of the prediction beyond all runs.
 const FAR: At = At { cells: 1e12, ranks: 1e5, facets: 0.0 };
 
@@ -20,7 +22,8 @@ fn models(groups: &Groups) -> Vec<(Subject<'_>, Vec<&Group>, Tested)> {
     for (subject, all) in by_subject(groups, "strong") {
         let sims = all.into_iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1);
         for (_, of) in by_key(sims, |g| (g.setup.layer_cells_min, g.setup.division())) {
-            models.extend(Tested::of(&of).map(|model| (subject, of, model)));
+            let tested = HELD_OUT.iter().find_map(|share| Tested::of(&of, *share));
+            models.extend(tested.map(|model| (subject, of, model)));
         }
     }
     models
@@ -79,15 +82,16 @@ fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
         ));
     }
     let facets = all[0].typical.facets as f64;
-    let [low, value, high] = model.run_s(&At { facets, ..FAR }).map(|s| format!("{s:.2}"));
-    let parts = || all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
-    if parts().any(|cells| cells > FAR.cells / FAR.ranks) {
-        notes.push(format!(
-            "A prediction: {:.0e} cells on {} ranks take {value} s (band of 90 %: {low} to {high} s).",
-            FAR.cells,
-            grouped(FAR.ranks as u64)
-        ));
-    }
+    let mut parts = all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
+    let far = Tested::of(all, 1.0).filter(|_| parts.any(|cells| cells > FAR.cells / FAR.ranks));
+    notes.extend(far.map(|model| {
+        let [low, value, high] = model.run_s(&At { facets, ..FAR }).map(|s| format!("{s:.2}"));
+        let [ranks, fitted] = [FAR.ranks, model.fitted].map(|ranks| grouped(ranks as u64));
+        format!(
+            "A prediction, of a model of all runs on up to {fitted} ranks: {:.0e} cells on {ranks} ranks take {value} s (band of 90 %: {low} to {high} s).",
+            FAR.cells
+        )
+    }));
     notes
 }
 
