@@ -98,7 +98,7 @@ impl Sample {
 
 /// A mean over the ranks, and the factor by which the maximum exceeds it.
 #[derive(Clone, Debug)]
-pub struct Law {
+struct Law {
     mean: Sum,
     /// a and b of a p^b.
     imbalance: [f64; 2],
@@ -113,7 +113,8 @@ impl Law {
         let row = |(s, [mean, _]): &(&Sample, Ends)| (s.at.ranks, *mean, terms(s));
         let mean = Sum::fit(&known.iter().map(row).collect::<Vec<_>>())?;
         let logs = known.iter().map(|(s, [mean, max])| [s.at.ranks.ln(), (max / mean).ln()]);
-        Some(Self { mean, imbalance: power(&logs.collect::<Vec<_>>()) })
+        let imbalance = power(&logs.collect::<Vec<_>>());
+        imbalance.iter().all(|of| of.is_finite()).then_some(Self { mean, imbalance })
     }
 
     /// Mean and maximum for the values of all terms.
@@ -133,7 +134,7 @@ impl Law {
     }
 }
 
-/// a and b of y = a x^b, from logarithms, by least squares with the weights x.
+/// a and b of y = a x^b, from logarithms, by least squares with the weights x; not finite for a single x.
 fn power(logs: &[[f64; 2]]) -> [f64; 2] {
     let total = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
         logs.iter().map(|[x, y]| x.exp() * of(*x, *y)).sum()
@@ -149,7 +150,7 @@ const RANKS_MIN: usize = 3;
 
 /// A model of the runs of one program around one geometry with one n.
 #[derive(Clone, Debug)]
-pub struct Model {
+struct Model {
     counters: BTreeMap<Key, Law>,
     /// By phases, in the program's order. The terms are [`causes`].
     phases: Vec<(String, Law)>,
@@ -400,6 +401,22 @@ mod tests {
         let few: Vec<&Group> = all.iter().filter(|g| g.setup.ranks <= 8).collect();
         assert!(Tested::of(&few, 0.25).is_none());
         assert!(Tested::of(&[], 1.0).is_none());
+    }
+
+    #[test]
+    fn a_time_that_is_too_short_to_be_kept_but_on_few_ranks_has_no_law() {
+        let sample = |ranks: f64, mean: f64| Sample {
+            at: At { cells: 1e9, ranks, facets: 12.0 },
+            of: [((Kind::Phase, "a".to_owned()), [mean; 2])].into(),
+            network: crate::experiments::network::ASSUMED,
+        };
+        let fit =
+            |samples: &[Sample]| Law::fit(samples, &(Kind::Phase, "a".to_owned()), |_| vec![1.0]);
+        assert!(
+            fit(&[sample(2.0, 1e-6), sample(2.0, 1e-6), sample(2.0, 1e-6), sample(4.0, 0.0)])
+                .is_none()
+        );
+        assert!(fit(&[sample(2.0, 1e-6), sample(4.0, 1e-6), sample(8.0, 1e-6)]).is_some());
     }
 
     #[test]
