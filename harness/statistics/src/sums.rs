@@ -18,7 +18,7 @@ pub struct Sum {
 const GAIN: f64 = 0.7;
 /// Errors below this are none.
 const EXACT: f64 = 1e-9;
-/// Terms whose columns differ less than this, relative to their lengths, are the same.
+/// Terms whose columns have an angle with a square sine below this are the same.
 const INDEPENDENT: f64 = 1e-9;
 
 impl Sum {

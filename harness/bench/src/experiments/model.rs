@@ -5,9 +5,12 @@
 //! long as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
 //!
 //! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same kind in
-//! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, each divided
-//! by its reach (the ratio of the ranks to the most that were fitted), times the prediction's reach. This is split conformal prediction; the
-//! retrospective errors are not independent, so the share of held-out values within bands is reported beside them.
+//! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, pooled over all
+//! quantities of a kind and each divided by its reach (the ratio of the ranks to the most that were fitted), times the prediction's reach. The
+//! quantile is that of split conformal prediction, without its guarantee, as later runs are not exchangeable with earlier ones: so the share
+//! of held-out values within bands is reported beside them.
+//!
+//! Only positive values are compared, and a counter that is below one per rank in some fitted run explains no time and has no law.
 //!
 //! Square errors have the weight of the ranks, because runs on more ranks are nearer to what is predicted. Runs on one rank are left out: they
 //! have no messages, no halos and other phases.
@@ -68,9 +71,16 @@ struct Sample {
     network: Network,
 }
 
-/// The keys of a phase's messages and bytes.
+/// The keys of a phase's messages and bytes begin with these words.
+const TRAFFIC: [&str; 2] = ["messages of ", "bytes of "];
+
 fn traffic(phase: &str) -> [Key; 2] {
-    ["messages", "bytes"].map(|what| (Kind::Counter, format!("{phase}: {what}")))
+    TRAFFIC.map(|what| (Kind::Counter, what.to_owned() + phase))
+}
+
+/// The key of facets per rank, which need no law.
+fn facets() -> Key {
+    (Kind::Counter, "facets per rank".to_owned())
 }
 
 impl Sample {
@@ -79,10 +89,11 @@ impl Sample {
         let at = At { cells: run.cells as f64, ranks, facets: run.facets as f64 };
         let ends = |of: &Spread| [of.sum / ranks, of.max];
         // The phases' messages are counted apart.
-        let own = run.counters.iter().filter(|(name, _)| !name.starts_with("message"));
+        let is_own = |name: &str| !["messages", "message_bytes"].contains(&name);
+        let own = run.counters.iter().filter(|(name, _)| is_own(name));
         let mut of: BTreeMap<Key, Ends> =
             own.map(|(name, of)| ((Kind::Counter, name.clone()), ends(of))).collect();
-        of.insert((Kind::Counter, "facets".to_owned()), [at.facets / ranks; 2]);
+        of.insert(facets(), [at.facets / ranks; 2]);
         for phase in &run.phases {
             let messages = [&phase.messages, &phase.message_bytes].map(ends);
             of.extend(traffic(&phase.name).into_iter().zip(messages));
@@ -113,8 +124,8 @@ impl Law {
         let row = |(s, [mean, _]): &(&Sample, Ends)| (s.at.ranks, *mean, terms(s));
         let mean = Sum::fit(&known.iter().map(row).collect::<Vec<_>>())?;
         let logs = known.iter().map(|(s, [mean, max])| [s.at.ranks.ln(), (max / mean).ln()]);
-        let imbalance = power(&logs.collect::<Vec<_>>());
-        imbalance.iter().all(|of| of.is_finite()).then_some(Self { mean, imbalance })
+        let is_known = distinct(known.iter().map(|(sample, _)| sample.at.ranks)).len() > 1;
+        is_known.then(|| Self { mean, imbalance: power(&logs.collect::<Vec<_>>()) })
     }
 
     /// Mean and maximum for the values of all terms.
@@ -134,7 +145,7 @@ impl Law {
     }
 }
 
-/// a and b of y = a x^b, from logarithms, by least squares with the weights x; not finite for a single x.
+/// a and b of y = a x^b, from logarithms, by least squares with the weights x.
 fn power(logs: &[[f64; 2]]) -> [f64; 2] {
     let total = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
         logs.iter().map(|[x, y]| x.exp() * of(*x, *y)).sum()
@@ -154,13 +165,13 @@ struct Model {
     counters: BTreeMap<Key, Law>,
     /// By phases, in the program's order. The terms are [`causes`].
     phases: Vec<(String, Law)>,
-    network: Network,
 }
 
 /// What the time of a phase may depend on: means of the program's counters and of its own messages, and a constant.
 fn causes<'a>(phase: &str, counters: impl Iterator<Item = &'a Key>) -> Vec<&'a Key> {
     let own = traffic(phase);
-    counters.filter(|key| !key.1.contains(": ") || own.contains(key)).collect()
+    let is_own = |key: &Key| !TRAFFIC.iter().any(|what| key.1.starts_with(what));
+    counters.filter(|key| is_own(key) || own.contains(key)).collect()
 }
 
 impl Model {
@@ -183,21 +194,22 @@ impl Model {
             Some((name.clone(), Law::fit(samples, &(Kind::Phase, name.clone()), terms)?))
         };
         let phases = phases.iter().filter_map(law).collect();
-        Some(Self { counters, phases, network: samples.last()?.network })
+        Some(Self { counters, phases })
     }
 
     /// All quantities, and the time of a run.
-    fn predict(&self, at: &At) -> BTreeMap<Key, Ends> {
+    fn predict(&self, at: &At, network: &Network) -> BTreeMap<Key, Ends> {
         let terms: Vec<f64> = TERMS.iter().map(|(_, term)| term(at)).collect();
         let ends = |(key, law): (&Key, &Law)| (key.clone(), law.at(&terms, at.ranks));
         let mut all: BTreeMap<Key, Ends> = self.counters.iter().map(ends).collect();
+        all.insert(facets(), [at.facets / at.ranks; 2]);
         let mut run_s = 0.0;
         for (name, law) in &self.phases {
             let causes = causes(name, self.counters.keys());
             let means: Vec<f64> = causes.iter().map(|key| all[*key][0]).chain([1.0]).collect();
             let useful_s = law.at(&means, at.ranks);
             let [messages, bytes] = traffic(name).map(|key| all.get(&key).map_or(0.0, |of| of[1]));
-            run_s += useful_s[1] + self.network.time_s(messages, bytes);
+            run_s += useful_s[1] + network.time_s(messages, bytes);
             all.insert((Kind::Phase, name.clone()), useful_s);
         }
         all.insert((Kind::Run, "run".to_owned()), [run_s; 2]);
@@ -211,7 +223,7 @@ impl Model {
             let at = sample.at;
             (predicted.min(measured) > 0.0).then_some(Compared { key, at, predicted, measured })
         };
-        self.predict(&sample.at).into_iter().filter_map(compared).collect()
+        self.predict(&sample.at, &sample.network).into_iter().filter_map(compared).collect()
     }
 }
 
@@ -266,13 +278,13 @@ impl Tested {
     pub fn of(groups: &[&Group], share: f64) -> Option<Self> {
         let mut sims: Vec<&&Group> =
             groups.iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1).collect();
-        sims.sort_by_key(|group| group.setup.ranks);
+        sims.sort_by_key(|group| (group.setup.ranks, group.cells()));
         let phases = &sims.last()?.typical.phases;
         let phases: Vec<String> = phases.iter().map(|phase| phase.name.clone()).collect();
         let samples: Vec<Sample> = sims.iter().map(|group| Sample::of(group)).collect();
         let most = samples.last()?.at.ranks;
         let up_to = |ranks: f64| &samples[..samples.partition_point(|s| s.at.ranks <= ranks)];
-        let fitted = share * most;
+        let fitted = up_to(share * most).last()?.at.ranks;
         let model = Model::fit(up_to(fitted), &phases)?;
         let in_retrospect = |cut: f64| {
             let of = |c: Compared| (c.key.0, (c.off() - 1.0) / reach(c.at.ranks, cut));
@@ -294,10 +306,10 @@ impl Tested {
         1.0 + self.bands[kind as usize] * reach(ranks, self.fitted)
     }
 
-    /// A run's time in seconds between the ends of its band.
-    pub fn run_s(&self, at: &At) -> [f64; 3] {
+    /// A run's time in seconds between the ends of its band, on a network.
+    pub fn run_s(&self, at: &At, network: &Network) -> [f64; 3] {
         let width = self.width(Kind::Run, at.ranks);
-        let [value, _] = self.model.predict(at)[&(Kind::Run, "run".to_owned())];
+        let [value, _] = self.model.predict(at, network)[&(Kind::Run, "run".to_owned())];
         [value / width, value, value * width]
     }
 
@@ -324,9 +336,10 @@ impl Tested {
         };
         let terms = TERMS.map(|(name, _)| name);
         let of_counter = |(key, law): (&Key, &Law)| (key.clone(), law.formulas(&terms));
+        let counters = counters.iter().filter(|(key, _)| **key != facets());
         let run = ["sum of the phases on their slowest ranks, and messages", ""].map(str::to_owned);
         let run = ((Kind::Run, "run".to_owned()), run);
-        phases.iter().map(of_phase).chain([run]).chain(counters.iter().map(of_counter)).collect()
+        phases.iter().map(of_phase).chain([run]).chain(counters.map(of_counter)).collect()
     }
 }
 
@@ -343,6 +356,7 @@ mod tests {
     use super::*;
     use crate::experiments::entry::{Entry, Run};
     use crate::experiments::group::Groups;
+    use crate::experiments::network::ASSUMED;
     use crate::testing::{line, run};
 
     /// Work that shrinks with the ranks and messages that grow with them: on N cells, a rank counts N/p work and 3 log2 p messages, and takes
@@ -382,7 +396,7 @@ mod tests {
         }
         let formulas = tested.formulas();
         let of = |name: &str| &formulas.iter().find(|(key, _)| key.1 == name).unwrap().1;
-        assert_eq!(of("work: messages")[0], "3.0e0 ⌈log₂p⌉");
+        assert_eq!(of("messages of work")[0], "3.0e0 ⌈log₂p⌉");
         assert_eq!(formulas[0].1[1], "1.00 p^0.10");
     }
 
@@ -390,7 +404,7 @@ mod tests {
     fn a_band_widens_beyond_the_fitted_ranks() {
         let tested = tested();
         let at = |ranks: f64| At { cells: 1e10, ranks, facets: 12.0 };
-        let [low, value, high] = tested.run_s(&at(1e5));
+        let [low, value, high] = tested.run_s(&at(1e5), &ASSUMED);
         assert!(0.0 < low && low <= value && value <= high);
         assert!(tested.width(Kind::Run, 1024.0) > tested.width(Kind::Run, 64.0));
     }
@@ -408,7 +422,7 @@ mod tests {
         let sample = |ranks: f64, mean: f64| Sample {
             at: At { cells: 1e9, ranks, facets: 12.0 },
             of: [((Kind::Phase, "a".to_owned()), [mean; 2])].into(),
-            network: crate::experiments::network::ASSUMED,
+            network: ASSUMED,
         };
         let fit =
             |samples: &[Sample]| Law::fit(samples, &(Kind::Phase, "a".to_owned()), |_| vec![1.0]);

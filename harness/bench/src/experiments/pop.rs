@@ -93,7 +93,10 @@ pub fn phase_s(run: &Run, phase: &Phase, network: &Network) -> f64 {
 /// Returns the time of a run in seconds: measured, or projected for simulated ranks.
 pub fn time_s(run: &Run, network: &Network) -> f64 {
     match run.setup.comm {
-        Comm::Sim => run.phases.iter().map(|phase| phase_s(run, phase, network)).sum(),
+        Comm::Sim => {
+            let phases = run.phases.iter().map(|phase| phase_s(run, phase, network));
+            phases.reduce(|a, b| a + b).unwrap_or(run.useful_s.max)
+        }
         Comm::Mpi | Comm::Solo => run.time_wall_s,
     }
 }
@@ -302,6 +305,8 @@ mod tests {
         let e = efficiency(&without_phases, &without_phases.clone(), &FREE);
         close(e.serialisation * e.transfer, 1.0);
         close(e.global(), 1.0);
+        without_phases.setup.comm = Comm::Sim;
+        close(time_s(&without_phases, &FREE), 3.0);
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub enum Command {
     /// Execute a study: series of runs, and targets that are met or missed; append every result to a record
     #[command(visible_alias = "targets")]
     Bench(Box<bench::Arguments>),
-    /// Make figures, a web page, and a LaTeX fragment from benchmark records
+    /// Make figures, models, a web page, and LaTeX fragments from benchmark records
     Report(report::Arguments),
     /// Put a report, its study and what a repetition must give into one directory, an RO-Crate
     Archive(archive::Arguments),

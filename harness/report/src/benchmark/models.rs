@@ -1,6 +1,7 @@
 //! Models of strong scaling on simulated ranks: their formulas, what they predicted of runs that they had not seen, and figures with bands.
 
 use super::groups::{Subject, by_subject, cells_label, range};
+use super::numbers::digits;
 use crate::figure::{Axis, Figure, Point, Provenance, Series};
 use crate::table::Table;
 use bench::experiments::entry::Comm;
@@ -34,7 +35,7 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     let of = |(subject, all, model): &(Subject, Vec<&Group>, Tested)| {
         let (counters, times): (Vec<_>, Vec<_>) =
             model.formulas().into_iter().partition(|((kind, _), _)| *kind == Kind::Counter);
-        let title = format!("model of {subject}, n = {}", all[0].setup.layer_cells_min);
+        let title = format!("model of {}", described(*subject, all));
         let notes = notes(all, model);
         let times = Table { notes, ..table(format!("{title}: seconds"), &times, model) };
         [times, table(format!("{title}: counters"), &counters, model)]
@@ -42,11 +43,29 @@ pub fn tables(groups: &Groups) -> Vec<Table> {
     models(groups).iter().flat_map(of).collect()
 }
 
-/// Formulas, and errors of what was held out.
+/// What is modelled: program, case, n and a partition that was chosen.
+fn described(subject: Subject, all: &[&Group]) -> String {
+    let setup = &all[0].setup;
+    let division = Some(setup.division()).filter(|division| division != "default");
+    let division = division.map_or(String::new(), |division| format!(", {division}"));
+    format!("{subject}, n = {}{division}", setup.layer_cells_min)
+}
+
+/// The runs that were held out.
+fn held_out(model: &Tested) -> Vec<At> {
+    distinct(model.held_out().map(|compared| compared.at))
+}
+
+/// Formulas, and errors of what was held out, run by run.
 fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Table {
+    let runs = held_out(model);
     let errors = |key: &Key| {
-        let of = model.held_out().filter(|c| c.key == *key);
-        of.map(|c| format!("{:+.0}", 100.0 * c.error())).collect::<Vec<_>>().join(", ")
+        let error = |at: &At| {
+            let of = model.held_out().find(|c| c.key == *key && c.at == *at);
+            // Adding 0 removes the sign of -0.
+            of.map_or("–".to_owned(), |c| format!("{:+.0}", (100.0 * c.error()).round() + 0.0))
+        };
+        runs.iter().map(error).collect::<Vec<_>>().join(", ")
     };
     Table::of(
         title,
@@ -62,13 +81,14 @@ fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Tabl
 
 /// What was fitted, how well it predicted, and what it predicts beyond.
 fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
-    let fitted = model.fitted;
-    let runs = distinct(model.held_out().map(|c| (c.at.ranks as u64, c.at.cells as u64)));
-    let runs: Vec<String> =
-        runs.iter().map(|(p, n)| format!("{p} ranks ({} cells)", cells_label(*n))).collect();
+    let runs = held_out(model).into_iter().map(|At { cells, ranks, .. }| {
+        format!("{ranks} ranks and {} cells", grouped(cells as u64))
+    });
     let mut notes = vec![format!(
-        "N cells, F facets, p ranks. Fitted are runs on 2 to {fitted} simulated ranks; held out: {}.",
-        runs.join(", ")
+        "N cells, F facets, p ranks. Fitted are runs on {} to {} simulated ranks. Errors are of these runs, which were held out: {}.",
+        all.iter().map(|group| group.setup.ranks).min().unwrap_or(0),
+        model.fitted,
+        runs.collect::<Vec<_>>().join("; ")
     )];
     for (kind, what) in [
         (Kind::Counter, "counters"),
@@ -77,36 +97,50 @@ fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
     ] {
         let (error, held, count) = model.summary(kind);
         notes.push(format!(
-            "Held-out {what}: {:.1} % off in the median; {held} of {count} are in their bands of 90 %.",
+            "Held-out {what}: {:.1} % off in the median; {held} of {count} are in their bands.",
             100.0 * error
         ));
     }
-    let facets = all[0].typical.facets as f64;
-    let mut parts = all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
-    let far = Tested::of(all, 1.0).filter(|_| parts.any(|cells| cells > FAR.cells / FAR.ranks));
-    notes.extend(far.map(|model| {
-        let [low, value, high] = model.run_s(&At { facets, ..FAR }).map(|s| format!("{s:.2}"));
-        let [ranks, fitted] = [FAR.ranks, model.fitted].map(|ranks| grouped(ranks as u64));
-        format!(
-            "A prediction, of a model of all runs on up to {fitted} ranks: {:.0e} cells on {ranks} ranks take {value} s (band of 90 %: {low} to {high} s).",
-            FAR.cells
-        )
-    }));
+    notes.extend(far(all));
     notes
+}
+
+/// The prediction beyond all runs, by a model of all, if they are of several meshes and have smaller and larger parts.
+fn far(all: &[&Group]) -> Option<String> {
+    let parts = all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
+    let (smaller, larger): (Vec<f64>, Vec<f64>) = parts.partition(|n| *n < FAR.cells / FAR.ranks);
+    let cells = distinct(all.iter().map(|group| group.cells()));
+    let (least, most) = (cells.iter().min()?, cells.iter().max()?);
+    if smaller.is_empty() || larger.is_empty() || *most < 2 * least {
+        return None;
+    }
+    let model = Tested::of(all, 1.0)?;
+    let (facets, network) = (all[0].typical.facets as f64, all[0].network);
+    let [low, value, high] = model.run_s(&At { facets, ..FAR }, &network).map(digits);
+    Some(format!(
+        "A prediction, of a model of all runs on up to {} ranks: {:.0e} cells on {} ranks take {value} s ({low} to {high} s, a band for the ranks alone; parts of \
+         that size were measured, of meshes with up to {} cells), with {network}.",
+        model.fitted,
+        FAR.cells,
+        grouped(FAR.ranks as u64),
+        grouped(*most),
+    ))
 }
 
 /// All quantities of all runs that were modelled, one per line.
 pub fn csv(groups: &Groups) -> String {
     let mut out =
-        "case,engine,kind,quantity,cells,ranks,held out,predicted,low,high,measured\n".to_owned();
-    for (subject, _, model) in models(groups) {
+        "model,kind,quantity,cells,ranks,held out,predicted,low,high,measured\n".to_owned();
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    for (subject, all, model) in models(groups) {
+        let of = quoted(&described(subject, &all));
         for Compared { key: (kind, name), at, predicted, measured } in &model.compared {
             let width = model.width(*kind, at.ranks);
             let (low, high) = (predicted / width, predicted * width);
-            let (Subject { case, engine, .. }, At { cells, ranks, .. }) = (subject, at);
+            let (At { cells, ranks, .. }, name) = (at, quoted(name));
             let held_out = if *ranks > model.fitted { "yes" } else { "no" };
             out += &format!(
-                "{case},{engine},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e}\n"
+                "{of},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e}\n"
             );
         }
     }
@@ -129,7 +163,7 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
     let modelled = |i: usize| {
         let ranks = (ends[0] + (ends[1] - ends[0]) * i as f64 / (POINTS - 1) as f64).exp();
         let at = At { cells: cells as f64, ranks, facets: of[0].typical.facets as f64 };
-        let [low, y, high] = model.run_s(&at);
+        let [low, y, high] = model.run_s(&at, &of[0].network);
         Point { x: ranks, y, low, high }
     };
     let line = (0..POINTS).map(modelled).collect();
@@ -140,18 +174,19 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
         of.iter().map(|g| Point::exact(g.setup.ranks as f64, g.time_s.value)).collect()
     };
     let series = vec![
-        Series::new("model, band of 90 %", Provenance::Modelled, 0, line),
+        Series::new("model and its band", Provenance::Modelled, 0, line),
         Series::new("fitted runs", Provenance::Projected, 0, points(seen))
             .drawn_as(crate::figure::Kind::Scattered),
         Series::new("held-out runs", Provenance::Projected, 1, points(held_out))
             .drawn_as(crate::figure::Kind::Scattered),
     ];
     let caption = format!(
-        "Run time of {subject}, {} cells, n = {}, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: exact counters as laws \
-         of cells and ranks, and costs of the counters fitted by phase. Its band holds 90 % of such predictions in retrospect.",
+        "Run time of {}, {} cells, on {} simulated ranks, and a model that saw only the runs on up to {fitted}: laws of exact counters, and a cost of \
+         each by phase. The band has the width that held 90 % of such predictions in retrospect. Projected with {}.",
+        described(subject, of),
         grouped(cells),
-        of[0].setup.layer_cells_min,
-        range(of, |g| g.setup.ranks as u64)
+        range(of, |g| g.setup.ranks as u64),
+        Groups::networks(of.iter().copied()),
     );
     let id = format!("model-{}-{}", subject.file(), cells_label(cells));
     let title = format!("Model of the run time: {subject}, {} cells", grouped(cells));

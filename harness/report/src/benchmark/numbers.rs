@@ -72,7 +72,7 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
 }
 
 /// Three significant digits, and all before the decimal point.
-fn digits(value: f64) -> String {
+pub fn digits(value: f64) -> String {
     let magnitude = value.abs().log10().floor();
     let decimals =
         if magnitude.is_finite() { (2.0 - magnitude).clamp(0.0, 9.0) as usize } else { 0 };
