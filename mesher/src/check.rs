@@ -9,11 +9,11 @@
 pub mod sides;
 pub mod splits;
 
-use crate::Mesh;
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
 use crate::input::lattice::{Root, Rules};
 use crate::input::quantise::Quantised;
+use crate::mesh::Mesh;
 use crate::output::stream::{Counts, total};
 use crate::partition::ownership::{OWNERS_MANY, Ownership};
 use crate::record::Options;

@@ -5,53 +5,21 @@ use crate::error::Error;
 use crate::grade;
 use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
+use crate::mesh::Mesh;
 use crate::output::warnings;
 use crate::partition::initial::{self, Estimate, Partition};
 use crate::partition::ownership::Ownership;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner, metis, repartition};
 use crate::record::{Job, Options, Recorder};
 use crate::refine::{self, BinnedFacets};
-use crate::sides::leaks::{self, Leaks};
-use crate::sides::{self, Base, Decided, Sides, openness};
+use crate::sides::leaks;
+use crate::sides::{self, Base, Decided, openness};
 use bricks::facet::Facet;
 use bricks::octant::{Level, Side};
-use bricks::tree::{Kept, PerLevel, Tree};
+use bricks::tree::{Kept, Tree};
 use ranks::{Comm, Solo, agree, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
-
-/// A mesh as one rank holds it, after phase 8.
-pub struct Mesh {
-    /// The facets of all ranks, in numbers.
-    pub facets: FacetCounts,
-    /// The rules on the lattice.
-    pub rules: Rules,
-    /// The ranks that own and hold bricks.
-    pub ownership: Ownership,
-    /// Level of the base leaves, or of the octants between which partition boundaries lie.
-    pub level_base: Level,
-    /// The partitioner that was used; none for a single rank.
-    pub partitioner: Option<Partitioner>,
-    /// Split octants: of the graded tree, or of T0 if gradation was not asked for.
-    pub split: PerLevel,
-    /// Crossing leaves of T0.
-    pub crossing: PerLevel,
-    /// Sides of the leaves of T0.
-    pub sides: Sides,
-    /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Leaks,
-    /// Whether the facets are an open body, and bound nothing although the outside is kept.
-    pub bounds_nothing: bool,
-    /// Whether the tree is T0, of which all leaves are in the mesh.
-    pub is_base: bool,
-}
-
-impl Mesh {
-    /// Whether crossing leaves of the base tree are no leaves of the mesh.
-    pub fn drops_crossing(&self) -> bool {
-        !self.is_base && !self.rules.keep_crossing
-    }
-}
 
 /// Phases 3 to 8: from the facets and the rules on the lattice to the tree. Collective.
 ///

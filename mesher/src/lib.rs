@@ -29,6 +29,7 @@ pub mod output {
     pub(crate) mod warnings;
     pub mod write;
 }
+mod mesh;
 pub mod partition;
 pub mod record;
 pub mod refine;
@@ -37,7 +38,8 @@ pub mod sides;
 #[path = "../bricks/src/values.rs"]
 mod values;
 
-pub use grow::{Mesh, grow};
+pub use grow::grow;
+pub use mesh::Mesh;
 pub use record::{Job, Options};
 
 use error::Error;

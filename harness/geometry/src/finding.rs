@@ -1,5 +1,6 @@
 //! The findings of a diagnosis: kinds, counts and places, and what each kind means for the mesh.
 
+use contract::lattice::UNITS_PER_EDGE;
 use contract::manifest::Keep;
 use contract::number::number;
 use contract::octant::CELLS_PER_EDGE;
@@ -129,6 +130,21 @@ impl Kind {
                 "No leaf exists on the far side of these facets, and no flow passes between the body and the root's boundary there."),
         }
     }
+}
+
+/// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.
+pub fn at_root(input: &Input, first: usize) -> [Finding; 2] {
+    let mut findings = [Kind::OutsideRoot, Kind::TouchingRoot].map(Finding::new);
+    for (facet, corners) in (0..).zip(&input.case.facets_lattice) {
+        let margins = corners.as_flattened().iter().map(|&c| c.min(UNITS_PER_EDGE - c));
+        let at = match margins.fold(i64::MAX, i64::min) {
+            ..0 => 0,
+            0 => 1,
+            1.. => continue,
+        };
+        findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
+    }
+    findings
 }
 
 /// The effect of a finding that occurs at least once.

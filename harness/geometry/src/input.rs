@@ -4,12 +4,11 @@ use std::path::Path;
 
 use contract::case::{Case, Facet};
 use contract::failure::Failure;
-use contract::lattice::{Root, UNITS_PER_EDGE};
+use contract::lattice::Root;
 use contract::manifest::Keep;
 use contract::stl;
 use serde::Serialize;
 
-use super::finding::{Finding, Kind, Place};
 use super::tree::{Aabb, Point, bounds};
 
 /// What a case file would have, in the user's units. It takes precedence over that of a case.
@@ -103,21 +102,6 @@ impl Input {
         let margin =
             (mins - origin).min(origin + Point::splat(self.case.root.edge) - maxs).min_element();
         Extent { low: mins.to_array(), high: maxs.to_array(), margin }
-    }
-
-    /// Facets with a point beyond the root, and facets that touch the root's boundary from within; on the lattice.
-    pub fn findings(&self, first: usize) -> [Finding; 2] {
-        let mut findings = [Kind::OutsideRoot, Kind::TouchingRoot].map(Finding::new);
-        for (facet, corners) in (0..).zip(&self.case.facets_lattice) {
-            let margins = corners.as_flattened().iter().map(|&c| c.min(UNITS_PER_EDGE - c));
-            let at = match margins.fold(i64::MAX, i64::min) {
-                ..0 => 0,
-                0 => 1,
-                1.. => continue,
-            };
-            findings[at].add(first, || Place::new(vec![facet], self.centroid(facet)));
-        }
-        findings
     }
 }
 

@@ -38,7 +38,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     if let Some(cell) = input.cell {
         findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
     }
-    findings.extend(input.findings(first));
+    findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
         if finding.kind.changes_region(input.case.keep) {
             finding.count_changing = finding.count;

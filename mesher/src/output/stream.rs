@@ -8,8 +8,8 @@
 //! - it is *complete*: the leaves emitted and the leaves left out (deleted, or
 //!   crossing in a mesh without crossing leaves) fill the bricks that the rank owns.
 
-use crate::Mesh;
 use crate::input::lattice::Keep;
+use crate::mesh::Mesh;
 use bricks::brick;
 use bricks::brickset::{Cursor, ones};
 use bricks::octant::{Level, Side, start57};

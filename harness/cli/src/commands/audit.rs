@@ -9,7 +9,7 @@ use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure, exit_first};
 use run::engine::description::Description;
 use run::engine::paths::Paths;
-use run::verify::others::{lacks_checker, proven};
+use run::verify::others::proven;
 use std::time::{Duration, Instant};
 
 /// Longest time of the proven checker. It takes two seconds for ten million leaves, but who has more may wait.
@@ -79,14 +79,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         balance => Promises { balance, ..Promises::default() },
     };
     let promises = engine.as_ref().map_or(&otherwise, |engine| &engine.promises);
-    let checker = Paths::find().proven_checker;
-    if let Some(why) = proved.as_ref().and_then(|_| lacks_checker(&checker)) {
+    let paths = Paths::find();
+    if let Some(why) = proved.as_ref().and_then(|_| paths.lacks_checker()) {
         return Err(Failure::missing(why));
     }
     let mut report = audit_against(directory, case.as_ref(), promises);
     let mut unproven = None;
     if let Some(base) = proved {
-        match proven(&checker, (directory, base), report.leaves, LIMIT) {
+        match proven(&paths.proven_checker, (directory, base), report.leaves, LIMIT) {
             Ok(proof) => report.checks.push(proof),
             Err(failure) => unproven = Some(Failure::from(failure)),
         }

@@ -94,6 +94,13 @@ impl Paths {
             harness,
         }
     }
+
+    /// Returns why the proven checker cannot be used, if it cannot.
+    pub fn lacks_checker(&self) -> Option<String> {
+        let checker = &self.proven_checker;
+        (!checker.is_file())
+            .then(|| format!("{} is missing: ci/prove proves and builds it", checker.display()))
+    }
 }
 
 /// The root of the repository: the nearest directory above the harness, or above the current directory, that contains

@@ -1,6 +1,5 @@
 //! The options of a verification, and the prerequisites, each tried once before the first case.
 
-use super::others::lacks_checker;
 use super::report::{CaseReport, Missing};
 use crate::engine::description::Description;
 use crate::engine::failure::{End, Failure};
@@ -165,7 +164,7 @@ impl Needs {
             (Need::Mpi, options.no_mpi, None, programs.engine.lacks_mpi()),
             (Need::Oracles, options.no_oracles, unused.clone(), None),
             (Need::P4est, options.no_p4est, unused.clone(), p4est),
-            (Need::Proof, options.no_proof, unused, lacks_checker(&paths.proven_checker)),
+            (Need::Proof, options.no_proof, unused, paths.lacks_checker()),
         ];
         let why = |(need, is_declined, unused, missing): (Need, bool, Option<_>, Option<_>)| {
             let declined = is_declined.then(|| format!("--no-{} was given", need.name()));

@@ -149,12 +149,6 @@ impl CaseRun<'_> {
     }
 }
 
-/// Returns why the proven checker of `reference/proof` cannot be used, if it cannot.
-pub fn lacks_checker(checker: &Path) -> Option<String> {
-    (!checker.is_file())
-        .then(|| format!("{} is missing: ci/prove proves and builds it", checker.display()))
-}
-
 /// What the proven checker finds of a mesh with so many leaves, given the directory of its base tree T0. The note on a mesh that is accepted
 /// says what is proven of it, and what is only tested.
 ///
