@@ -1,4 +1,4 @@
-//! Phases 3 to 8: from facets and rules on the lattice to the tree, and the mesh as one rank holds it after them.
+//! Phases 3 to 8: from facets and rules on the lattice to the tree.
 
 use crate::check;
 use crate::error::Error;
@@ -12,8 +12,7 @@ use crate::partition::ownership::Ownership;
 use crate::partition::{Division, PAPER_DEPTH, Partitioner, metis, repartition};
 use crate::record::{Job, Options, Recorder};
 use crate::refine::{self, BinnedFacets};
-use crate::sides::leaks;
-use crate::sides::{self, Base, Decided, openness};
+use crate::sides::{self, Base, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::octant::{Level, Side};
 use bricks::tree::{Kept, Tree};
