@@ -91,9 +91,6 @@ pub enum Entry {
     Failure(NoResult),
     /// A program was not run on a mesh.
     LeftOut(NoResult),
-    /// A verdict on a target, or the audit of a mesh, of records before 2026-11-24. It is not read.
-    #[serde(rename = "target", alias = "audit")]
-    Former,
 }
 
 /// The circumstances of a session.
@@ -318,8 +315,7 @@ pub struct Run {
     pub oversubscribed: bool,
     /// The command line.
     pub command: String,
-    /// Digest of the program's files; empty in old records.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    /// Digest of the program's files; empty if one cannot be read.
     pub program: String,
     /// Facets of the geometry.
     pub facets: u64,
@@ -334,8 +330,7 @@ pub struct Run {
     pub time_wall_s: f64,
     /// Wall time by the harness's clock, from the start of the launcher to its end.
     pub time_launch_s: f64,
-    /// CPU time of the whole process and of all its descendants, seen from outside, in seconds; 0 in old records.
-    #[serde(default)]
+    /// CPU time of the whole process and of all its descendants, seen from outside, in seconds.
     pub time_cpu_s: f64,
     /// Peak resident memory per rank, or of the whole process if ranks are simulated.
     pub peak_rss_bytes: Spread,
@@ -388,7 +383,6 @@ pub fn read(path: &Path) -> io::Result<Content> {
     let (mut lines, mut broken) = Content::default();
     for jsonl::Line { number, content: line, .. } in jsonl::read::<Line>(path)? {
         match line {
-            Ok(Line { entry: Entry::Former, .. }) => {}
             Ok(line) if line.schema != SCHEMA => {
                 broken.push((number, format!("its schema is {}", line.schema)));
             }

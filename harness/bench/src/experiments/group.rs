@@ -196,7 +196,7 @@ impl Groups {
                         }
                     }
                 }
-                Entry::Network(_) | Entry::Former => {}
+                Entry::Network(_) => {}
             }
         }
         let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
@@ -344,13 +344,8 @@ fn apart(
     if let Some(given) = network.filter(|network| !network.measured) {
         machine += &format!("{given}; ");
     }
-    // Old records have no digest of the program: the commit stands for it.
-    let origin = match (session, run.program.as_str()) {
-        (None, "") => machine,
-        (Some(session), "") => format!("{machine}commit {}", session.machine.commit),
-        (_, program) => format!("{machine}program {program}"),
-    };
-    setup.engine += &programs.suffix(&run.setup.engine, &origin);
+    machine += &format!("program {}", run.program);
+    setup.engine += &programs.suffix(&run.setup.engine, &machine);
     if let Some(digest) = &run.geometry {
         let Setup { case, spacing_min, layer_cells_min: n, .. } = &run.setup;
         let mesh = format!("{case} at spacing {spacing_min:e}, n {n}");

@@ -14,8 +14,7 @@ pub struct Measures {
     pub schema: String,
     /// The program.
     pub of: Measured,
-    /// The machine; empty in old records.
-    #[serde(default)]
+    /// The machine.
     pub machine: String,
     /// By case.
     pub cases: BTreeMap<String, CaseMeasures>,
@@ -28,8 +27,7 @@ pub struct Measured {
     pub named: String,
     /// The revision it was built from.
     pub revision: Option<String>,
-    /// Digest of the program file; empty in old records.
-    #[serde(default)]
+    /// Digest of the program's files; empty if one cannot be read.
     pub program: String,
 }
 
