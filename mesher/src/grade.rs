@@ -76,10 +76,10 @@ pub fn grade(
     for l in (1..=rules.level_deepest()).rev() {
         g.close(l, touched);
         if rules.layer_cells_min > 1 {
-            let reached = g.reach(l, rules.layer_cells_min - 1);
+            let reached = g.reach(l, rules.layer_cells_min - 1, l - 1);
             g.split_where_kept(l - 1, reached);
         }
-        touched = if l > 1 { g.reach(l, 1).coarsen() } else { BrickSet::default() };
+        touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
     }
     (g.split, g.counters)
 }
@@ -108,26 +108,34 @@ impl Gradation<'_> {
         self.split_kept(l - 1, touched);
     }
 
-    /// The octants of level `l - 1` that the kept leaves of level `l` in bricks that this rank owns
+    /// The octants of level `to`, `l - 1` or `l - 2`, that the kept leaves of level `l` in bricks that this rank owns
     /// reach within `radius` cells.
-    fn reach(&mut self, l: Level, radius: u32) -> BrickSet {
-        self.reached(l - 1, |g, reach| {
-            if l > g.surface {
+    fn reach(&mut self, l: Level, radius: u32, to: Level) -> BrickSet {
+        if l > self.surface {
+            let parents = self.reached(l - 1, |g, reach| {
                 let mut split = g.split[l as usize].cursor();
                 let mut deleted = g.kept.deleted(l).cursor();
                 let leaves = Tree::exists(&g.split, l)
                     .filter(|b| g.ownership.owns(l, b.key))
                     .map(|b| Brick { bits: b.bits & !split.get(b.key) & !deleted.get(b.key), ..b })
                     .filter(|b| b.bits != 0);
-                return reach.dilate_children(leaves, radius);
-            }
+                reach.dilate_children(leaves, radius);
+            });
+            return if to < l - 1 { parents.coarsen() } else { parents };
+        }
+        self.reached(to, |g, reach| {
             let exhausted = g.groups_without_kept_leaf(l);
             let mut exhausted = exhausted.cursor();
             let groups = (g.split[l as usize - 1].bricks())
                 .filter(|b| g.ownership.owns(l - 1, b.key))
                 .map(|b| Brick { bits: b.bits & !exhausted.get(b.key), ..b })
                 .filter(|b| b.bits != 0);
-            reach.dilate(groups, radius.div_ceil(2));
+            let radius = radius.div_ceil(2);
+            // What is reached is the greatest set of all: its parents are made without it.
+            match to < l - 1 {
+                true => reach.dilate_children(groups, radius),
+                false => reach.dilate(groups, radius),
+            }
         })
     }
 

@@ -54,6 +54,24 @@ impl BrickSet {
         bricks.into_iter().collect()
     }
 
+    /// The octants `bits` of bricks with these keys, which ascend. Empty bricks are left out, in place.
+    pub(crate) fn from_sorted(keys: impl Iterator<Item = u64>, mut bits: Vec<u64>) -> Self {
+        let mut set = Self::default();
+        for (at, key) in keys.enumerate() {
+            if bits[at] != 0 {
+                let high = high_of(key);
+                if set.runs.last().is_none_or(|run| run.high != high) {
+                    set.runs.push(Run { high, start: set.low.len() });
+                }
+                bits[set.low.len()] = bits[at];
+                set.low.push(key as u32);
+            }
+        }
+        bits.truncate(set.low.len());
+        bits.shrink_to_fit();
+        Self { bits, ..set }
+    }
+
     /// Adds octants to the last brick or after it.
     ///
     /// # Panics

@@ -154,20 +154,37 @@ impl Gathered {
         latest.1
     }
 
-    /// The set of all octants gathered.
-    fn into_set(self) -> BrickSet {
+    /// The set of all octants gathered. Blocks are put in order where they are: this is the largest set of a mesh.
+    fn into_set(mut self) -> BrickSet {
         let mut order: Vec<(u64, u32)> = self.numbers.into_iter().collect();
         order.sort_unstable();
-        let mut set = BrickSet::default();
+        let mut keys: Vec<u64> = Vec::with_capacity(self.words.len());
+        let mut places: Vec<u32> = Vec::with_capacity(self.words.len());
         for (page, number) in order {
-            let blocks = (0..).zip(&self.pages[number as usize]).filter(|b| *b.1 != NONE);
-            for (block, &at) in blocks {
-                for (k, &bits) in (0..).zip(&self.words[at as usize]) {
-                    set.push((page << PAGE_LOG2 | block) << BLOCK_LOG2 | k, bits);
-                }
+            for (block, &at) in (0..).zip(&self.pages[number as usize]).filter(|b| *b.1 != NONE) {
+                keys.push((page << PAGE_LOG2 | block) << BLOCK_LOG2);
+                places.push(at);
             }
         }
-        set
+        self.pages = Vec::new();
+        arrange(&mut self.words, &mut places);
+        let keys = keys.iter().flat_map(|block| *block..block + BLOCK as u64);
+        BrickSet::from_sorted(keys, self.words.into_flattened())
+    }
+}
+
+/// Moves items in place so that item `i` is the one that was at `places[i]`. Cycle by cycle; a place that is done is its own.
+fn arrange<T: Copy>(items: &mut [T], places: &mut [u32]) {
+    for start in 0..items.len() {
+        let (first, mut at) = (items[start], start);
+        while places[at] as usize != start {
+            let from = places[at] as usize;
+            items[at] = items[from];
+            places[at] = at as u32;
+            at = from;
+        }
+        items[at] = first;
+        places[at] = at as u32;
     }
 }
 
