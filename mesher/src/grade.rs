@@ -79,6 +79,10 @@ pub fn grade(
             let reached = g.reach(l, rules.layer_cells_min - 1, l - 1);
             g.split_where_kept(l - 1, reached);
         }
+        // Splits of this level are complete. Those of several ranks may be moved after gradation.
+        if comm.size() == 1 {
+            g.split[l as usize - 1].condense();
+        }
         touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
     }
     (g.split, g.counters)

@@ -1,12 +1,14 @@
 //! Sets of octants of one level: sorted sequences of bricks.
 //!
 //! The memory that these sets take limits the size of a mesh. Consecutive keys mostly agree in their upper
-//! halves; so an upper half is stored once per *run* of bricks, and a brick takes 12 bytes.
+//! halves; so an upper half is stored once per *run* of bricks, and a brick takes 12 bytes. Thick layers consist of full bricks: a set
+//! that will only be read can store these as the octants, two levels higher, that they fill.
 //!
 //! Invariants:
 //! - keys ascend strictly, and no brick is empty;
 //! - the first run starts at the first brick, and each run has at least one brick;
-//! - runs have strictly ascending upper halves of keys.
+//! - runs have strictly ascending upper halves of keys;
+//! - what is stored as full is not empty, and all other bricks of such a set are not full.
 
 mod parts;
 #[cfg(test)]
@@ -18,12 +20,14 @@ use crate::brick::{self, Brick};
 const LOW_BITS: u32 = 32;
 
 /// A set of octants of one level.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct BrickSet {
     /// Lower halves of the keys.
     low: Vec<u32>,
     bits: Vec<u64>,
     runs: Vec<Run>,
+    /// The octants that full bricks fill, if these are stored so.
+    full: Option<Box<BrickSet>>,
 }
 
 /// Number of bricks for which a set allocates at its first brick: most sets grow beyond a vector's usual four.
@@ -46,7 +50,8 @@ const fn high_of(key: u64) -> u64 {
 
 impl BrickSet {
     /// The empty set.
-    pub const EMPTY: Self = Self { low: Vec::new(), bits: Vec::new(), runs: Vec::new() };
+    pub const EMPTY: Self =
+        Self { low: Vec::new(), bits: Vec::new(), runs: Vec::new(), full: None };
 
     /// The set of all octants of some bricks, which may be in any order and repeat keys.
     pub fn from_unsorted(mut bricks: Vec<Brick>) -> Self {
@@ -109,30 +114,51 @@ impl BrickSet {
         Cursor::new(self)
     }
 
-    /// Number of bricks.
+    /// Number of bricks. Full ones must not be stored apart.
     pub fn len(&self) -> usize {
+        self.assert_plain();
         self.low.len()
     }
 
     /// Bytes that its bricks take.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.low[..]) + size_of_val(&self.bits[..])
+        let full = self.full.as_ref().map_or(0, |full| full.bytes());
+        size_of_val(&self.low[..]) + size_of_val(&self.bits[..]) + full
     }
 
     /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
-        self.low.is_empty()
+        self.low.is_empty() && self.full.is_none()
     }
 
     /// Number of octants.
     pub fn count(&self) -> u64 {
-        self.bits.iter().map(|w| u64::from(w.count_ones())).sum()
+        let full = self.full.as_ref().map_or(0, |full| full.count());
+        self.bits.iter().map(|w| u64::from(w.count_ones())).sum::<u64>() + 64 * full
     }
 
     /// The bits of brick `key`; 0 if the set has no octant in it.
     pub fn get(&self, key: u64) -> u64 {
-        let at = self.position(key);
-        if at < self.len() && self.brick(at).key == key { self.bits[at] } else { 0 }
+        self.cursor().get(key)
+    }
+
+    /// Stores full bricks as the octants that they fill, 64 of them in the memory of one. After that the set can only be read.
+    pub fn condense(&mut self) {
+        let mut full = Self::default();
+        self.retain(|b| {
+            let is_full = b.bits == u64::MAX;
+            full.push(b.key >> 6, u64::from(is_full) << (b.key & 63));
+            if is_full { 0 } else { b.bits }
+        });
+        self.low.shrink_to_fit();
+        self.bits.shrink_to_fit();
+        self.full = Some(Box::new(full)).filter(|full| !full.is_empty());
+    }
+
+    /// # Panics
+    /// If full bricks are stored apart: then the set can only be read.
+    fn assert_plain(&self) {
+        assert!(self.full.is_none(), "a condensed set is only read");
     }
 
     /// Whether the octant with this Morton code is in the set.
@@ -147,6 +173,7 @@ impl BrickSet {
 
     /// Replaces the bits of every brick, in order, by what `keep` returns for it.
     pub fn retain(&mut self, mut keep: impl FnMut(Brick) -> u64) {
+        self.assert_plain();
         let runs = std::mem::take(&mut self.runs);
         let mut kept = 0;
         for (i, run) in runs.iter().enumerate() {
@@ -205,16 +232,31 @@ impl BrickSet {
         let ascend = self.runs.is_sorted_by(|a, b| a.start < b.start);
         assert!(ascend, "each run must have a brick");
         let (mut same, mut before) = (Self::default(), None);
-        for Brick { key, bits } in self.bricks() {
+        let partial = Cursor { full: None, ..self.bricks() };
+        for Brick { key, bits } in partial {
             assert!(bits != 0, "brick {key:#x} must not be empty");
             if let Some(before) = before.replace(key) {
                 assert!(before < key, "brick {key:#x} must follow brick {before:#x}");
             }
             same.push(key, bits);
         }
-        assert!(*self == same, "each brick must be in the run of its upper half");
+        assert!(self.runs == same.runs, "each brick must be in the run of its upper half");
+        if let Some(full) = &self.full {
+            assert!(!full.is_empty(), "a condensed set must have full bricks");
+            full.check_invariants();
+            let is_twice = same.bricks().find(|b| b.bits == u64::MAX || full.contains(b.key));
+            assert_eq!(is_twice, None, "a full brick must be stored as such, and once");
+        }
     }
 }
+
+impl PartialEq for BrickSet {
+    fn eq(&self, other: &Self) -> bool {
+        self.bricks().eq(other.bricks())
+    }
+}
+
+impl Eq for BrickSet {}
 
 /// The octants of some bricks in Morton order; those with the same key become one.
 impl FromIterator<Brick> for BrickSet {
@@ -241,6 +283,8 @@ pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
 /// The bricks of a set in order; also finds bricks by ascending keys, see [`BrickSet::cursor`].
 #[derive(Clone)]
 pub struct Cursor<'a> {
+    /// Full bricks that are stored apart.
+    full: Option<Box<Full<'a>>>,
     set: &'a BrickSet,
     /// The rest of the current run.
     low: &'a [u32],
@@ -259,10 +303,43 @@ impl Iterator for Cursor<'_> {
         if self.low.is_empty() {
             self.next_run();
         }
+        if let Some(full) = &mut self.full {
+            let partial = self.low.first().map_or(u64::MAX, |low| self.high | u64::from(*low));
+            if let Some(key) = full.before(partial) {
+                return Some(Brick { key, bits: u64::MAX });
+            }
+        }
         let (&low, rest) = self.low.split_first()?;
         let bits = self.set.bits[self.end - self.low.len()];
         self.low = rest;
         Some(Brick { key: self.high | u64::from(low), bits })
+    }
+}
+
+/// A reader of full bricks that are stored as the octants that they fill.
+#[derive(Clone)]
+struct Full<'a> {
+    cursor: Cursor<'a>,
+    /// The rest of the cursor's last brick.
+    rest: Brick,
+}
+
+impl Full<'_> {
+    /// The key of the next full brick, if it precedes this one.
+    fn before(&mut self, key: u64) -> Option<u64> {
+        while self.rest.bits == 0 {
+            self.rest = self.cursor.next()?;
+        }
+        let next = self.rest.key << 6 | u64::from(self.rest.bits.trailing_zeros());
+        (next < key).then(|| {
+            self.rest.bits &= self.rest.bits - 1;
+            next
+        })
+    }
+
+    /// The bits of a brick: all, or none.
+    fn get(&mut self, key: u64) -> u64 {
+        (self.cursor.get(key >> 6) >> (key & 63) & 1) * u64::MAX
     }
 }
 
@@ -281,7 +358,11 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
 impl<'a> Cursor<'a> {
     #[inline]
     fn new(set: &'a BrickSet) -> Self {
-        let mut cursor = Self { set, low: &[], end: 0, high: u64::MAX, runs: &set.runs };
+        let full = set
+            .full
+            .as_ref()
+            .map(|full| Box::new(Full { cursor: full.cursor(), rest: Brick { key: 0, bits: 0 } }));
+        let mut cursor = Self { full, set, low: &[], end: 0, high: u64::MAX, runs: &set.runs };
         cursor.next_run();
         cursor
     }
@@ -289,6 +370,15 @@ impl<'a> Cursor<'a> {
     /// The bits of brick `key`, 0 if the set has none. Keys of consecutive queries must not descend.
     #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {
+        match (self.partial(key), &mut self.full) {
+            (0, Some(full)) => full.get(key),
+            (bits, _) => bits,
+        }
+    }
+
+    /// The bits of a brick that is not stored as full.
+    #[inline(always)]
+    fn partial(&mut self, key: u64) -> u64 {
         if self.high == high_of(key) {
             // The usual case is the next brick.
             if let [low, rest @ ..] = self.low
@@ -328,7 +418,7 @@ impl<'a> Cursor<'a> {
             return;
         };
         self.high = run.high;
-        self.end = after.first().map_or(self.set.len(), |r| r.start);
+        self.end = after.first().map_or(self.set.low.len(), |r| r.start);
         self.low = &self.set.low[run.start..self.end];
         self.runs = after;
     }

@@ -71,7 +71,9 @@ impl<'t> Reach<'t> {
         }
         let mut near = Gathered::new(self.level);
         self.words += self.tile.pass(sources, radius, to_parents, &mut near);
-        self.dilate(near.into_set().bricks(), rest);
+        let mut near = near.into_set();
+        near.condense();
+        self.dilate(near.bricks(), rest);
     }
 
     /// The octants reached, and the work done.

@@ -76,6 +76,7 @@ impl BrickSet {
             low: bytemuck::cast_slice(low)[..bits.len()].to_vec(),
             bits: bits.to_vec(),
             runs: runs.map(|&[high, start]| Run { high, start: start as usize }).collect(),
+            full: None,
         };
         (set, words)
     }
