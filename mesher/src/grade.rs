@@ -56,7 +56,7 @@ use ranks::Comm;
 
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
 /// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
-/// `crossing` are the base tree's crossing leaves. Counts the work. Collective.
+/// `crossing` are the base tree's crossing leaves. Counts the work, and the bytes of split octants at most. Collective.
 pub fn grade(
     split: PerLevel,
     crossing: &PerLevel,
@@ -64,10 +64,10 @@ pub fn grade(
     rules: &Rules,
     ownership: &Ownership,
     comm: &dyn Comm,
-) -> (PerLevel, Counters) {
+) -> (PerLevel, Counters, usize) {
     let surface = rules.level_surface;
     let counters = Counters::default();
-    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, counters };
+    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, counters, bytes: 0 };
     if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
@@ -85,7 +85,7 @@ pub fn grade(
         }
         touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
     }
-    (g.split, g.counters)
+    (g.split, g.counters, g.bytes)
 }
 
 struct Gradation<'a> {
@@ -96,6 +96,8 @@ struct Gradation<'a> {
     ownership: &'a Ownership,
     comm: &'a dyn Comm,
     counters: Counters,
+    /// Bytes of split octants, and of those that are reached, at most.
+    bytes: usize,
 }
 
 impl Gradation<'_> {
@@ -161,8 +163,10 @@ impl Gradation<'_> {
         let mut tile = Tile::default();
         let mut reach = Reach::new(l, &mut tile);
         dilate(self, &mut reach);
-        let (reached, words) = reach.finish();
+        let (reached, words, bytes) = reach.finish();
         self.counters.words_dilated += words;
+        let split: usize = self.split.iter().map(BrickSet::bytes).sum();
+        self.bytes = self.bytes.max(split + bytes);
         reached
     }
 

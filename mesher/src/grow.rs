@@ -112,6 +112,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         sides,
         leaks,
         bounds_nothing,
+        bytes_graded: 0,
         is_base: options.ungraded,
     };
     if options.strict
@@ -125,12 +126,12 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
     let base = is_whole.then(|| mesh.split.clone());
-    let (split, work) = job.phase("grade", |comm| {
+    let (split, work, bytes) = job.phase("grade", |comm| {
         let split = std::mem::take(&mut mesh.split);
         let kept = Kept::new(mesh.sides.deleted());
         grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
     });
-    mesh.split = split;
+    (mesh.split, mesh.bytes_graded) = (split, bytes);
     job.counters.octants_split_graded = work.octants_split_graded;
     job.counters.words_dilated = work.words_dilated;
     job.counters.halo_bricks = work.halo_bricks;

@@ -31,6 +31,8 @@ pub struct Mesh {
     pub leaks: Leaks,
     /// Whether the facets are an open body, and bound nothing although the outside is kept.
     pub bounds_nothing: bool,
+    /// Bytes of split octants in gradation, at most.
+    pub bytes_graded: usize,
     /// Whether the tree is T0, of which all leaves are in the mesh.
     pub is_base: bool,
 }

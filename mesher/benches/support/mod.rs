@@ -84,7 +84,7 @@ impl Phases {
         let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(sides.deleted());
-        let (graded, _) =
+        let (graded, ..) =
             grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
         let mesh = Mesh {
             facets: FacetCounts { total: given.total, beyond_root: false, digest: 0 },
@@ -97,6 +97,7 @@ impl Phases {
             sides,
             leaks: Leaks::default(),
             bounds_nothing: false,
+            bytes_graded: 0,
             is_base: false,
         };
         Self { given, facets, rules, ownership, binned, tree, mesh }

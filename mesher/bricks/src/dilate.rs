@@ -35,12 +35,14 @@ pub struct Reach<'t> {
     tile: &'t mut Tile,
     out: Gathered,
     words: Words,
+    /// Bytes of what was gathered on the way, at most.
+    bytes: usize,
 }
 
 impl<'t> Reach<'t> {
     /// The empty union, of octants of level `level`. `tile` is scratch; it must be empty and is left empty.
     pub fn new(level: Level, tile: &'t mut Tile) -> Self {
-        Self { level, tile, out: Gathered::new(level), words: 0 }
+        Self { level, tile, out: Gathered::new(level), words: 0, bytes: 0 }
     }
 
     /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
@@ -71,14 +73,16 @@ impl<'t> Reach<'t> {
         }
         let mut near = Gathered::new(self.level);
         self.words += self.tile.pass(sources, radius, to_parents, &mut near);
+        self.bytes = near.bytes();
         let mut near = near.into_set();
         near.condense();
         self.dilate(near.bricks(), rest);
     }
 
-    /// The octants reached, and the work done.
-    pub fn finish(self) -> (BrickSet, Words) {
-        (self.out.into_set(), self.words)
+    /// The octants reached, the work done, and the bytes that it took at most.
+    pub fn finish(self) -> (BrickSet, Words, usize) {
+        let bytes = self.bytes.max(self.out.bytes());
+        (self.out.into_set(), self.words, bytes)
     }
 }
 
@@ -140,6 +144,11 @@ impl Gathered {
         }
         let words = self.words[*block as usize].iter_mut();
         words.zip(bits).zip(&self.valid).for_each(|((w, b), valid)| *w |= b & valid);
+    }
+
+    /// Bytes that it takes while it becomes a set: of each block its words, its key and place, and the keys of its bricks.
+    fn bytes(&self) -> usize {
+        self.words.len() * (size_of::<[u64; BLOCK]>() + 12 + 4 * BLOCK)
     }
 
     /// The number of a page, which is created if it does not exist.

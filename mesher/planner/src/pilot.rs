@@ -60,9 +60,6 @@ impl Amounts {
     }
 }
 
-/// Copies of the graded sets that exist at a time in gradation: the sets, and for one level also the octants reached and the union that
-/// replaces the set. Measured on a sphere with layers of 4 to 30 cells.
-const COPIES_GRADED: f64 = 1.75;
 /// Visits of bricks without facets that take as long as one test of a facet against a brick.
 const VISITS_PER_TEST: f64 = 5.0;
 
@@ -99,7 +96,7 @@ pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amoun
         tests: job.counters.facet_brick_tests as f64
             + job.counters.bricks_voxelised as f64 / VISITS_PER_TEST,
         bytes_sides: mesh.sides.bytes as f64,
-        bytes_graded: stored + COPIES_GRADED * bytes(&mesh.split),
+        bytes_graded: stored + mesh.bytes_graded as f64,
         time_refine_s,
         time_cells_s,
         time_fixed_s: all - time_refine_s - time_cells_s,
