@@ -1,23 +1,23 @@
 //! A positive quantity as a sum of few known terms, each times a positive coefficient.
 //!
 //! Errors are relative, because such quantities range over decades. Coefficients must be positive: a difference of two terms fits what was
-//! measured, and has no meaning beyond it. Of all choices of terms, the one is taken that best predicts each value from the others
-//! (leave-one-out cross-validation; its errors follow from the leverages of one fit: Allen, "The relationship between variable selection and
-//! data augmentation and a method for prediction", 1974).
+//! measured, and has no meaning beyond it. Terms are chosen for what the sum is needed for, which is to predict values further on: of all
+//! choices, the one is taken that best predicts the values beyond each place in the further half of the data from those up to it. A sum of
+//! many terms, and leave-one-out cross-validation, choose what interpolates best.
+
+/// Where a value was measured, such as a number of ranks, which is also the weight of its square error; the value, which is positive; and the
+/// values of all terms, none of which is negative.
+pub type Row = (f64, f64, Vec<f64>);
 
 /// A sum of terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sum {
     /// Indices of the terms, ascending, with their coefficients.
     pub terms: Vec<(usize, f64)>,
-    /// Root mean square of the relative errors of values that are left out.
-    error: f64,
 }
 
-/// A further term must reduce the error to this part.
-const GAIN: f64 = 0.7;
-/// Errors below this are none.
-const EXACT: f64 = 1e-9;
+/// Mean square errors below this are none.
+const EXACT: f64 = 1e-12;
 /// Terms whose columns have an angle with a square sine below this are the same.
 const INDEPENDENT: f64 = 1e-9;
 
@@ -27,58 +27,74 @@ impl Sum {
         self.terms.iter().map(|(term, coefficient)| coefficient * terms[*term]).sum()
     }
 
-    /// The sum of at most two terms that predicts positive values best; `None` if there are fewer than two values more than terms.
-    /// A row has the weight of a square error, the value, and the values of all terms, none of which is negative.
-    pub fn fit(rows: &[(f64, f64, Vec<f64>)]) -> Option<Self> {
-        let terms = rows.first().map_or(0, |(_, _, terms)| terms.len());
-        let mut best: Option<Self> = None;
-        let pairs = (0..terms).flat_map(|a| (a + 1..terms).map(move |b| vec![a, b]));
-        for chosen in (0..terms).map(|a| vec![a]).chain(pairs) {
-            let Some(sum) = of_terms(rows, &chosen) else { continue };
-            let needed = best.as_ref().map_or(f64::INFINITY, |best| match best.terms.len() {
-                fewer if fewer < chosen.len() => GAIN * best.error,
-                _ => best.error,
-            });
-            if sum.error < needed {
-                best = Some(sum);
-            }
-        }
-        best
+    /// The sum of at most so many terms that extrapolates best, the shortest one of several; `None` without values at three places.
+    pub fn fit(rows: &[Row], most: u32) -> Option<Self> {
+        let mut places: Vec<f64> = rows.iter().map(|row| row.0).collect();
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        let [_, .., before, last] = places[..] else { return None };
+        places.retain(|place| (before.min(0.5 * last)..last).contains(place));
+        let split = |cut: &f64| rows.iter().cloned().partition(|row| row.0 <= *cut);
+        let splits: Vec<(Vec<Row>, Vec<Row>)> = places.iter().map(split).collect();
+        let candidate = |chosen: Vec<usize>| {
+            let beyond = |(known, further): &(Vec<Row>, Vec<Row>)| {
+                Some(Self::of_terms(known, &chosen)?.error(further))
+            };
+            let error = splits.iter().map(beyond).sum::<Option<f64>>()?.max(EXACT);
+            Some((error, Self::of_terms(rows, &chosen)?))
+        };
+        let all = choices(rows[0].2.len(), most).filter_map(candidate);
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sum)| sum)
+    }
+
+    /// The least squares of these terms, whose sum relative to the value should be 1 in every row; `None` unless all coefficients are positive.
+    fn of_terms(rows: &[Row], chosen: &[usize]) -> Option<Self> {
+        let relative = |(weight, value, terms): &Row| {
+            (*weight, 1.0, chosen.iter().map(|term| terms[*term] / value).collect())
+        };
+        let found = least_squares(&rows.iter().map(relative).collect::<Vec<Row>>());
+        let is_sum = found.iter().all(|coefficient| *coefficient > 0.0);
+        is_sum.then(|| Self { terms: chosen.iter().copied().zip(found).collect() })
+    }
+
+    /// Mean square of the relative errors.
+    fn error(&self, rows: &[Row]) -> f64 {
+        let square = |(weight, value, terms): &Row| weight * (self.at(terms) / value - 1.0).powi(2);
+        rows.iter().map(square).sum::<f64>() / rows.iter().map(|row| row.0).sum::<f64>()
     }
 }
 
-/// The least squares of these one or two terms, whose sum relative to the value should be 1 in every row.
-fn of_terms(rows: &[(f64, f64, Vec<f64>)], chosen: &[usize]) -> Option<Sum> {
-    if rows.len() < chosen.len() + 2 {
-        return None;
+/// All choices of one to so many terms, the shorter ones first; some repeatedly. The digits of a number say which: the terms from 1 on, and 0
+/// for none.
+fn choices(terms: usize, most: u32) -> impl Iterator<Item = Vec<usize>> {
+    let digit = move |number: usize, place: u32| number / (terms + 1).pow(place) % (terms + 1);
+    let choice = move |number: usize| -> Vec<usize> {
+        (0..most).rev().filter_map(|place| digit(number, place).checked_sub(1)).collect()
+    };
+    (1..(terms + 1).pow(most)).map(choice).filter(|of| of.is_sorted_by(|a, b| a < b))
+}
+
+/// The coefficients of terms whose sums have the least square errors, each with its row's weight; 0 for one that is the same as those before it.
+pub fn least_squares(rows: &[Row]) -> Vec<f64> {
+    let count = rows.first().map_or(0, |row| row.2.len());
+    // The value is the last column. The normal equations are solved by Gauss-Jordan elimination.
+    let column = |row: &Row, i: usize| row.2.get(i).copied().unwrap_or(row.1);
+    let product = |i: usize, j: usize| -> f64 {
+        rows.iter().map(|row| row.0 * column(row, i) * column(row, j)).sum()
+    };
+    let equation = |i: usize| (0..=count).map(|j| product(i, j)).collect();
+    let mut equations: Vec<Vec<f64>> = (0..count).map(equation).collect();
+    for i in 0..count {
+        let pivot = equations[i][i];
+        let scale = if pivot > INDEPENDENT * product(i, i) { 1.0 / pivot } else { 0.0 };
+        let scaled: Vec<f64> = equations[i].iter().map(|entry| scale * entry).collect();
+        for equation in &mut equations {
+            let factor = equation[i];
+            equation.iter_mut().zip(&scaled).for_each(|(entry, of)| *entry -= factor * of);
+        }
+        equations[i] = scaled;
     }
-    // Relative to the value; a single term is a pair whose second one is 0.
-    let pair = |(weight, value, terms): &(f64, f64, Vec<f64>)| {
-        let second = chosen.get(1).map_or(0.0, |term| terms[*term]);
-        (*weight, terms[chosen[0]] / value, second / value)
-    };
-    let pairs: Vec<(f64, f64, f64)> = rows.iter().map(pair).collect();
-    let total = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        pairs.iter().map(|(weight, a, b)| weight * of(*a, *b)).sum()
-    };
-    let [aa, ab, bb] = [total(&|a, _| a * a), total(&|a, b| a * b), total(&|_, b| b * b)];
-    let [a1, b1] = [total(&|a, _| a), total(&|_, b| b)];
-    // The inverse of the normal equations' matrix.
-    let [ia, iab, ib] = match (chosen.len(), aa * bb - ab * ab) {
-        (1, _) => [1.0 / aa, 0.0, 0.0],
-        (_, determinant) if determinant <= INDEPENDENT * aa * bb => return None,
-        (_, determinant) => [bb, -ab, aa].map(|entry| entry / determinant),
-    };
-    let coefficients = [ia * a1 + iab * b1, iab * a1 + ib * b1];
-    let left_out = pairs.iter().map(|(weight, a, b)| {
-        let leverage = weight * (ia * a * a + 2.0 * iab * a * b + ib * b * b);
-        let error = 1.0 - coefficients[0] * a - coefficients[1] * b;
-        weight * (error / (1.0 - leverage).max(INDEPENDENT)).powi(2)
-    });
-    let error = (left_out.sum::<f64>() / pairs.iter().map(|pair| pair.0).sum::<f64>()).sqrt();
-    let terms: Vec<(usize, f64)> = chosen.iter().copied().zip(coefficients).collect();
-    let is_sum = terms.iter().all(|(_, coefficient)| *coefficient > 0.0);
-    (is_sum && error.is_finite()).then_some(Sum { terms, error: error.max(EXACT) })
+    equations.iter().map(|equation| equation[count]).collect()
 }
 
 #[cfg(test)]
@@ -87,20 +103,19 @@ mod tests {
     use proptest::prelude::*;
 
     /// Terms 1, x, x^2, 1/x.
-    fn rows(all: &[[f64; 2]]) -> Vec<(f64, f64, Vec<f64>)> {
-        all.iter().map(|[x, value]| (1.0, *value, vec![1.0, *x, x * x, 1.0 / x])).collect()
+    fn rows(all: &[[f64; 2]]) -> Vec<Row> {
+        all.iter().map(|[x, value]| (*x, *value, vec![1.0, *x, x * x, 1.0 / x])).collect()
     }
 
     proptest! {
         #[test]
-        fn a_sum_of_two_terms_is_found_again(a in 1e-3..1e3f64, b in 1e-3..1e3f64, first in 0..4usize, second in 0..4usize) {
-            prop_assume!(first != second);
-            let mut rows = rows(&[1.0, 2.0, 4.0, 8.0, 16.0, 32.0].map(|x| [x, 0.0]));
+        fn a_sum_of_three_terms_is_found_again(of in prop::array::uniform4(1e-2..1e2f64), absent in 0..4usize) {
+            let mut rows = rows(&[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0].map(|x| [x, 0.0]));
             for row in &mut rows {
-                row.1 = a * row.2[first] + b * row.2[second];
+                row.1 = (0..4).filter(|i| *i != absent).map(|i| of[i] * row.2[i]).sum();
             }
-            let sum = Sum::fit(&rows).unwrap();
-            // A single term is taken only if it predicts as well.
+            let sum = Sum::fit(&rows, 3).unwrap();
+            // A term is left out only if the others predict as well.
             for (_, value, terms) in &rows {
                 prop_assert!((sum.at(terms) / value - 1.0).abs() < 1e-3, "{sum:?}");
             }
@@ -109,22 +124,44 @@ mod tests {
 
     #[test]
     fn errors_are_relative_and_weighted() {
-        let row = |weight: f64, value: f64| (weight, value, vec![1.0]);
-        // Of 2, and of 4 twice, by a constant c: (c/2 - 1)^2 + 2 (c/4 - 1)^2 is least at c = 8/3.
-        for rows in [
-            vec![row(1.0, 2.0), row(1.0, 4.0), row(1.0, 4.0)],
-            vec![row(1.0, 2.0), row(1.0, 4.0), row(0.5, 4.0), row(0.5, 4.0)],
-        ] {
-            let sum = Sum::fit(&rows).unwrap();
-            assert!((sum.at(&[1.0]) - 8.0 / 3.0).abs() < 1e-12, "{sum:?}");
-        }
+        let row = |place: f64, value: f64| (place, value, vec![1.0]);
+        // Of 2, of 4 twice and of 4 thrice, by a constant c: (c/2 - 1)^2 + 5 (c/4 - 1)^2 is least at c = 28/9.
+        let sum = Sum::fit(&[row(1.0, 2.0), row(2.0, 4.0), row(3.0, 4.0)], 1).unwrap();
+        assert!((sum.at(&[1.0]) - 28.0 / 9.0).abs() < 1e-12, "{sum:?}");
+    }
+
+    #[test]
+    fn a_term_that_fits_a_disturbance_but_predicts_worse_is_left_out() {
+        // Falls as 1/x but for the last values, to which a second term brings the sum nearer; of those up to 16, it predicts the one at 32 worse.
+        let factors = [(1.0, 1.0), (2.0, 1.0), (4.0, 1.0), (8.0, 1.0), (16.0, 1.08), (32.0, 1.05)];
+        let sum = Sum::fit(&rows(&factors.map(|(x, factor)| [x, factor / x])), 2).unwrap();
+        assert_eq!(sum.terms.iter().map(|term| term.0).collect::<Vec<_>>(), [3]);
     }
 
     #[test]
     fn too_few_values_and_differences_are_no_sum() {
-        assert_eq!(Sum::fit(&rows(&[[1.0, 1.0], [2.0, 2.0]])), None);
+        assert_eq!(Sum::fit(&rows(&[[1.0, 1.0], [2.0, 2.0], [2.0, 2.0]]), 2), None);
         // Nothing falls from 9 by 1 with these terms but a sum with 1/x; none is subtracted.
-        let sum = Sum::fit(&rows(&[[1.0, 9.0], [2.0, 8.0], [3.0, 7.0], [4.0, 6.0]])).unwrap();
+        let rows = rows(&[[1.0, 9.0], [2.0, 8.0], [3.0, 7.0], [4.0, 6.0]]);
+        let sum = Sum::fit(&rows, 2).unwrap();
         assert!(sum.terms.iter().all(|(_, coefficient)| *coefficient > 0.0), "{sum:?}");
+    }
+
+    #[test]
+    fn choices_are_all_of_any_length_and_the_shorter_ones_come_first() {
+        let mut all: Vec<Vec<usize>> = choices(4, 3).collect();
+        assert_eq!(all[..4], [[0], [1], [2], [3]]);
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), 4 + 6 + 4);
+    }
+
+    #[test]
+    fn a_term_that_is_the_same_as_another_one_has_no_coefficient() {
+        let rows = [[1.0, 5.0], [2.0, 7.0], [4.0, 11.0]];
+        let rows = rows.map(|[x, value]: [f64; 2]| (x, value, vec![1.0, x, 3.0 - x]));
+        let found = least_squares(&rows);
+        assert!((found[0] - 3.0).abs() + (found[1] - 2.0).abs() < 1e-9, "{found:?}");
+        assert_eq!(found[2], 0.0);
     }
 }

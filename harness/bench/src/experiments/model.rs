@@ -1,25 +1,26 @@
 //! Models of a program's phases on simulated ranks, to predict what was not measured.
 //!
 //! A counter is exact, so it comes first: its mean over the ranks is a [`Sum`] of [`TERMS`], functions of cells N, ranks p and facets F. The mean
-//! time of a phase is then a sum of costs times means of counters. Of both, the maximum exceeds the mean by a factor a p^b. A phase takes as
-//! long as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
+//! time of a phase is then a sum of costs times means of counters. Of both, the maximum exceeds the mean by a factor a p^b (N/p)^c. A phase takes
+//! as long as on its slowest rank, plus its messages in the latency-bandwidth model of [`pop`](super::pop), and a run as long as all phases.
 //!
-//! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same kind in
-//! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, pooled over all
-//! quantities of a kind and each divided by its reach (the ratio of the ranks to the most that were fitted), times the prediction's reach. The
-//! quantile is that of split conformal prediction, without its guarantee, as later runs are not exchangeable with earlier ones: so the share
-//! of held-out values within bands is reported beside them.
+//! [`Tested`] fits runs on few ranks and holds out those on many. The band of a prediction follows from predictions of the same quantity in
+//! retrospect: of the runs that were fitted, from those on fewer ranks. Its relative width is the 90 % quantile of their errors, each divided by
+//! its reach, times the prediction's reach. A cost that no fitted run shows is at most as great as the error there, and may grow in proportion
+//! to the ranks, while the quantity shrinks: so the reach is the ratio of the ranks to the most that were fitted, times that of the quantity on
+//! as many to the quantity itself, if this is more than 1. The quantile is that of split conformal prediction, without its guarantee, as later
+//! runs are not exchangeable with earlier ones: so the share of held-out values within bands is reported beside them.
 //!
 //! Only positive values are compared, and a counter that is below one per rank in some fitted run explains no time and has no law.
 //!
 //! Square errors have the weight of the ranks, because runs on more ranks are nearer to what is predicted. Runs on one rank are left out: they
 //! have no messages, no halos and other phases.
 
-use super::entry::{Comm, Network, Spread};
+use super::entry::{Comm, Network, Phase, Spread};
 use super::group::Group;
 use crate::order::distinct;
 use statistics::median_of;
-use statistics::sums::Sum;
+use statistics::sums::{Row, Sum, least_squares};
 use std::collections::BTreeMap;
 
 /// Cells, ranks and facets of a run.
@@ -33,19 +34,29 @@ pub struct At {
     pub facets: f64,
 }
 
+/// Of the factor by which a maximum exceeds a mean, the logarithms of the bases, the first of which is e.
+fn logs(at: &At) -> [f64; 3] {
+    [1.0, at.ranks.ln(), (at.cells / at.ranks).ln()]
+}
+
 /// A function of a run, with its name.
 type Term = (&'static str, fn(&At) -> f64);
 
-/// The terms of a mean over the ranks: shares of cells and of facets, the boundary of a part of a surface, a constant, a collective operation by
-/// a tree, and one in which every rank receives from all others.
-const TERMS: [Term; 6] = [
+/// The terms of a mean over the ranks: parts of cells and of facets, the cells along the facets of a part, the boundary of a
+/// part of a surface, a constant, reduction by a tree, and what an allgather sends of a fixed size per rank and of one in total.
+const TERMS: [Term; 8] = [
     ("N/p", |at| at.cells / at.ranks),
     ("F/p", |at| at.facets / at.ranks),
+    ("√(NF)/p", |at| (at.cells * at.facets).sqrt() / at.ranks),
     ("√(N/p)", |at| (at.cells / at.ranks).sqrt()),
     ("", |_| 1.0),
     ("⌈log₂p⌉", |at| at.ranks.log2().ceil()),
     ("(p – 1)", |at| at.ranks - 1.0),
+    ("(1 – 1/p)", |at| 1.0 - 1.0 / at.ranks),
 ];
+
+/// The most terms of a counter, which is exact, and of a time, which is not.
+const TERMS_MAX: [u32; 2] = [3, 2];
 
 /// Kinds of quantities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,12 +73,16 @@ pub enum Kind {
 pub type Key = (Kind, String);
 
 /// Mean over the ranks and maximum.
-type Ends = [f64; 2];
+pub type Ends = [f64; 2];
+
+type Quantities = BTreeMap<Key, Ends>;
+/// Terms with their names.
+type Terms<'a> = Vec<(&'a str, f64)>;
 
 /// What is known of a run.
 struct Sample {
     at: At,
-    of: BTreeMap<Key, Ends>,
+    of: Quantities,
     network: Network,
 }
 
@@ -78,9 +93,9 @@ fn traffic(phase: &str) -> [Key; 2] {
     TRAFFIC.map(|what| (Kind::Counter, what.to_owned() + phase))
 }
 
-/// The key of facets per rank, which need no law.
-fn facets() -> Key {
-    (Kind::Counter, "facets per rank".to_owned())
+/// The key of a run's time.
+fn run_time() -> Key {
+    (Kind::Run, "run".to_owned())
 }
 
 impl Sample {
@@ -89,20 +104,18 @@ impl Sample {
         let at = At { cells: run.cells as f64, ranks, facets: run.facets as f64 };
         let ends = |of: &Spread| [of.sum / ranks, of.max];
         // The phases' messages are counted apart.
-        let is_own = |name: &str| !["messages", "message_bytes"].contains(&name);
-        let own = run.counters.iter().filter(|(name, _)| is_own(name));
-        let mut of: BTreeMap<Key, Ends> =
-            own.map(|(name, of)| ((Kind::Counter, name.clone()), ends(of))).collect();
-        of.insert(facets(), [at.facets / ranks; 2]);
+        let is_own = |(name, _): &(&String, _)| *name != "messages" && *name != "message_bytes";
+        let own = run.counters.iter().filter(is_own);
+        let own = own.map(|(name, of)| ((Kind::Counter, name.clone()), ends(of)));
+        let mut of: Quantities = own.collect();
         for phase in &run.phases {
             let messages = [&phase.messages, &phase.message_bytes].map(ends);
             of.extend(traffic(&phase.name).into_iter().zip(messages));
+            of.insert((Kind::Phase, phase.name.clone()), ends(&phase.useful_s));
         }
         // What happens less than once on a rank explains no time.
-        of.retain(|_, [mean, _]| *mean >= 1.0);
-        let times = run.phases.iter().map(|phase| (phase.name.clone(), ends(&phase.useful_s)));
-        of.extend(times.map(|(name, ends)| ((Kind::Phase, name), ends)));
-        of.insert((Kind::Run, "run".to_owned()), [group.time_s.value; 2]);
+        of.retain(|(kind, _), [mean, _]| *kind == Kind::Phase || *mean >= 1.0);
+        of.insert(run_time(), [group.time_s.value; 2]);
         Self { at, of, network: group.network }
     }
 }
@@ -111,119 +124,122 @@ impl Sample {
 #[derive(Clone, Debug)]
 struct Law {
     mean: Sum,
-    /// a and b of a p^b.
-    imbalance: [f64; 2],
+    /// Exponents of the bases of [`logs`]; that of N/p is 0 if all runs are of one mesh.
+    imbalance: Vec<f64>,
+    /// Both.
+    formulas: [String; 2],
 }
 
 impl Law {
-    /// Of the runs that have this quantity, with all terms of each; `None` if they are too few.
-    fn fit(samples: &[Sample], key: &Key, terms: impl Fn(&Sample) -> Vec<f64>) -> Option<Self> {
-        let of = |sample: &Sample| sample.of.get(key).copied().filter(|ends| ends[0] > 0.0);
-        let known: Vec<(&Sample, Ends)> =
-            samples.iter().filter_map(|sample| Some((sample, of(sample)?))).collect();
-        let row = |(s, [mean, _]): &(&Sample, Ends)| (s.at.ranks, *mean, terms(s));
-        let mean = Sum::fit(&known.iter().map(row).collect::<Vec<_>>())?;
-        let logs = known.iter().map(|(s, [mean, max])| [s.at.ranks.ln(), (max / mean).ln()]);
-        let is_known = distinct(known.iter().map(|(sample, _)| sample.at.ranks)).len() > 1;
-        is_known.then(|| Self { mean, imbalance: power(&logs.collect::<Vec<_>>()) })
+    /// Of the runs that have this quantity, with all terms of each and their names; `None` if they are too few.
+    fn fit<'a>(samples: &[Sample], key: &Key, of: impl Fn(&Sample) -> Terms<'a>) -> Option<Self> {
+        let known = samples.iter().filter_map(|s| Some((s, *s.of.get(key)?)));
+        let known = known.filter(|(_, [mean, _])| *mean > 0.0);
+        let rows = |value: fn(Ends) -> f64, terms: &dyn Fn(&Sample) -> Vec<f64>| -> Vec<Row> {
+            known.clone().map(|(s, ends)| (s.at.ranks, value(ends), terms(s))).collect()
+        };
+        let means = rows(|[mean, _]| mean, &|s| of(s).iter().map(|term| term.1).collect());
+        let mean = Sum::fit(&means, TERMS_MAX[key.0 as usize])?;
+        let factors = rows(|[mean, max]| (max / mean).ln(), &|s| logs(&s.at).to_vec());
+        let imbalance = least_squares(&factors);
+        let names = of(&samples[0]);
+        let term = |(term, coefficient): &(usize, f64)| {
+            format!("{coefficient:.1e} {}", names[*term].0).trim().to_owned()
+        };
+        let sum: Vec<String> = mean.terms.iter().map(term).collect();
+        let powers = imbalance[1..].iter().zip(["p", "(N/p)"]);
+        let powers: String = powers.map(|(power, base)| format!(" {base}^{power:.2}")).collect();
+        let formulas = [sum.join(" + "), format!("{:.2}{powers}", imbalance[0].exp())];
+        Some(Self { mean, imbalance, formulas })
     }
 
     /// Mean and maximum for the values of all terms.
-    fn at(&self, terms: &[f64], ranks: f64) -> Ends {
-        let ([a, b], mean) = (self.imbalance, self.mean.at(terms));
-        [mean, mean * (a * ranks.powf(b)).clamp(1.0, ranks)]
-    }
-
-    /// The mean as a sum of terms with these names, and the imbalance.
-    fn formulas(&self, names: &[&str]) -> [String; 2] {
-        let term = |(term, coefficient): &(usize, f64)| {
-            format!("{coefficient:.1e} {}", names[*term]).trim().to_owned()
-        };
-        let [a, b] = self.imbalance;
-        let terms: Vec<String> = self.mean.terms.iter().map(term).collect();
-        [terms.join(" + "), format!("{a:.2} p^{b:.2}")]
+    fn at(&self, terms: &[f64], at: &At) -> Ends {
+        let (mean, logs) = (self.mean.at(terms), logs(at));
+        let factor = self.imbalance.iter().zip(logs).map(|(power, log)| power * log);
+        [mean, mean * factor.sum::<f64>().exp().clamp(1.0, at.ranks)]
     }
 }
-
-/// a and b of y = a x^b, from logarithms, by least squares with the weights x.
-fn power(logs: &[[f64; 2]]) -> [f64; 2] {
-    let total = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        logs.iter().map(|[x, y]| x.exp() * of(*x, *y)).sum()
-    };
-    let count = total(&|_, _| 1.0);
-    let [x, y] = [total(&|x, _| x) / count, total(&|_, y| y) / count];
-    let b = total(&|of, at| (of - x) * (at - y)) / total(&|of, _| (of - x).powi(2));
-    [(y - b * x).exp(), b]
-}
-
-/// The least numbers of ranks to fit.
-const RANKS_MIN: usize = 3;
 
 /// A model of the runs of one program around one geometry with one n.
 #[derive(Clone, Debug)]
 struct Model {
-    counters: BTreeMap<Key, Law>,
-    /// By phases, in the program's order. The terms are [`causes`].
-    phases: Vec<(String, Law)>,
+    /// The most cells and ranks that were fitted.
+    most: At,
+    /// Of counters, then of phases in the program's order.
+    laws: Vec<(Key, Law)>,
 }
 
-/// What the time of a phase may depend on: means of the program's counters and of its own messages, and a constant.
-fn causes<'a>(phase: &str, counters: impl Iterator<Item = &'a Key>) -> Vec<&'a Key> {
-    let own = traffic(phase);
-    let is_own = |key: &Key| !TRAFFIC.iter().any(|what| key.1.starts_with(what));
-    counters.filter(|key| is_own(key) || own.contains(key)).collect()
+/// The terms of a law with their names: of a counter [`TERMS`]; of the time of a phase the means of the program's counters and of its own
+/// messages, facets per rank, and a constant.
+fn terms<'a>(laws: &'a [(Key, Law)], (kind, name): &Key, at: &At, of: &Quantities) -> Terms<'a> {
+    if *kind == Kind::Counter {
+        return TERMS.iter().map(|(name, term)| (*name, term(at))).collect();
+    }
+    let own = traffic(name);
+    let is_of_program = |key: &Key| !TRAFFIC.iter().any(|what| key.1.starts_with(what));
+    let is_cause = |key: &&Key| key.0 == Kind::Counter && (is_of_program(key) || own.contains(key));
+    let causes = laws.iter().map(|law| &law.0).filter(is_cause);
+    let means = causes.map(|key| (key.1.as_str(), of[key][0]));
+    means.chain([("facets per rank", at.facets / at.ranks), ("", 1.0)]).collect()
 }
 
 impl Model {
-    /// Fits runs, which are on at least three numbers of ranks.
-    fn fit(samples: &[Sample], phases: &[String]) -> Option<Self> {
-        if distinct(samples.iter().map(|s| s.at.ranks)).len() < RANKS_MIN {
-            return None;
-        }
-        let terms = |sample: &Sample| TERMS.iter().map(|(_, term)| term(&sample.at)).collect();
+    /// Fits runs, the last one of which is on the most ranks; without those on three numbers of ranks, nothing has a law.
+    fn fit(samples: &[Sample], phases: &[Phase]) -> Option<Self> {
+        let cells = samples.iter().map(|sample| sample.at.cells).fold(0.0, f64::max);
+        let most = At { cells, ..samples.last()?.at };
         let is_counter = |key: &&Key| {
             key.0 == Kind::Counter && samples.iter().all(|sample| sample.of.contains_key(key))
         };
-        let law = |key: &Key| Some((key.clone(), Law::fit(samples, key, terms)?));
-        let counters: BTreeMap<Key, Law> =
-            samples[0].of.keys().filter(is_counter).filter_map(law).collect();
-        let law = |name: &String| {
-            let causes = causes(name, counters.keys());
-            let terms =
-                |sample: &Sample| causes.iter().map(|key| sample.of[key][0]).chain([1.0]).collect();
-            Some((name.clone(), Law::fit(samples, &(Kind::Phase, name.clone()), terms)?))
-        };
-        let phases = phases.iter().filter_map(law).collect();
-        Some(Self { counters, phases })
+        let counters = samples[0].of.keys().filter(is_counter).cloned();
+        let phases = phases.iter().map(|phase| (Kind::Phase, phase.name.clone()));
+        let mut laws = Vec::new();
+        for key in counters.chain(phases) {
+            let law = Law::fit(samples, &key, |s| terms(&laws, &key, &s.at, &s.of));
+            laws.extend(law.map(|law| (key, law)));
+        }
+        Some(Self { most, laws })
     }
 
     /// All quantities, and the time of a run.
-    fn predict(&self, at: &At, network: &Network) -> BTreeMap<Key, Ends> {
-        let terms: Vec<f64> = TERMS.iter().map(|(_, term)| term(at)).collect();
-        let ends = |(key, law): (&Key, &Law)| (key.clone(), law.at(&terms, at.ranks));
-        let mut all: BTreeMap<Key, Ends> = self.counters.iter().map(ends).collect();
-        all.insert(facets(), [at.facets / at.ranks; 2]);
-        let mut run_s = 0.0;
-        for (name, law) in &self.phases {
-            let causes = causes(name, self.counters.keys());
-            let means: Vec<f64> = causes.iter().map(|key| all[*key][0]).chain([1.0]).collect();
-            let useful_s = law.at(&means, at.ranks);
-            let [messages, bytes] = traffic(name).map(|key| all.get(&key).map_or(0.0, |of| of[1]));
-            run_s += useful_s[1] + network.time_s(messages, bytes);
-            all.insert((Kind::Phase, name.clone()), useful_s);
+    fn predict(&self, at: &At, network: &Network) -> Quantities {
+        let (mut all, mut run_s) = (BTreeMap::new(), 0.0);
+        for (key, law) in &self.laws {
+            let terms =
+                terms(&self.laws, key, at, &all).iter().map(|term| term.1).collect::<Vec<f64>>();
+            let ends = law.at(&terms, at);
+            if key.0 == Kind::Phase {
+                let most = |key: Key| all.get(&key).map_or(0.0, |of: &Ends| of[1]);
+                let [messages, bytes] = traffic(&key.1).map(most);
+                run_s += ends[1] + network.time_s(messages, bytes);
+            }
+            all.insert(key.clone(), ends);
         }
-        all.insert((Kind::Run, "run".to_owned()), [run_s; 2]);
+        all.insert(run_time(), [run_s; 2]);
         all
+    }
+
+    /// All quantities with their reach.
+    fn reaching(&self, at: &At, network: &Network) -> BTreeMap<Key, (Ends, f64)> {
+        let At { cells, ranks, .. } = self.most;
+        let fitted = At { cells: at.cells.min(cells), ranks: at.ranks.min(ranks), ..*at };
+        let (fitted, ratio) = (self.predict(&fitted, network), (at.ranks / ranks).max(1.0));
+        let reach = |key: &Key, ends: Ends| ratio * (fitted[key][1] / ends[1]).max(1.0);
+        let all = self.predict(at, network).into_iter();
+        all.map(|(key, ends)| (key.clone(), (ends, reach(&key, ends)))).collect()
     }
 
     /// Every quantity of a run with its predicted and its measured value, if both are positive.
     fn compare(&self, sample: &Sample) -> Vec<Compared> {
-        let compared = |(key, [_, predicted]): (Key, Ends)| {
-            let measured = sample.of.get(&key).map_or(0.0, |ends| ends[1]);
-            let at = sample.at;
-            (predicted.min(measured) > 0.0).then_some(Compared { key, at, predicted, measured })
+        let compared = |(key, (predicted, reach)): (Key, (Ends, f64))| {
+            let (at, measured) = (sample.at, *sample.of.get(&key)?);
+            let ratio = predicted[1] / measured[1];
+            let error = (ratio.max(1.0 / ratio) - 1.0) / reach;
+            let is_compared = predicted[1].min(measured[1]) > 0.0;
+            is_compared.then_some(Compared { key, at, predicted, measured, reach, error })
         };
-        self.predict(&sample.at, &sample.network).into_iter().filter_map(compared).collect()
+        self.reaching(&sample.at, &sample.network).into_iter().filter_map(compared).collect()
     }
 }
 
@@ -235,30 +251,24 @@ pub struct Compared {
     /// The run.
     pub at: At,
     /// By the model.
-    pub predicted: f64,
+    pub predicted: Ends,
     /// In the run.
-    pub measured: f64,
+    pub measured: Ends,
+    /// How far the prediction reaches beyond the fitted runs; 1 within them.
+    reach: f64,
+    /// By how much the ratio of both maxima exceeds 1, relative to the reach.
+    error: f64,
 }
 
 impl Compared {
-    /// Relative error of the prediction.
-    pub fn error(&self) -> f64 {
-        self.predicted / self.measured - 1.0
-    }
-
-    /// The greater of both values over the lesser.
-    fn off(&self) -> f64 {
-        (self.predicted / self.measured).max(self.measured / self.predicted)
+    /// Errors of the mean and of the maximum, in percents.
+    pub fn errors(&self) -> Ends {
+        [0, 1].map(|end| 100.0 * (self.predicted[end] / self.measured[end] - 1.0))
     }
 }
 
 /// Share of values that a band should hold.
 const HELD: f64 = 0.9;
-
-/// How far a prediction reaches beyond the ranks that were fitted: what was too rare there to be seen grows in proportion.
-fn reach(ranks: f64, fitted: f64) -> f64 {
-    (ranks / fitted).max(1.0)
-}
 
 /// A model and what it predicted of runs that it did not see.
 #[derive(Clone, Debug)]
@@ -268,8 +278,8 @@ pub struct Tested {
     pub fitted: f64,
     /// Every quantity of every run, fitted or held out, beside the model's prediction.
     pub compared: Vec<Compared>,
-    /// Widths of bands by [`Kind`]: relative, per reach.
-    bands: [f64; 3],
+    /// Widths of bands: relative, per reach.
+    bands: BTreeMap<Key, f64>,
 }
 
 impl Tested {
@@ -280,36 +290,36 @@ impl Tested {
             groups.iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1).collect();
         sims.sort_by_key(|group| (group.setup.ranks, group.cells()));
         let phases = &sims.last()?.typical.phases;
-        let phases: Vec<String> = phases.iter().map(|phase| phase.name.clone()).collect();
         let samples: Vec<Sample> = sims.iter().map(|group| Sample::of(group)).collect();
         let most = samples.last()?.at.ranks;
         let up_to = |ranks: f64| &samples[..samples.partition_point(|s| s.at.ranks <= ranks)];
         let fitted = up_to(share * most).last()?.at.ranks;
-        let model = Model::fit(up_to(fitted), &phases)?;
-        let in_retrospect = |cut: f64| {
-            let of = |c: Compared| (c.key.0, (c.off() - 1.0) / reach(c.at.ranks, cut));
-            let model = Model::fit(up_to(cut), &phases)?;
+        let model = Model::fit(up_to(fitted), phases)?;
+        let mut errors = BTreeMap::<Key, Vec<f64>>::new();
+        for cut in distinct(up_to(fitted).iter().map(|s| s.at.ranks)) {
+            let earlier = Model::fit(up_to(cut), phases)?;
             let later = &up_to(fitted)[up_to(cut).len()..];
-            Some(later.iter().flat_map(|s| model.compare(s)).map(of).collect::<Vec<_>>())
-        };
-        let cuts = distinct(up_to(fitted).iter().map(|s| s.at.ranks));
-        let all: Vec<(Kind, f64)> = cuts.into_iter().filter_map(in_retrospect).flatten().collect();
-        let bands = [Kind::Counter, Kind::Phase, Kind::Run]
-            .map(|kind| quantile(all.iter().filter(|error| error.0 == kind).map(|error| error.1)));
-        let compared = samples.iter().flat_map(|s| model.compare(s)).collect();
-        let is_tested = bands.iter().all(|width| width.is_finite());
-        is_tested.then_some(Self { model, fitted, compared, bands })
+            for compared in later.iter().flat_map(|sample| earlier.compare(sample)) {
+                errors.entry(compared.key).or_default().push(compared.error);
+            }
+        }
+        // No value is stored more precisely.
+        let bands = errors.into_iter().map(|(key, of)| (key, quantile(of).max(1e-9)));
+        let bands: BTreeMap<Key, f64> = bands.filter(|(_, width)| width.is_finite()).collect();
+        let compared = samples.iter().flat_map(|s| model.compare(s));
+        let compared = compared.filter(|of| bands.contains_key(&of.key)).collect();
+        bands.contains_key(&run_time()).then_some(Self { model, fitted, compared, bands })
     }
 
     /// The factor between a prediction and either end of its band.
-    pub fn width(&self, kind: Kind, ranks: f64) -> f64 {
-        1.0 + self.bands[kind as usize] * reach(ranks, self.fitted)
+    pub fn width(&self, of: &Compared) -> f64 {
+        1.0 + self.bands[&of.key] * of.reach
     }
 
     /// A run's time in seconds between the ends of its band, on a network.
     pub fn run_s(&self, at: &At, network: &Network) -> [f64; 3] {
-        let width = self.width(Kind::Run, at.ranks);
-        let [value, _] = self.model.predict(at, network)[&(Kind::Run, "run".to_owned())];
+        let ([value, _], reach) = self.model.reaching(at, network)[&run_time()];
+        let width = 1.0 + self.bands[&run_time()] * reach;
         [value / width, value, value * width]
     }
 
@@ -318,34 +328,25 @@ impl Tested {
         self.compared.iter().filter(|c| c.at.ranks > self.fitted)
     }
 
-    /// Of the held-out quantities of a kind: the median of their errors without sign, how many lie in their bands, and how many they are.
-    pub fn summary(&self, kind: Kind) -> (f64, usize, usize) {
+    /// Of the held-out quantities of a kind: the medians of their errors without sign in percents, how many lie in their bands, and how many they are.
+    pub fn summary(&self, kind: Kind) -> (Ends, usize, usize) {
         let of: Vec<&Compared> = self.held_out().filter(|c| c.key.0 == kind).collect();
-        let errors: Vec<f64> = of.iter().map(|c| c.error().abs()).collect();
-        let held = of.iter().filter(|c| c.off() <= self.width(kind, c.at.ranks)).count();
-        (median_of(&errors), held, of.len())
+        let errors = |end: usize| of.iter().map(|c| c.errors()[end].abs()).collect::<Vec<f64>>();
+        let held = of.iter().filter(|c| c.error <= self.bands[&c.key]).count();
+        ([0, 1].map(|end| median_of(&errors(end))), held, of.len())
     }
 
-    /// Quantities of the model with mean and imbalance as formulas: phases, the run, then counters.
+    /// Quantities of the model with mean and imbalance as formulas.
     pub fn formulas(&self) -> Vec<(Key, [String; 2])> {
-        let Model { counters, phases, .. } = &self.model;
-        let of_phase = |(name, law): &(String, Law)| {
-            let causes = causes(name, counters.keys());
-            let names: Vec<&str> = causes.iter().map(|key| key.1.as_str()).chain([""]).collect();
-            ((Kind::Phase, name.clone()), law.formulas(&names))
-        };
-        let terms = TERMS.map(|(name, _)| name);
-        let of_counter = |(key, law): (&Key, &Law)| (key.clone(), law.formulas(&terms));
-        let counters = counters.iter().filter(|(key, _)| **key != facets());
-        let run = ["sum of the phases on their slowest ranks, and messages", ""].map(str::to_owned);
-        let run = ((Kind::Run, "run".to_owned()), run);
-        phases.iter().map(of_phase).chain([run]).chain(counters.map(of_counter)).collect()
+        let time = "sum of the phases on their slowest ranks, and messages";
+        let time = (run_time(), [time, ""].map(str::to_owned));
+        let laws = self.model.laws.iter().map(|(key, law)| (key.clone(), law.formulas.clone()));
+        laws.chain([time]).collect()
     }
 }
 
 /// The least value that at least [`HELD`] of these and of one more do not exceed; infinite for fewer than nine.
-fn quantile(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
+fn quantile(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let rank = (HELD * (values.len() + 1) as f64).ceil() as usize;
     values.get(rank.max(1) - 1).copied().unwrap_or(f64::INFINITY)
@@ -391,22 +392,35 @@ mod tests {
         assert_eq!(tested.fitted, 64.0);
         for kind in [Kind::Counter, Kind::Phase, Kind::Run] {
             // Times are stored to the microsecond, which is more than the width of such a band.
-            let (error, _, count) = tested.summary(kind);
-            assert!(error < 0.01 && count >= 4, "{kind:?}: {error} of {count}");
+            let (errors, _, count) = tested.summary(kind);
+            assert!(
+                errors[0].max(errors[1]) < 1.0 && count >= 4,
+                "{kind:?}: {errors:?} of {count}"
+            );
         }
         let formulas = tested.formulas();
-        let of = |name: &str| &formulas.iter().find(|(key, _)| key.1 == name).unwrap().1;
-        assert_eq!(of("messages of work")[0], "3.0e0 ⌈log₂p⌉");
-        assert_eq!(formulas[0].1[1], "1.00 p^0.10");
+        let of = |kind: Kind, name: &str| {
+            &formulas.iter().find(|(key, _)| *key == (kind, name.to_owned())).unwrap().1
+        };
+        assert_eq!(of(Kind::Counter, "messages of work")[0], "3.0e0 ⌈log₂p⌉");
+        assert_eq!(of(Kind::Phase, "work")[1].replace("-0.00", "0.00"), "1.00 p^0.10 (N/p)^0.00");
     }
 
     #[test]
     fn a_band_widens_beyond_the_fitted_ranks() {
         let tested = tested();
-        let at = |ranks: f64| At { cells: 1e10, ranks, facets: 12.0 };
-        let [low, value, high] = tested.run_s(&at(1e5), &ASSUMED);
-        assert!(0.0 < low && low <= value && value <= high);
-        assert!(tested.width(Kind::Run, 1024.0) > tested.width(Kind::Run, 64.0));
+        let width = |at: At| {
+            let [low, value, high] = tested.run_s(&at, &ASSUMED);
+            assert!(0.0 < low && low <= value && value <= high);
+            high / value - 1.0
+        };
+        let at = |cells: f64, ranks: f64| At { cells, ranks, facets: 12.0 };
+        let [within, at_most] = [2.0, 64.0].map(|ranks| width(at(1e10, ranks)));
+        assert!((at_most / within - 1.0).abs() < 1e-9);
+        // Eight times the ranks, on which this mesh takes nearly an eighth of the time; and with a mesh that grows with them.
+        assert!(width(at(1e10, 512.0)) > 50.0 * at_most);
+        let weak = width(at(8e10, 512.0));
+        assert!(7.0 * at_most < weak && weak < 9.0 * at_most);
     }
 
     #[test]
@@ -424,8 +438,9 @@ mod tests {
             of: [((Kind::Phase, "a".to_owned()), [mean; 2])].into(),
             network: ASSUMED,
         };
-        let fit =
-            |samples: &[Sample]| Law::fit(samples, &(Kind::Phase, "a".to_owned()), |_| vec![1.0]);
+        let fit = |samples: &[Sample]| {
+            Law::fit(samples, &(Kind::Phase, "a".to_owned()), |_| vec![("", 1.0)])
+        };
         assert!(
             fit(&[sample(2.0, 1e-6), sample(2.0, 1e-6), sample(2.0, 1e-6), sample(4.0, 0.0)])
                 .is_none()
@@ -435,8 +450,8 @@ mod tests {
 
     #[test]
     fn a_quantile_holds_its_share_of_values_to_come() {
-        assert_eq!(quantile((1..=9).map(f64::from)), 9.0);
-        assert_eq!(quantile((1..=99).map(f64::from)), 90.0);
-        assert_eq!(quantile((1..=8).map(f64::from)), f64::INFINITY);
+        assert_eq!(quantile((1..=9).map(f64::from).collect()), 9.0);
+        assert_eq!(quantile((1..=99).map(f64::from).collect()), 90.0);
+        assert_eq!(quantile((1..=8).map(f64::from).collect()), f64::INFINITY);
     }
 }

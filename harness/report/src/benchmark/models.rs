@@ -6,7 +6,7 @@ use crate::figure::{Axis, Figure, Point, Provenance, Series};
 use crate::table::Table;
 use bench::experiments::entry::Comm;
 use bench::experiments::group::{Group, Groups};
-use bench::experiments::model::{At, Compared, Key, Kind, Tested};
+use bench::experiments::model::{At, Key, Kind, Tested};
 use bench::order::{by_key, distinct};
 use contract::number::grouped;
 
@@ -63,7 +63,7 @@ fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Tabl
         let error = |at: &At| {
             let of = model.held_out().find(|c| c.key == *key && c.at == *at);
             // Adding 0 removes the sign of -0.
-            of.map_or("–".to_owned(), |c| format!("{:+.0}", (100.0 * c.error()).round() + 0.0))
+            of.map_or("–".to_owned(), |c| format!("{:+.0}", c.errors()[1].round() + 0.0))
         };
         runs.iter().map(error).collect::<Vec<_>>().join(", ")
     };
@@ -90,16 +90,10 @@ fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
         model.fitted,
         runs.collect::<Vec<_>>().join("; ")
     )];
-    for (kind, what) in [
-        (Kind::Counter, "counters"),
-        (Kind::Phase, "times of phases"),
-        (Kind::Run, "times of runs"),
-    ] {
-        let (error, held, count) = model.summary(kind);
-        notes.push(format!(
-            "Held-out {what}: {:.1} % off in the median; {held} of {count} are in their bands.",
-            100.0 * error
-        ));
+    let kinds = ["counters", "times of phases", "times of runs"];
+    for (what, kind) in kinds.into_iter().zip([Kind::Counter, Kind::Phase, Kind::Run]) {
+        let ([mean, max], held, count) = model.summary(kind);
+        notes.push(format!("Held-out {what}: means are {mean:.1} % off in the median, maxima {max:.1} %; of these, {held} of {count} are in their bands."));
     }
     notes.extend(far(all));
     notes
@@ -107,11 +101,10 @@ fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
 
 /// The prediction beyond all runs, by a model of all, if they are of several meshes and have smaller and larger parts.
 fn far(all: &[&Group]) -> Option<String> {
-    let parts = all.iter().map(|group| group.cells() as f64 / group.setup.ranks as f64);
-    let (smaller, larger): (Vec<f64>, Vec<f64>) = parts.partition(|n| *n < FAR.cells / FAR.ranks);
-    let cells = distinct(all.iter().map(|group| group.cells()));
-    let (least, most) = (cells.iter().min()?, cells.iter().max()?);
-    if smaller.is_empty() || larger.is_empty() || *most < 2 * least {
+    let is_larger = |g: &&Group| g.cells() as f64 / g.setup.ranks as f64 >= FAR.cells / FAR.ranks;
+    let cells = || all.iter().map(|group| group.cells());
+    let (least, most) = (cells().min()?, cells().max()?);
+    if !all.iter().any(is_larger) || all.iter().all(is_larger) || most < 2 * least {
         return None;
     }
     let model = Tested::of(all, 1.0)?;
@@ -123,7 +116,7 @@ fn far(all: &[&Group]) -> Option<String> {
         model.fitted,
         FAR.cells,
         grouped(FAR.ranks as u64),
-        grouped(*most),
+        grouped(most),
     ))
 }
 
@@ -134,11 +127,11 @@ pub fn csv(groups: &Groups) -> String {
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     for (subject, all, model) in models(groups) {
         let of = quoted(&described(subject, &all));
-        for Compared { key: (kind, name), at, predicted, measured } in &model.compared {
-            let width = model.width(*kind, at.ranks);
+        for c in &model.compared {
+            let (At { cells, ranks, .. }, kind, name) = (c.at, c.key.0, quoted(&c.key.1));
+            let ([_, predicted], [_, measured], width) = (c.predicted, c.measured, model.width(c));
             let (low, high) = (predicted / width, predicted * width);
-            let (At { cells, ranks, .. }, name) = (at, quoted(name));
-            let held_out = if *ranks > model.fitted { "yes" } else { "no" };
+            let held_out = if ranks > model.fitted { "yes" } else { "no" };
             out += &format!(
                 "{of},{kind:?},{name},{cells},{ranks},{held_out},{predicted:e},{low:e},{high:e},{measured:e}\n"
             );
