@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{Result, Write};
 use std::path::Path;
 
-use super::mutant::{AUDITED, Change, INFORMED, Mutant, Mutation, other_side, sets};
+use super::mutant::{AUDITED, INFORMED, Mutant, Mutation, damaged, edit, other_side, sets};
 use contract::digest::Digest;
 use contract::manifest::{Enclosed, ExtentBox, FILE as MANIFEST, Keep, Manifest, Part, Tree};
 use contract::npy;
@@ -50,15 +50,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
     manifest("manifest: one box too many", INFORMED, |m| {
         m.boxes.push(ExtentBox { min: [0; 3], max: [1; 3], level: 0 });
     }),
-    sets("manifest: boxes missing", "manifest", INFORMED, |s, mutation| {
-        mutation.mesh.manifest.boxes.clear();
-        (!s.case.boxes.is_empty()).then_some(())
-    }),
+    manifest("manifest: boxes missing", INFORMED, |m| m.boxes.clear()),
     manifest("manifest: one seed too many", INFORMED, |m| m.seeds.push([1 << 20; 3])),
-    sets("manifest: seeds missing", "manifest", INFORMED, |s, mutation| {
-        mutation.mesh.manifest.seeds.clear();
-        (!s.case.seeds.is_empty()).then_some(())
-    }),
+    manifest("manifest: seeds missing", INFORMED, |m| m.seeds.clear()),
     manifest("manifest: wrong treatment of enclosed components", INFORMED, |m| {
         let is_deleted = m.enclosed == Enclosed::Delete;
         m.enclosed = if is_deleted { Enclosed::Keep } else { Enclosed::Delete };
@@ -75,63 +69,56 @@ pub(super) const MUTANTS: &[Mutant] = &[
         *last = other_side(*last);
         Some(())
     }),
-    damaged("part truncated", "files", |dir| keep_bytes(dir, |len| len - 4)),
-    damaged("part truncated within its header", "files", |dir| keep_bytes(dir, |_| 40)),
-    damaged("part with extra bytes", "files", |dir| {
+    damaged("part truncated", "files", AUDITED, |dir| keep_bytes(dir, |len| len - 4)),
+    damaged("part truncated within its header", "files", AUDITED, |dir| keep_bytes(dir, |_| 40)),
+    damaged("part with extra bytes", "files", AUDITED, |dir| {
         fs::OpenOptions::new().append(true).open(dir.join(PART))?.write_all(&[0; 8])
     }),
-    damaged("part of zero bytes", "files", |dir| fs::write(dir.join(PART), b"")),
-    damaged("part missing", "files", |dir| fs::remove_file(dir.join(PART))),
-    damaged("part that the manifest does not name", "files", |dir| {
+    damaged("part of zero bytes", "files", AUDITED, |dir| fs::write(dir.join(PART), b"")),
+    damaged("part missing", "files", AUDITED, |dir| fs::remove_file(dir.join(PART))),
+    damaged("part that the manifest does not name", "files", AUDITED, |dir| {
         fs::copy(dir.join(PART), dir.join("leaves-99999.npy")).map(drop)
     }),
-    damaged("part of signed words", "files", |dir| reheaded(dir, "<i8", 8, false)),
-    damaged("part of 32-bit words", "files", |dir| reheaded(dir, "<u4", 4, false)),
-    damaged("part of big-endian words", "files", |dir| reheaded(dir, ">u8", 8, false)),
-    damaged("part of two dimensions", "files", |dir| reheaded(dir, "<u8", 8, true)),
-    damaged("parts swapped", "manifest", |dir| {
+    damaged("part of signed words", "files", AUDITED, |dir| reheaded(dir, "<i8", 8, false)),
+    damaged("part of 32-bit words", "files", AUDITED, |dir| reheaded(dir, "<u4", 4, false)),
+    damaged("part of big-endian words", "files", AUDITED, |dir| reheaded(dir, ">u8", 8, false)),
+    damaged("part of two dimensions", "files", AUDITED, |dir| reheaded(dir, "<u8", 8, true)),
+    damaged("parts swapped", "manifest", AUDITED, |dir| {
         let aside = dir.join("aside");
         fs::rename(dir.join(PART), &aside)?;
         fs::rename(dir.join(OTHER), dir.join(PART))?;
         fs::rename(aside, dir.join(OTHER))
     }),
-    damaged("part overwritten with a copy of another", "linear", |dir| {
+    damaged("part overwritten with a copy of another", "linear", AUDITED, |dir| {
         fs::copy(dir.join(OTHER), dir.join(PART)).map(drop)
     }),
-    damaged("part without leaves", "manifest", |dir| npy::write(&dir.join(PART), &[])),
+    damaged("part without leaves", "manifest", AUDITED, |dir| npy::write(&dir.join(PART), &[])),
     sets("part named twice", "linear", AUDITED, |_, mutation| {
         // The file is written once per entry, so both entries must have the same leaves.
         mutation.mesh.parts[1] = mutation.mesh.parts[0].clone();
-        renamed(mutation, "leaves-00000.npy")
+        mutation.mesh.manifest.parts[1].file = "leaves-00000.npy".to_owned();
+        Some(())
     }),
-    sets("part outside the directory", "files", AUDITED, |_, mutation| {
-        renamed(mutation, "../leaves-00001.npy")
+    edit("part outside the directory", "files", AUDITED, |m| {
+        m.parts[1].file = "../leaves-00001.npy".to_owned();
     }),
-    damaged("manifest missing", "files", |dir| fs::remove_file(dir.join(MANIFEST))),
-    damaged("manifest truncated", "files", |dir| {
+    damaged("manifest missing", "files", AUDITED, |dir| fs::remove_file(dir.join(MANIFEST))),
+    damaged("manifest truncated", "files", AUDITED, |dir| {
         let path = dir.join(MANIFEST);
         let text = fs::read(&path)?;
         fs::write(path, &text[..text.len() / 2])
     }),
-    damaged("manifest of an unknown schema", "files", |dir| edited(dir, "set/1", "set/9")),
-    damaged("manifest with an unknown key", "files", |dir| {
+    damaged("manifest of an unknown schema", "files", AUDITED, |dir| edited(dir, "set/1", "set/9")),
+    damaged("manifest with an unknown key", "files", AUDITED, |dir| {
         edited(dir, "\"program\"", "\"programme\"")
     }),
-    sets("manifest without the digest of one octant", "files", AUDITED, |_, mutation| {
-        mutation.mesh.manifest.octant_digests.pop().map(drop)
+    edit("manifest without the digest of one octant", "files", AUDITED, |m| {
+        m.octant_digests.pop();
     }),
 ];
 
 const PART: &str = "leaves-00001.npy";
 const OTHER: &str = "leaves-00002.npy";
-
-const fn damaged(
-    name: &'static str,
-    expected: &'static str,
-    damage: fn(&Path) -> Result<()>,
-) -> Mutant {
-    Mutant { name, expected, audit: AUDITED, change: Change::Files(damage) }
-}
 
 fn keep_bytes(dir: &Path, of: impl Fn(u64) -> u64) -> Result<()> {
     let file = fs::OpenOptions::new().write(true).open(dir.join(PART))?;
@@ -151,12 +138,6 @@ fn reheaded(dir: &Path, descr: &str, width: usize, two_dimensions: bool) -> Resu
     fs::write(path, bytes)
 }
 
-/// The second part's entry in the manifest names another file.
-fn renamed(mutation: &mut Mutation, file: &str) -> Option<()> {
-    mutation.mesh.manifest.parts[1].file = file.to_owned();
-    Some(())
-}
-
 fn edited(dir: &Path, from: &str, to: &str) -> Result<()> {
     let path = dir.join(MANIFEST);
     let text = fs::read_to_string(&path)?;
@@ -164,8 +145,8 @@ fn edited(dir: &Path, from: &str, to: &str) -> Result<()> {
     fs::write(path, text.replacen(from, to, 1))
 }
 
-const fn manifest(name: &'static str, audit: bool, edit: fn(&mut Manifest)) -> Mutant {
-    Mutant { name, expected: "manifest", audit, change: Change::Manifest(edit) }
+const fn manifest(name: &'static str, audit: bool, change: fn(&mut Manifest)) -> Mutant {
+    edit(name, "manifest", audit, change)
 }
 
 fn last_part(m: &mut Manifest) -> &mut Part {
@@ -175,6 +156,7 @@ fn last_part(m: &mut Manifest) -> &mut Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::selftest::mutant::Change;
     use contract::testing::{leaf_set, words_of};
 
     #[test]

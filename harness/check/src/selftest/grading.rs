@@ -5,14 +5,12 @@
 //! property in the corruption's name.
 
 use super::SelftestCase;
-use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, has_side, merge, sibling_groups, split, words,
-};
+use super::mutant::{self, AUDITED, INFORMED, Mutant, merge, sibling_groups, split, words};
 use contract::manifest::Keep;
 use contract::neighbourhood::{Neighbourhood, OFFSETS};
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX};
 use contract::tree::Tree;
-use contract::word::{self, Side};
+use contract::word;
 
 pub(super) const MUTANTS: &[Mutant] = &[
     words("two levels apart over a face", "balance", AUDITED, |s| {
@@ -114,7 +112,7 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
         if distance < n * cell {
             found.within_layer = found.within_layer.max(leaf.level);
         }
-        let at_surface = has_side(w, Side::Crossing) && leaf.level == surface;
+        let at_surface = word::is_crossing(w) && leaf.level == surface;
         let too_coarse = at_surface && merged.level < surface;
         found.in_surface_layer |= too_coarse && distance < (n - 1) * cell_surface;
     }
@@ -151,7 +149,7 @@ fn extra_layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
     let words = &s.mesh.words;
     let touches = |i: usize| {
         let merged = word::octant(mutant::parent(words[i]));
-        let mut crossing = s.base.words.iter().filter(|&&w| has_side(w, Side::Crossing));
+        let mut crossing = s.base.words.iter().filter(|&&w| word::is_crossing(w));
         word::level(words[i]) == s.case.level_surface
             && crossing.any(|&w| merged.distance(&word::octant(w)) == 0)
     };
@@ -164,6 +162,7 @@ mod tests {
     use contract::case::Case;
     use contract::octant::Octant;
     use contract::testing::{leaf_set, words_with_sides};
+    use contract::word::Side;
 
     #[test]
     fn layers_exist_at_levels_coarser_than_the_surface_and_at_all_levels_if_all_is_kept() {

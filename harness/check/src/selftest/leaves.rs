@@ -3,8 +3,8 @@
 
 use super::SelftestCase;
 use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, base, changed, has_side, merge, middle, sets, sibling_groups,
-    split, words,
+    self, AUDITED, INFORMED, Mutant, base, changed, merge, middle, sets, sibling_groups, split,
+    words,
 };
 use contract::manifest::Keep;
 use contract::neighbourhood::Neighbourhood;
@@ -57,7 +57,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("all leaves shifted by half the root", "sides", INFORMED, |s| {
         let words = mutant::shifted(&s.mesh.words, CELLS_PER_EDGE / 2);
-        let crossing = s.mesh.words.iter().any(|&w| has_side(w, Side::Crossing));
+        let crossing = s.mesh.words.iter().any(|&w| word::is_crossing(w));
         let moved = words.iter().any(|w| s.mesh.words.binary_search(w).is_err());
         (crossing && moved).then_some(words)
     }),
@@ -76,14 +76,14 @@ pub(super) const MUTANTS: &[Mutant] = &[
         changed(s, away, |words, i| _ = words.remove(i))
     }),
     words("crossing leaf removed", "complete", INFORMED, |s| {
-        changed(s, |w| has_side(w, Side::Crossing), |words, i| _ = words.remove(i))
+        changed(s, word::is_crossing, |words, i| _ = words.remove(i))
     }),
     words("octant emptied", "complete", AUDITED, |s| {
         // The corner of the root is far from the body, so the leaves around the hole are coarse.
         let octant = Octant::ROOT.child(0).child(0);
         let (inside, left): (Vec<u64>, Vec<u64>) =
             s.mesh.words.iter().partition(|&&w| octant.contains(&word::octant(w)));
-        let crossing = inside.iter().any(|&w| has_side(w, Side::Crossing));
+        let crossing = inside.iter().any(|&w| word::is_crossing(w));
         (!crossing && !inside.is_empty()).then_some(left)
     }),
     words("all leaves after the first half removed", "complete", INFORMED, |s| {
@@ -97,7 +97,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             Keep::Inside => Side::Outside,
             Keep::All => Side::Crossing,
         };
-        let i = middle(&s.base.words, |w| has_side(w, deleted) && !in_mesh(w))?;
+        let i = middle(&s.base.words, |w| word::side(w) == deleted && !in_mesh(w))?;
         Some([&s.mesh.words[..], &[s.base.words[i]]].concat())
     }),
     words("leaf of T0 merged with its siblings", "complete", INFORMED, |s| {
@@ -125,7 +125,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("crossing leaves of the mesh merged", "spacing", AUDITED, |s| {
         let words = &s.mesh.words;
-        let crossing = |&i: &usize| has_side(words[i], Side::Crossing);
+        let crossing = |&i: &usize| word::is_crossing(words[i]);
         let i = sibling_groups(words).into_iter().find(crossing)?;
         (word::level(words[i]) == s.case.level_surface).then(|| merge(words, &[i]))
     }),
@@ -143,7 +143,7 @@ fn coarse_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
     let sideless: Vec<u64> = s.base.words.iter().map(|w| w & !3).collect();
     let fit = |&i: &usize| {
         word::level(sideless[i]) == s.case.level_surface
-            && s.base.words[i..i + 8].iter().any(|&w| has_side(w, Side::Crossing))
+            && s.base.words[i..i + 8].iter().any(|&w| word::is_crossing(w))
     };
     let i = sibling_groups(&sideless).into_iter().find(fit)?;
     let mut merged = merge(&s.base.words, &[i]);
@@ -162,14 +162,14 @@ fn merged_in_box(s: &SelftestCase, words: &[u64]) -> Option<Vec<u64>> {
 }
 
 fn fine_away(s: &SelftestCase) -> Option<Vec<u64>> {
-    let fit = |&w: &u64| !has_side(w, Side::Crossing) && word::level(w) < LEVEL_MAX;
+    let fit = |&w: &u64| !word::is_crossing(w) && word::level(w) < LEVEL_MAX;
     Some(split(&s.base.words, s.base.words.iter().position(fit)?))
 }
 
 fn fine_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
     // On the deepest level, no box requires the split.
     let deepest = s.case.level_deepest();
-    let fit = |&w: &u64| has_side(w, Side::Crossing) && word::level(w) == deepest;
+    let fit = |&w: &u64| word::is_crossing(w) && word::level(w) == deepest;
     let i = s.base.words.iter().position(fit).filter(|_| deepest < LEVEL_MAX)?;
     Some(split(&s.base.words, i))
 }

@@ -67,7 +67,10 @@ impl Mutant {
                 let mesh = with_words(correct.set(tree), words(correct)?);
                 made = Mutation { tree, mesh, ..made };
             }
-            Change::Manifest(edit) => edit(&mut made.mesh.manifest),
+            Change::Manifest(edit) => {
+                edit(&mut made.mesh.manifest);
+                (made.mesh.manifest != correct.mesh.manifest).then_some(())?;
+            }
             Change::Files(tamper) => {
                 // Both parts have enough leaves for the damage to have an effect.
                 let are_enough = |part: &Vec<u64>| (2..1 << 20).contains(&part.len());
@@ -94,6 +97,8 @@ macro_rules! rows {
 rows! {
     words: Words[Final](fn(&SelftestCase) -> Option<Vec<u64>>);
     base: Words[Base](fn(&SelftestCase) -> Option<Vec<u64>>);
+    edit: Manifest(fn(&mut Manifest));
+    damaged: Files(fn(&Path) -> io::Result<()>);
     sets: Sets(fn(&SelftestCase, &mut Mutation) -> Option<()>);
 }
 
@@ -141,11 +146,6 @@ pub(super) fn with_side(word: u64, side: Side) -> u64 {
 /// The leaf with the side that follows its own.
 pub(super) fn other_side(word: u64) -> u64 {
     with_side(word, Side::ALL[(word as usize % 4 + 1) % 3])
-}
-
-/// Whether a leaf has this side.
-pub(super) fn has_side(word: u64, side: Side) -> bool {
-    word & 3 == side as u64
 }
 
 /// The eight children of a leaf, with its side.
@@ -201,9 +201,9 @@ pub(super) fn shifted(words: &[u64], by: u32) -> Vec<u64> {
 /// The leaves, mirrored in the middle plane across x.
 pub(super) fn mirrored(words: &[u64]) -> Vec<u64> {
     let mirror = |&w: &u64| {
-        let Leaf { mut octant, side } = Leaf { octant: word::octant(w), side: word::side(w) };
+        let mut octant = word::octant(w);
         octant.corner[0] = CELLS_PER_EDGE - octant.edge() - octant.corner[0];
-        word::encode(&Leaf { octant, side })
+        word::encode(&Leaf { octant, side: word::side(w) })
     };
     let mut all: Vec<u64> = words.iter().map(mirror).collect();
     all.sort_unstable();

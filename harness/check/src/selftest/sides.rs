@@ -4,11 +4,9 @@
 //! larger mesh, too.
 
 use super::SelftestCase;
-use super::mutant::{
-    AUDITED, INFORMED, Mutant, Mutation, changed, has_side, sets, with_side, words,
-};
+use super::mutant::{AUDITED, INFORMED, Mutant, changed, edit, sets, with_side, words};
 use crate::checks::components;
-use contract::manifest::{Components, Keep};
+use contract::manifest::Keep;
 use contract::neighbourhood::Neighbourhood;
 use contract::tree::Tree;
 use contract::word::{self, Side};
@@ -31,13 +29,13 @@ pub(super) const MUTANTS: &[Mutant] = &[
         // Leaves of the same component surround it.
         let deep = |w: u64| {
             let around = Neighbourhood::of(&tree, word::octant(w));
-            has_side(w, Side::Outside)
+            word::side(w) == Side::Outside
                 && around.handles.iter().all(|&h| tree.kinds(h) & !outside == 0)
         };
         labelled(s, Side::Inside, deep).filter(|_| s.case.keep == Keep::All)
     }),
     words("all inside leaves labelled outside", "sides", INFORMED, |s| {
-        flipped(s, |w| has_side(w, Side::Inside))
+        flipped(s, |w| word::side(w) == Side::Inside)
     }),
     words("inside and outside swapped everywhere", "sides", INFORMED, |s| flipped(s, |_| true)),
     words("crossing leaf labelled outside", "sides", INFORMED, |s| {
@@ -47,19 +45,17 @@ pub(super) const MUTANTS: &[Mutant] = &[
         relabelled(s, Side::Crossing, Side::Inside)
     }),
     words("leaf labelled crossing", "sides", INFORMED, |s| {
-        labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing))
+        labelled(s, Side::Crossing, |w| !word::is_crossing(w))
     }),
     words("leaf of the surface's level labelled crossing", "sides", INFORMED, |s| {
         let of_surface = |w| word::level(w) == s.case.level_surface;
-        labelled(s, Side::Crossing, |w| !has_side(w, Side::Crossing) && of_surface(w))
+        labelled(s, Side::Crossing, |w| !word::is_crossing(w) && of_surface(w))
     }),
-    sets("one ambiguous component too many in the manifest", "sides", INFORMED, |_, mutation| {
-        mutation.mesh.manifest.components_ambiguous.count += 1;
-        Some(())
+    edit("one ambiguous component too many in the manifest", "sides", INFORMED, |m| {
+        m.components_ambiguous.count += 1;
     }),
-    sets("wrong example of an ambiguous component", "sides", INFORMED, |s, mutation| {
-        mutation.mesh.manifest.components_ambiguous.example = Some(s.case.root.origin);
-        Some(())
+    edit("wrong example of an ambiguous component", "sides", INFORMED, |m| {
+        m.components_ambiguous.example = Some(m.root.origin);
     }),
     words("one leaf of an enclosed component kept", "kept", INFORMED, |s| enclosed_kept(s, 1)),
     words("enclosed component kept", "kept", INFORMED, |s| enclosed_kept(s, usize::MAX)),
@@ -75,20 +71,20 @@ pub(super) const MUTANTS: &[Mutant] = &[
     }),
     words("side flipped against the seeds", "sides", INFORMED, |s| {
         let flow = s.case.side_of_flow();
-        let flipped = swapped(s, |w| has_side(w, flow));
+        let flipped = swapped(s, |w| word::side(w) == flow);
         flipped.filter(|_| !s.case.seeds.is_empty())
     }),
-    sets("manifest: one outside component too many", "kept", INFORMED, |_, mutation| {
-        counted(mutation, |c| c.outside += 1)
+    edit("manifest: one outside component too many", "kept", INFORMED, |m| {
+        m.components.iter_mut().for_each(|c| c.outside += 1);
     }),
-    sets("manifest: one inside component too many", "kept", INFORMED, |_, mutation| {
-        counted(mutation, |c| c.inside += 1)
+    edit("manifest: one inside component too many", "kept", INFORMED, |m| {
+        m.components.iter_mut().for_each(|c| c.inside += 1);
     }),
-    sets("manifest: one enclosed component too many", "kept", INFORMED, |_, mutation| {
-        counted(mutation, |c| c.enclosed.count += 1)
+    edit("manifest: one enclosed component too many", "kept", INFORMED, |m| {
+        m.components.iter_mut().for_each(|c| c.enclosed.count += 1);
     }),
-    sets("manifest: one enclosed leaf too many", "kept", INFORMED, |_, mutation| {
-        counted(mutation, |c| c.enclosed.leaves += 1)
+    edit("manifest: one enclosed leaf too many", "kept", INFORMED, |m| {
+        m.components.iter_mut().for_each(|c| c.enclosed.leaves += 1);
     }),
     sets("manifest: enclosed component in the mesh", "kept", AUDITED, |s, mutation| {
         let leaf = word::octant(*s.mesh.words.first()?);
@@ -96,8 +92,8 @@ pub(super) const MUTANTS: &[Mutant] = &[
         components.enclosed.example = Some(s.case.root.to_user(leaf.centre()));
         Some(())
     }),
-    sets("manifest: every outside component enclosed", "kept", AUDITED, |_, mutation| {
-        counted(mutation, |c| c.enclosed.count = c.outside)
+    edit("manifest: every outside component enclosed", "kept", AUDITED, |m| {
+        m.components.iter_mut().for_each(|c| c.enclosed.count = c.outside);
     }),
 ];
 
@@ -108,7 +104,7 @@ fn labelled(s: &SelftestCase, to: Side, predicate: impl Fn(u64) -> bool) -> Opti
 
 /// The same of those with a side.
 fn relabelled(s: &SelftestCase, from: Side, to: Side) -> Option<Vec<u64>> {
-    labelled(s, to, |w| has_side(w, from))
+    labelled(s, to, |w| word::side(w) == from)
 }
 
 /// The mesh with inside and outside swapped where a predicate holds, if there is such a leaf.
@@ -130,7 +126,7 @@ fn enclosed_kept(s: &SelftestCase, most: usize) -> Option<Vec<u64>> {
         let end = word::key(w) + word::span(word::level(w));
         mesh.get(first).is_some_and(|&m| word::key(m) < end)
     };
-    let enclosed = |w: &u64| has_side(*w, Side::Outside) && !refined(*w);
+    let enclosed = |w: &u64| word::side(*w) == Side::Outside && !refined(*w);
     let restored: Vec<u64> = s.base.words.iter().copied().filter(enclosed).take(most).collect();
     let applies = s.case.keep == Keep::Outside && !restored.is_empty();
     applies.then(|| [mesh.clone(), restored].concat())
@@ -141,12 +137,4 @@ fn removed(s: &SelftestCase, applies: impl Fn(&[u32]) -> bool) -> Option<Vec<u64
     let group = components::groups(&s.mesh.words).into_iter().find(|group| applies(group))?;
     let is_kept = |&(i, _): &(u32, u64)| !group.contains(&i);
     Some((0..).zip(s.mesh.words.iter().copied()).filter(is_kept).map(|(_, w)| w).collect())
-}
-
-/// Changes the counts in the manifest, if it has any.
-fn counted(mutation: &mut Mutation, change: fn(&mut Components)) -> Option<()> {
-    let components = mutation.mesh.manifest.components.as_mut()?;
-    let before = *components;
-    change(components);
-    (*components != before).then_some(())
 }
