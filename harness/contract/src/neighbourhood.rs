@@ -1,6 +1,6 @@
 //! An octant together with its 26 neighbours of the same level, and the search for the coarsest leaf near it.
 
-use crate::octant::{Octant, edge_of};
+use crate::octant::Octant;
 use crate::tree::{Handle, NO_LEAF, Tree};
 use std::array;
 use std::sync::LazyLock;
@@ -69,11 +69,8 @@ impl Neighbourhood {
 
     /// The neighbourhood of any octant, found by descent from the root.
     pub fn of(tree: &Tree, octant: Octant) -> Self {
-        let mut neighbourhood = Self::root(tree);
-        for level in 1..=octant.level {
-            neighbourhood = neighbourhood.child(tree, octant.ancestor(level).digit());
-        }
-        neighbourhood
+        let digits = (1..=octant.level).map(|level| octant.ancestor(level).digit());
+        digits.fold(Self::root(tree), |around, digit| around.child(tree, digit))
     }
 
     /// The content of the octant itself.
@@ -96,13 +93,18 @@ impl Neighbourhood {
     /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
     /// of the root.
     pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Option<Octant> {
-        let (level, mut found) = (self.octant.level, None);
-        let edge = i64::from(self.octant.edge());
-        for (&handle, offset) in self.handles.iter().zip(OFFSETS.iter()) {
-            let corner: [i64; 3] = std::array::from_fn(|a| {
-                i64::from(self.octant.corner[a]) + i64::from(offset[a]) * edge
+        let mut found: Option<Octant> = None;
+        for (&handle, &offset) in self.handles.iter().zip(OFFSETS.iter()) {
+            let Some(octant) = self.octant.neighbour(offset) else { continue };
+            tree.walk_below(octant, handle, &mut |part, content| {
+                let coarsest = tree.coarsest_level(content, part.level);
+                let is_coarser = coarsest < found.map_or(bound, |leaf| leaf.level);
+                let may_be_coarser = is_coarser && region.meets(&part);
+                if may_be_coarser && !content.is_node() {
+                    found = Some(part.ancestor(coarsest));
+                }
+                may_be_coarser
             });
-            found = search(tree, handle, (corner, level), region, level_or(found, bound)).or(found);
         }
         found
     }
@@ -132,36 +134,8 @@ impl Region {
     }
 
     /// Whether the interior of an octant meets the box.
-    fn meets(&self, corner: [i64; 3], edge: i64) -> bool {
-        (0..3).all(|a| corner[a] < self.high[a] && self.low[a] < corner[a] + edge)
+    fn meets(&self, octant: &Octant) -> bool {
+        let (low, edge) = (octant.corner.map(i64::from), i64::from(octant.edge()));
+        (0..3).all(|a| low[a] < self.high[a] && self.low[a] < low[a] + edge)
     }
-}
-
-/// The level of the leaf that was found, or the bound of the search.
-fn level_or(found: Option<Octant>, bound: u8) -> u8 {
-    found.map_or(bound, |leaf| leaf.level)
-}
-
-/// The coarsest leaf in an octant that is coarser than level `bound` and meets the region.
-fn search(
-    tree: &Tree,
-    handle: Handle,
-    (corner, level): ([i64; 3], u8),
-    region: &Region,
-    bound: u8,
-) -> Option<Octant> {
-    let coarsest = tree.coarsest_level(handle, level);
-    let edge = edge_of(level);
-    if coarsest >= bound || !region.meets(corner, edge) {
-        return None;
-    }
-    if !handle.is_node() {
-        // A leaf lies in the root.
-        return Some(Octant { corner: corner.map(|c| c as u32), level }.ancestor(coarsest));
-    }
-    (0..8u8).fold(None, |found, digit| {
-        let corner = std::array::from_fn(|a| corner[a] + edge / 2 * i64::from(digit >> a & 1));
-        let child = tree.child(handle, digit, level);
-        search(tree, child, (corner, level + 1), region, level_or(found, bound)).or(found)
-    })
 }

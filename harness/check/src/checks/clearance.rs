@@ -38,13 +38,13 @@ pub const ALL_AXES: [[i64; 3]; 1] = [[1, 1, 1]];
 impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
     /// Reports every octant other than the root that is too near to a coarse leaf.
     pub fn check(&self, result: &mut CheckResult) {
-        self.below(&mut Trail::new(self.tree), result);
+        self.below(&Trail::new(self.tree), result);
     }
 
     /// Checks the children of the current octant. One search around all of them comes first; it usually finds nothing, and
     /// usually not even that search is necessary.
-    fn below(&self, trail: &mut Trail, result: &mut CheckResult) {
-        let (handle, octant) = (trail.current().centre(), trail.current().octant);
+    fn below(&self, trail: &Trail, result: &mut CheckResult) {
+        let (handle, octant) = (trail.around.centre(), trail.around.octant);
         let children: [Option<Required>; 8] = std::array::from_fn(|digit| {
             let content = self.tree.child(handle, digit as u8, octant.level);
             (self.requires)(content, octant.level + 1)
@@ -55,37 +55,37 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
         let around = |(digit, _)| Region::along(&octant.child(digit), [margin; 3]);
         let region = || present().map(around).reduce(Region::hull).expect("a child is present");
         // The level of the coarsest leaf in the region, if it is less than `bound`; otherwise any from `bound` up to that level.
-        let (wide, coarsest) = trail.wide(margin);
-        let nearby = match *coarsest {
-            coarsest if coarsest >= bound => coarsest,
-            _ => wide.coarsest_within(self.tree, &region(), bound).map_or(bound, |leaf| leaf.level),
-        };
+        let wide = trail.wide(margin);
+        let mut nearby = wide.coarsest;
+        if nearby < bound {
+            let found = wide.around.coarsest_within(self.tree, &region(), bound);
+            nearby = found.map_or(bound, |leaf| leaf.level);
+        }
         for (digit, &Required { margin, own, below }) in present() {
             let (own, is_deep) = (own.filter(|&own| own > nearby), below > Some(nearby));
             if own.is_none() && !is_deep {
                 continue;
             }
-            trail.descend(self.tree, digit);
+            let child = trail.child(self.tree, digit);
             if let Some(bound) = own {
-                self.report(trail, margin, bound, result);
+                self.report(&child, margin, bound, result);
             }
             if is_deep {
-                self.below(trail, result);
+                self.below(&child, result);
             }
-            trail.ascend();
         }
     }
 
     /// Repeats the search for each part of the current octant that has no holes, and reports the first coarse leaf.
     fn report(&self, trail: &Trail, margin: i64, bound: u8, result: &mut CheckResult) {
-        let (handle, octant) = (trail.current().centre(), trail.current().octant);
+        let (handle, octant) = (trail.around.centre(), trail.around.octant);
+        let wide = &trail.wide(margin).around;
         let mut found = None;
         self.tree.walk_below(octant, handle, &mut |part, content| {
             let is_solid = self.tree.kinds(content) & HOLES == 0;
             if found.is_none() && is_solid {
                 found = self.directions.iter().find_map(|axes| {
                     let region = Region::along(&part, axes.map(|axis| axis * margin));
-                    let (wide, _) = trail.wide(margin);
                     let coarse = wide.coarsest_within(self.tree, &region, bound)?;
                     Some((part, coarse))
                 });
@@ -124,46 +124,39 @@ pub fn check_gap(
     Clearance { tree, requires, directions, report: &report }.check(result);
 }
 
-/// The neighbourhoods of all octants from the root to the current octant of a walk.
-pub struct Trail {
-    /// One neighbourhood per level, with the level of its coarsest leaf.
-    neighbourhoods: Vec<(Neighbourhood, u8)>,
+/// The neighbourhood of the current octant of a walk, and those of all octants above it.
+pub struct Trail<'a> {
+    /// The neighbourhood.
+    pub around: Neighbourhood,
+    /// The level of its coarsest leaf.
+    coarsest: u8,
+    above: Option<&'a Self>,
 }
 
-impl Trail {
+impl Trail<'_> {
     /// A walk at the root.
     pub fn new(tree: &Tree) -> Self {
-        let root = Neighbourhood::root(tree);
-        Self { neighbourhoods: vec![(root, root.coarsest_level(tree))] }
+        let around = Neighbourhood::root(tree);
+        Self { around, coarsest: around.coarsest_level(tree), above: None }
     }
 
-    /// The neighbourhood of the current octant.
-    pub fn current(&self) -> &Neighbourhood {
-        &self.neighbourhoods.last().expect("the root is never left").0
-    }
-
-    /// Moves to a child.
-    pub fn descend(&mut self, tree: &Tree, digit: u8) {
-        let neighbourhood = self.current().child(tree, digit);
-        self.neighbourhoods.push((neighbourhood, neighbourhood.coarsest_level(tree)));
-    }
-
-    /// Moves to the parent.
-    pub fn ascend(&mut self) {
-        self.neighbourhoods.pop();
+    /// The walk at a child.
+    pub fn child(&self, tree: &Tree, digit: u8) -> Trail<'_> {
+        let around = self.around.child(tree, digit);
+        Trail { around, coarsest: around.coarsest_level(tree), above: Some(self) }
     }
 
     /// The smallest neighbourhood that contains everything within this distance of the current octant.
-    fn wide(&self, margin: i64) -> &(Neighbourhood, u8) {
-        let fits = |(neighbourhood, _): &&(Neighbourhood, u8)| {
-            i64::from(neighbourhood.octant.edge()) >= margin
-        };
-        self.neighbourhoods.iter().rev().find(fits).unwrap_or(&self.neighbourhoods[0])
+    fn wide(&self, margin: i64) -> &Self {
+        match self.above {
+            Some(above) if i64::from(self.around.octant.edge()) < margin => above.wide(margin),
+            _ => self,
+        }
     }
 
     /// Whether a predicate of content and level holds for octants that contain everything within `margin` of the current octant.
     pub fn all_nearby(&self, margin: i64, predicate: impl Fn(Handle, u8) -> bool) -> bool {
-        let (wide, _) = self.wide(margin);
+        let wide = &self.wide(margin).around;
         wide.handles.iter().all(|&handle| predicate(handle, wide.octant.level))
     }
 }

@@ -94,17 +94,15 @@ impl<'a> Mesh<'a> {
     /// not known.
     pub fn audit(&self, visit: Visit) {
         assert!(self.knows_surface(), "splits are audited where the surface is known");
-        self.audit_below(&mut Trail::new(self.tree), visit);
+        self.audit_below(&Trail::new(self.tree), visit);
     }
 
-    fn audit_below(&self, trail: &mut Trail, visit: Visit) {
-        let (handle, octant) = (trail.current().centre(), trail.current().octant);
+    fn audit_below(&self, trail: &Trail, visit: Visit) {
+        let (handle, octant) = (trail.around.centre(), trail.around.octant);
         if handle.is_node() {
             visit(octant, (!self.is_justified(&octant)).then_some(NEEDLESS));
             for digit in 0..8 {
-                trail.descend(self.tree, digit);
-                self.audit_below(trail, visit);
-                trail.ascend();
+                self.audit_below(&trail.child(self.tree, digit), visit);
             }
         } else if handle.as_leaf().is_some() {
             let is_missing = match self.has_nothing_finer(trail) {
@@ -117,7 +115,7 @@ impl<'a> Mesh<'a> {
 
     /// Whether nothing within the reach of a layer or the balance can force the current leaf to split. True for most leaves, and quick.
     fn has_nothing_finer(&self, trail: &Trail) -> bool {
-        let level = trail.current().octant.level;
+        let level = trail.around.octant.level;
         let is_coarse = |handle, at| {
             let may_have_crossing =
                 self.has_deleted_crossing() && self.tree.kinds(handle) & HOLES != 0;
