@@ -66,9 +66,10 @@ impl Isometry {
 /// All orders of the axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// The axes other than this one.
-fn across(dimension: usize, axis: usize) -> Vec<usize> {
-    (0..dimension).filter(|&other| other != axis).collect()
+/// A corner on the low side of an axis, numbered among those.
+fn low_corner(dimension: usize, axis: usize, number: usize) -> usize {
+    let others = (0..dimension).filter(|&other| other != axis);
+    others.enumerate().map(|(i, other)| (number >> i & 1) << other).sum()
 }
 
 /// A corner of a tree as a point.
@@ -83,21 +84,18 @@ pub fn corner_at(point: [i64; 3]) -> usize {
 
 /// A corner of a face, numbered within it.
 fn face_corner(dimension: usize, face: usize, number: usize) -> [i64; 3] {
-    let along = across(dimension, face / 2);
-    let bits = along.iter().enumerate().map(|(i, axis)| (number >> i & 1) << axis);
-    point(bits.sum::<usize>() + ((face & 1) << (face / 2)))
+    point(low_corner(dimension, face / 2, number) + ((face & 1) << (face / 2)))
 }
 
 /// The directed edge from a corner to a neighbouring one.
 pub fn edge_between(from: usize, to: usize) -> usize {
     let axis = (from ^ to).trailing_zeros() as usize;
-    let bits = across(3, axis).into_iter().enumerate().map(|(i, a)| (from >> a & 1) << i);
-    4 * axis + bits.sum::<usize>() + if from > to { EDGES } else { 0 }
+    let number = (0..4).find(|&number| low_corner(3, axis, number) == from & to);
+    4 * axis + number.expect("the lower corner") + if from > to { EDGES } else { 0 }
 }
 
 /// The corner in which a directed edge begins, or the one in which it ends.
 pub fn edge_end(edge: usize, end: bool) -> usize {
-    let (axis, number) = (edge % EDGES / 4, edge % 4);
-    let bits = across(3, axis).into_iter().enumerate().map(|(i, a)| (number >> i & 1) << a);
-    bits.sum::<usize>() + (usize::from(end != (edge >= EDGES)) << axis)
+    let axis = edge % EDGES / 4;
+    low_corner(3, axis, edge % 4) + (usize::from(end != (edge >= EDGES)) << axis)
 }

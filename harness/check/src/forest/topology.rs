@@ -41,8 +41,8 @@ impl Identified {
         let mut sets = Sets::new(trees * places);
         pairs.iter().for_each(|&(first, other)| sets.union(index(first), index(other)));
         let mut members = vec![Vec::new(); trees * places];
-        let all = all_places(trees, places);
-        let roots: Vec<usize> = all.map(|at| sets.root(index(at)) as usize).collect();
+        let all = 0..(trees * places) as u32;
+        let roots: Vec<usize> = all.map(|at| sets.root(at) as usize).collect();
         all_places(trees, places).zip(&roots).for_each(|(at, &root)| members[root].push(at));
         Self { places, roots, members }
     }
@@ -132,22 +132,22 @@ impl Topology {
     /// in the opposite direction is a mistake in most connectivities.
     fn remarks(&self, connectivity: &Connectivity) -> String {
         let &Connectivity { trees, ref edges, ref corners, .. } = connectivity;
-        let is_in = |lists: &Lists, at: usize| lists.of_tree.get(at).is_some_and(|&list| list >= 0);
+        let is_unlisted = |lists: &Lists, index: usize, same: &Identified, at, near: &[Place]| {
+            let is_listed = lists.of_tree.get(index).is_some_and(|&list| list >= 0);
+            !is_listed && same.with(at).any(|other| other != at && !near.contains(&other))
+        };
         let is_unlisted_edge = |&(tree, edge): &Place| {
-            let mut near: Vec<Place> = self.edges_across((tree, edge)).collect();
-            near.push((tree, edge));
-            !is_in(edges, EDGES * tree + edge)
-                && !self.edges.with((tree, edge)).all(|at| near.contains(&at))
+            let near: Vec<Place> = self.edges_across((tree, edge)).collect();
+            is_unlisted(edges, EDGES * tree + edge, &self.edges, (tree, edge), &near)
         };
         let is_unlisted_corner = |&(tree, corner): &Place| {
             let mut near: Vec<Place> = self.corners_across((tree, corner)).collect();
-            near.push((tree, corner));
             for edge in (0..self.edges.places).filter(|&edge| edge_end(edge, false) == corner) {
                 let meeting = self.edges.with((tree, edge));
                 near.extend(meeting.map(|(other, its)| (other, edge_end(its, false))));
             }
-            !is_in(corners, (tree << self.dimension) + corner)
-                && !self.corners.with((tree, corner)).all(|at| near.contains(&at))
+            let index = (tree << self.dimension) + corner;
+            is_unlisted(corners, index, &self.corners, (tree, corner), &near)
         };
         let meets_itself = |&(tree, edge): &Place| {
             self.edges.with((tree, edge)).any(|other| other == (tree, edge + EDGES))
