@@ -14,7 +14,7 @@ use crate::options::{Export, Options};
 use crate::points::Point;
 use contract::failure::Failure;
 use contract::mesh::Leaf;
-use contract::octant::{CELLS_PER_EDGE, Octant};
+use contract::octant::{CELLS_PER_EDGE, Octant, UNITS_PER_CELL};
 use contract::word;
 
 /// In place of a side: a leaf of the mesh that is not exported.
@@ -64,9 +64,8 @@ impl Leaves {
         export.mesh.leaves(&|| export.options.check(), &mut |leaf| {
             let is_selected = export.selection.has(&leaf);
             if takes(&leaf, is_selected) {
-                let Octant { corner, level } = leaf.octant;
-                let side = if is_selected { leaf.side as u64 } else { CUT };
-                words.push(word::key_of(corner) << 7 | u64::from(level) << 2 | side);
+                let word = word::encode(&word::Leaf { octant: leaf.octant, side: leaf.side });
+                words.push(if is_selected { word } else { word | CUT });
             }
             Ok(())
         })?;
@@ -141,22 +140,20 @@ impl Leaves {
     ) -> Result<(), Failure> {
         let content = self.content(0, self.words.len(), 0);
         let root = Around { octant: Octant::ROOT, content, across: [[Content::Outside; 2]; 3] };
-        let mut squares = Vec::new();
-        self.descend(&root, options, &mut |number, around| {
-            self.squares(around, &mut squares);
-            visit(number, &around.octant, &squares)
-        })
+        self.descend(&root, &mut Vec::new(), options, visit)
     }
 
     fn descend(
         &self,
         around: &Around,
+        squares: &mut Vec<Square>,
         options: &Options,
-        visit: &mut impl FnMut(u32, &Around) -> Result<(), Failure>,
+        visit: &mut impl FnMut(u32, &Octant, &[Square]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         if let Content::Cell(number) = around.content {
             options.check_at(u64::from(number))?;
-            return visit(number, around);
+            self.squares(around, squares);
+            return visit(number, &around.octant, squares);
         }
         if !matches!(around.content, Content::Split(..)) {
             return Ok(());
@@ -175,7 +172,7 @@ impl Leaves {
                 content: own[digit],
                 across: std::array::from_fn(|axis| [across(axis, 0), across(axis, 1)]),
             };
-            self.descend(&child, options, visit)?;
+            self.descend(&child, squares, options, visit)?;
         }
         Ok(())
     }
@@ -199,12 +196,9 @@ impl Leaves {
         }
         let (u, v) = ((square.axis + 1) % 3, (square.axis + 2) % 3);
         let (begin, level) = (squares.len(), square.level + 1);
-        let edge = CELLS_PER_EDGE >> level;
         let children = self.children(square.across, level);
         for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let mut corner = square.corner;
-            corner[u] += i * edge;
-            corner[v] += j * edge;
+            let corner = square.moved(level, i, j);
             // The children that touch the square are on the side from which it is seen.
             let digit =
                 (i as usize) << u | (j as usize) << v | usize::from(!square.is_high) << square.axis;
@@ -248,16 +242,24 @@ pub struct Square {
 }
 
 impl Square {
+    /// The minimum corner, moved by these numbers of a level's edges along the next two axes.
+    fn moved(&self, level: u8, i: u32, j: u32) -> Point {
+        let (mut corner, edge) = (self.corner, CELLS_PER_EDGE >> level);
+        corner[(self.axis + 1) % 3] += i * edge;
+        corner[(self.axis + 2) % 3] += j * edge;
+        corner
+    }
+
+    /// The centre in lattice units.
+    pub fn centre(&self) -> [i64; 3] {
+        let [low, _, high, _] = self.corners(true);
+        std::array::from_fn(|a| i64::from(low[a] + high[a]) * UNITS_PER_CELL / 2)
+    }
+
     /// The corners, counterclockwise around the positive axis or the negative one, the minimum corner first.
     pub fn corners(&self, is_positive: bool) -> [Point; 4] {
-        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let edge = CELLS_PER_EDGE >> self.level;
-        let mut corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
-            let mut corner = self.corner;
-            corner[u] += i * edge;
-            corner[v] += j * edge;
-            corner
-        });
+        let mut corners =
+            [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| self.moved(self.level, i, j));
         if !is_positive {
             corners[1..].reverse();
         }

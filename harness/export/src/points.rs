@@ -1,10 +1,16 @@
 //! Points without duplicates, numbered in the order in which they were added, and the polygons that join them.
 
-use contract::lattice::cross;
+use contract::lattice::{Root, cross};
+use contract::octant::UNITS_PER_CELL;
 use rustc_hash::FxHashMap;
 
 /// A point, in level-19 cells from the root's minimum corner: up to `CELLS_PER_EDGE`, inclusive.
 pub type Point = [u32; 3];
+
+/// A point in the user's units.
+pub fn to_user(point: &Point, root: &Root) -> [f64; 3] {
+    root.to_user(point.map(|c| i64::from(c) * UNITS_PER_CELL))
+}
 
 /// The points.
 #[derive(Debug, Default)]

@@ -35,9 +35,8 @@ impl Slice {
     /// The plane at a coordinate in the user's units; `None` if it does not meet the root.
     pub fn new(root: &Root, axis: usize, coordinate: f64) -> Option<Self> {
         let position = (coordinate - root.origin[axis]) / root.edge;
-        (0.0..=1.0)
-            .contains(&position)
-            .then(|| Self { axis, at: (position * UNITS_PER_EDGE as f64).round_ties_even() as i64 })
+        let at = (position * UNITS_PER_EDGE as f64).round_ties_even() as i64;
+        (0.0..=1.0).contains(&position).then_some(Self { axis, at })
     }
 
     /// The layer of level-19 cells that the plane cuts.

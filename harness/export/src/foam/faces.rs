@@ -104,26 +104,18 @@ impl Faces {
     /// If one is violated.
     pub fn check_invariants(&self, leaves: &Leaves, points: &Points) {
         let pairs = || self.owner.iter().zip(&self.neighbour);
-        let disordered = pairs().position(|(owner, neighbour)| owner >= neighbour);
-        assert_eq!(disordered, None, "a face belongs to the cell with the higher number");
-        let disordered = pairs().zip(pairs().skip(1)).position(|(a, b)| a >= b);
-        assert_eq!(disordered, None, "a face is not in upper-triangular order");
+        assert!(pairs().all(|(a, b)| a < b), "a face belongs to the cell with the higher number");
+        assert!(pairs().is_sorted_by(|a, b| a < b), "a face is not in upper-triangular order");
         let cells = leaves.count();
-        assert!(
-            self.owner.iter().chain(&self.neighbour).all(|&cell| cell < cells),
-            "a face of cell {cells} or beyond"
-        );
+        let exist = self.owner.iter().chain(&self.neighbour).all(|&cell| cell < cells);
+        assert!(exist, "a face of cell {cells} or beyond");
         let (mut used, mut sums) = (vec![false; points.all.len()], vec![0u64; cells as usize]);
         let mut volume = 0;
         let is_beyond = points.all.as_flattened().iter().any(|&c| c > CELLS_PER_EDGE);
         assert!(!is_beyond, "a point outside of the root");
         for (face, &owner) in self.owner.iter().enumerate() {
             let vertices = self.vertices(face);
-            assert!(
-                vertices.len() >= 4,
-                "face {face} of cell {owner} has {} vertices",
-                vertices.len()
-            );
+            assert!(vertices.len() >= 4, "face {face} of cell {owner} has {vertices:?} only");
             vertices.iter().for_each(|&v| used[v as usize] = true);
             let sum = edges(vertices);
             let to = &mut sums[owner as usize];
@@ -140,11 +132,8 @@ impl Faces {
         assert_eq!(used.iter().position(|used| !used), None, "a point belongs to no face");
         assert_eq!(sums.iter().position(|&sum| sum != 0), None, "a cell is not closed");
         let of_cells: u64 = leaves.cells().map(|w| word::span(word::level(w))).sum();
-        assert_eq!(
-            volume,
-            2 * i128::from(of_cells),
-            "twice the volume within the patches is not that of {cells} cells"
-        );
+        let expected = 2 * i128::from(of_cells);
+        assert_eq!(volume, expected, "twice the volume within the patches, and that of cells");
     }
 }
 

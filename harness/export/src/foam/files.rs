@@ -7,12 +7,11 @@ use std::path::Path;
 
 use bytemuck::NoUninit;
 use contract::manifest::Sides;
-use contract::octant::UNITS_PER_CELL;
 use contract::word;
 
 use super::Mesh;
 use crate::options::{Export, Label, Options};
-use crate::points::Point;
+use crate::points::to_user;
 use contract::failure::Failure;
 
 impl Mesh {
@@ -55,8 +54,7 @@ impl Mesh {
         file.labels(vertices, faces.all().flatten().map(|&point| point.into()))?;
         file.finish()?;
         let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
-        let place = |at: &Point| manifest.root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
-        file.list(points, self.points.all.iter().map(place))?;
+        file.list(points, self.points.all.iter().map(|at| to_user(at, &manifest.root)))?;
         file.finish()?;
         self.write_boundary(options.label, dir)
     }

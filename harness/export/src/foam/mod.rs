@@ -22,7 +22,6 @@ use std::path::Path;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::files::{Staging, nearest_directory};
-use contract::octant::UNITS_PER_CELL;
 use contract::sets::Sets;
 use contract::word::{self, Side};
 use geometry::tree::{FacetTree, Point};
@@ -244,10 +243,7 @@ impl Patches {
     /// The patch of the solid with the facet nearest to the centre of a face.
     fn nearest(&self, square: &Square) -> usize {
         let Some(facets) = &self.facets else { return SIDES.len() };
-        let [low, _, high, _] = square.corners(true);
-        let units = UNITS_PER_CELL as f64 / 2.0;
-        let centre = [0, 1, 2].map(|a| (f64::from(low[a]) + f64::from(high[a])) * units);
-        let centre = Point::from(centre);
+        let centre = Point::from(square.centre().map(|c| c as f64));
         // Half a lattice unit more, for rounding.
         let nearest = facets.within(centre, facets.distance(centre) + 0.5);
         self.of_facet[nearest[0] as usize]

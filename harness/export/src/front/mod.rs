@@ -35,7 +35,7 @@ use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Options, Summary, require_new};
-use crate::points::Points;
+use crate::points::{Points, to_user};
 use crate::polydata::{self, array};
 
 /// A square of the front.
@@ -83,7 +83,7 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
     write(export, path, &|(root, faces, polygons), out| {
         let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
-        let point = |at: &[u32; 3]| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
+        let points = polygons.points.all.iter().flat_map(|at| to_user(at, root));
         let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
         let mut cell = vec![
             array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
@@ -92,7 +92,7 @@ pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
         ];
         cell.extend(gaps.map(|gaps| array("gap", gaps)));
         let piece = PolyDataPiece {
-            points: polygons.points.all.iter().flat_map(point).collect::<Vec<f64>>().into(),
+            points: points.collect::<Vec<f64>>().into(),
             polys: Some(VertexNumbers::XML {
                 connectivity: polygons.corners.iter().map(|&c| u64::from(c)).collect(),
                 offsets: polygons.ends.clone(),
@@ -147,23 +147,17 @@ fn write(
 
 /// The polygons as triangles.
 fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
-    let single = |at: [i64; 3]| root.to_user(at).map(|c| c as f32);
-    let point =
-        |index: &u32| polygons.points.all[*index as usize].map(|c| i64::from(c) * UNITS_PER_CELL);
+    let point = |index: u32| to_user(&polygons.points.all[index as usize], root).map(|c| c as f32);
     let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
     for (face, corners) in faces.iter().zip(polygons.iter()) {
-        let corner = |i: usize| single(point(&corners[i % corners.len()]));
+        let corner = |i: usize| point(corners[i % corners.len()]);
         if corners.len() == 4 {
             triangles.extend([[0, 1, 2], [0, 2, 3]].map(|ids| ids.map(corner)));
             continue;
         }
         // A fan from a corner could have triangles without area.
-        let half = edge_of(face.square.level) * UNITS_PER_CELL / 2;
-        let middle = std::array::from_fn(|a| {
-            let along = if a == face.square.axis { 0 } else { half };
-            i64::from(face.square.corner[a]) * UNITS_PER_CELL + along
-        });
-        triangles.extend((0..corners.len()).map(|i| [single(middle), corner(i), corner(i + 1)]));
+        let middle = root.to_user(face.square.centre()).map(|c| c as f32);
+        triangles.extend((0..corners.len()).map(|i| [middle, corner(i), corner(i + 1)]));
     }
     match triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
         None => Ok(triangles),

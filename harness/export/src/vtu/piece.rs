@@ -9,13 +9,12 @@ use bytemuck::NoUninit;
 use contract::digest::Digest;
 use contract::lattice::Root;
 use contract::mesh::Leaf;
-use contract::octant::UNITS_PER_CELL;
 use contract::word;
 use libdeflater::{CompressionLvl, Compressor};
 
 use super::Array;
 use crate::options::Written;
-use crate::points::{Point, Points};
+use crate::points::{Points, to_user};
 
 /// VTK's number of the cell type hexahedron.
 const HEXAHEDRON: u8 = 12;
@@ -63,14 +62,13 @@ impl Encoder {
         let Self { leaves, points, connectivity, zlib, .. } = self;
         let points = &points.all;
         let edge = |leaf: &Leaf| root.edge_of(leaf.octant.level);
-        let point = |at: &Point| root.to_user(at.map(|c| i64::from(c) * UNITS_PER_CELL));
         let cells = 0..leaves.len();
         let (mut bytes, mut offsets) = (Vec::new(), Vec::new());
         for (_, name, _) in arrays {
             offsets.push(bytes.len() as u64);
             let to = &mut bytes;
             match *name {
-                "Points" => zlib.append(points.iter().map(point), to),
+                "Points" => zlib.append(points.iter().map(|at| to_user(at, root)), to),
                 "connectivity" => zlib.append(connectivity.iter().map(|&i| u64::from(i)), to),
                 "offsets" => zlib.append(cells.clone().map(|i| 8 * (i as u64 + 1)), to),
                 "types" => zlib.append(cells.clone().map(|_| HEXAHEDRON), to),
