@@ -6,6 +6,7 @@
 use contract::case::Facet;
 use contract::lattice::{self, sorted};
 use serde::Serialize;
+use std::collections::HashMap;
 
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
@@ -128,17 +129,14 @@ pub fn findings(edges: &Edges, first: usize) -> [Finding; 2] {
 
 /// Facets with the vertices of an earlier facet. A facet with a repeated vertex is degenerate, not a duplicate.
 pub fn duplicates(input: &Input, edges: &Edges, first: usize) -> Finding {
-    let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
-    let mut facets: Vec<_> = all.filter(|([a, b, c], _)| a != b && b != c).collect();
-    facets.sort_unstable();
-    let mut pairs: Vec<(u32, u32)> = Vec::new();
-    for same in facets.chunk_by(|a, b| a.0 == b.0) {
-        pairs.extend(same[1..].iter().map(|copy| (copy.1, same[0].1)));
-    }
-    pairs.sort_unstable();
     let mut finding = Finding::new(Kind::Duplicates);
-    for (copy, original) in pairs {
-        finding.add(first, || Place::new(vec![original, copy], input.centroid(copy)));
+    let mut originals = HashMap::new();
+    let all = edges.corners.iter().copied().map(sorted).zip(0u32..);
+    for (corners, facet) in all.filter(|([a, b, c], _)| a != b && b != c) {
+        let original = *originals.entry(corners).or_insert(facet);
+        if original != facet {
+            finding.add(first, || Place::new(vec![original, facet], input.centroid(facet)));
+        }
     }
     finding
 }

@@ -65,26 +65,20 @@ impl Diagnosis {
     /// # Panics
     /// If one is violated, which is a bug.
     pub fn check_invariants(&self) {
-        let Self { edges, shells, facets, .. } = self;
+        let Self { edges, shells, facets, extent, .. } = self;
         let classes = edges.open + edges.paired + edges.flipped + edges.odd + edges.even;
         assert_eq!(classes, edges.all, "edges by class do not sum to all: {edges:?}");
         let at_edges = edges.open + 2 * (edges.paired + edges.flipped) + edges.facets_non_manifold;
         assert_eq!(at_edges, 3 * shells.facets, "facets at {edges:?} are not those of shells");
         assert!(shells.facets <= *facets, "shells have more facets than the geometry");
-        let are_closed = shells.closed == shells.count;
-        assert!(
-            shells.closed <= shells.count && are_closed == (edges.open + edges.odd == 0),
-            "{shells:?} with {edges:?}"
-        );
+        assert!(shells.closed <= shells.count, "{shells:?}");
+        let are_closed = edges.open + edges.odd == 0;
+        assert_eq!(shells.closed == shells.count, are_closed, "{shells:?} with {edges:?}");
         let count = |kind| self.finding(kind).map_or(0, |finding| finding.count);
         let of_edges = [Kind::NonManifoldOdd, Kind::Winding].map(count);
         assert_eq!(of_edges, [edges.odd, edges.flipped], "findings of edges with {edges:?}");
         let inward = count(Kind::InsideOut) + count(Kind::Nested);
-        assert!(
-            inward <= shells.closed,
-            "{inward} of {} closed shells are wound inward, or nested",
-            shells.closed
-        );
+        assert!(inward <= shells.closed, "{inward} are wound inward, or nested: {shells:?}");
         let cell = self.cell.unwrap_or(f64::INFINITY);
         for finding in &self.findings {
             let most = match finding.kind {
@@ -96,12 +90,8 @@ impl Diagnosis {
             finding.check_invariants(*facets, cell);
         }
         let beyond = 2.0 * self.root.edge / UNITS_PER_EDGE as f64;
-        let is_beyond = self.extent.margin < -beyond;
-        assert!(
-            !is_beyond || count(Kind::OutsideRoot) > 0,
-            "no facet is beyond the root, but the body is: {:?}",
-            self.extent
-        );
+        let is_within = extent.margin >= -beyond;
+        assert!(is_within || count(Kind::OutsideRoot) > 0, "no facet is beyond, but {extent:?}");
     }
 
     /// The finding of a kind, if this kind was searched for.
@@ -122,10 +112,8 @@ impl Finding {
         let widths: Vec<f64> = places.iter().filter_map(|place| place.width).collect();
         assert!(widths.is_sorted_by(|a, b| a >= b), "widths of {kind:?}: {widths:?}");
         if matches!(kind, Kind::ThinWalls | Kind::ThinGaps) {
-            assert!(
-                widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w)),
-                "{widths:?} of {kind:?} in cells of {cell}"
-            );
+            let are_thin = widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w));
+            assert!(are_thin, "{widths:?} of {kind:?} in cells of {cell}");
         }
     }
 }

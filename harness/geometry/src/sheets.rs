@@ -8,6 +8,7 @@
 
 use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::query::Ray;
+use std::collections::HashSet;
 
 use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
@@ -59,9 +60,7 @@ pub fn sheets(
         let mut hits = hits(tree, edges, side, cell / unit, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
         // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.
-        let mut of_sheets: Vec<u32> = hits.iter().map(|hit| hit.from).collect();
-        of_sheets.sort_unstable();
-        of_sheets.dedup();
+        let of_sheets: HashSet<u32> = hits.iter().map(|hit| hit.from).collect();
         let place = |hit: &Hit| {
             let middle = hit.middle.round().to_array().map(|c| c as i64);
             let place = Place::new(hit.facets.into(), input.case.root.to_user(middle));

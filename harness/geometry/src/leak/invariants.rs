@@ -76,10 +76,8 @@ impl Passage {
                 let is_met = met(&facet, &Ray::new(leg.a, leg.b - leg.a), 1.0).is_some();
                 let of_ends = from_point(leg.a, &facet).min(from_point(leg.b, &facet));
                 let distance = if is_met { -1.0 } else { of_ends.min(from_edges(leg, &facet)) };
-                assert!(
-                    distance >= clearance - ROUNDING,
-                    "facet {number} is {distance} units from {leg:?} of clearance {clearance}"
-                );
+                let is_clear = distance >= clearance - ROUNDING;
+                assert!(is_clear, "facet {number} is {distance} from {leg:?}, not {clearance}");
             }
         }
     }
@@ -91,21 +89,16 @@ impl Passage {
         assert!(is_point && is_counted, "point {} of {:?}", narrowest.index, self.inner);
         let [min, width, max] =
             [narrowest.width_min, narrowest.width, narrowest.width_max].map(|w| w * scale);
-        assert!(
-            0.0 < min && min <= width && width <= max + ROUNDING,
-            "width {width} is not between {min} and {max} units"
-        );
+        let is_between = 0.0 < min && min <= width && width <= max + ROUNDING;
+        assert!(is_between, "width {width} is not between {min} and {max} units");
         let counted = self.points[first..=last].iter().map(|p| p.width * scale);
         let least = counted.fold(f64::INFINITY, f64::min);
         let from = |facet: &FacetLattice| 2.0 * from_point(centre, &triangle(facet));
         let nearest = case.facets_lattice.iter().map(from).fold(f64::INFINITY, f64::min);
         let rim = narrowest.facets.first().map(|&facet| from(&case.facets_lattice[facet as usize]));
-        assert!(
-            is_near(least, width)
-                && is_near(nearest, width)
-                && rim.is_some_and(|r| is_near(r, width)),
-            "width {width}; {least} of all points, {nearest} to all facets, {rim:?} at the rim"
-        );
+        let widths = [Some(least), Some(nearest), rim];
+        let are_near = widths.iter().all(|w| w.is_some_and(|w| is_near(w, width)));
+        assert!(are_near, "width {width}; of all points, to all facets, at the rim {widths:?}");
     }
 }
 

@@ -21,6 +21,7 @@ use contract::failure::{Failure, Watch};
 use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::PointQuery as _;
+use std::collections::BTreeSet;
 
 /// Ratio of the bounds on the width, at most.
 const PRECISION: f64 = 1.05;
@@ -194,11 +195,9 @@ impl Search<'_> {
             let promises = shown < wanted && clearance + cell.half_diagonal() >= radius;
             cell.is_open && promises && is_near(cell.centre())
         });
-        let mut divided: Vec<u32> = cells.map(|(_, i)| i).collect();
+        let mut divided: BTreeSet<u32> = cells.map(|(_, i)| i).collect();
         divided.extend(narrow.iter().map(|place| place.cell));
-        divided.sort_unstable();
-        divided.dedup();
-        divided.retain(|&i: &u32| {
+        divided.retain(|&i| {
             let cell = &self.space.cells[i as usize];
             cell.half_diagonal() > SMALL * radius && cell.edge() > 1.0
         });

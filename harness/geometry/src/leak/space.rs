@@ -5,6 +5,7 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
+use std::iter::successors;
 
 use super::{Ends, leaf_at};
 use crate::tree::{FacetTree, Point};
@@ -101,34 +102,29 @@ impl<'a> Space<'a> {
         *before.expect("the cells tile the root").1
     }
 
-    /// Calls `visit` with every cell that shares part of a face with this one.
-    pub fn neighbours(&self, cell: u32, visit: &mut impl FnMut(u32)) {
+    /// Appends every cell that shares part of a face with this one.
+    pub fn neighbours(&self, cell: u32, joined: &mut Vec<u32>) {
         let Cell { low, edge, .. } = self.cells[cell as usize];
-        for (axis, is_below) in (0..6).map(|face| (face / 2, face % 2 == 0)) {
-            let across =
-                if is_below { low[axis].checked_sub(edge) } else { Some(low[axis] + edge) };
-            if let Some(across) = across.filter(|&c| i64::from(c) < UNITS_PER_EDGE) {
-                let mut at = low;
-                at[axis] = across;
-                self.facing((at, edge), axis, is_below, visit);
+        for axis in 0..3 {
+            let across = [(1, low[axis].checked_sub(edge)), (0, Some(low[axis] + edge))];
+            for (side, across) in across {
+                if let Some(across) = across.filter(|&c| i64::from(c) < UNITS_PER_EDGE) {
+                    let mut at = low;
+                    at[axis] = across;
+                    self.facing(at, edge, (axis, side), joined);
+                }
             }
         }
     }
 
-    /// The cells in a cube, or the one around it, at its upper or lower face.
-    fn facing(
-        &self,
-        (low, edge): ([u32; 3], u32),
-        axis: usize,
-        is_upper: bool,
-        visit: &mut impl FnMut(u32),
-    ) {
+    /// Appends the cells in a cube, or the one around it, at its lower (0) or upper (1) face normal to an axis.
+    fn facing(&self, low: [u32; 3], edge: u32, face: (usize, u32), joined: &mut Vec<u32>) {
         let cell = self.at(low);
         if self.cells[cell as usize].edge >= edge {
-            return visit(cell);
+            return joined.push(cell);
         }
-        for digit in (0..8).filter(|digit| (digit >> axis & 1 == 1) == is_upper) {
-            self.facing((child(low, edge, digit), edge / 2), axis, is_upper, visit);
+        for digit in (0..8).filter(|digit| digit >> face.0 & 1 == face.1) {
+            self.facing(child(low, edge, digit), edge / 2, face, joined);
         }
     }
 
@@ -207,10 +203,8 @@ impl<'a> Space<'a> {
                 continue;
             }
             if end.map_or_else(|| self.is_far(cell), |end| cell == end) {
-                let mut path = vec![cell];
-                while path[path.len() - 1] != start {
-                    path.push(via[path[path.len() - 1] as usize]);
-                }
+                let before = |&cell: &u32| (cell != start).then(|| via[cell as usize]);
+                let mut path: Vec<u32> = successors(Some(cell), before).collect();
                 path.reverse();
                 return Ok(Some((path, label.0)));
             }
@@ -218,7 +212,7 @@ impl<'a> Space<'a> {
                 return Err(Failure::interrupted());
             }
             joined.clear();
-            self.neighbours(cell, &mut |next| joined.push(next));
+            self.neighbours(cell, &mut joined);
             for &next in &joined {
                 if !self.cells[next as usize].is_open {
                     continue;
