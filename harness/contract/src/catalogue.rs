@@ -7,9 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Size class of a case in the catalogue.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
     /// Seconds each; the oracles decide every leaf of the base tree.

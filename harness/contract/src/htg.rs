@@ -15,7 +15,6 @@ use std::path::{Path, PathBuf};
 use vtkhdf::format::Chunked;
 pub use vtkhdf::format::ReadError as TreeError;
 use vtkhdf::read::TreeReader;
-use vtkhdf::tree::Shape;
 
 /// Number of words that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
@@ -49,11 +48,9 @@ impl TreeFile {
     /// If the file is not a hyper-tree grid as this repository writes it.
     pub fn open(path: &Path) -> Result<Self> {
         let file = TreeReader::open(path)?;
-        let Shape { origin, edge, .. } = file.shape;
-        let is_cube = edge > 0.0 && edge.is_finite() && origin.iter().all(|c| c.is_finite());
-        if !is_cube {
-            let why = format!("its root is no cube: corner {origin:?}, edge {edge}");
-            return Err(TreeError::Unknown(why));
+        let root = Root { origin: file.shape.origin, edge: file.shape.edge };
+        if !root.is_cube() {
+            return Err(TreeError::Unknown(format!("its root is no cube: {root}")));
         }
         let (mut levels, mut end) = (Vec::new(), 0);
         for count in &file.shape.nodes {
@@ -77,8 +74,7 @@ impl TreeFile {
                 return Err(TreeError::Damaged(why));
             }
         }
-        let (path, root) = (path.to_owned(), Root { origin, edge });
-        Ok(Self { path, file, root, leaves, levels, split, masked })
+        Ok(Self { path: path.to_owned(), file, root, leaves, levels, split, masked })
     }
 
     /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
@@ -204,7 +200,7 @@ mod tests {
     use crate::word::{Side, key, key_of, level, span};
     use std::fs;
     use tempfile::NamedTempFile;
-    use vtkhdf::tree::{Siblings, TreeWriter, WINDOW, Window, groups};
+    use vtkhdf::tree::{Shape, Siblings, TreeWriter, WINDOW, Window, groups};
     use vtkhdf::write::Deflater;
 
     const ROOT: Root = Root { origin: [-1.0, 0.0, 2.0], edge: 4.0 };

@@ -1,6 +1,6 @@
 //! The integer lattice on which every geometric decision is made (reference/DEFINITION.md, section 2).
 
-use crate::octant::{LEVEL_MAX, Octant};
+use crate::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -50,6 +50,12 @@ pub fn bounds(&[a, b, c]: &FacetLattice) -> [[i64; 3]; 2] {
     [pick(i64::min), pick(i64::max)]
 }
 
+/// The level-19 cell whose half-open cube contains a lattice point; `None` outside the root.
+pub fn cell_at(point: [i64; 3]) -> Option<[u32; 3]> {
+    let is_in_root = point.iter().all(|c| (0..UNITS_PER_EDGE).contains(c));
+    is_in_root.then(|| point.map(|c| (c / UNITS_PER_CELL) as u32))
+}
+
 /// The root cube, in the user's units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,6 +76,11 @@ impl Root {
     /// The unit cube.
     pub const UNIT: Self = Self { origin: [0.0; 3], edge: 1.0 };
 
+    /// Whether it is a cube: its edge is positive, and all numbers are finite.
+    pub fn is_cube(&self) -> bool {
+        self.edge > 0.0 && self.edge.is_finite() && self.origin.iter().all(|c| c.is_finite())
+    }
+
     /// A vertex on the lattice; `None` if it is not finite or lies more than one root edge outside the root.
     pub fn quantise(&self, at: [f64; 3]) -> Option<[i64; 3]> {
         let near = -(UNITS_PER_EDGE as f64)..=2.0 * UNITS_PER_EDGE as f64;
@@ -85,7 +96,7 @@ impl Root {
     /// A seed on the lattice; `None` if it is not finite or lies outside the root, and so in no leaf. Leaves are
     /// half-open, so the root's maximum faces are outside.
     pub fn quantise_seed(&self, at: [f64; 3]) -> Option<[i64; 3]> {
-        self.quantise(at).filter(|q| q.iter().all(|c| (0..UNITS_PER_EDGE).contains(c)))
+        self.quantise(at).filter(|q| cell_at(*q).is_some())
     }
 
     /// Lattice coordinates as floating-point numbers.

@@ -68,10 +68,8 @@ pub enum Sides {
     Unknown,
 }
 
-impl Sides {
-    fn are_known(&self) -> bool {
-        *self == Self::Known
-    }
+fn are_known(sides: &Sides) -> bool {
+    *sides == Sides::Known
 }
 
 /// An extent box on the lattice, clamped to the root.
@@ -217,7 +215,7 @@ pub struct Manifest {
     #[serde(default)]
     pub enclosed: Enclosed,
     /// Whether the words hold sides. Written only if they do not.
-    #[serde(default, skip_serializing_if = "Sides::are_known")]
+    #[serde(default, skip_serializing_if = "are_known")]
     pub sides: Sides,
     /// The facets as read; `None` if the program does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -62,9 +62,9 @@ impl Mesh {
     pub fn open(dir: &Path) -> Result<Self, Failure> {
         let manifest = Manifest::read(dir)?;
         if manifest.parts.is_empty()
-            && let Some(mesh) = Self::of_tree(dir, &manifest)?
+            && let Some(name) = &manifest.hyper_tree_grid
         {
-            return Ok(mesh);
+            return Self::of_tree(dir, name, &manifest);
         }
         let open = |part: &Part| {
             let path = dir.join(&part.file);
@@ -80,29 +80,27 @@ impl Mesh {
         Ok(Self { dir: dir.to_owned(), manifest, parts, tree_file: None })
     }
 
-    /// Opens the tree of a directory with this manifest, whether or not it has parts; `None` if there is none.
+    /// Opens the tree of a directory with this manifest, whether or not it has parts.
     ///
     /// # Errors
     /// If the file is not the tree of a mesh with this root.
-    pub fn of_tree(dir: &Path, manifest: &Manifest) -> Result<Option<Self>, Failure> {
-        let Some(name) = &manifest.hyper_tree_grid else { return Ok(None) };
+    pub fn of_tree(dir: &Path, name: &str, manifest: &Manifest) -> Result<Self, Failure> {
         let path = dir.join(name);
-        let tree = TreeFile::open(&path);
-        let tree = tree.map_err(|why| damaged_tree(&path, &why))?;
+        let tree = TreeFile::open(&path).map_err(|why| damaged_tree(&path, &why))?;
         if tree.root != manifest.root {
             let (found, stated) = (tree.root, manifest.root);
             let why = format!("the tree has the root {found}, but the manifest states {stated}");
             return Err(Failure::about(&path, why));
         }
         let (dir, manifest) = (dir.to_owned(), manifest.clone());
-        Ok(Some(Self { dir, manifest, parts: Vec::new(), tree_file: Some(tree) }))
+        Ok(Self { dir, manifest, parts: Vec::new(), tree_file: Some(tree) })
     }
 
     /// Number of leaves in the files, whatever the manifest states.
     pub fn leaf_count(&self) -> u64 {
         match &self.tree_file {
             Some(tree) => tree.leaves,
-            None => self.parts.iter().map(PartFile::leaves).sum(),
+            None => self.parts.iter().map(|part| part.leaves).sum(),
         }
     }
 
@@ -280,15 +278,15 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Refills an exhausted buffer; false at the end of the part.
-    fn fill(&mut self) -> Result<bool, Failure> {
+    /// The next word, after an exhausted buffer was refilled; `None` at the end of the part.
+    fn head(&mut self) -> Result<Option<u64>, Failure> {
         if self.position == self.words.len() {
-            let left = (self.file.leaves() - self.next).min(CHUNK);
+            let left = (self.file.leaves - self.next).min(CHUNK);
             self.words.resize(left as usize, 0);
             self.file.read_at(self.next, &mut self.words)?;
             (self.next, self.position) = (self.next + left, 0);
         }
-        Ok(!self.words.is_empty())
+        Ok(self.words.get(self.position).copied())
     }
 }
 
@@ -303,9 +301,7 @@ fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Resu
     let mut readers: Vec<Reader> = parts.iter().map(reader).collect();
     let mut heads = BinaryHeap::new();
     for (part, reader) in readers.iter_mut().enumerate() {
-        if reader.fill()? {
-            heads.push(Reverse((reader.words[0], part)));
-        }
+        heads.extend(reader.head()?.map(|head| Reverse((head, part))));
     }
     while let Some(Reverse((_, part))) = heads.pop() {
         let limit = heads.peek().map_or(u64::MAX, |Reverse((head, _))| *head);
@@ -317,9 +313,7 @@ fn merge(parts: &[PartFile], run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Resu
             return Ok(());
         }
         reader.position += len;
-        if reader.fill()? {
-            heads.push(Reverse((reader.words[reader.position], part)));
-        }
+        heads.extend(reader.head()?.map(|head| Reverse((head, part))));
     }
     Ok(())
 }

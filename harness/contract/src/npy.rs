@@ -16,7 +16,8 @@ pub struct PartFile {
     path: PathBuf,
     file: File,
     offset: u64,
-    leaves: u64,
+    /// Number of words.
+    pub leaves: u64,
 }
 
 impl PartFile {
@@ -49,11 +50,6 @@ impl PartFile {
             return Err(wrong(format!("has {found} bytes, but {implied}")));
         }
         Ok(Self { path: path.to_owned(), file, offset, leaves: len })
-    }
-
-    /// Number of words.
-    pub fn leaves(&self) -> u64 {
-        self.leaves
     }
 
     /// Fills `words` with the words from index `first` on.
@@ -144,7 +140,7 @@ mod tests {
         write(file.path(), &words).unwrap();
         let part = PartFile::open(file.path()).unwrap();
         assert_eq!(part.read_all().unwrap(), words);
-        assert!(part.leaves() > 0);
+        assert!(part.leaves > 0);
     }
 
     #[test]
@@ -163,8 +159,8 @@ mod tests {
         let file = file_of(b"");
         write(file.path(), &[]).unwrap();
         let part = PartFile::open(file.path()).unwrap();
-        assert_eq!((part.leaves(), part.read_all().unwrap()), (0, Vec::new()));
-        assert_eq!(part.leaves(), 0);
+        assert_eq!((part.leaves, part.read_all().unwrap()), (0, Vec::new()));
+        assert_eq!(part.leaves, 0);
     }
 
     #[test]

@@ -76,12 +76,9 @@ impl Octant {
 
     /// Chebyshev distance of two closed octants, in level-19 cells; 0 if they touch.
     pub fn distance(&self, other: &Self) -> i64 {
-        let ends = |o: &Self, a: usize| (i64::from(o.corner[a]), i64::from(o.corner[a] + o.edge()));
-        let along = |a: usize| {
-            let ((low, high), (low_other, high_other)) = (ends(self, a), ends(other, a));
-            (low - high_other).max(low_other - high)
-        };
-        (0..3).map(along).fold(0, i64::max)
+        let ((low, high), (its_low, its_high)) = (self.bounds(), other.bounds());
+        let along = |a: usize| (low[a] - its_high[a]).max(its_low[a] - high[a]);
+        (0..3).map(along).fold(0, i64::max) / UNITS_PER_CELL
     }
 
     /// Minimum and maximum corner in lattice units.

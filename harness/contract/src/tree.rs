@@ -257,10 +257,8 @@ impl Builder {
     /// # Errors
     /// If it is rejected; the tree is unchanged.
     pub fn push(&mut self, word: u64) -> Result<(), String> {
-        match word::fault(word) {
-            Some(why) => Err(why),
-            None => self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind),
-        }
+        word::check(word)?;
+        self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind)
     }
 
     /// Adds a leaf of any kind, [`DELETED`] included.
@@ -314,10 +312,7 @@ impl Builder {
 
 /// Number of common ancestors of two level-19 cells, themselves excluded.
 fn shared_levels(a: u64, b: u64) -> usize {
-    match (a ^ b).checked_ilog2() {
-        Some(bit) => usize::from(LEVEL_MAX) - bit as usize / 3,
-        None => usize::from(LEVEL_MAX),
-    }
+    usize::from(LEVEL_MAX) - (a ^ b).checked_ilog2().unwrap_or(0) as usize / 3
 }
 
 /// The digit of the child that contains this cell, among the children of its ancestor at `level`.

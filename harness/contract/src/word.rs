@@ -8,6 +8,7 @@ use std::fmt;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
+use crate::lattice::cell_at;
 use crate::octant::{CELLS_PER_EDGE, LEVEL_MAX, Octant};
 
 /// One past the Morton code of the last level-19 cell.
@@ -94,11 +95,14 @@ pub fn level(word: u64) -> u8 {
     (word >> 2 & 31) as u8
 }
 
-/// The reason why a word is not a leaf, and whether its bytes may be swapped; `None` if it is one.
-pub fn fault(word: u64) -> Option<String> {
-    let why = violation(word)?;
+/// Checks that a word is a leaf.
+///
+/// # Errors
+/// The reason why it is none, and whether its bytes may be swapped.
+pub fn check(word: u64) -> Result<(), String> {
+    let Some(why) = violation(word) else { return Ok(()) };
     let is_swapped = violation(word.swap_bytes()).is_none();
-    Some(why + if is_swapped { "; with its bytes swapped it would be a leaf" } else { "" })
+    Err(why + if is_swapped { "; with its bytes swapped it would be a leaf" } else { "" })
 }
 
 fn violation(word: u64) -> Option<String> {
@@ -124,9 +128,7 @@ impl Order {
     /// # Errors
     /// Why the word is none.
     pub fn add(&mut self, word: u64) -> Result<(), String> {
-        if let Some(why) = fault(word) {
-            return Err(format!("the word {word:#018x} is not a leaf: {why}"));
-        }
+        check(word).map_err(|why| format!("the word {word:#018x} is not a leaf: {why}"))?;
         if key(word) < self.0 {
             return Err(format!("{} overlaps or precedes the leaf before it", octant(word)));
         }
@@ -145,12 +147,21 @@ pub fn encode(leaf: &Leaf) -> u64 {
 /// # Errors
 /// If the word is not a leaf.
 pub fn decode(word: u64) -> Result<Leaf, String> {
-    fault(word).map_or_else(|| Ok(Leaf { octant: octant(word), side: side(word) }), Err)
+    check(word)?;
+    Ok(Leaf { octant: octant(word), side: side(word) })
 }
 
 /// The octant of a valid word.
 pub fn octant(word: u64) -> Octant {
     Octant { corner: corner_of(key(word)), level: level(word) }
+}
+
+/// The index of the leaf whose half-open octant contains a lattice point, among sorted leaves that do not overlap; `None` for a point outside
+/// the root.
+pub fn leaf_at(words: &[u64], point: [i64; 3]) -> Option<usize> {
+    let of_cell = key_of(cell_at(point)?);
+    let i = words.partition_point(|&w| key(w) <= of_cell).checked_sub(1)?;
+    (of_cell < key(words[i]) + span(level(words[i]))).then_some(i)
 }
 
 /// Whether the surface crosses the leaf of a word.
@@ -166,6 +177,8 @@ pub fn side(word: u64) -> Side {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::UNITS_PER_EDGE;
+    use crate::testing::random_words;
     use proptest::prelude::*;
 
     #[test]
@@ -196,15 +209,42 @@ mod tests {
             prop_assert_eq!(key_of([x, y, z]), expected);
             prop_assert_eq!(corner_of(expected), [x, y, z]);
         }
+
+        #[test]
+        fn the_leaf_at_a_point_is_found_among_all(words in random_words(3), point in prop::array::uniform3(-5i64..=UNITS_PER_EDGE + 5)) {
+            let contains = |w: &u64| {
+                let (low, high) = octant(*w).bounds();
+                (0..3).all(|a| low[a] <= point[a] && point[a] < high[a])
+            };
+            prop_assert_eq!(leaf_at(&words, point), words.iter().position(contains));
+            for &w in &words {
+                let (low, high) = octant(w).bounds();
+                prop_assert_eq!(leaf_at(&words, low).map(|i| words[i]), Some(w));
+                prop_assert_eq!(leaf_at(&words, high.map(|c| c - 1)).map(|i| words[i]), Some(w));
+            }
+        }
     }
 
     #[test]
     fn each_invalid_field_has_its_own_error() {
-        assert_eq!(fault(20 << 2).unwrap(), "level 20 is deeper than 19");
-        let swapped = fault(0x1234_5670_0000_004c_u64.swap_bytes()).unwrap();
+        assert_eq!(check(20 << 2).unwrap_err(), "level 20 is deeper than 19");
+        let swapped = check(0x1234_5670_0000_004c_u64.swap_bytes()).unwrap_err();
         assert!(swapped.ends_with("; with its bytes swapped it would be a leaf"), "{swapped}");
-        assert_eq!(fault(3).unwrap(), "side 3 does not exist");
-        assert!(fault(1 << 7).unwrap().starts_with("the corner"));
-        assert_eq!(fault(1 << 7 | 19 << 2), None);
+        assert_eq!(check(3).unwrap_err(), "side 3 does not exist");
+        assert!(check(1 << 7).unwrap_err().starts_with("the corner"));
+        assert_eq!(check(1 << 7 | 19 << 2), Ok(()));
+    }
+
+    #[test]
+    fn the_root_is_half_open() {
+        assert_eq!(cell_at([0; 3]), Some([0; 3]));
+        assert_eq!(cell_at([UNITS_PER_EDGE - 1; 3]), Some([CELLS_PER_EDGE - 1; 3]));
+        for axis in 0..3 {
+            for outside in [-1, UNITS_PER_EDGE] {
+                let mut point = [5; 3];
+                point[axis] = outside;
+                assert!(cell_at(point).is_none() && leaf_at(&[0], point).is_none());
+            }
+        }
     }
 }

@@ -136,13 +136,12 @@ fn audit_within(
             report.leaves = pass.tally.leaves;
             report.nodes = pass.tree.as_ref().map_or(0, Tree::nodes) as u64;
             let mut files = CheckResult::new(checks::FILES);
-            let tree = manifest.hyper_tree_grid.is_some();
-            files.examined = manifest.parts.len() as u64 + u64::from(tree);
+            let tree = manifest.hyper_tree_grid.as_deref();
+            files.examined = manifest.parts.len() as u64 + u64::from(tree.is_some());
             let subject = Subject::of(manifest, manifest.tree, pass, case).promising(promises);
             report.checks = std::iter::once(files).chain(checks::all(&subject)).collect();
-            if tree && mesh.tree_file.is_none() {
-                report.checks.push(tree_file(dir, manifest));
-            }
+            let beside_parts = tree.filter(|_| mesh.tree_file.is_none());
+            report.checks.extend(beside_parts.map(|name| tree_file(dir, name, manifest)));
         }
         Err(e) => report.checks.push(CheckResult::unreadable(&e)),
     }
@@ -152,11 +151,10 @@ fn audit_within(
 }
 
 /// Compares the tree of a mesh that also has parts with the manifest.
-fn tree_file(dir: &Path, manifest: &Manifest) -> CheckResult {
+fn tree_file(dir: &Path, name: &str, manifest: &Manifest) -> CheckResult {
     let mut result = CheckResult::new(TREE);
     let mut digest = Digest::default();
-    let read = Mesh::of_tree(dir, manifest).and_then(|tree| {
-        let Some(tree) = tree else { return Ok(()) };
+    let read = Mesh::of_tree(dir, name, manifest).and_then(|tree| {
         tree.stream(&mut |_, run| {
             result.examined += run.len() as u64;
             run.iter().for_each(|&word| digest.add(word));

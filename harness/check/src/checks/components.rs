@@ -1,12 +1,12 @@
 //! The components of T0's leaves, their sides, and which of them are enclosed (reference/DEFINITION.md,
 //! sections 4 and 5).
 
-use contract::lattice::{FacetLattice, UNITS_PER_EDGE};
+use contract::lattice::FacetLattice;
 use contract::manifest::Manifest;
-use contract::octant::{Octant, UNITS_PER_CELL};
+use contract::octant::Octant;
 use contract::parity::Parity;
 use contract::sets::Sets;
-use contract::word::{self, Side};
+use contract::word::{self, Side, leaf_at};
 
 /// Number of candidates whose rays are computed before the majority decides.
 const CANDIDATES_MAX: usize = 32;
@@ -72,16 +72,13 @@ fn decided(
     let component = |leaves: Vec<u32>| {
         let (side, decision) = decide(&leaves);
         let first = word::octant(words[leaves[0] as usize]);
-        Component { leaves, side, decision, first, enclosed: false }
+        let enclosed = side == Side::Outside && !touches_boundary(words, &leaves);
+        Component { leaves, side, decision, first, enclosed }
     };
     let mut components: Vec<Component> = groups(words).into_iter().map(component).collect();
-    let is_outside = |component: &Component| component.side == Side::Outside;
-    let is_far_field = |c: &Component| is_outside(c) && touches_boundary(words, &c.leaves);
-    let far_field: Vec<bool> = components.iter().map(is_far_field).collect();
-    if inputs.deletes_enclosed() && far_field.contains(&true) {
-        for (component, is_far_field) in components.iter_mut().zip(far_field) {
-            component.enclosed = is_outside(component) && !is_far_field;
-        }
+    let has_far_field = components.iter().any(|c| c.side == Side::Outside && !c.enclosed);
+    if !(inputs.deletes_enclosed() && has_far_field) {
+        components.iter_mut().for_each(|component| component.enclosed = false);
     }
     components
 }
@@ -108,21 +105,6 @@ pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
 /// Whether any of these leaves has a face on the root's boundary.
 pub fn touches_boundary(words: &[u64], leaves: &[u32]) -> bool {
     leaves.iter().any(|&i| word::octant(words[i as usize]).is_at_boundary())
-}
-
-/// The index of the leaf whose half-open octant contains a lattice point; `None` for a point outside the root.
-pub fn leaf_at(words: &[u64], point: [i64; 3]) -> Option<usize> {
-    if !in_root(point) {
-        return None;
-    }
-    let key = word::key_of(point.map(|q| (q / UNITS_PER_CELL) as u32));
-    let i = words.partition_point(|&w| word::key(w) <= key).checked_sub(1)?;
-    (key < word::key(words[i]) + word::span(word::level(words[i]))).then_some(i)
-}
-
-/// Whether a lattice point lies in the root's half-open cube.
-pub fn in_root(point: [i64; 3]) -> bool {
-    point.iter().all(|q| (0..UNITS_PER_EDGE).contains(q))
 }
 
 /// The indices of the leaves that contain seeds, ascending, with the index of the first seed in each.
@@ -187,6 +169,7 @@ fn by_rays(leaves: &[u32], words: &[u64], parity: &Parity) -> (Side, Decision) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::lattice::UNITS_PER_EDGE;
     use contract::testing::random_words;
     use proptest::prelude::*;
 
@@ -229,20 +212,6 @@ mod tests {
                     low.contains(&0) || high.contains(&UNITS_PER_EDGE)
                 });
                 prop_assert_eq!(touches_boundary(&words, &group), at_boundary);
-            }
-        }
-
-        #[test]
-        fn the_leaf_at_a_point_is_found_among_all(words in random_words(3), point in prop::array::uniform3(-5i64..=UNITS_PER_EDGE + 5)) {
-            let contains = |w: &u64| {
-                let (low, high) = word::octant(*w).bounds();
-                (0..3).all(|a| low[a] <= point[a] && point[a] < high[a])
-            };
-            prop_assert_eq!(leaf_at(&words, point), words.iter().position(contains));
-            for &w in &words {
-                let (low, high) = word::octant(w).bounds();
-                prop_assert_eq!(leaf_at(&words, low).map(|i| words[i]), Some(w));
-                prop_assert_eq!(leaf_at(&words, high.map(|c| c - 1)).map(|i| words[i]), Some(w));
             }
         }
     }
@@ -300,18 +269,6 @@ mod tests {
             assert_eq!((component.side, component.is_ambiguous()), (side, ambiguous), "{twice}");
             let other = found.iter().find(|c| c.first != component.first).unwrap();
             assert_eq!((other.side, other.is_ambiguous()), (Side::Outside, false), "{twice}");
-        }
-    }
-
-    #[test]
-    fn the_root_is_half_open() {
-        assert!(in_root([0; 3]) && in_root([UNITS_PER_EDGE - 1; 3]));
-        for axis in 0..3 {
-            for outside in [-1, UNITS_PER_EDGE] {
-                let mut point = [5; 3];
-                point[axis] = outside;
-                assert!(!in_root(point) && leaf_at(&[0], point).is_none());
-            }
         }
     }
 }

@@ -31,11 +31,7 @@ pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
         return result;
     }
     let first = mesh.iter().zip(reference).take_while(|(a, b)| a == b).count();
-    let text = |words: &[u64]| match words.get(first) {
-        Some(&word) => Named(word, *root).to_string(),
-        None => "no more leaves".to_owned(),
-    };
-    let (has, wanted) = (text(mesh), text(reference));
+    let [has, wanted] = [mesh, reference].map(|words| Named(words.get(first).copied(), *root));
     result.report(format_args!("first difference: the mesh has {has}; it should have {wanted}"));
     let lacking = |a: &[u64], b: &[u64]| a.iter().filter(|&w| b.binary_search(w).is_err()).count();
     let (mesh, reference) = (&mesh[first..], &reference[first..]);
@@ -45,14 +41,15 @@ pub fn compare(mesh: &[u64], reference: &[u64], root: &Root) -> CheckResult {
     result
 }
 
-/// A word of a mesh in a root as text, whether or not it is a leaf.
-pub(crate) struct Named(pub u64, pub Root);
+/// A word of a mesh in a root as text, whether or not it is a leaf, if the mesh has any more.
+pub(crate) struct Named(pub Option<u64>, pub Root);
 
 impl fmt::Display for Named {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match word::decode(self.0) {
+        let Some(word) = self.0 else { return f.write_str("no more leaves") };
+        match word::decode(word) {
             Ok(Leaf { octant, side }) => write!(f, "{side} leaf: {}", self.1.place(octant)),
-            Err(why) => write!(f, "the word {:#018x}: {why}", self.0),
+            Err(why) => write!(f, "the word {word:#018x}: {why}"),
         }
     }
 }

@@ -13,8 +13,9 @@
 use super::components::{self, Component};
 use super::manifest::COMPONENTS;
 use super::{Check, CheckResult, Subject, contact, json, some_leaves};
+use contract::lattice::cell_at;
 use contract::manifest::{Components, EnclosedComponents, Manifest, Sides, Tree as Kind};
-use contract::octant::{Octant, UNITS_PER_CELL};
+use contract::octant::Octant;
 use contract::tree::{Handle, Tree};
 use contract::word::{self, Leaf, Side};
 
@@ -150,8 +151,7 @@ fn uniform_octants(tree: &Tree) -> Option<Vec<u64>> {
 fn seeds_in_flow(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let flow = terms.side_of_flow();
     for (i, &seed) in terms.seeds.iter().enumerate() {
-        let cell = components::in_root(seed).then(|| seed.map(|q| (q / UNITS_PER_CELL) as u32));
-        let found = match cell.map(|cell| tree.locate(cell)) {
+        let found = match cell_at(seed).map(|cell| tree.locate(cell)) {
             Some(Some((_, kind))) if kind == flow as u8 => continue,
             Some(Some((leaf, kind))) => {
                 format!("in the {} leaf {}", contact::name(1 << kind), terms.root.place(leaf))
@@ -187,8 +187,8 @@ fn possible(tree: &Tree, terms: &Manifest, manifest: &Manifest, result: &mut Che
 
 /// Whether a point lies in a leaf that was deleted from a final mesh, or that is outside in T0.
 fn deleted_at(tree: &Tree, at: [f64; 3], kind: Kind, terms: &Manifest) -> bool {
-    let Some(point) = terms.root.quantise_seed(at) else { return false };
-    let found = tree.locate(point.map(|q| (q / UNITS_PER_CELL) as u32));
+    let Some(cell) = terms.root.quantise(at).and_then(cell_at) else { return false };
+    let found = tree.locate(cell);
     match kind {
         Kind::Final => found.is_none(),
         Kind::Base => found.is_some_and(|(leaf, side): (Octant, u8)| {
@@ -201,6 +201,7 @@ fn deleted_at(tree: &Tree, at: [f64; 3], kind: Kind, terms: &Manifest) -> bool {
 mod tests {
     use super::*;
     use contract::manifest::{Components, Enclosed, Keep};
+    use contract::octant::UNITS_PER_CELL;
     use contract::testing::{leaf_set, words_with_sides};
 
     /// 8^3 cells of edge 1: a cavity of 2^3 outside leaves in the middle, within a wall of crossing leaves.

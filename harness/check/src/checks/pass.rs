@@ -96,7 +96,7 @@ impl State {
         for &word in run {
             self.by_code[(word & 127) as usize] += 1;
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
-                let [before, word] = [before, word].map(|word| Named(word, self.root));
+                let [before, word] = [before, word].map(|word| Named(Some(word), self.root));
                 let finding = format_args!("{file} is not sorted: {word} follows {before}");
                 self.linear.report(finding);
             }
@@ -113,10 +113,10 @@ impl State {
                 self.last = word;
                 continue;
             }
-            let [leaf, last] = [word, self.last].map(|word| Named(word, self.root));
-            match word::fault(word) {
-                Some(_) => self.linear.report(format_args!("not a leaf: {leaf}")),
-                None => self.linear.report(format_args!("two leaves overlap: {leaf} and {last}")),
+            let [leaf, last] = [word, self.last].map(|word| Named(Some(word), self.root));
+            match word::check(word) {
+                Err(_) => self.linear.report(format_args!("not a leaf: {leaf}")),
+                Ok(()) => self.linear.report(format_args!("two leaves overlap: {leaf} and {last}")),
             }
         }
     }

@@ -93,7 +93,7 @@ impl Truth {
 
     /// The component of the leaf of T0 that contains an octant; `None` if a facet crosses that leaf.
     pub fn component_at(&self, octant: &Octant) -> Option<&Component> {
-        let leaf = components::leaf_at(&self.words, octant.bounds().0)?;
+        let leaf = word::leaf_at(&self.words, octant.bounds().0)?;
         self.component_of[leaf].map(|index| &self.components[index as usize])
     }
 

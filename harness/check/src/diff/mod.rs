@@ -99,9 +99,8 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
         let [x, y] = pairs.find(|[x, y]| x != y).expect("the digests of the octant differ");
         let root = a.manifest.root;
         let text = |word: Option<u64>| match word {
-            None => "no more leaves".to_owned(),
-            Some(word) if without_sides.is_none() => Named(word, root).to_string(),
-            Some(word) => root.place(word::octant(word)).to_string(),
+            Some(word) if without_sides.is_some() => root.place(word::octant(word)).to_string(),
+            _ => Named(word, root).to_string(),
         };
         report.leaf = Some(format!("first difference:\n  A has {}\n  B has {}", text(x), text(y)));
         report.rule = without_sides.is_none().then(|| rule(&a, &b, case, [x, y]));

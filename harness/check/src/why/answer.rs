@@ -12,8 +12,8 @@ use super::Mesh;
 pub use super::gradation::Rule;
 use super::gradation::parent;
 use crate::checks::components::{Component, Decision};
-use contract::lattice::{Root, UNITS_PER_EDGE};
-use contract::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
+use contract::lattice::{Root, UNITS_PER_EDGE, cell_at};
+use contract::octant::{LEVEL_MAX, Octant};
 use contract::word::{Leaf, Side};
 use std::fmt;
 
@@ -74,9 +74,9 @@ impl Answer {
         let Self { point, leaf, base_leaf, deleted_by, split, root, .. } = self;
         let leaf = leaf.map(|leaf| leaf.octant);
         for octant in leaf.iter().chain(base_leaf) {
-            let ((low, high), at) = (octant.bounds(), root.quantise_seed(*point));
-            let holds = |at: [i64; 3]| (0..3).all(|a| (low[a]..high[a]).contains(&at[a]));
-            assert!(at.is_some_and(holds), "{point:?} is not in the {octant}");
+            let cell = root.quantise(*point).and_then(cell_at);
+            let holds = |corner| octant.contains(&Octant { corner, level: LEVEL_MAX });
+            assert!(cell.is_some_and(holds), "{point:?} is not in the {octant}");
         }
         let is_apart = deleted_by.is_none() || leaf.is_none();
         assert!(is_apart, "the leaf {leaf:?} was deleted: {deleted_by:?}");
@@ -198,11 +198,10 @@ impl Mesh<'_> {
     /// One sentence, if the point lies outside the root.
     pub fn at(&self, point: [f64; 3]) -> Result<Answer, String> {
         let root = self.inputs.root;
-        let lattice = root.quantise_seed(point).ok_or_else(|| {
+        let corner = root.quantise(point).and_then(cell_at).ok_or_else(|| {
             let (from, to) = (root.origin, root.to_user([UNITS_PER_EDGE; 3]));
             format!("the point {point:?} lies outside the root, which is from {from:?} to {to:?}; give a point inside")
         })?;
-        let corner = lattice.map(|q| (q / UNITS_PER_CELL) as u32);
         let leaf = self.tree.locate(corner);
         let leaf = leaf.map(|(octant, kind)| Leaf { octant, side: Side::ALL[usize::from(kind)] });
         let cell = Octant { corner, level: LEVEL_MAX };

@@ -15,7 +15,7 @@ use std::collections::HashSet;
 /// The words of a mesh that lie in these leaves of T0, and the others.
 fn within(mesh: &[u64], base: &[u64], leaves: &[u32]) -> (Vec<u64>, Vec<u64>) {
     let leaves: HashSet<usize> = leaves.iter().map(|&i| i as usize).collect();
-    let containing = |w: u64| components::leaf_at(base, word::octant(w).bounds().0);
+    let containing = |w: u64| word::leaf_at(base, word::octant(w).bounds().0);
     mesh.iter().partition(|&&w| containing(w).is_some_and(|i| leaves.contains(&i)))
 }
 

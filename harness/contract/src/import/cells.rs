@@ -75,14 +75,12 @@ impl Cells {
     fn agree_with_levels(&self, words: &[u64]) -> Result<(), Failure> {
         let Some(levels) = &self.levels else { return Ok(()) };
         let offset = |i: usize| i64::from(word::level(words[i])).wrapping_sub(levels[i]);
-        match (1..words.len()).find(|&i| offset(i) != offset(0)) {
-            None => Ok(()),
-            Some(i) => Err(Failure::input(format!(
-                "cell {i} has level {} and edge {}, but cell 0 has level {} and edge {}: levels and edges contradict each \
-                 other",
-                levels[i], self.edges[i], levels[0], self.edges[0]
-            ))),
-        }
+        let differs = (1..words.len()).find(|&i| offset(i) != offset(0));
+        let Some(i) = differs else { return Ok(()) };
+        Err(Failure::input(format!(
+            "cell {i} has level {} and edge {}, but cell 0 has level {} and edge {}: levels and edges contradict each other",
+            levels[i], self.edges[i], levels[0], self.edges[0]
+        )))
     }
 
     /// The least root in which the cells can be leaves of one oct-tree, for a file that states none: its edge is a power of two of the coarsest
@@ -98,10 +96,8 @@ impl Cells {
             ))
         };
         let (edges, corners) = (&self.edges, &self.corners);
-        let coarsest = (0..self.count()).max_by(|&a, &b| edges[a].total_cmp(&edges[b]));
-        let (edge, corner) = coarsest
-            .map(|cell| (edges[cell], corners[cell]))
-            .ok_or_else(|| unusable("there are none"))?;
+        let coarsest = edges.iter().zip(corners).max_by(|a, b| a.0.total_cmp(b.0));
+        let (&edge, corner) = coarsest.ok_or_else(|| unusable("there are none"))?;
         let finest = edges.iter().copied().fold(f64::INFINITY, f64::min);
         let along = |axis: usize| corners.iter().map(move |corner| corner[axis]);
         let low = [0, 1, 2].map(|axis| along(axis).fold(f64::INFINITY, f64::min));
@@ -137,7 +133,7 @@ impl Cells {
 /// The octant of a cell.
 fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
     let wrong = |why: &str| Err(why.to_owned());
-    if !(edge > 0.0 && edge.is_finite() && corner.iter().all(|c| c.is_finite())) {
+    if !(Root { origin: corner, edge }).is_cube() {
         return wrong("has an edge that is not positive, or coordinates that are not finite");
     }
     let depth = (root.edge / edge).log2().round();

@@ -13,8 +13,8 @@ use crate::files;
 use bytemuck::{Pod, pod_collect_to_vec};
 use std::path::Path;
 
-/// `P4EST_ONDISK_FORMAT` and `P8EST_ONDISK_FORMAT`, by the dimension.
-const FORMATS: [(usize, u64); 2] = [(2, 0x0200_0009), (3, FORMAT)];
+/// `P4EST_ONDISK_FORMAT`.
+const FORMAT_PLANE: u64 = 0x0200_0009;
 /// `P8EST_ONDISK_FORMAT`.
 pub const FORMAT: u64 = 0x0300_0009;
 /// Lengths of a tree in integer coordinates, in the versions of p4est.
@@ -192,8 +192,8 @@ impl<'a> Input<'a> {
 /// The connectivity, and the format of the file.
 fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
     let (dimension, expected) = match input.items(8, 1)? {
-        b"p4est\0\0\0" => FORMATS[0],
-        b"p8est\0\0\0" => FORMATS[1],
+        b"p4est\0\0\0" => (2, FORMAT_PLANE),
+        b"p8est\0\0\0" => (3, FORMAT),
         _ => return Err(damaged("it does not begin with p4est or p8est")),
     };
     input.items(24, 1)?;

@@ -31,9 +31,7 @@ pub fn leaf_set(
 ) -> Result<LeafSet, Failure> {
     let stated = given.or(case.map(|case| case.root)).or(cells.root);
     let root = stated.map_or_else(|| cells.least_root(), Ok)?;
-    if !(root.edge > 0.0 && root.edge.is_finite() && root.origin.iter().all(|c| c.is_finite())) {
-        return Err(Failure::input(format!("has a root that is not a cube: {root}")));
-    }
+    Failure::unless(root.is_cube(), format_args!("has a root that is not a cube: {root}"))?;
     let words = cells.words(&root)?;
     let is_of_digest = |stated: Digest| cells.root != Some(root) || stated == Digest::of(&words);
     let is_whole = cells.digest.is_none_or(is_of_digest);
@@ -65,10 +63,8 @@ pub fn check_invariants(cells: &Cells, set: &LeafSet) {
     let of_cells = cells.edges.iter().map(|edge| (edge / manifest.root.edge).powi(3)).sum::<f64>();
     let span = |&leaf: &u64| word::span(word::level(leaf)) as f64 / word::KEY_END as f64;
     let of_leaves = words.iter().map(span).sum::<f64>();
-    assert!(
-        (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells,
-        "cells fill {of_cells} of the root, and their leaves {of_leaves}"
-    );
+    let is_same = (of_cells - of_leaves).abs() <= 4.0 * TOLERANCE * of_cells;
+    assert!(is_same, "cells fill {of_cells} of the root, and their leaves {of_leaves}");
 }
 
 /// Name of the tree in a directory.

@@ -34,7 +34,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     for (part, words) in parts {
         for word in words {
             // Side bits must be valid only if they are used.
-            if let Some(why) = word::fault(if with_sides { word } else { word & !3 }) {
+            if let Err(why) = word::check(if with_sides { word } else { word & !3 }) {
                 let cell = cells.count();
                 let part = if part.is_empty() { part } else { part + ": " };
                 return Err(Failure::input(format!(

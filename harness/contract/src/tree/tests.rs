@@ -66,7 +66,7 @@ fn a_deleted_leaf_bounds_no_level_from_above_and_is_a_kind() {
         }
     }
     assert!(builder.push_leaf(word::KEY_END - 1, 19, 0).unwrap_err().contains("overlaps"));
-    assert_eq!(builder.push(25 << 2), Err(word::fault(25 << 2).unwrap()));
+    assert_eq!(builder.push(25 << 2), Err(word::check(25 << 2).unwrap_err()));
     let tree = builder.finish();
     let root = tree.root();
     assert_eq!(

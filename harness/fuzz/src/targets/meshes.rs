@@ -93,7 +93,7 @@ pub(super) fn forest(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         return false;
     };
     assert_eq!(set.words.len(), count);
-    assert!(set.words.iter().all(|&word| word::fault(word).is_none()));
+    assert!(set.words.iter().all(|&word| word::check(word).is_ok()));
     assert!(
         set.words.is_sorted_by(|&a, &b| word::key(a) + word::span(word::level(a)) <= word::key(b))
     );
@@ -127,7 +127,7 @@ pub(super) fn tree_file(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     if whole.is_err() {
         return false;
     }
-    assert!(words.iter().all(|&word| word::fault(word).is_none()));
+    assert!(words.iter().all(|&word| word::check(word).is_ok()));
     assert!(words.is_sorted_by(|&a, &b| word::key(a) + word::span(word::level(a)) <= word::key(b)));
     assert_eq!(tree.leaves, words.len() as u64);
     true

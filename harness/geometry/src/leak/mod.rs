@@ -20,7 +20,6 @@ use contract::case::Case;
 use contract::failure::{Failure, Watch};
 use contract::lattice::{Root, UNITS_PER_EDGE};
 use contract::manifest::Leak;
-use contract::octant::{CELLS_PER_EDGE, UNITS_PER_CELL};
 use contract::word::{self, Side};
 use report::{Answers, Closes, Report, SCHEMA, Spacing};
 use serde::Serialize;
@@ -250,10 +249,8 @@ fn to_user(root: &Root, at: Point) -> [f64; 3] {
 
 /// The leaf that contains a point of the root, among the sorted words of a tree that fills it.
 fn leaf_at(words: &[u64], at: Point) -> u64 {
-    let last = i64::from(CELLS_PER_EDGE) - 1;
-    let cell = at.to_array().map(|c| (c as i64 / UNITS_PER_CELL).clamp(0, last) as u32);
-    let after = words.partition_point(|&w| word::key(w) <= word::key_of(cell));
-    words[after - 1]
+    let at = at.to_array().map(|c| (c as i64).clamp(0, UNITS_PER_EDGE - 1));
+    words[word::leaf_at(words, at).expect("the leaves fill the root")]
 }
 
 /// The sentence about an end in a leaf that facets cross, with the nearest centre of a free one.
