@@ -37,7 +37,6 @@ pub fn publications() -> MutexGuard<'static, Vec<PathBuf>> {
 }
 
 /// A directory that is being filled beside its final place. It is deleted when it is dropped, or when the user interrupts.
-#[derive(Debug)]
 pub struct Staging(TempDir);
 
 impl Staging {

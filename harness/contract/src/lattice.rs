@@ -142,7 +142,6 @@ impl Root {
 }
 
 /// An octant in a root, as text. The text takes a while, and is made only if it is shown.
-#[derive(Clone, Copy, Debug)]
 pub struct Place(Root, Octant);
 
 impl fmt::Display for Place {

@@ -111,7 +111,6 @@ impl Neighbourhood {
 }
 
 /// An open box, in level-19 cells.
-#[derive(Clone, Copy, Debug)]
 pub struct Region {
     low: [i64; 3],
     high: [i64; 3],

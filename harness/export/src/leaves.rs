@@ -21,7 +21,6 @@ use contract::word;
 pub const CUT: u64 = 3;
 
 /// The leaves.
-#[derive(Debug, Default)]
 pub struct Leaves {
     words: Vec<u64>,
     /// How many cells are before each leaf.
@@ -217,7 +216,6 @@ impl Leaves {
 }
 
 /// An octant with its content and that of the octants of the same level across its faces.
-#[derive(Clone, Copy, Debug)]
 struct Around {
     /// The octant.
     octant: Octant,

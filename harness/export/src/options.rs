@@ -18,7 +18,6 @@ use contract::word::{self, KEY_END};
 use crate::selection::Selection;
 
 /// The leaves that are exported, and how.
-#[derive(Clone, Copy)]
 pub struct Export<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
@@ -63,7 +62,6 @@ impl Export<'_> {
 }
 
 /// Options of every export.
-#[derive(Clone, Copy)]
 pub struct Options<'a> {
     /// Whoever waits for the export.
     pub watch: &'a dyn Watch,

@@ -12,7 +12,6 @@ use super::tree::{Aabb, Point};
 use std::collections::HashMap;
 
 /// A shell.
-#[derive(Clone, Debug)]
 pub struct Shell {
     /// Index of the first facet.
     pub facet_first: u32,

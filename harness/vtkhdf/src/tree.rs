@@ -89,7 +89,6 @@ pub fn groups(window: u64) -> Range<u64> {
 }
 
 /// The nodes of a window, to be filled in any order.
-#[derive(Debug)]
 pub struct Window {
     first: u64,
     split: Vec<u8>,
@@ -204,7 +203,6 @@ pub(crate) fn metadata(shape: &Shape, arrays: &[Chunked; 3], start: u64) -> (Vec
 }
 
 /// A file that is being written: chunks in any order first, then the metadata.
-#[derive(Debug)]
 pub struct TreeWriter<W> {
     out: W,
     end: u64,

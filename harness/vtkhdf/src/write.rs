@@ -196,7 +196,6 @@ fn simple(len: u64) -> Vec<u8> {
 const LEVEL: u32 = 4;
 
 /// Compresses chunks.
-#[derive(Debug)]
 pub struct Deflater(Compress);
 
 impl Default for Deflater {

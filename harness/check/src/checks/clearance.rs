@@ -11,7 +11,6 @@ use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Tree};
 
 /// What is required near an octant: within `margin` level-19 cells of it, no leaf is coarser than these levels.
-#[derive(Clone, Copy)]
 pub struct Required {
     pub margin: i64,
     /// The level that the octant itself requires.

@@ -42,7 +42,6 @@ const NO_GEOMETRY: &str = "the geometry is unknown without a case";
 pub(crate) const NO_LEAVES: &str = "the mesh has no leaves";
 
 /// A property of meshes.
-#[derive(Clone, Copy, Debug)]
 pub struct Check {
     /// Its name in reports.
     pub name: &'static str,

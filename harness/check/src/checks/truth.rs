@@ -34,7 +34,6 @@ pub struct Truth {
 }
 
 /// A part of a mesh: a leaf, a hole, or an octant that has leaves of one kind only, whole or within one leaf of T0.
-#[derive(Clone, Copy, Debug)]
 pub struct Found {
     /// The octant.
     pub octant: Octant,

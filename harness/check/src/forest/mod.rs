@@ -23,7 +23,6 @@ use std::time::Instant;
 use topology::Topology;
 
 /// A leaf in units of [`LENGTH`].
-#[derive(Clone, Copy, Debug)]
 struct Leaf {
     corner: [i64; 3],
     level: u32,

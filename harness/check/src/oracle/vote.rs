@@ -6,7 +6,6 @@
 //! so contradictions are reported only. So are all contradictions of a case with seeds, which decide instead of rays.
 
 /// One oracle's answers.
-#[derive(Clone, Debug)]
 pub struct Answer {
     /// The oracle's name.
     pub name: String,

@@ -41,7 +41,6 @@ pub(super) enum Change {
 }
 
 /// A corrupted mesh.
-#[derive(Clone, Debug)]
 pub struct Mutation {
     /// The tree that was corrupted.
     pub tree: Kind,

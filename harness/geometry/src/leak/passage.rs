@@ -41,7 +41,6 @@ struct Way {
 }
 
 /// A point of a path.
-#[derive(Clone, Copy)]
 struct Place {
     at: Point,
     clearance: f64,
