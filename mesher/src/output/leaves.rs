@@ -90,7 +90,11 @@ impl Heaviest {
             if octant != self.octant {
                 (self.octant, self.leaves) = (octant, 0);
             }
-            let count = words.partition_point(|w| w >> 7 >> self.shift <= octant);
+            let is_within = |w: &u64| w >> 7 >> self.shift <= octant;
+            // Far from the surface most leaves are larger than an octant: a search of all words would take longer than making the leaf.
+            let near = (1..).map(|k| 1 << k).find(|&k| words.get(k).is_none_or(|w| !is_within(w)));
+            let near = near.map_or(words.len(), |k| words.len().min(k));
+            let count = words[..near].partition_point(is_within);
             self.leaves += count as u64;
             self.max = self.max.max(self.leaves);
             words = &words[count..];
