@@ -62,7 +62,7 @@ pub trait Comm {
         Traffic::default()
     }
 
-    /// Runs `body` without counting or timing its calls: for checks, which must not change the counters.
+    /// Runs `body` without counting the messages of its calls, whose time is that of calls all the same: for checks, and what serves reports.
     fn uncounted(&self, body: &mut dyn FnMut()) {
         body();
     }
@@ -90,7 +90,7 @@ pub fn gather<T: Pod>(comm: &dyn Comm, mine: &[T]) -> Vec<T> {
     comm.all_gather(packed.words()).values().collect()
 }
 
-/// Runs `body` without counting or timing its calls, and returns its result.
+/// Runs `body` without counting the messages of its calls, and returns its result.
 pub fn uncounted<T>(comm: &dyn Comm, body: impl FnOnce() -> T) -> T {
     let (mut body, mut result) = (Some(body), None);
     comm.uncounted(&mut || result = body.take().map(|body| body()));
