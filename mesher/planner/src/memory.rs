@@ -7,6 +7,7 @@ use mesher::record::{peak_rss_bytes, stated_bytes};
 use ranks::{Comm, gather};
 use rustix::process::{Resource, getrlimit};
 use serde::Serialize;
+use std::collections::HashMap;
 use std::fs::read_to_string;
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::path::Path;
@@ -134,10 +135,12 @@ impl Ranks {
 
     /// The limit that the ranks come closest to, if each takes as many bytes as given beyond what it has.
     pub fn tightest(&self, more: &[f64]) -> Option<Tightest> {
-        let mut all = Vec::new();
+        let (mut nodes, mut all) = (HashMap::new(), Vec::new());
         for (rank, own) in self.all.iter().zip(more) {
-            let on_node = self.all.iter().zip(more).filter(|(other, _)| other.node == rank.node);
-            let node: f64 = on_node.map(|(_, more)| more).sum();
+            *nodes.entry(rank.node).or_insert(0.0) += own;
+        }
+        for (rank, own) in self.all.iter().zip(more) {
+            let node = nodes[&rank.node];
             all.push(("address space", rank.address_space, own * self.in_process));
             all.push(("control group", rank.control_group, node));
             all.push(("machine", rank.machine, node));
