@@ -248,12 +248,6 @@ impl Ownership {
             || Some(self.owner(l, key)) == self.rank
     }
 
-    /// Whether this rank holds a brick.
-    #[inline]
-    pub fn holds(&self, l: Level, key: u64) -> bool {
-        self.owns(l, key) || !matches!(self.placement(l, key), Placement::Remote(_))
-    }
-
     /// Whether several ranks hold a brick of level `l`.
     pub fn is_replicated(&self, l: Level) -> bool {
         self.ranks > 1 && l <= self.level_replicated

@@ -10,6 +10,7 @@ use super::components::{self, FacedOctants, UnionFind};
 use super::nodes::{Component, Nodes};
 use bricks::octant::Level;
 use ranks::{Comm, MessageBuffer, gather};
+use rustc_hash::FxHashMap;
 
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
@@ -25,12 +26,8 @@ pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u3
     }
     let mut pairs = label_replicated(&mut labels, base, nodes, merged);
     pairs.extend(across_ranks(nodes, faces, merged, &labels, comm));
-    let all = forest(&gather(comm, &group_forest(pairs, comm)));
-    let least = |label: Label| {
-        let at = all.binary_search_by_key(&label, |pair| pair[0]);
-        at.map_or(label, |at| all[at][1])
-    };
-    labels.into_iter().map(least).collect()
+    let least = least(&gather(comm, &group_forest(pairs, comm)));
+    labels.iter().map(|label| *least.get(label).unwrap_or(label)).collect()
 }
 
 /// A spanning forest of the pairs of all ranks in a group, on the group's first rank, and none on the others.
@@ -81,24 +78,25 @@ fn label_replicated(
 /// Pairs of labels of components that share a face between this rank's bricks and another's. Collective.
 fn across_ranks(
     nodes: &Nodes,
-    mut faces: Vec<FacedOctants>,
+    faces: Vec<FacedOctants>,
     merged: &[u32],
     labels: &[Label],
     comm: &dyn Comm,
 ) -> Vec<[Label; 2]> {
     let label = |c: Component| labels[merged[c as usize] as usize];
-    let target = |f: &FacedOctants| (f.rank, f.level, f.key, label(f.component));
-    faces.sort_unstable_by_key(target);
+    let labelled = |f: FacedOctants| ((f.rank, f.level, f.key, label(f.component)), f.bits);
+    let mut faces: Vec<_> = faces.into_iter().map(labelled).collect();
+    faces.sort_unstable();
     let mut out = MessageBuffer::default();
-    for run in faces.chunk_by(|a, b| target(a) == target(b)) {
-        let bits = run.iter().fold(0, |all, f| all | f.bits);
-        let (rank, level, key, label) = target(&run[0]);
+    for run in faces.chunk_by(|a, b| a.0 == b.0) {
+        let bits = run.iter().fold(0, |all, f| all | f.1);
+        let (rank, level, key, label) = run[0].0;
         out.write(rank, [u64::from(level), key, label, bits]);
     }
     drop(faces);
-    let mut pairs = Vec::new();
+    let (mut pairs, mut path) = (Vec::new(), Vec::new());
     for &[level, key, remote, bits] in comm.sparse_all_to_all(out).words().as_chunks().0 {
-        nodes.find(level as Level, key, bits, |c| {
+        nodes.find(&mut path, level as Level, key, bits, |c| {
             let mine = label(c);
             // Most components on both sides have the label of a fully replicated brick already.
             if remote != mine && pairs.last() != Some(&[remote, mine]) {
@@ -111,16 +109,30 @@ fn across_ranks(
 
 /// Pairs that unite the same labels as `pairs`: one for each label but the least of its set, with that one. Ascending.
 fn forest(pairs: &[[Label; 2]]) -> Vec<[Label; 2]> {
-    let mut labels = pairs.as_flattened().to_vec();
-    labels.sort_unstable();
-    labels.dedup();
-    let mut sets = UnionFind::new(labels.len() as u32);
-    for pair in pairs {
-        let [a, b] = pair.map(|label| labels.partition_point(|&l| l < label) as u32);
-        sets.unite(a, b);
+    let all = least(pairs).into_iter().filter(|(label, least)| label != least);
+    let mut all: Vec<_> = all.map(|(label, least)| [label, least]).collect();
+    all.sort_unstable();
+    all
+}
+
+/// The least label of the set of each label in `pairs`.
+fn least(pairs: &[[Label; 2]]) -> FxHashMap<Label, Label> {
+    let mut numbers = FxHashMap::default();
+    let mut number = |label: &Label| {
+        let next = numbers.len() as Label;
+        *numbers.entry(*label).or_insert(next) as u32
+    };
+    let pairs: Vec<_> = pairs.iter().map(|[a, b]| [number(a), number(b)]).collect();
+    let mut sets = UnionFind::new(numbers.len() as u32);
+    pairs.into_iter().for_each(|[a, b]| sets.unite(a, b));
+    let mut least = vec![Label::MAX; numbers.len()];
+    for (label, number) in &mut numbers {
+        *number = sets.find(*number as u32).into();
+        let least = &mut least[*number as usize];
+        *least = (*least).min(*label);
     }
-    let all = (0..).zip(&labels).map(|(n, &label)| [label, labels[sets.find(n) as usize]]);
-    all.filter(|[label, least]| label != least).collect()
+    numbers.values_mut().for_each(|number| *number = least[*number as usize]);
+    numbers
 }
 
 #[cfg(test)]

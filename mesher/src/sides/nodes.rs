@@ -42,8 +42,8 @@ pub struct OpenBrick {
     pub split: u64,
     /// Its non-crossing leaves.
     pub open: u64,
-    /// Whether this rank holds it.
-    pub is_held: bool,
+    /// Which ranks hold it.
+    pub placement: Placement,
 }
 
 /// The bricks of a level in Morton order: one for each node.
@@ -55,10 +55,13 @@ pub fn open_bricks<'a>(
     let mut split = tree.split[l as usize].cursor();
     let mut crossing = tree.crossing[l as usize].cursor();
     Tree::exists(&tree.split, l).map(move |Brick { key, bits }| {
-        let is_held = ownership.holds(l, key);
-        let split = if is_held { split.get(key) } else { 0 };
-        let open = if is_held { bits & !split & !crossing.get(key) } else { 0 };
-        OpenBrick { key, split, open, is_held }
+        let is_local = !ownership.is_replicated(l) && ownership.owns(l, key);
+        let placement = if is_local { Placement::Local } else { ownership.placement(l, key) };
+        if let Placement::Remote(_) = placement {
+            return OpenBrick { key, split: 0, open: 0, placement };
+        }
+        let split = split.get(key);
+        OpenBrick { key, split, open: bits & !split & !crossing.get(key), placement }
     })
 }
 
@@ -97,9 +100,9 @@ impl Nodes {
                     out.first_child.push(children);
                     children += brick::parents(b.split).count_ones();
                 }
-                if l < 2 || ownership.is_replicated(l) || !b.is_held || !out.placements.is_empty() {
+                if b.placement != Placement::Local {
                     out.placements.resize(n, Placement::Local);
-                    out.placements.push(ownership.placement(l, b.key));
+                    out.placements.push(b.placement);
                 }
                 out.components.push(masks.len() as Component);
                 masks.extend(brick::components(b.open));
@@ -194,10 +197,24 @@ impl Nodes {
     }
 
     /// Calls `found` with the components of the octants `bits` of brick `key` of level `l`: of the leaves of that
-    /// level, or of the coarser leaves that contain them. Octants that are split have no component.
-    pub fn find(&self, l: Level, key: u64, bits: u64, mut found: impl FnMut(Component)) {
-        let mut node = 0;
-        for m in 0..=l {
+    /// level, or of the coarser leaves that contain them. Octants that are split have no component. `path` has the bricks on the way to
+    /// another brick, by level, empty at first; afterwards those on the way to this one.
+    pub fn find(
+        &self,
+        path: &mut Vec<(u64, Node)>,
+        l: Level,
+        key: u64,
+        bits: u64,
+        mut found: impl FnMut(Component),
+    ) {
+        let common = (0..=l).zip(&*path).take_while(|&(m, at)| at.0 == key >> (3 * (l - m))).count();
+        path.truncate(common);
+        if common == 0 {
+            path.push((0, 0));
+        }
+        // Where two bricks of the path follow on one, its octant that contains `bits` is split.
+        for m in common.saturating_sub(2) as Level..=l {
+            let node = path[m as usize].1;
             // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
             // one sibling group do.
             let octants = match l - m {
@@ -213,8 +230,11 @@ impl Nodes {
             if leaves == octants || m == l {
                 return;
             }
-            let Some((child, _)) = family.child(key >> (3 * (l - m - 1)) & 7) else { return };
-            node = child;
+            if path.len() == m as usize + 1 {
+                let below = key >> (3 * (l - m - 1));
+                let Some((child, _)) = family.child(below & 7) else { return };
+                path.push((below, child));
+            }
         }
     }
 }
@@ -269,12 +289,13 @@ mod tests {
             tree.check_structure();
             let nodes = Nodes::new(&tree, &Ownership::solo());
             nodes.check_invariants();
+            let mut path = Vec::new();
             for (l, near, offset, bits) in queries {
                 // Near a region where the tree is deep, as queries by neighbouring ranks are.
                 let place = (near.get(&deepest) % (1 << (3 * DEEPEST))) >> (3 * (DEEPEST - l));
                 let key = (place ^ offset) >> 6;
                 let mut found = BTreeSet::new();
-                nodes.find(l, key, bits, |c| _ = found.insert(c));
+                nodes.find(&mut path, l, key, bits, |c| _ = found.insert(c));
                 let codes = ones(bits).map(|bit| key << 6 | u64::from(bit));
                 let want: BTreeSet<Component> =
                     codes.filter_map(|code| component_of(&nodes, &tree, l, code)).collect();

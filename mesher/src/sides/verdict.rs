@@ -161,13 +161,13 @@ fn xor_over_ranks(mut mine: Vec<u8>, comm: &dyn Comm) -> Vec<u8> {
 
 /// The seeds that lie in leaves that do not cross, by number, each with the component that it lies in. Collective; the same on all ranks.
 pub(super) fn find_seeds(base: &Base, components: &Components) -> HashMap<u64, Label> {
-    let mut mine = Vec::new();
+    let (mut mine, mut path) = (Vec::new(), Vec::new());
     for (number, seed) in (0..).zip(&base.rules.seeds).filter(|(_, seed)| seed.is_in_root()) {
         let code = morton(seed.lattice.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32));
         // The owner of a part of a leaf holds the leaf's brick.
         if base.ownership.owner_at(code) == base.comm.rank() {
             let found = |c| mine.push([number, components.label(c)]);
-            components.nodes.find(LEVEL_MAX, code >> 6, 1 << (code & 63), found);
+            components.nodes.find(&mut path, LEVEL_MAX, code >> 6, 1 << (code & 63), found);
         }
     }
     gather(base.comm, &mine).into_iter().map(|[number, label]| (number, label)).collect()
