@@ -31,7 +31,7 @@ pub struct BrickSet {
 }
 
 /// Number of bricks for which a set allocates at its first brick: most sets grow beyond a vector's usual four.
-const CAPACITY_FIRST: usize = 16;
+const CAPACITY_FIRST: usize = 64;
 
 /// A run of bricks whose keys agree in their upper half.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

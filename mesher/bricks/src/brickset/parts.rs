@@ -95,66 +95,46 @@ impl BrickSet {
         }
         let mut cursor = set.cursor();
         let common = rest.bricks().filter(|b| cursor.get(b.key) != 0).count();
-        let (mut mine, mut theirs) = (Back::new(&set), Back::new(&rest));
-        let mut k = set.len() + rest.len() - common;
-        set.low.reserve_exact(k - set.len());
-        set.bits.reserve_exact(k - set.len());
+        let (mut i, mut j) = (set.len(), rest.len());
+        let mut k = i + j - common;
+        set.low.reserve_exact(k - i);
+        set.bits.reserve_exact(k - i);
         set.low.resize(k, 0);
         set.bits.resize(k, 0);
-        // New runs, in descending order; the runs before them do not change.
+        // Run by run; new runs are in descending order, and those that remain at the end do not change.
+        let (mut mine, mut theirs) = (std::mem::take(&mut set.runs), &rest.runs[..]);
         let mut runs: Vec<Run> = Vec::new();
-        while let Some(r) = theirs.last(&rest) {
-            k -= 1;
-            let b = mine.last(&set);
-            let (from_mine, from_theirs) =
-                (b.is_some_and(|b| b.key >= r.key), b.is_none_or(|b| b.key <= r.key));
-            let key = if from_theirs { r.key } else { b.map_or(r.key, |b| b.key) };
-            let part = |from: bool, bits: u64| if from { bits } else { 0 };
-            set.low[k] = key as u32;
-            set.bits[k] = part(from_theirs, r.bits) | part(from_mine, b.map_or(0, |b| b.bits));
-            match runs.last_mut() {
-                Some(run) if run.high == high_of(key) => run.start = k,
-                _ => runs.push(Run { high: high_of(key), start: k }),
+        while let Some(last) = theirs.last() {
+            let high = mine.last().map_or(last.high, |run| run.high.max(last.high));
+            let from_mine = mine.pop_if(|run| run.high == high).map_or(i, |run| run.start);
+            let mut from_theirs = j;
+            if last.high == high {
+                from_theirs = last.start;
+                theirs = &theirs[..theirs.len() - 1];
             }
-            if from_mine {
-                mine.step(&set);
+            while j > from_theirs {
+                (j, k) = (j - 1, k - 1);
+                while i > from_mine && set.low[i - 1] > rest.low[j] {
+                    i -= 1;
+                    (set.low[k], set.bits[k]) = (set.low[i], set.bits[i]);
+                    k -= 1;
+                }
+                let mut bits = rest.bits[j];
+                if i > from_mine && set.low[i - 1] == rest.low[j] {
+                    i -= 1;
+                    bits |= set.bits[i];
+                }
+                (set.low[k], set.bits[k]) = (rest.low[j], bits);
             }
-            if from_theirs {
-                theirs.step(&rest);
+            if k > i {
+                set.low.copy_within(from_mine..i, k + from_mine - i);
+                set.bits.copy_within(from_mine..i, k + from_mine - i);
             }
+            (i, k) = (from_mine, k + from_mine - i);
+            runs.push(Run { high, start: k });
         }
-        set.runs.truncate(mine.runs);
-        if set.runs.last().is_some_and(|r| runs.last().is_some_and(|n| n.high == r.high)) {
-            runs.pop();
-        }
-        set.runs.extend(runs.into_iter().rev());
+        mine.extend(runs.into_iter().rev());
+        set.runs = mine;
         set
-    }
-}
-
-/// Reads a set from the back; bricks that have been read may be overwritten.
-struct Back {
-    /// Number of bricks that remain.
-    left: usize,
-    /// Number of runs that they belong to.
-    runs: usize,
-}
-
-impl Back {
-    fn new(set: &BrickSet) -> Self {
-        Self { left: set.len(), runs: set.runs.len() }
-    }
-
-    #[inline]
-    fn last(&self, set: &BrickSet) -> Option<Brick> {
-        let at = self.left.checked_sub(1)?;
-        let key = set.runs[self.runs - 1].high | u64::from(set.low[at]);
-        Some(Brick { key, bits: set.bits[at] })
-    }
-
-    #[inline]
-    fn step(&mut self, set: &BrickSet) {
-        self.left -= 1;
-        self.runs -= usize::from(set.runs[self.runs - 1].start == self.left);
     }
 }
