@@ -20,7 +20,7 @@ use crate::brick::{self, Brick};
 const LOW_BITS: u32 = 32;
 
 /// A set of octants of one level.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BrickSet {
     /// Lower halves of the keys.
     low: Vec<u32>,
@@ -116,7 +116,7 @@ impl BrickSet {
 
     /// Number of bricks. Full ones must not be stored apart.
     pub fn len(&self) -> usize {
-        self.assert_plain();
+        assert!(self.full.is_none(), "a condensed set is only read");
         self.low.len()
     }
 
@@ -155,12 +155,6 @@ impl BrickSet {
         self.full = Some(Box::new(full)).filter(|full| !full.is_empty());
     }
 
-    /// # Panics
-    /// If full bricks are stored apart: then the set can only be read.
-    fn assert_plain(&self) {
-        assert!(self.full.is_none(), "a condensed set is only read");
-    }
-
     /// Whether the octant with this Morton code is in the set.
     pub fn contains(&self, code: u64) -> bool {
         self.get(code >> 6) >> (code & 63) & 1 == 1
@@ -173,12 +167,11 @@ impl BrickSet {
 
     /// Replaces the bits of every brick, in order, by what `keep` returns for it.
     pub fn retain(&mut self, mut keep: impl FnMut(Brick) -> u64) {
-        self.assert_plain();
-        let runs = std::mem::take(&mut self.runs);
+        let (len, runs) = (self.len(), std::mem::take(&mut self.runs));
         let mut kept = 0;
         for (i, run) in runs.iter().enumerate() {
             let first = kept;
-            for at in run.start..runs.get(i + 1).map_or(self.low.len(), |r| r.start) {
+            for at in run.start..runs.get(i + 1).map_or(len, |r| r.start) {
                 let low = self.low[at];
                 let bits = keep(Brick { key: run.high | u64::from(low), bits: self.bits[at] });
                 if bits != 0 {
@@ -232,31 +225,19 @@ impl BrickSet {
         let ascend = self.runs.is_sorted_by(|a, b| a.start < b.start);
         assert!(ascend, "each run must have a brick");
         let (mut same, mut before) = (Self::default(), None);
-        let partial = Cursor { full: None, ..self.bricks() };
-        for Brick { key, bits } in partial {
+        for Brick { key, bits } in self.bricks() {
             assert!(bits != 0, "brick {key:#x} must not be empty");
             if let Some(before) = before.replace(key) {
                 assert!(before < key, "brick {key:#x} must follow brick {before:#x}");
             }
-            same.push(key, bits);
+            let is_apart = self.full.is_some() && bits == u64::MAX;
+            same.push(key, if is_apart { 0 } else { bits });
         }
-        assert!(self.runs == same.runs, "each brick must be in the run of its upper half");
-        if let Some(full) = &self.full {
-            assert!(!full.is_empty(), "a condensed set must have full bricks");
-            full.check_invariants();
-            let is_twice = same.bricks().find(|b| b.bits == u64::MAX || full.contains(b.key));
-            assert_eq!(is_twice, None, "a full brick must be stored as such, and once");
-        }
+        same.full.clone_from(&self.full);
+        assert!(*self == same, "each brick must be in the run of its upper half, or full");
+        self.full.iter().for_each(|full| full.check_invariants());
     }
 }
-
-impl PartialEq for BrickSet {
-    fn eq(&self, other: &Self) -> bool {
-        self.bricks().eq(other.bricks())
-    }
-}
-
-impl Eq for BrickSet {}
 
 /// The octants of some bricks in Morton order; those with the same key become one.
 impl FromIterator<Brick> for BrickSet {

@@ -207,7 +207,8 @@ impl Nodes {
         bits: u64,
         mut found: impl FnMut(Component),
     ) {
-        let common = (0..=l).zip(&*path).take_while(|&(m, at)| at.0 == key >> (3 * (l - m))).count();
+        let common =
+            (0..=l).zip(&*path).take_while(|&(m, at)| at.0 == key >> (3 * (l - m))).count();
         path.truncate(common);
         if common == 0 {
             path.push((0, 0));

@@ -57,6 +57,24 @@ fn of(bricks: &BTreeMap<u64, u64>) -> BrickSet {
 
 proptest! {
     #[test]
+    fn a_condensed_set_reads_as_before(partial in bricks(), full in bricks()) {
+        let full = full.into_keys().map(|key| (key, u64::MAX));
+        let all: BTreeMap<u64, u64> = partial.into_iter().chain(full).collect();
+        let plain = of(&all);
+        let mut condensed = plain.clone();
+        condensed.condense();
+        condensed.check_invariants();
+        prop_assert!(condensed.bricks().eq(plain.bricks()));
+        prop_assert_eq!(condensed.count(), plain.count());
+        prop_assert_eq!(condensed.is_empty(), plain.is_empty());
+        let (mut here, mut there) = (condensed.cursor(), plain.cursor());
+        for key in all.keys().flat_map(|key| [*key, *key, key + 1]) {
+            prop_assert_eq!(condensed.get(key), plain.get(key));
+            prop_assert_eq!(here.get(key), there.get(key));
+        }
+    }
+
+    #[test]
     fn sets_of_several_runs_behave_like_maps(a in bricks(), b in bricks(), mask in 0u64..8) {
         let (x, y) = (of(&a), of(&b));
         x.check_invariants();
@@ -136,4 +154,13 @@ fn leading_elements_are_counted_for_every_length() {
         let found = leading(&all[..length], |low| low < end);
         assert_eq!(found, length.min(end as usize), "{length}, {end}");
     }
+}
+
+#[test]
+#[should_panic(expected = "is only read")]
+fn a_condensed_set_is_not_changed() {
+    let mut set: BrickSet = [Brick { key: 3, bits: u64::MAX }].into_iter().collect();
+    set.condense();
+    assert_eq!((set.count(), set.bytes()), (64, 12));
+    set.retain(|b| b.bits);
 }
