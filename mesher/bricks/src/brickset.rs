@@ -317,11 +317,6 @@ impl Full<'_> {
             next
         })
     }
-
-    /// The bits of a brick: all, or none.
-    fn get(&mut self, key: u64) -> u64 {
-        (self.cursor.get(key >> 6) >> (key & 63) & 1) * u64::MAX
-    }
 }
 
 /// Number of elements before the first one for which `leads` is false. Galloping search: fast if that one is
@@ -352,7 +347,7 @@ impl<'a> Cursor<'a> {
     #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {
         match (self.partial(key), &mut self.full) {
-            (0, Some(full)) => full.get(key),
+            (0, Some(full)) => (full.cursor.get(key >> 6) >> (key & 63) & 1) * u64::MAX,
             (bits, _) => bits,
         }
     }

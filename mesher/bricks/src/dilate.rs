@@ -35,14 +35,12 @@ pub struct Reach<'t> {
     tile: &'t mut Tile,
     out: Gathered,
     words: Words,
-    /// Bytes of what was gathered on the way, at most.
-    bytes: usize,
 }
 
 impl<'t> Reach<'t> {
     /// The empty union, of octants of level `level`. `tile` is scratch; it must be empty and is left empty.
     pub fn new(level: Level, tile: &'t mut Tile) -> Self {
-        Self { level, tile, out: Gathered::new(level), words: 0, bytes: 0 }
+        Self { level, tile, out: Gathered::new(level), words: 0 }
     }
 
     /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
@@ -73,15 +71,14 @@ impl<'t> Reach<'t> {
         }
         let mut near = Gathered::new(self.level);
         self.words += self.tile.pass(sources, radius, to_parents, &mut near);
-        self.bytes = near.bytes();
         let mut near = near.into_set();
         near.condense();
         self.dilate(near.bricks(), rest);
     }
 
-    /// The octants reached, the work done, and the bytes that it took at most.
+    /// The octants reached, the work done, and the bytes that it took at most: passes on the way reach less.
     pub fn finish(self) -> (BrickSet, Words, usize) {
-        let bytes = self.bytes.max(self.out.bytes());
+        let bytes = self.out.bytes();
         (self.out.into_set(), self.words, bytes)
     }
 }
