@@ -12,7 +12,7 @@ pub use world::{Adversary, Arrival, Schedule, World};
 use super::{Comm, Gathered, MessageBuffer, Metered};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, panic_any, resume_unwind};
-use std::sync::{Condvar, Mutex, MutexGuard};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use world::Call;
 
 /// One rank of a simulated group.
@@ -28,27 +28,37 @@ pub struct Sim<'a> {
 /// With the panic of the lowest rank that panicked; the other ranks are stopped.
 pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + Sync) -> Vec<T> {
     let world = World::new(size, Adversary::new(seed));
-    let turns = (0..size).map(|_| Condvar::new()).collect();
-    let threads = Threads { next: Mutex::new(world.next()), turns, world };
+    // Tell a rank that it runs next, or that no rank can go on.
+    let (turns, turns_of): (Vec<Sender<bool>>, Vec<_>) = (0..size).map(|_| channel()).unzip();
+    let pass_on = || match world.next() {
+        Some(rank) => _ = turns[rank].send(true),
+        None => turns.iter().for_each(|turn| _ = turn.send(false)),
+    };
+    pass_on();
     let mut results: Vec<std::thread::Result<T>> = std::thread::scope(|scope| {
-        let spawn = |rank| {
-            let (threads, body) = (&threads, &body);
+        let spawn = |(rank, turn): (usize, Receiver<bool>)| {
+            let (world, body, pass_on) = (&world, &body, &pass_on);
             let run = move || {
-                threads.wait(rank);
-                let pass = || {
-                    threads.pass_on();
-                    threads.wait(rank);
+                let wait = || {
+                    if turn.recv() != Ok(true) {
+                        panic_any(STOPPED);
+                    }
                 };
-                let sim = Metered::new(Sim::new(rank, &threads.world, &pass));
+                wait();
+                let pass = || {
+                    pass_on();
+                    wait();
+                };
+                let sim = Metered::new(Sim::new(rank, world, &pass));
                 let result = catch_unwind(AssertUnwindSafe(|| body(&sim)));
-                threads.world.end(rank, result.is_err());
-                threads.pass_on();
+                world.end(rank, result.is_err());
+                pass_on();
                 result
             };
             let builder = std::thread::Builder::new().stack_size(16 << 20);
             builder.spawn_scoped(scope, run).expect("a thread per simulated rank")
         };
-        let handles: Vec<_> = (0..size).map(spawn).collect();
+        let handles: Vec<_> = turns_of.into_iter().enumerate().map(spawn).collect();
         handles.into_iter().map(|t| t.join().flatten()).collect()
     });
     let is_cause = |p: &Box<dyn Any + Send>| p.downcast_ref() != Some(&STOPPED);
@@ -58,37 +68,6 @@ pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + 
 }
 
 const STOPPED: &str = "stopped because another simulated rank panicked";
-
-/// Ranks as threads.
-struct Threads {
-    world: World,
-    next: Mutex<Option<usize>>,
-    /// One per rank, so that passing the token wakes one thread only.
-    turns: Vec<Condvar>,
-}
-
-impl Threads {
-    fn pass_on(&self) {
-        let next = self.world.next();
-        *self.lock() = next;
-        match next {
-            Some(rank) => self.turns[rank].notify_one(),
-            None => self.turns.iter().for_each(Condvar::notify_one),
-        }
-    }
-
-    fn wait(&self, rank: usize) {
-        let is_for_others = |next: &mut Option<usize>| next.is_some_and(|next| next != rank);
-        let next = self.turns[rank].wait_while(self.lock(), is_for_others);
-        if next.unwrap_or_else(|p| p.into_inner()).is_none() {
-            panic_any(STOPPED);
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<usize>> {
-        self.next.lock().unwrap_or_else(|p| p.into_inner())
-    }
-}
 
 impl<'a> Sim<'a> {
     /// A rank of a world, which has been chosen to run. `pass` passes the token on, and returns when the world has chosen this rank again.
