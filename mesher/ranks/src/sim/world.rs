@@ -70,29 +70,9 @@ impl World {
 
     /// A rank's contribution to its next call, which completes the call if it is the last one.
     pub(super) fn post(&self, rank: usize, call: Call, words: MessageBuffer) {
-        let mut state = self.lock();
+        let state = &mut *self.lock();
         state.ranks[rank] = Rank::Waiting(call, words);
-        state.deliver();
-    }
-
-    /// The result of a completed call for a rank.
-    pub(super) fn result(&self, rank: usize) -> Gathered {
-        match std::mem::replace(&mut self.lock().ranks[rank], Rank::Ready(None)) {
-            Rank::Ready(Some(result)) => result,
-            _ => unreachable!("a completed call has a result for every rank"),
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // A poisoned lock means that another rank panicked, which `broken` records as well.
-        self.state.lock().unwrap_or_else(|p| p.into_inner())
-    }
-}
-
-impl State {
-    /// Completes the current call once all ranks have contributed.
-    fn deliver(&mut self) {
-        let posts = self.ranks.iter().map(|rank| match rank {
+        let posts = state.ranks.iter().map(|rank| match rank {
             Rank::Waiting(call, words) => Some((*call, words)),
             _ => None,
         });
@@ -107,9 +87,22 @@ impl State {
                 words().enumerate().map(|(rank, words)| (rank, words.iter().copied())).collect(),
             ),
             Call::Sum => by_all([(0, sums(words()))].into_iter().collect()),
-            Call::Send => delivered(&sent, &mut *self.schedule),
+            Call::Send => delivered(&sent, &mut *state.schedule),
         };
-        self.ranks = results.into_iter().map(|result| Rank::Ready(Some(result))).collect();
+        state.ranks = results.into_iter().map(|result| Rank::Ready(Some(result))).collect();
+    }
+
+    /// The result of a completed call for a rank.
+    pub(super) fn result(&self, rank: usize) -> Gathered {
+        match std::mem::replace(&mut self.lock().ranks[rank], Rank::Ready(None)) {
+            Rank::Ready(Some(result)) => result,
+            _ => unreachable!("a completed call has a result for every rank"),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A poisoned lock means that another rank panicked, which `broken` records as well.
+        self.state.lock().unwrap_or_else(|p| p.into_inner())
     }
 }
 
