@@ -30,7 +30,6 @@ pub fn ranks() -> Option<usize> {
 pub fn abort(code: i32) -> ! {
     #[cfg(feature = "mpi")]
     crate::mpi::abort(code);
-    #[cfg(not(feature = "mpi"))]
     std::process::exit(code)
 }
 

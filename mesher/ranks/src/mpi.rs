@@ -58,10 +58,9 @@ pub fn join() -> Box<dyn Comm> {
     }))
 }
 
-/// Ends all ranks of the job at once.
-pub fn abort(code: i32) -> ! {
-    // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation; panics
-    // outside of that time end this process below.
+/// Ends all ranks of the job at once, between initialisation and finalisation; outside of that time there is none, and this returns.
+pub fn abort(code: i32) {
+    // SAFETY: MPI_Abort may be called at any time between initialisation and finalisation.
     unsafe {
         let (mut up, mut down) = (0, 0);
         mpi::ffi::MPI_Initialized(&mut up);
@@ -70,7 +69,6 @@ pub fn abort(code: i32) -> ! {
             mpi::ffi::MPI_Abort(mpi::ffi::RSMPI_COMM_WORLD, code);
         }
     }
-    std::process::exit(code)
 }
 
 impl Comm for Mpi {
