@@ -16,8 +16,7 @@ use std::io::{self, Cursor, Read, Write, stderr};
 use std::mem::MaybeUninit;
 use std::os::unix::net::UnixStream;
 use std::ptr::null;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Barrier, Once, OnceLock};
+use std::sync::{Barrier, Mutex, Once, OnceLock};
 use std::thread::{self, sleep};
 use std::time::Duration;
 use std::{env, fmt};
@@ -196,11 +195,9 @@ impl Heap {
     /// Ends the program. Nothing in here allocates, unless a library does.
     #[cold]
     fn end(&self, bytes: usize) -> ! {
-        static IS_ENDING: AtomicBool = AtomicBool::new(false);
-        while IS_ENDING.swap(true, Ordering::AcqRel) {
-            // The thread that came first ends the process.
-            sleep(Duration::from_secs(1));
-        }
+        static ENDING: Mutex<()> = Mutex::new(());
+        // The thread that came first ends the process.
+        let _first = ENDING.lock();
         abandon(true);
         // The exit code remains if the standard error is full. A launcher puts lines of its own between two writes.
         let mut line = Cursor::new([0; 256]);
