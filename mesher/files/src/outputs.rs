@@ -69,12 +69,6 @@ impl Draft {
         Ok(Self { file, place: Place::Beside(unfinished) })
     }
 
-    /// A file of a claimed directory with a temporary and a final name.
-    pub(crate) fn claimed(dir: OwnedFd, names: [CString; 2]) -> io::Result<Self> {
-        let file = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?.0;
-        Ok(Self { file, place: Place::Claimed { dir, names } })
-    }
-
     /// Synchronises the file with the disk and gives it its final name.
     ///
     /// # Errors
@@ -260,7 +254,9 @@ impl Claim {
     /// # Errors
     /// If it exists or cannot be created.
     pub fn draft(&self, name: &str) -> io::Result<Draft> {
-        Draft::claimed(self.unfinished.dir()?, names_of(name))
+        let (dir, names) = (self.unfinished.dir()?, names_of(name));
+        let (file, _) = locked(|| open_file(&dir, &names[0], OFlags::CREATE | OFlags::EXCL))?;
+        Ok(Draft { file, place: Place::Claimed { dir, names } })
     }
 
     /// Writes the last file. In one process of the run, after all others have published their files.
