@@ -181,7 +181,13 @@ impl Comm for Mpi {
     }
 
     fn limit_calls(&self, limit: Duration) {
-        self.watch.get_or_init(|| Watch::new(&self.world, limit));
+        self.watch.get_or_init(|| Watch {
+            side: self.world.duplicate(),
+            limit,
+            phase: Cell::new("start"),
+            since: Cell::new(Instant::now()),
+            answered: RefCell::new(None),
+        });
     }
 
     fn enter(&self, phase: &'static str) {
@@ -211,7 +217,7 @@ struct Watch {
     side: SimpleCommunicator,
     limit: Duration,
     /// The phase that the rank is in.
-    pub phase: Cell<&'static str>,
+    phase: Cell<&'static str>,
     /// The start of the present call, or the time of the question.
     since: Cell<Instant>,
     /// The ranks that have answered; none if there was no question.
@@ -219,25 +225,14 @@ struct Watch {
 }
 
 impl Watch {
-    /// Watches calls on a communicator. Collective.
-    pub fn new(world: &SimpleCommunicator, limit: Duration) -> Self {
-        Self {
-            side: world.duplicate(),
-            limit,
-            phase: Cell::new("start"),
-            since: Cell::new(Instant::now()),
-            answered: RefCell::new(None),
-        }
-    }
-
     /// Begins a call.
-    pub fn start(&self) {
+    fn start(&self) {
         self.since.set(Instant::now());
         *self.answered.borrow_mut() = None;
     }
 
     /// Answers questions, and asks when the limit is exceeded. Again and again during a call.
-    pub fn poll(&self) {
+    fn poll(&self) {
         let mut answered = self.answered.borrow_mut();
         while let Some((message, status)) = self.side.any_process().immediate_matched_probe() {
             let _ = message.matched_receive::<u64>();
