@@ -9,7 +9,7 @@ use crate::Mesh;
 use crate::error::Error;
 use crate::output::stream::{LevelCursors, Octants};
 use crate::output::write::{OutDir, TREE};
-use crate::partition::ownership::Ownership;
+use crate::partition::ownership::{Ownership, brick_start};
 use bricks::brick::{byte, children, parents};
 use bricks::brickset::ones;
 use bricks::octant::Level;
@@ -171,7 +171,7 @@ impl Numbering {
 
 /// The place in a numbering of the interval that contains the minimum corner of a brick.
 fn place(ownership: &Ownership, l: Level, key: u64) -> usize {
-    l as usize * ownership.boundaries().len() + ownership.interval(l, key)
+    l as usize * ownership.boundaries().len() + ownership.at(brick_start(l, key))
 }
 
 /// The siblings in the bricks that this rank owns, with their numbers, in ascending order.

@@ -46,8 +46,6 @@ pub struct Ownership {
     boundaries: Arc<[Boundary]>,
     /// This rank's longest interval: most queries are for octants within it.
     own: Range<u64>,
-    /// Whether this rank has exactly one interval.
-    is_single: bool,
     /// Deepest level with a brick of several owners.
     level_replicated: Level,
     /// Deepest level with a fully replicated brick.
@@ -86,17 +84,15 @@ impl Ownership {
             level_fully_replicated: deepest_brick_of(OWNERS_MANY, &all),
             boundaries: all.into(),
             own: 0..0,
-            is_single: false,
         };
         let longest = ownership.intervals().max_by_key(|own| own.end - own.start);
         ownership.own = longest.unwrap_or(0..0);
-        ownership.is_single = ownership.intervals().count() == 1;
         ownership
     }
 
     /// The same partition seen from outside all ranks: every brick is fully replicated or remote.
     pub fn non_owning_view(&self) -> Self {
-        Self { rank: None, own: 0..0, is_single: false, ..self.clone() }
+        Self { rank: None, own: 0..0, ..self.clone() }
     }
 
     /// The largest octants that this rank owns all of, in Morton order: level and code.
@@ -129,11 +125,6 @@ impl Ownership {
     /// The boundaries between the intervals of all ranks.
     pub fn boundaries(&self) -> &[Boundary] {
         &self.boundaries
-    }
-
-    /// The index, among those of all ranks, of the interval that contains the minimum corner of a brick.
-    pub fn interval(&self, l: Level, key: u64) -> usize {
-        self.at(brick_start(l, key))
     }
 
     /// The owner at a level-19 code.
@@ -205,7 +196,8 @@ impl Ownership {
         if l < 2 {
             return Placement::FullyReplicated;
         }
-        if self.ranks == 1 || self.is_within(l, key) {
+        let (start, end) = (brick_start(l, key), brick_start(l, key + 1));
+        if self.ranks == 1 || self.own.start <= start && end <= self.own.end {
             return Placement::Local;
         }
         let intervals = self.meeting_in(l, key);
@@ -216,12 +208,6 @@ impl Ownership {
             _ if intervals.iter().any(is_own) => Placement::PartiallyReplicated,
             _ => Placement::Remote(intervals[0].1),
         }
-    }
-
-    /// Whether brick `key` of level `l`, which is 2 or more, lies within this rank's longest interval.
-    #[inline]
-    fn is_within(&self, l: Level, key: u64) -> bool {
-        self.own.start <= brick_start(l, key) && brick_start(l, key + 1) <= self.own.end
     }
 
     /// The intervals that meet in a brick of level `l`, which is 2 or more, in order; not all if there are many.
@@ -253,9 +239,9 @@ impl Ownership {
         self.ranks > 1 && l <= self.level_replicated
     }
 
-    /// The index of the interval that contains a position.
+    /// The index, among those of all ranks, of the interval that contains a position.
     #[inline]
-    fn at(&self, start: u64) -> usize {
+    pub fn at(&self, start: u64) -> usize {
         self.boundaries.partition_point(|b| b.0 <= start) - 1
     }
 

@@ -85,7 +85,7 @@ impl Ownership {
         set: &mut BrickSet,
         out: &mut Outgoing,
     ) -> Range<usize> {
-        if self.is_single && l > self.level_replicated {
+        if l > self.level_replicated && self.intervals().count() == 1 {
             // No brick has several owners, and the bricks of each interval are contiguous.
             let position = |start: u64| set.position(start >> (3 * (LEVEL_MAX + 2 - l)));
             let local = position(self.own.start)..position(self.own.end);
