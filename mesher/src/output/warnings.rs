@@ -75,25 +75,21 @@ fn bounds_nothing(rules: &Rules, case_name: &str) -> String {
 
 fn empty_region(keep: Keep, summary: &Summary) -> Option<String> {
     let &Summary { outside, inside, enclosed, .. } = summary;
-    let kept = match keep {
-        Keep::Outside => outside - enclosed.count,
-        Keep::Inside => inside,
-        Keep::All => outside + inside,
-    };
-    let warning = match keep {
-        _ if kept > 0 => return None,
-        Keep::Inside => {
+    let (kept, warning) = match keep {
+        Keep::Outside => (
+            outside - enclosed.count,
+            "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
+             or set keep = inside",
+        ),
+        Keep::Inside => (
+            inside,
             "nothing is inside the geometry, so the mesh has at most crossing leaves: close inlets, outlets and holes that are \
              wider than a cell (`harness leak` finds them), remove facets that appear twice (`harness geometry`), change spacing_min, or \
-             set keep = outside"
-        }
-        Keep::Outside => {
-            "nothing is outside the geometry, so the mesh has at most crossing leaves: enlarge the root, decrease spacing_min, \
-             or set keep = inside"
-        }
-        Keep::All => "the geometry crosses all leaves: decrease spacing_min",
+             set keep = outside",
+        ),
+        Keep::All => (outside + inside, "the geometry crosses all leaves: decrease spacing_min"),
     };
-    Some(warning.to_owned())
+    (kept == 0).then(|| warning.to_owned())
 }
 
 #[cfg(test)]
