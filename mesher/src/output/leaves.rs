@@ -57,14 +57,11 @@ pub fn finish(
     let (digests, parts) = gather(total(counts), digests, comm);
     let by_level = comm.sums(counts.as_flattened());
     let entry = MeshEntry::new(mesh, by_level.as_chunks().0, &digests);
-    let publish = || match out {
-        Some(out) if comm.rank() == 0 => {
-            stop_at(format_args!("manifest:0"));
-            out.manifest(&manifest(&out.output, &entry, &digests, &parts))
-        }
-        _ => Ok(()),
-    };
-    agree(comm, publish())?;
+    let published = out.filter(|_| comm.rank() == 0).map_or(Ok(()), |out| {
+        stop_at(format_args!("manifest:0"));
+        out.manifest(&manifest(&out.output, &entry, &digests, &parts))
+    });
+    agree(comm, published)?;
     Ok(entry)
 }
 
