@@ -165,10 +165,7 @@ impl Comm for Mpi {
 
     fn next_run(&self) {
         if self.rank() == 0 {
-            for rank in 1..self.size() {
-                self.world.process_at_rank(rank as i32).send_with_tag(&0u64, NEXT_RUN);
-            }
-            return;
+            return tell_others(&self.world, NEXT_RUN);
         }
         // MPI itself would wait by computing.
         let first = self.world.process_at_rank(0);
@@ -194,6 +191,13 @@ impl Comm for Mpi {
         if let Some(watch) = self.watch.get() {
             watch.phase.set(phase);
         }
+    }
+}
+
+/// Sends all other ranks a message that is its tag.
+fn tell_others(comm: &SimpleCommunicator, tag: i32) {
+    for rank in (0..comm.size()).filter(|&rank| rank != comm.rank()) {
+        comm.process_at_rank(rank).send_with_tag(&0u64, tag);
     }
 }
 
@@ -251,7 +255,7 @@ impl Watch {
         let patience = PATIENCE.max(self.limit / 2);
         match &*answered {
             None if waited > self.limit => {
-                self.tell_others(QUESTION);
+                tell_others(&self.side, QUESTION);
                 *answered = Some(BTreeSet::from([self.side.rank()]));
                 self.since.set(Instant::now());
             }
@@ -268,15 +272,8 @@ impl Watch {
         }
     }
 
-    fn tell_others(&self, tag: i32) {
-        let me = self.side.rank();
-        for rank in (0..self.side.size()).filter(|&rank| rank != me) {
-            self.side.process_at_rank(rank).send_with_tag(&0u64, tag);
-        }
-    }
-
     fn end(&self, answered: &BTreeSet<i32>) -> ! {
-        self.tell_others(END);
+        tell_others(&self.side, END);
         let silent: Vec<String> = (0..self.side.size())
             .filter(|r| !answered.contains(r))
             .map(|r| r.to_string())
