@@ -62,8 +62,20 @@ impl Ownership {
             parts.push(vec![set]);
         }
         let mut received: Vec<Entry> = Vec::new();
-        for (_, words) in comm.sparse_all_to_all(messages).messages() {
-            read_message(words, &mut parts, &mut received, &mut out.full);
+        for (_, mut words) in comm.sparse_all_to_all(messages).messages() {
+            while let Some((&header, packed)) = words.split_first() {
+                if header < ENTRIES {
+                    let (set, rest) = BrickSet::unpack(packed);
+                    parts[header as usize].push(set);
+                    words = rest;
+                    continue;
+                }
+                let (entries, rest) = packed[1..].split_at(2 * packed[0] as usize);
+                let is_to_reduce = header == ENTRIES_TO_REDUCE;
+                let target = if is_to_reduce { &mut out.full } else { &mut received };
+                target.extend_from_slice(entries.as_chunks().0);
+                words = rest;
+            }
         }
         if any_full {
             received.extend(all_gather_from_reducers(out.full, |a, b| a | b, comm));
@@ -177,25 +189,4 @@ fn messages(mut queue: Vec<Queued>, sets: &[(Level, BrickSet)]) -> (MessageBuffe
         });
     }
     (messages, sent)
-}
-
-/// Reads a message: parts of sets, entries, and entries of fully replicated bricks that this rank reduces.
-fn read_message(
-    mut words: &[u64],
-    parts: &mut [Vec<BrickSet>],
-    received: &mut Vec<Entry>,
-    full: &mut Vec<Entry>,
-) {
-    while let Some((&header, packed)) = words.split_first() {
-        if header < ENTRIES {
-            let (set, rest) = BrickSet::unpack(packed);
-            parts[header as usize].push(set);
-            words = rest;
-            continue;
-        }
-        let (entries, rest) = packed[1..].split_at(2 * packed[0] as usize);
-        let target = if header == ENTRIES_TO_REDUCE { &mut *full } else { &mut *received };
-        target.extend_from_slice(entries.as_chunks().0);
-        words = rest;
-    }
 }
