@@ -4,7 +4,6 @@
 //! Signals wake a thread of their own, which removes what is unfinished. In a signal handler, that would have to do without locks.
 //! Without memory, the standard library ends a process with SIGABRT, and its hook for that is not stable. A global allocator is.
 
-use crate::unfinished::complete;
 use crate::uses::forget;
 use libc::{SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGPWR, SIGQUIT, SIGSTKFLT};
 use libc::{SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ};
@@ -21,7 +20,7 @@ use std::thread::{self, sleep};
 use std::time::Duration;
 use std::{env, fmt};
 
-pub use crate::unfinished::abandon;
+pub use crate::unfinished::{abandon, decide};
 /// Ends the process without what it would run at its exit.
 pub use signal_hook::low_level::exit as exit_at_once;
 
@@ -44,7 +43,7 @@ static HANDLER: OnceLock<(UnixStream, Barrier)> = OnceLock::new();
 const TAKING: Duration = Duration::from_millis(300);
 
 /// Makes each of the signals remove all unfinished files, print `message` on the standard error and end the process with exit code 130,
-/// after the time `linger`. If output is complete or the outcome [decided], the first signal is ignored, as the process is about to end.
+/// after the time `linger`. If output is complete or the outcome [decided](decide), the first signal is ignored, as the process is about to end.
 /// Signals that the process was started to ignore, as `nohup` does, stay ignored.
 ///
 /// # Errors
@@ -89,15 +88,10 @@ pub fn signals() -> io::Result<impl Iterator<Item = i32>> {
     Ok(SIGNALS.into_iter().filter(|&signal| !is_ignored(signal)))
 }
 
-/// Notes that the program's outcome is decided: from now on a first signal changes nothing.
-pub fn decided() {
-    complete(true);
-}
-
 /// Notes that another run begins, whose outcome is open and whose files are others: for a program that stays for several runs.
 pub fn begin() {
     forget();
-    complete(false);
+    decide(false);
 }
 
 /// Stops the process, as SIGSTOP does, where it first reaches the point that the environment variable `STOP_AT` names. Tests then send

@@ -114,9 +114,9 @@ impl Drop for Unfinished {
     }
 }
 
-/// Notes that the outcome of the run is decided, or that another run begins.
-pub fn complete(is_complete: bool) {
-    lock_to_work().is_complete = is_complete;
+/// Notes whether the outcome of the run is decided: from then on a first signal changes nothing.
+pub fn decide(is_decided: bool) {
+    lock_to_work().is_complete = is_decided;
 }
 
 /// Removes all unfinished output before the process ends, and lets no other thread begin any. Removes none if some is complete and the process

@@ -182,7 +182,7 @@ fn obey(asked: &Result<Args, Error>, comm: &dyn Comm) -> i32 {
         Ok(args) if args.serve => serve(comm),
         Ok(args) => run(&args, comm),
         Err(e) => {
-            interrupt::decided();
+            interrupt::decide(true);
             fail(&e, comm.rank() == 0)
         }
     }
@@ -244,7 +244,7 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     record.progress = progress;
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
-    interrupt::decided();
+    interrupt::decide(true);
     record.report_status("done");
     if let Some(limit) = args.stall_limit {
         comm.enter("done");
