@@ -86,6 +86,7 @@ impl BrickSet {
         if bits == 0 {
             return;
         }
+        debug_assert!(self.full.is_none(), "a condensed set is only read");
         let high = high_of(key);
         let last = self.runs.last().map_or(0, |run| run.high);
         if let Some(&low) = self.low.last() {
@@ -139,7 +140,11 @@ impl BrickSet {
 
     /// The bits of brick `key`; 0 if the set has no octant in it.
     pub fn get(&self, key: u64) -> u64 {
-        self.cursor().get(key)
+        let at = self.position(key);
+        if at < self.low.len() && self.brick(at).key == key {
+            return self.bits[at];
+        }
+        self.full.as_ref().map_or(0, |full| u64::from(full.contains(key)) * u64::MAX)
     }
 
     /// Stores full bricks as the octants that they fill, 64 of them in the memory of one. After that the set can only be read.
@@ -160,7 +165,7 @@ impl BrickSet {
         self.get(code >> 6) >> (code & 63) & 1 == 1
     }
 
-    /// A reader for queries with ascending keys.
+    /// A reader for queries with ascending keys. It is not for reading the bricks in order, too.
     pub fn cursor(&self) -> Cursor<'_> {
         Cursor::new(self)
     }
@@ -235,7 +240,10 @@ impl BrickSet {
         }
         same.full.clone_from(&self.full);
         assert!(*self == same, "each brick must be in the run of its upper half, or full");
-        self.full.iter().for_each(|full| full.check_invariants());
+        for full in &self.full {
+            assert!(!full.is_empty(), "a condensed set must have full bricks");
+            full.check_invariants();
+        }
     }
 }
 

@@ -136,7 +136,7 @@ impl Gathered {
         let page = self.page(key >> PAGE_LOG2);
         let block = &mut self.pages[page as usize][key as usize % PAGE];
         if *block == NONE {
-            *block = self.words.len() as u32;
+            *block = u32::try_from(self.words.len()).expect("fewer than 2^32 blocks");
             self.words.push([0; BLOCK]);
         }
         let words = self.words[*block as usize].iter_mut();

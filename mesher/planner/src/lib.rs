@@ -82,7 +82,7 @@ const CELLS_SMALL: f64 = 64e6;
 /// Bytes per cell of a rough estimate; a quarter of it is usual.
 const BYTES_ROUGH: f64 = 2.0;
 /// Part of the memory that a rough estimate of a run with layers of four cells takes which does certainly not fit. Cells of thicker layers
-/// take less.
+/// take less, down to a sixteenth.
 const USED_UNDOUBTED: f64 = 8.0;
 /// A pilot run has at most this fraction of the cells, so that all of them take about 2 % of the time.
 const PART_OF_CELLS: f64 = 64.0;
@@ -195,7 +195,7 @@ impl<'a> Problem<'a> {
         let rough_at =
             |shift: Level| rough / 4f64.powi(shift as i32) + rough_boxed / 8f64.powi(shift as i32);
         // Without doubt that the run does not fit, its pilots are short.
-        let thick = f64::max(f64::from(self.rules.layer_cells_min) / 4.0, 1.0);
+        let thick = (f64::from(self.rules.layer_cells_min) / 4.0).clamp(1.0, 16.0);
         let is_undoubted = self.used_rough() > USED_UNDOUBTED * thick;
         let doubted = if is_undoubted { 0.0 } else { rough_at(0) };
         let cells_max = (doubted / PART_OF_CELLS).max(CELLS_MOMENT);

@@ -8,7 +8,7 @@ impl BrickSet {
     /// Number of bricks before `key`.
     pub fn position(&self, key: u64) -> usize {
         let run = self.runs.partition_point(|r| r.high < high_of(key));
-        let start = |run: usize| self.runs.get(run).map_or(self.len(), |r| r.start);
+        let start = |run: usize| self.runs.get(run).map_or(self.low.len(), |r| r.start);
         match self.runs.get(run).filter(|r| r.high == high_of(key)) {
             None => start(run),
             Some(r) => {
@@ -50,6 +50,7 @@ impl BrickSet {
     /// Appends the bricks at a range of positions to a message: the numbers of runs and bricks, the runs, the lower
     /// halves of the keys in pairs, and the bits.
     pub fn pack(&self, range: Range<usize>, words: &mut Vec<u64>) {
+        assert!(range.end <= self.len(), "bricks of the set");
         let runs = self.runs_of(&range);
         let (low, bits) = (&self.low[range.clone()], &self.bits[range]);
         words.reserve(2 + 2 * runs.len() + low.len().div_ceil(2) + bits.len());
