@@ -240,7 +240,7 @@ impl BrickSet {
         }
         same.full.clone_from(&self.full);
         assert!(*self == same, "each brick must be in the run of its upper half, or full");
-        for full in &self.full {
+        if let Some(full) = &self.full {
             assert!(!full.is_empty(), "a condensed set must have full bricks");
             full.check_invariants();
         }
