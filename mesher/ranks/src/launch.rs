@@ -43,7 +43,7 @@ pub fn check_size(comm: &dyn crate::Comm) -> Result<(), String> {
     check(launcher(), comm.size(), library.as_deref().unwrap_or("of unknown version"))
 }
 
-#[cfg(feature = "mpi")]
+#[cfg(any(feature = "mpi", test))]
 fn check(launcher: Option<(&str, usize)>, size: usize, library: &str) -> Result<(), String> {
     // Some libraries go on for pages.
     let first = library.split(['\n', ',']).next().unwrap_or_default();
@@ -71,7 +71,6 @@ pub fn is_first() -> bool {
 }
 
 #[cfg(test)]
-#[cfg(feature = "mpi")]
 mod tests {
     use super::*;
 

@@ -28,7 +28,7 @@ pub struct Sim<'a> {
 /// With the panic of the lowest rank that panicked; the other ranks are stopped.
 pub fn run<T: Send>(size: usize, seed: u64, body: impl Fn(&Metered<Sim>) -> T + Sync) -> Vec<T> {
     let world = World::new(size, Adversary::new(seed));
-    // Tell a rank that it runs next, or that no rank can go on.
+    // What a rank waits for: true when it runs next, false when no rank can go on.
     let (turns, turns_of): (Vec<Sender<bool>>, Vec<_>) = (0..size).map(|_| channel()).unzip();
     let pass_on = || match world.next() {
         Some(rank) => _ = turns[rank].send(true),
