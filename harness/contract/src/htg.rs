@@ -243,7 +243,7 @@ mod tests {
         let siblings = |first: usize| {
             let bits = |is_set: &dyn Fn(usize) -> bool| {
                 (0..8)
-                    .map(|i| u8::from(nodes.sides.len() > first + i && is_set(first + i)) << i)
+                    .map(|i| u64::from(nodes.sides.len() > first + i && is_set(first + i)) << i)
                     .sum()
             };
             Siblings {

@@ -36,7 +36,8 @@ pub fn write(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let shape = Shape { origin, edge, nodes: std::iter::once(1).chain(below_root).collect() };
     // The root, then the groups of siblings as the file numbers them.
     let families = families.levels.concat();
-    let shown = families.iter().map(|family| (!(family.split | family.deleted)).count_ones());
+    let shown =
+        families.iter().map(|family| (0xff & !(family.split | family.deleted)).count_ones());
     let shown: u64 = shown.map(u64::from).sum();
     assert_eq!(shown, leaves, "nodes that are neither split nor masked, and leaves");
     let named = |error| Failure::at(path, error);
@@ -95,7 +96,7 @@ impl Families {
     }
 
     /// The last family of a level, and the bit of the octant in it that contains a level-19 cell.
-    fn last(&mut self, level: usize, key: u64) -> (&mut Siblings, u8) {
+    fn last(&mut self, level: usize, key: u64) -> (&mut Siblings, u64) {
         let digit = if level == 0 { 0 } else { (key / word::span(level as u8)) & 7 };
         let family = self.levels[level].last_mut().expect("families are added from the root on");
         (family, 1 << digit)

@@ -141,6 +141,7 @@ fn write(path: &Path, shape: Shape, groups: &[[u8; 4]], sparse: bool) {
         let only = |bits: u8, other: u8| if sparse { bits & !other } else { bits };
         let (split, deleted) = (only(split, 0xf5), only(deleted, split | 0xf0));
         let inside = only(inside, crossing);
+        let [split, deleted, crossing, inside] = [split, deleted, crossing, inside].map(u64::from);
         window.put(number, Siblings { split, deleted, crossing, inside });
     }
     let chunks = window.compress(&shape, &mut Deflater::default());

@@ -70,17 +70,17 @@ impl Shape {
     }
 }
 
-/// Eight siblings: a bit for each, from the lowest.
+/// Up to eight consecutive groups of eight siblings: a bit for each node, from the lowest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Siblings {
     /// Split nodes.
-    pub split: u8,
+    pub split: u64,
     /// Leaves that are not in the mesh.
-    pub deleted: u8,
+    pub deleted: u64,
     /// Leaves that the surface crosses.
-    pub crossing: u8,
+    pub crossing: u64,
     /// Leaves inside.
-    pub inside: u8,
+    pub inside: u64,
 }
 
 /// The groups of siblings with a node in a window; the first and the last may have others outside of it. The root is in no group.
@@ -88,9 +88,12 @@ pub fn groups(window: u64) -> Range<u64> {
     (window * WINDOW / 8).saturating_sub(1)..(window + 1) * WINDOW / 8
 }
 
-/// The nodes of a window, to be filled in any order.
+/// Bytes of bits before the first of a window and after the last, for groups that are partly outside.
+const MARGIN: usize = 8;
+
+/// The nodes of a window and its margins, to be filled in any order.
 pub struct Window {
-    first: u64,
+    index: u64,
     split: Vec<u8>,
     deleted: Vec<u8>,
     sides: Vec<u8>,
@@ -102,66 +105,65 @@ pub type Chunks = [Option<Vec<u8>>; 3];
 impl Window {
     /// The window with a number, all zero.
     pub fn new(index: u64) -> Self {
-        let bits = || vec![0; WINDOW as usize / 8];
-        Self {
-            first: index * WINDOW,
-            split: bits(),
-            deleted: bits(),
-            sides: vec![0; WINDOW as usize],
-        }
+        let bytes = 2 * MARGIN + WINDOW as usize / 8;
+        let bits = || vec![0; bytes];
+        Self { index, split: bits(), deleted: bits(), sides: vec![0; 8 * bytes] }
     }
 
     /// Sets the root, which is in the first window.
     pub fn put_root(&mut self, root: Siblings) {
-        self.split[0] |= (root.split & 1) << 7;
-        self.deleted[0] |= (root.deleted & 1) << 7;
-        self.sides[0] = (root.crossing & 1) << 1 | root.inside & 1;
+        self.split[MARGIN] |= (root.split as u8 & 1) << 7;
+        self.deleted[MARGIN] |= (root.deleted as u8 & 1) << 7;
+        self.sides[8 * MARGIN] = (root.crossing as u8 & 1) << 1 | root.inside as u8 & 1;
     }
 
-    /// Sets those nodes of a group that are in the window.
+    /// Sets those nodes that are in the window, of groups that begin with this one.
     #[inline]
     pub fn put(&mut self, group: u64, siblings: Siblings) {
-        // The first sibling is the second node of a byte, because the root is in no group.
-        let first = 1 + 8 * group;
-        let byte = (first / 8).wrapping_sub(self.first / 8) as usize;
+        let at = (group + MARGIN as u64).wrapping_sub(self.index * WINDOW / 8) as usize;
+        let bytes = at..at.saturating_add(MARGIN + 1);
+        if bytes.end > self.split.len() {
+            return;
+        }
         for (bits, new) in
             [(&mut self.split, siblings.split), (&mut self.deleted, siblings.deleted)]
         {
-            if new != 0 {
-                let new = new.reverse_bits();
-                if let Some(bits) = bits.get_mut(byte) {
-                    *bits |= new >> 1;
-                }
-                if let Some(bits) = bits.get_mut(byte.wrapping_add(1)) {
-                    *bits |= new << 7;
-                }
-            }
+            // The first sibling is the second node of a byte, because the root is in no group.
+            let new = (u128::from(new.reverse_bits()) << 63).to_be_bytes();
+            bits[bytes.clone()].iter_mut().zip(new).for_each(|(bits, new)| *bits |= new);
         }
-        if siblings.crossing | siblings.inside != 0 {
-            for i in 0..8 {
-                let side = (siblings.crossing >> i & 1) << 1 | siblings.inside >> i & 1;
-                let at = (first + i).wrapping_sub(self.first) as usize;
-                if let Some(node) = self.sides.get_mut(at) {
-                    *node = side;
-                }
+        let Siblings { crossing, inside, .. } = siblings;
+        if crossing | inside != 0 {
+            for (i, node) in self.sides[8 * at + 1..].iter_mut().take(64).enumerate() {
+                *node |= ((crossing >> i & 1) << 1 | inside >> i & 1) as u8;
             }
         }
     }
 
     /// The compressed chunks.
     pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Chunks {
-        let [split, deleted, sides] = arrays(shape);
+        let [split, deleted, sides] = lengths(shape);
         // Arrays shorter than a window have one shorter chunk.
-        [(&self.split, split), (&self.deleted, deleted), (&self.sides, sides)]
-            .map(|(bytes, array)| deflater.compress(&bytes[..array.chunk_len as usize]))
+        [(&self.split, split, 1), (&self.deleted, deleted, 1), (&self.sides, sides, 8)].map(
+            |(bytes, length, per_byte)| {
+                let bytes = &bytes[per_byte * MARGIN..bytes.len() - per_byte * MARGIN];
+                deflater.compress(&bytes[..bytes.len().min(length as usize)])
+            },
+        )
     }
 }
 
-/// The arrays that have a chunk per window: split, deleted, side.
+/// The bytes of the arrays that have a chunk per window: split, deleted, side.
+fn lengths(shape: &Shape) -> [u64; 3] {
+    let nodes = shape.nodes_total();
+    [shape.nodes_described().div_ceil(8), nodes.div_ceil(8), nodes]
+}
+
+/// These arrays, all zero.
 pub(crate) fn arrays(shape: &Shape) -> [Chunked; 3] {
-    let (nodes, described) = (shape.nodes_total(), shape.nodes_described());
-    let bits = |nodes: u64| Chunked::new(nodes.div_ceil(8), WINDOW as u32 / 8);
-    [bits(described), bits(nodes), Chunked::new(nodes, WINDOW as u32)]
+    let [split, deleted, sides] = lengths(shape);
+    let bits = |length| Chunked::new(length, WINDOW as u32 / 8);
+    [bits(split), bits(deleted), Chunked::new(sides, WINDOW as u32)]
 }
 
 /// The metadata of a tree's file in which they begin at byte `start`; and the superblock.

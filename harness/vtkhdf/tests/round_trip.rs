@@ -17,8 +17,18 @@ fn file_of(nodes: Vec<u64>, of: impl Fn(u64) -> Siblings) -> (Vec<u8>, Shape) {
     let mut deflater = Deflater::default();
     for index in 0..shape.windows() {
         let mut window = Window::new(index);
-        for group in groups(index).take_while(|group| 8 * group + 1 < shape.nodes_total()) {
-            window.put(group, of(group));
+        // Five at a time, whether they are in the window or not.
+        for first in (groups(index).start.saturating_sub(3)..groups(index).end).step_by(5) {
+            let mut all = Siblings::default();
+            let exists = |group: &u64| 8 * group + 1 < shape.nodes_total();
+            for (i, group) in (first..first + 5).enumerate().filter(|(_, group)| exists(group)) {
+                let Siblings { split, deleted, crossing, inside } = of(group);
+                all.split |= split << (8 * i);
+                all.deleted |= deleted << (8 * i);
+                all.crossing |= crossing << (8 * i);
+                all.inside |= inside << (8 * i);
+            }
+            window.put(first, all);
         }
         out.add(index, &window.compress(&shape, &mut deflater)).unwrap();
     }
@@ -54,8 +64,8 @@ proptest! {
         let nodes: Vec<u64> = (0..8).map(|level| if level < 7 { 1 << (3 * level) } else { 1 << 20 }).collect();
         let of = |group: u64| {
             let mixed = (group ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 20;
-            let deleted = if is_masked { mixed as u8 } else { 0 };
-            Siblings { split: (mixed >> 8) as u8, deleted, crossing: 1, inside: 4 }
+            let deleted = if is_masked { mixed & 0xff } else { 0 };
+            Siblings { split: mixed >> 8 & 0xff, deleted, crossing: 1, inside: 4 }
         };
         let (content, shape) = file_of(nodes, of);
         let place = tempfile::NamedTempFile::new().unwrap();
@@ -67,7 +77,7 @@ proptest! {
             let siblings = of(group);
             for i in 0..8 {
                 let node = (1 + 8 * group + i) as usize;
-                let bit = |bits: &[u8]| bits.get(node / 8).map_or(0, |byte| byte >> (7 - node % 8) & 1);
+                let bit = |bits: &[u8]| bits.get(node / 8).map_or(0, |byte| u64::from(byte >> (7 - node % 8) & 1));
                 if (node as u64) < shape.nodes_described() {
                     prop_assert_eq!(bit(&split), siblings.split >> i & 1);
                 }

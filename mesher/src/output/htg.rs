@@ -24,8 +24,8 @@ use vtkhdf::write::Deflater;
 
 type TreeFile = TreeWriter<BufWriter<Draft>>;
 
-/// Greatest number of windows of a round. One rank may have to send all of their nodes, half a byte each.
-const WINDOWS_MAX: u64 = 256;
+/// Greatest number of windows of a round. One rank may have to send all of their nodes, in bricks of 40 bytes: usually one byte each.
+const WINDOWS_MAX: u64 = 128;
 
 /// Writes the file. Collective.
 ///
@@ -63,12 +63,11 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
 }
 
-/// Siblings with their number.
+/// Groups of siblings with the number of the first.
 type Numbered = (u64, Siblings);
 
-/// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message consists of
-/// runs of siblings: number of the first, and four bytes for each. `last` are the last siblings sent: some of them may belong to the
-/// following window.
+/// The messages with this rank's nodes in some windows; window by window, they go to ranks 0, 1, ... . A message has five words for each
+/// brick. `last` is the last brick sent: some of its groups may belong to the following window.
 fn messages(
     own: &mut Peekable<impl Iterator<Item = Numbered>>,
     last: &mut Option<Numbered>,
@@ -76,19 +75,12 @@ fn messages(
 ) -> MessageBuffer {
     let mut messages = MessageBuffer::default();
     for (to, window) in windows.enumerate() {
-        let range = groups(window);
-        let mut found = Vec::from_iter(last.filter(|(group, _)| range.contains(group)));
-        while let Some(next) = own.next_if(|(group, _)| *group < range.end) {
-            found.push(next);
-        }
-        *last = found.last().copied();
-        for run in found.chunk_by(|a, b| a.0 + 1 == b.0) {
-            let of = |s: Siblings| [s.split, s.deleted, s.crossing, s.inside];
-            let bytes: Vec<u8> = run.iter().flat_map(|&(_, s)| of(s)).collect();
-            messages.append(to, |words| {
-                words.push(run[0].0);
-                pack_bytes(&bytes, words);
-            });
+        let end = groups(window).end;
+        let more = std::iter::from_fn(|| own.next_if(|(first, _)| *first < end));
+        for (first, siblings) in last.take().into_iter().chain(more) {
+            let Siblings { split, deleted, crossing, inside } = siblings;
+            messages.write(to, [first, split, deleted, crossing, inside]);
+            *last = Some((first, siblings));
         }
     }
     messages
@@ -99,18 +91,10 @@ fn fill(mesh: &Mesh, window: u64, messages: &MessageBuffer) -> Window {
     let mut filled = Window::new(window);
     if window == 0 {
         // All ranks hold the root.
-        let brick = Path::new(mesh, 0).load(0, 0);
-        filled.put_root(siblings(brick, 0, 1));
+        filled.put_root(siblings(Path::new(mesh, 0).load(0, 0), 1));
     }
-    for (_, mut words) in messages.messages() {
-        while let [first, rest @ ..] = words {
-            let (bytes, after) = unpack_bytes(rest);
-            for (group, &[split, deleted, crossing, inside]) in (*first..).zip(bytes.as_chunks().0)
-            {
-                filled.put(group, Siblings { split, deleted, crossing, inside });
-            }
-            words = after;
-        }
+    for [first, split, deleted, crossing, inside] in messages.values::<[u64; 5]>() {
+        filled.put(first, Siblings { split, deleted, crossing, inside });
     }
     filled
 }
@@ -184,28 +168,37 @@ fn own_siblings<'a>(
         // The place of the last brick, and the number of the next siblings.
         let (mut last, mut next) = (None, 0);
         let bricks = mesh.split[l as usize - 1].child_bricks();
-        bricks.filter(move |b| mesh.ownership.owns(l, b.key)).flat_map(move |b| {
+        bricks.filter(move |b| mesh.ownership.owns(l, b.key)).map(move |b| {
             let place = place(&mesh.ownership, l, b.key);
             if last.replace(place) != Some(place) {
                 next = numbering.first[place];
             }
-            let (brick, groups, first) = (path.load(l, b.key), parents(b.bits), next);
-            next += u64::from(groups.count_ones());
-            let of_group = move |j| siblings(brick, u64::from(j), 0xff);
-            (first..).zip(ones(u64::from(groups)).map(of_group))
+            let first = next;
+            next += u64::from(b.bits.count_ones() / 8);
+            (first, siblings(path.load(l, b.key), b.bits))
         })
     };
     (1..LEVELS as Level).flat_map(of_level)
 }
 
-/// Siblings: byte `j` of a brick, of which those in the mask `exist` do.
+/// The siblings in a brick that exist; those of the groups that do not are left out.
 #[inline]
-fn siblings(brick: Octants, j: u64, exist: u8) -> Siblings {
+fn siblings(brick: Octants, exist: u64) -> Siblings {
     let Octants { split, crossing, inside, deleted } = brick;
-    let kept = !split & !deleted;
-    let [split, deleted, crossing, inside] =
-        [split, deleted & !split, crossing & kept, inside & kept].map(|bits| byte(bits, j) & exist);
-    Siblings { split, deleted, crossing, inside }
+    let kept = exist & !split & !deleted;
+    let groups = parents(exist);
+    let packed = |bits: u64| match groups {
+        0xff => bits,
+        _ => {
+            (0..).zip(ones(groups.into())).map(|(to, j)| (bits >> (8 * j) & 0xff) << (8 * to)).sum()
+        }
+    };
+    Siblings {
+        split: packed(split & exist),
+        deleted: packed(deleted & exist & !split),
+        crossing: packed(crossing & kept),
+        inside: packed(inside & kept),
+    }
 }
 
 /// Readers of the sets, level by level, and the bricks that contain the current one, each with its key.

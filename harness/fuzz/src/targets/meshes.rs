@@ -143,7 +143,7 @@ fn file_of(bytes: &[u8]) -> Vec<u8> {
     let shape = Shape { origin: [-1.0, 0.0, 0.5], edge: 2.0, nodes };
     let mut window = Window::new(0);
     let mut siblings = || {
-        let [split, deleted, crossing, inside] = [next(), next(), next(), next()];
+        let [split, deleted, crossing, inside] = [next(), next(), next(), next()].map(u64::from);
         Siblings { split, deleted, crossing, inside }
     };
     window.put_root(siblings());
