@@ -47,26 +47,30 @@
 use crate::input::lattice::Rules;
 use crate::partition::ownership::Ownership;
 use crate::record::Counters;
-use bricks::brick::{self, Brick};
+use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::dilate::{Reach, Tile};
 use bricks::octant::Level;
 use bricks::tree::{Kept, PerLevel, Tree};
 use ranks::Comm;
 
+/// Bricks of a level from which on those that are full are stored as the octants that they fill. With fewer it would cost more time than it
+/// saves. In debug builds all are, so that small cases test it.
+const BRICKS_MANY: usize = if cfg!(debug_assertions) { 1 } else { 1 << 16 };
+
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
 /// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
-/// `crossing` are the base tree's crossing leaves. Counts the work, and the bytes of split octants at most. Collective.
+/// `crossing` are the base tree's crossing leaves. Adds its work to the counters; also returns the bytes of split octants at most. Collective.
 pub fn grade(
     split: PerLevel,
     crossing: &PerLevel,
     kept: &Kept,
     rules: &Rules,
     ownership: &Ownership,
+    counters: Counters,
     comm: &dyn Comm,
 ) -> (PerLevel, Counters, usize) {
     let surface = rules.level_surface;
-    let counters = Counters::default();
     let mut g = Gradation { split, crossing, kept, surface, ownership, comm, counters, bytes: 0 };
     if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
@@ -79,9 +83,10 @@ pub fn grade(
             let reached = g.reach(l, rules.layer_cells_min - 1, l - 1);
             g.split_where_kept(l - 1, reached);
         }
-        // Splits of this level are complete. Those of several ranks may be moved after gradation.
-        if comm.size() == 1 {
-            g.split[l as usize - 1].condense();
+        // Splits of this level are complete.
+        let complete = &mut g.split[l as usize - 1];
+        if complete.len() >= BRICKS_MANY {
+            complete.condense();
         }
         touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
     }
@@ -130,12 +135,8 @@ impl Gradation<'_> {
             return if to < l - 1 { parents.coarsen() } else { parents };
         }
         self.reached(to, |g, reach| {
-            let exhausted = g.groups_without_kept_leaf(l);
-            let mut exhausted = exhausted.cursor();
-            let groups = (g.split[l as usize - 1].bricks())
-                .filter(|b| g.ownership.owns(l - 1, b.key))
-                .map(|b| Brick { bits: b.bits & !exhausted.get(b.key), ..b })
-                .filter(|b| b.bits != 0);
+            let groups = g.split[l as usize - 1].bricks();
+            let groups = groups.filter(|b| g.ownership.owns(l - 1, b.key));
             let radius = radius.div_ceil(2);
             // What is reached is the greatest set of all: its parents are made without it.
             match to < l - 1 {
@@ -143,19 +144,6 @@ impl Gradation<'_> {
                 false => reach.dilate(groups, radius),
             }
         })
-    }
-
-    /// Parents, of level `l - 1`, whose children are all split or deleted. As sources they would add no
-    /// split, but messages. Those that this rank cannot see, because it does not hold the children, may be
-    /// missing.
-    fn groups_without_kept_leaf(&self, l: Level) -> BrickSet {
-        let mut deleted = self.kept.deleted(l).cursor();
-        let mut set = BrickSet::default();
-        for b in self.split[l as usize].bricks() {
-            let full = !brick::parents(!(b.bits | deleted.get(b.key)));
-            set.push(b.key >> 3, u64::from(full) << (8 * (b.key & 7)));
-        }
-        set
     }
 
     /// The octants of level `l` that `dilate` reaches; counts the work.

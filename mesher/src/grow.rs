@@ -126,15 +126,11 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
     let base = is_whole.then(|| mesh.split.clone());
-    let (split, work, bytes) = job.phase("grade", |comm| {
+    (mesh.split, job.counters, mesh.bytes_graded) = job.phase("grade", |comm| {
         let split = std::mem::take(&mut mesh.split);
         let kept = Kept::new(mesh.sides.deleted());
-        grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, comm)
+        grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, work, comm)
     });
-    (mesh.split, mesh.bytes_graded) = (split, bytes);
-    job.counters.octants_split_graded = work.octants_split_graded;
-    job.counters.words_dilated = work.words_dilated;
-    job.counters.halo_bricks = work.halo_bricks;
     let mut fingerprint = 0;
     job.check(|comm| {
         check::graded(&mesh, comm);
@@ -199,7 +195,7 @@ fn repartition_by_leaves(mesh: &mut Mesh, comm: &dyn Comm) {
     let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
     let (split, before) = (&mesh.split, &mesh.ownership);
     let new = repartition::after_gradation(split, gone, before, mesh.level_base, comm);
-    let sets = &mut [&mut mesh.split, &mut mesh.crossing, &mut mesh.sides.stored];
-    repartition::migrate(sets, &mesh.ownership, &new, comm);
+    let others = [&mut mesh.crossing, &mut mesh.sides.stored];
+    repartition::migrate(&mut mesh.split, others, &mesh.ownership, &new, comm);
     mesh.ownership = new;
 }

@@ -21,8 +21,8 @@ pub struct Mesh {
     pub level_base: Level,
     /// The partitioner that was used; none for a single rank.
     pub partitioner: Option<Partitioner>,
-    /// Split octants: of the graded tree, or of T0 if gradation was not asked for. On one rank the sets of a graded tree are condensed: they
-    /// can only be read.
+    /// Split octants: of the graded tree, or of T0 if gradation was not asked for. Great sets of a graded tree are condensed: they can
+    /// only be read.
     pub split: PerLevel,
     /// Crossing leaves of T0.
     pub crossing: PerLevel,

@@ -17,6 +17,7 @@ use mesher::output::stream::total;
 use mesher::partition::curve;
 use mesher::partition::ownership::Ownership;
 use mesher::partition::{Division, Partitioner, Weights};
+use mesher::record::Counters;
 use mesher::refine::{BinnedFacets, refine};
 use mesher::sides::leaks::Leaks;
 use mesher::sides::{Base, Sides, decide};
@@ -84,8 +85,15 @@ impl Phases {
         let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
         let kept = Kept::new(sides.deleted());
-        let (graded, ..) =
-            grade::grade(tree.split.clone(), &tree.crossing, &kept, &rules, &ownership, &Solo);
+        let (graded, ..) = grade::grade(
+            tree.split.clone(),
+            &tree.crossing,
+            &kept,
+            &rules,
+            &ownership,
+            Counters::default(),
+            &Solo,
+        );
         let mesh = Mesh {
             facets: FacetCounts { total: given.total, beyond_root: false, digest: 0 },
             rules: rules.clone(),
@@ -155,6 +163,7 @@ pub fn kernels() -> Vec<Kernel> {
                     &kept,
                     &p.rules,
                     &p.ownership,
+                    Counters::default(),
                     &Solo,
                 )
                 .1

@@ -157,7 +157,13 @@ impl BrickSet {
         });
         self.low.shrink_to_fit();
         self.bits.shrink_to_fit();
-        self.full = Some(Box::new(full)).filter(|full| !full.is_empty());
+        self.replace_full(full);
+    }
+
+    /// Replaces the octants that full bricks are stored as, of which the set must have no others. Without any, the set can be changed again.
+    pub fn replace_full(&mut self, octants: Self) -> Self {
+        let new = Some(Box::new(octants)).filter(|full| !full.is_empty());
+        std::mem::replace(&mut self.full, new).map_or(Self::EMPTY, |full| *full)
     }
 
     /// Whether the octant with this Morton code is in the set.

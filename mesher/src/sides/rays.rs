@@ -34,20 +34,17 @@ struct Grid {
 impl Grid {
     fn new(points: &[[i64; 3]], axis: usize) -> Self {
         let side_log2 = (points.len().max(1).ilog2() / 2).min(10);
-        let mut grid = Self { axis, side_log2, members: Vec::new() };
-        let mut members: Vec<_> = points.iter().map(|p| grid.square_of(p)).zip(0..).collect();
+        let grid = Self { axis, side_log2, members: Vec::new() };
+        let [u, w] = [1, 2].map(|next| (axis + next) % 3);
+        let square = |p: &[i64; 3]| grid.index(p[w]) << side_log2 | grid.index(p[u]);
+        let mut members: Vec<_> = points.iter().map(square).zip(0..).collect();
         members.sort_unstable();
-        grid.members = members;
-        grid
+        Self { members, ..grid }
     }
 
     /// Index, along one side, of the square of a lattice coordinate, clamped to the root.
     fn index(&self, c: i64) -> usize {
         (c.clamp(0, ROOT_EDGE - 1) >> (ROOT_BITS - self.side_log2)) as usize
-    }
-
-    fn square_of(&self, p: &[i64; 3]) -> usize {
-        self.index(p[(self.axis + 2) % 3]) << self.side_log2 | self.index(p[(self.axis + 1) % 3])
     }
 
     /// Flips the parities of the points whose rays along the axis meet the facet.
