@@ -70,7 +70,7 @@ fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
     for component in components {
         let first = coarse.octant(component.leaves[0]);
         // All leaves of T0 within a leaf of T0/k that no facet crosses have one side.
-        let within = tree.leaves_meeting(&first.extent())[0];
+        let within = leaf_at(tree, first.min).expect("a point of the root");
         if leaked(component.side, tree.side(within)) && !has_seed(&component) {
             let edge = |level: u32| input.root.edge / f64::from(1_u32 << level);
             let volume = |level: u32| 1_u64 << (3 * (LEVEL_MAX - level));

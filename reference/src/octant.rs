@@ -36,6 +36,15 @@ impl Extent {
         (0..3).all(|a| self.min[a].max(other.min[a]) < self.max[a].min(other.max[a]))
     }
 
+    /// Whether the two boxes have an area in common: part of a face, or part of their interiors.
+    #[must_use]
+    pub fn share_area(&self, other: &Extent) -> bool {
+        let common = |a: usize| self.max[a].min(other.max[a]) - self.min[a].max(other.min[a]);
+        let lengths = [common(0), common(1), common(2)];
+        lengths.iter().all(|&length| length >= 0)
+            && lengths.iter().filter(|&&length| length == 0).count() < 2
+    }
+
     /// The box enlarged by `margin` on every side.
     ///
     /// Because corners are integers, a box with volume touches this one if and only if its interior

@@ -91,9 +91,8 @@ pub fn example(tree: &Tree, input: &Input, components: &[&Component]) -> Option<
 /// The components, each a set of leaves.
 fn components(tree: &Tree) -> Vec<Vec<Index>> {
     let mut components = Vec::new();
-    let leaves = tree.leaves();
-    let mut reached = vec![false; leaves.iter().max().map_or(0, |last| last + 1)];
-    for start in leaves {
+    let mut reached = vec![false; tree.len()];
+    for (start, _) in tree.leaves() {
         if reached[start] || tree.side(start) == Side::Crossing {
             continue;
         }
@@ -102,7 +101,7 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
         let mut visited = 0;
         while let Some(&leaf) = component.get(visited) {
             visited += 1;
-            for neighbour in face_neighbours(tree, leaf) {
+            for neighbour in tree.face_neighbours(leaf) {
                 if !reached[neighbour] && tree.side(neighbour) != Side::Crossing {
                     reached[neighbour] = true;
                     component.push(neighbour);
@@ -112,22 +111,6 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
         components.push(component);
     }
     components
-}
-
-/// The leaves that share part of a face with `leaf`: those that meet the faces of its cube
-/// thickened outwards by one lattice unit, which is less than the edge of any leaf.
-fn face_neighbours(tree: &Tree, leaf: Index) -> Vec<Index> {
-    let Extent { min, max } = tree.octant(leaf).extent();
-    let mut neighbours = Vec::new();
-    for axis in 0..3 {
-        let mut below = Extent { min, max };
-        (below.min[axis], below.max[axis]) = (min[axis] - 1, min[axis]);
-        let mut above = Extent { min, max };
-        (above.min[axis], above.max[axis]) = (max[axis], max[axis] + 1);
-        neighbours.extend(tree.leaves_meeting(&below));
-        neighbours.extend(tree.leaves_meeting(&above));
-    }
-    neighbours
 }
 
 struct Verdict {
@@ -185,7 +168,7 @@ fn seeded_leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
 /// integers, so the unit cube at the point lies in one leaf.
 pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
     let cube = Extent { min: point, max: point.map(|x| x + 1) };
-    tree.leaves_meeting(&cube).first().copied()
+    tree.leaves_meeting(&cube).next().map(|(leaf, _)| leaf)
 }
 
 /// The centroid, in the user's unit, of the leaf that no facet crosses and whose centroid is
@@ -193,8 +176,8 @@ pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
 /// `None` if facets cross every leaf.
 fn nearest_centroid(tree: &Tree, input: &Input, seed: &Seed) -> Option<[f64; 3]> {
     let point = seed.point.map(|x| x.clamp(0, ROOT_EDGE));
-    let free = tree.leaves().into_iter().filter(|&leaf| tree.side(leaf) != Side::Crossing);
-    let nearest = free.map(|leaf| tree.octant(leaf)).min_by_key(|octant| {
+    let free = tree.leaves().filter(|&(leaf, _)| tree.side(leaf) != Side::Crossing);
+    let nearest = free.map(|(_, octant)| octant).min_by_key(|octant| {
         let centroid = octant.centroid();
         let square: i64 = (0..3).map(|a| (centroid[a] - point[a]).pow(2)).sum();
         (square, octant.coarsest_first())

@@ -5,46 +5,49 @@
 //! an octant is the least level of the kept leaves among its descendants.
 use crate::crossing::crosses;
 use crate::lattice::Facet;
-use crate::octant::{Extent, Octant, Side};
+use crate::octant::{Extent, LEVEL_MAX, Octant, Side};
+use std::num::NonZeroU32;
 
 /// The index of an octant in the arena.
 pub type Index = usize;
 
 /// The `level_least` of an octant without kept descendants. It exceeds every level, so such an
 /// octant is never refined.
-const NOTHING_KEPT: u32 = u32::MAX;
+const NOTHING_KEPT: u8 = u8::MAX;
 
-#[derive(Clone, Debug)]
+/// What every search reads of an octant. Eight siblings fill a cache line.
+#[derive(Clone, Copy, Debug)]
 struct Node {
-    octant: Octant,
-    /// The first of eight children; `None` for a leaf.
-    children: Option<Index>,
+    /// The first of eight children; `None` for a leaf. The root, which has index 0, is no child.
+    children: Option<NonZeroU32>,
     /// Meaningful for leaves only.
     side: Side,
-    level_least: u32,
+    level_least: u8,
 }
 
 /// A full oct-tree: its leaves tile the root.
 #[derive(Clone, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
+    /// The octants of `nodes`. Searches start at the root and compute the octants that they pass.
+    octants: Vec<Octant>,
 }
 
 impl Tree {
     /// The tree whose only leaf is the root.
     #[must_use]
     pub fn root() -> Self {
-        Self { nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)] }
+        let root = Octant::ROOT;
+        Self { nodes: vec![Node::leaf(&root, Side::Outside)], octants: vec![root] }
     }
 
     /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks
     /// these leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
-        self.insert_below(0, facet, level);
+        self.insert_below((0, Octant::ROOT), facet, level);
     }
 
-    fn insert_below(&mut self, index: Index, facet: &Facet, level: u32) {
-        let octant = self.nodes[index].octant;
+    fn insert_below(&mut self, (index, octant): (Index, Octant), facet: &Facet, level: u32) {
         if !crosses(facet, &octant.extent()) {
             return;
         }
@@ -55,7 +58,7 @@ impl Tree {
             }
             self.split(index);
         }
-        for child in self.children(index) {
+        for child in self.children(index, octant) {
             self.insert_below(child, facet, level);
         }
         self.update_level_least(index);
@@ -64,31 +67,35 @@ impl Tree {
     /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least
     /// level `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
-        self.refine_below(0, extent, level);
+        self.refine_below((0, Octant::ROOT), extent, level);
     }
 
-    fn refine_below(&mut self, index: Index, extent: &Extent, level: u32) {
+    fn refine_below(&mut self, (index, octant): (Index, Octant), extent: &Extent, level: u32) {
         let node = &self.nodes[index];
-        if node.level_least >= level || !node.octant.extent().interiors_meet(extent) {
+        if u32::from(node.level_least) >= level || !octant.extent().interiors_meet(extent) {
             return;
         }
         if node.children.is_none() {
             self.split(index);
         }
-        for child in self.children(index) {
+        for child in self.children(index, octant) {
             self.refine_below(child, extent, level);
         }
         self.update_level_least(index);
     }
 
     fn split(&mut self, index: Index) {
-        let Node { octant, side, .. } = self.nodes[index];
-        self.nodes[index].children = Some(self.nodes.len());
-        self.nodes.extend((0..8).map(|i| Node::leaf(octant.child(i), side)));
+        let (octant, side) = (self.octants[index], self.nodes[index].side);
+        let first = u32::try_from(self.nodes.len()).expect("a tree that fits into memory");
+        self.nodes[index].children = NonZeroU32::new(first);
+        let children = (0..8).map(|i| octant.child(i));
+        self.nodes.extend(children.clone().map(|child| Node::leaf(&child, side)));
+        self.octants.extend(children);
     }
 
     fn update_level_least(&mut self, index: Index) {
-        let levels = self.children(index).map(|child| self.nodes[child].level_least);
+        let children = self.children(index, self.octants[index]);
+        let levels = children.map(|(child, _)| self.nodes[child].level_least);
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
@@ -105,8 +112,14 @@ impl Tree {
         }
     }
 
-    fn children(&self, index: Index) -> std::ops::Range<Index> {
-        self.nodes[index].children.map_or(0..0, |first| first..first + 8)
+    /// The children of an octant, in Morton order; none if it is a leaf.
+    fn children(
+        &self,
+        index: Index,
+        octant: Octant,
+    ) -> impl DoubleEndedIterator<Item = (Index, Octant)> + use<> {
+        let first = self.nodes[index].children.map(|first| first.get() as Index);
+        first.into_iter().flat_map(move |first| (0..8).map(move |i| (first + i, octant.child(i))))
     }
 
     /// Checks the invariants of this module.
@@ -114,7 +127,7 @@ impl Tree {
     /// # Panics
     /// If an invariant does not hold.
     pub fn check_invariants(&self) {
-        assert_eq!(self.nodes[0].octant, Octant::ROOT);
+        assert_eq!((self.octants[0], self.octants.len()), (Octant::ROOT, self.nodes.len()));
         let parents = self.nodes.iter().filter(|node| node.children.is_some()).count();
         assert_eq!(
             self.nodes.len(),
@@ -122,62 +135,78 @@ impl Tree {
             "every octant except the root is the child of exactly one octant"
         );
         for (index, node) in self.nodes.iter().enumerate() {
-            let kept = node.level_least != NOTHING_KEPT;
+            let (kept, octant) = (node.level_least != NOTHING_KEPT, self.octants[index]);
             if node.children.is_none() {
-                assert!(!kept || node.level_least == node.octant.level);
+                assert!(!kept || u32::from(node.level_least) == octant.level);
                 continue;
             }
-            assert!(self.children(index).start > index, "children follow their parent");
-            let children = || self.children(index).map(|child| &self.nodes[child]);
-            assert!(children().enumerate().all(|(i, child)| child.octant == node.octant.child(i)));
-            assert_eq!(Some(node.level_least), children().map(|child| child.level_least).min());
+            let children = || self.children(index, octant);
+            assert!(children().all(|(child, _)| child > index), "children follow their parent");
+            assert!(children().all(|(child, octant)| self.octants[child] == octant));
+            let levels = children().map(|(child, _)| self.nodes[child].level_least);
+            assert_eq!(Some(node.level_least), levels.min());
         }
+    }
+
+    /// The leaves that are `wanted` and lie in no octant that is not, in Morton order.
+    fn leaves_where(
+        &self,
+        wanted: impl Fn(&Node, &Octant) -> bool,
+    ) -> impl Iterator<Item = (Index, Octant)> {
+        let mut pending = vec![(0, Octant::ROOT)];
+        std::iter::from_fn(move || {
+            while let Some((index, octant)) = pending.pop() {
+                if wanted(&self.nodes[index], &octant) {
+                    if self.nodes[index].children.is_none() {
+                        return Some((index, octant));
+                    }
+                    pending.extend(self.children(index, octant).rev());
+                }
+            }
+            None
+        })
+    }
+
+    /// The number of octants, which is more than every index.
+    #[must_use]
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.nodes.len()
     }
 
     /// All leaves, in Morton order.
-    #[must_use]
-    pub fn leaves(&self) -> Vec<Index> {
-        let mut leaves = Vec::new();
-        self.push_leaves(0, &|_| true, &mut leaves);
-        leaves
+    pub fn leaves(&self) -> impl Iterator<Item = (Index, Octant)> {
+        self.leaves_where(|_, _| true)
     }
 
     /// The leaves whose interior meets that of `extent`, in Morton order.
-    #[must_use]
-    pub fn leaves_meeting(&self, extent: &Extent) -> Vec<Index> {
-        let mut leaves = Vec::new();
-        self.push_leaves(0, &|octant| octant.extent().interiors_meet(extent), &mut leaves);
-        leaves
+    pub fn leaves_meeting(&self, extent: &Extent) -> impl Iterator<Item = (Index, Octant)> {
+        self.leaves_where(|_, octant| octant.extent().interiors_meet(extent))
     }
 
-    fn push_leaves(&self, index: Index, wanted: &impl Fn(&Octant) -> bool, to: &mut Vec<Index>) {
-        if !wanted(&self.nodes[index].octant) {
-            return;
-        }
-        if self.nodes[index].children.is_none() {
-            to.push(index);
-        }
-        for child in self.children(index) {
-            self.push_leaves(child, wanted, to);
-        }
+    /// The leaves that share part of a face with a leaf, and this leaf itself.
+    pub fn face_neighbours(&self, leaf: Index) -> impl Iterator<Item = Index> {
+        let extent = self.octants[leaf].extent();
+        let wanted = move |_: &Node, octant: &Octant| octant.extent().share_area(&extent);
+        self.leaves_where(wanted).map(|(leaf, _)| leaf)
     }
 
-    /// The kept leaves, in Morton order, each with its side.
-    pub fn kept_leaves(&self) -> impl Iterator<Item = (Octant, Side)> {
-        let kept = |&index: &Index| self.nodes[index].level_least != NOTHING_KEPT;
-        self.leaves().into_iter().filter(kept).map(|index| (self.octant(index), self.side(index)))
+    /// The kept leaves of at most level `level`, in Morton order, each with its side.
+    pub fn kept_leaves(&self, level: u32) -> impl Iterator<Item = (Octant, Side)> {
+        let leaves = self.leaves_where(move |node, _| u32::from(node.level_least) <= level);
+        leaves.map(|(index, octant)| (octant, self.side(index)))
     }
 
     /// The words of the kept leaves whose side satisfies `wanted`, in ascending order.
     pub fn words(&self, wanted: impl Fn(Side) -> bool) -> Vec<u64> {
-        let leaves = self.kept_leaves().filter(|&(_, side)| wanted(side));
+        let leaves = self.kept_leaves(LEVEL_MAX).filter(|&(_, side)| wanted(side));
         leaves.map(|(octant, side)| octant.word(side)).collect()
     }
 
     /// The octant at an index.
     #[must_use]
     pub fn octant(&self, index: Index) -> Octant {
-        self.nodes[index].octant
+        self.octants[index]
     }
 
     /// The side of a leaf.
@@ -193,7 +222,7 @@ impl Tree {
 }
 
 impl Node {
-    fn leaf(octant: Octant, side: Side) -> Self {
-        Self { octant, children: None, side, level_least: octant.level }
+    fn leaf(octant: &Octant, side: Side) -> Self {
+        Self { children: None, side, level_least: octant.level as u8 }
     }
 }
