@@ -30,6 +30,20 @@ pub struct Extent {
 }
 
 impl Extent {
+    /// The least box that contains three points.
+    #[must_use]
+    pub fn around([p, q, r]: &[[i64; 3]; 3]) -> Extent {
+        let least = std::array::from_fn(|a| p[a].min(q[a]).min(r[a]));
+        let greatest = std::array::from_fn(|a| p[a].max(q[a]).max(r[a]));
+        Extent { min: least, max: greatest }
+    }
+
+    /// Whether the two closed boxes share a point.
+    #[must_use]
+    pub fn touches(&self, other: &Extent) -> bool {
+        (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
+    }
+
     /// Whether the two interiors share a point. A box without volume has no interior.
     #[must_use]
     pub fn interiors_meet(&self, other: &Extent) -> bool {

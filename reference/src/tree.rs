@@ -44,11 +44,19 @@ impl Tree {
     /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks
     /// these leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
-        self.insert_below((0, Octant::ROOT), facet, level);
+        self.insert_below((0, Octant::ROOT), facet, &Extent::around(facet), level);
     }
 
-    fn insert_below(&mut self, (index, octant): (Index, Octant), facet: &Facet, level: u32) {
-        if !crosses(facet, &octant.extent()) {
+    fn insert_below(
+        &mut self,
+        (index, octant): (Index, Octant),
+        facet: &Facet,
+        bounds: &Extent,
+        level: u32,
+    ) {
+        // The bounds are for speed only: most octants that a facet is tested against are far away from it.
+        let extent = octant.extent();
+        if !extent.touches(bounds) || !crosses(facet, &extent) {
             return;
         }
         if self.nodes[index].children.is_none() {
@@ -59,7 +67,7 @@ impl Tree {
             self.split(index);
         }
         for child in self.children(index, octant) {
-            self.insert_below(child, facet, level);
+            self.insert_below(child, facet, bounds, level);
         }
         self.update_level_least(index);
     }
