@@ -46,12 +46,12 @@ impl Ambiguous {
 }
 
 /// Sets the side of every leaf that is not `Crossing` to the side of its component, and returns the
-/// components.
+/// components. Rays decide if `seeds` is empty.
 ///
 /// # Errors
 /// A seed lies outside the root or in a crossing leaf.
-pub fn assign(tree: &mut Tree, input: &Input) -> Result<Vec<Component>, Error> {
-    let seeded = seeded_leaves(tree, input)?;
+pub fn assign(tree: &mut Tree, input: &Input, seeds: &[Seed]) -> Result<Vec<Component>, Error> {
+    let seeded = seeded_leaves(tree, input, seeds)?;
     let mut assigned = Vec::new();
     for mut leaves in components(tree) {
         leaves.sort_by_cached_key(|&leaf| tree.octant(leaf).coarsest_first());
@@ -145,9 +145,9 @@ fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
 ///
 /// # Errors
 /// A seed lies outside the root or in a crossing leaf.
-fn seeded_leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
+fn seeded_leaves(tree: &Tree, input: &Input, seeds: &[Seed]) -> Result<Vec<Index>, Error> {
     let mut leaves = Vec::new();
-    for (index, seed) in input.seeds.iter().enumerate() {
+    for (index, seed) in seeds.iter().enumerate() {
         let nearest = || nearest_centroid(tree, input, seed);
         match leaf_at(tree, seed.point) {
             Some(leaf) if tree.side(leaf) != Side::Crossing => leaves.push(leaf),

@@ -72,6 +72,31 @@ impl Tree {
         self.update_level_least(index);
     }
 
+    /// This tree cut at a level: an octant of that level that this tree splits is a leaf, which is
+    /// `Crossing` if it contains a crossing leaf.
+    #[must_use]
+    pub fn cut(&self, level: u32) -> Tree {
+        let mut cut = Tree::root();
+        cut.copy_below(0, self, (0, Octant::ROOT), level);
+        cut
+    }
+
+    fn copy_below(&mut self, to: Index, tree: &Tree, from: (Index, Octant), level: u32) {
+        let (index, octant) = from;
+        if octant.level == level || tree.nodes[index].children.is_none() {
+            let mut leaves = tree.leaves_below(from, |_, _| true);
+            if leaves.any(|(leaf, _)| tree.side(leaf) == Side::Crossing) {
+                self.nodes[to].side = Side::Crossing;
+            }
+            return;
+        }
+        self.split(to);
+        for ((to, _), from) in self.children(to, octant).zip(tree.children(index, octant)) {
+            self.copy_below(to, tree, from, level);
+        }
+        self.update_level_least(to);
+    }
+
     /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least
     /// level `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
@@ -156,12 +181,13 @@ impl Tree {
         }
     }
 
-    /// The leaves that are `wanted` and lie in no octant that is not, in Morton order.
-    fn leaves_where(
+    /// The leaves in `octant` that are `wanted`, as are all octants that contain them, in Morton order.
+    fn leaves_below(
         &self,
+        octant: (Index, Octant),
         wanted: impl Fn(&Node, &Octant) -> bool,
     ) -> impl Iterator<Item = (Index, Octant)> {
-        let mut pending = vec![(0, Octant::ROOT)];
+        let mut pending = vec![octant];
         std::iter::from_fn(move || {
             while let Some((index, octant)) = pending.pop() {
                 if wanted(&self.nodes[index], &octant) {
@@ -184,24 +210,25 @@ impl Tree {
 
     /// All leaves, in Morton order.
     pub fn leaves(&self) -> impl Iterator<Item = (Index, Octant)> {
-        self.leaves_where(|_, _| true)
+        self.leaves_below((0, Octant::ROOT), |_, _| true)
     }
 
     /// The leaves whose interior meets that of `extent`, in Morton order.
     pub fn leaves_meeting(&self, extent: &Extent) -> impl Iterator<Item = (Index, Octant)> {
-        self.leaves_where(|_, octant| octant.extent().interiors_meet(extent))
+        self.leaves_below((0, Octant::ROOT), |_, octant| octant.extent().interiors_meet(extent))
     }
 
     /// The leaves that share part of a face with a leaf, and this leaf itself.
     pub fn face_neighbours(&self, leaf: Index) -> impl Iterator<Item = Index> {
         let extent = self.octants[leaf].extent();
         let wanted = move |_: &Node, octant: &Octant| octant.extent().share_area(&extent);
-        self.leaves_where(wanted).map(|(leaf, _)| leaf)
+        self.leaves_below((0, Octant::ROOT), wanted).map(|(leaf, _)| leaf)
     }
 
     /// The kept leaves of at most level `level`, in Morton order, each with its side.
     pub fn kept_leaves(&self, level: u32) -> impl Iterator<Item = (Octant, Side)> {
-        let leaves = self.leaves_where(move |node, _| u32::from(node.level_least) <= level);
+        let leaves = self
+            .leaves_below((0, Octant::ROOT), move |node, _| u32::from(node.level_least) <= level);
         leaves.map(|(index, octant)| (octant, self.side(index)))
     }
 
