@@ -38,25 +38,18 @@ impl Extent {
         Extent { min: least, max: greatest }
     }
 
-    /// Whether the two closed boxes share a point.
-    #[must_use]
-    pub fn touches(&self, other: &Extent) -> bool {
-        (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
-    }
-
     /// Whether the two interiors share a point. A box without volume has no interior.
     #[must_use]
     pub fn interiors_meet(&self, other: &Extent) -> bool {
         (0..3).all(|a| self.min[a].max(other.min[a]) < self.max[a].min(other.max[a]))
     }
 
-    /// Whether the two boxes have an area in common: part of a face, or part of their interiors.
+    /// Whether the common points of two cubes that touch have an area: not if the cubes lie side by
+    /// side along two axes.
     #[must_use]
     pub fn share_area(&self, other: &Extent) -> bool {
-        let common = |a: usize| self.max[a].min(other.max[a]) - self.min[a].max(other.min[a]);
-        let lengths = [common(0), common(1), common(2)];
-        lengths.iter().all(|&length| length >= 0)
-            && lengths.iter().filter(|&&length| length == 0).count() < 2
+        let side_by_side = |&a: &usize| self.max[a] == other.min[a] || self.min[a] == other.max[a];
+        (0..3).filter(side_by_side).count() < 2
     }
 
     /// The box enlarged by `margin` on every side.
@@ -112,6 +105,21 @@ impl Octant {
         let half = self.edge() / 2;
         let min = std::array::from_fn(|a| self.min[a] + half * (index >> a & 1) as i64);
         Octant { min, level: self.level + 1 }
+    }
+
+    /// The indices of the children whose interior meets that of `extent`, for an octant whose
+    /// interior does.
+    pub fn children_meeting(
+        &self,
+        extent: &Extent,
+    ) -> impl DoubleEndedIterator<Item = usize> + use<> {
+        let middle = self.centroid();
+        let halves = |a: usize| {
+            usize::from(extent.min[a] >= middle[a])..1 + usize::from(extent.max[a] > middle[a])
+        };
+        let [x, y, z] = [halves(0), halves(1), halves(2)];
+        let columns = z.flat_map(move |k| y.clone().map(move |j| k << 2 | j << 1));
+        columns.flat_map(move |column| x.clone().map(move |i| column | i))
     }
 
     /// The Morton key: the interleaved coordinates of the minimum corner in level-19 cells, with x

@@ -168,7 +168,7 @@ fn seeded_leaves(tree: &Tree, input: &Input, seeds: &[Seed]) -> Result<Vec<Index
 /// integers, so the unit cube at the point lies in one leaf.
 pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
     let cube = Extent { min: point, max: point.map(|x| x + 1) };
-    tree.leaves_meeting(&cube).next().map(|(leaf, _)| leaf)
+    tree.leaves_meeting(cube).next().map(|(leaf, _)| leaf)
 }
 
 /// The centroid, in the user's unit, of the leaf that no facet crosses and whose centroid is

@@ -44,31 +44,29 @@ impl Tree {
     /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks
     /// these leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
-        self.insert_below((0, Octant::ROOT), facet, &Extent::around(facet), level);
+        self.insert_below(0, Octant::ROOT, facet, &Extent::around(facet).enlarged(1), level);
     }
 
+    /// `bounds` are for speed only: most octants are far away from the facet.
     fn insert_below(
         &mut self,
-        (index, octant): (Index, Octant),
+        index: Index,
+        octant: Octant,
         facet: &Facet,
         bounds: &Extent,
         level: u32,
     ) {
-        // The bounds are for speed only: most octants that a facet is tested against are far away from it.
-        let extent = octant.extent();
-        if !extent.touches(bounds) || !crosses(facet, &extent) {
+        if !crosses(facet, &octant.extent()) {
             return;
         }
-        if self.nodes[index].children.is_none() {
-            if octant.level >= level {
-                self.nodes[index].side = Side::Crossing;
-                return;
-            }
-            self.split(index);
+        if self.is_leaf(index) && octant.level >= level {
+            self.nodes[index].side = Side::Crossing;
+            return;
         }
-        for child in self.children(index, octant) {
-            self.insert_below(child, facet, bounds, level);
-        }
+        let first = self.children(index).unwrap_or_else(|| self.split(index));
+        octant.children_meeting(bounds).for_each(|i| {
+            self.insert_below(first + i, octant.child(i), facet, bounds, level);
+        });
         self.update_level_least(index);
     }
 
@@ -77,58 +75,62 @@ impl Tree {
     #[must_use]
     pub fn cut(&self, level: u32) -> Tree {
         let mut cut = Tree::root();
-        cut.copy_below(0, self, (0, Octant::ROOT), level);
+        cut.copy_below(0, self, 0, level);
         cut
     }
 
-    fn copy_below(&mut self, to: Index, tree: &Tree, from: (Index, Octant), level: u32) {
-        let (index, octant) = from;
-        if octant.level == level || tree.nodes[index].children.is_none() {
-            let mut leaves = tree.leaves_below(from, |_, _| true);
-            if leaves.any(|(leaf, _)| tree.side(leaf) == Side::Crossing) {
-                self.nodes[to].side = Side::Crossing;
-            }
-            return;
+    fn copy_below(&mut self, to: Index, tree: &Tree, from: Index, level: u32) {
+        let octant = tree.octants[from];
+        if let Some(children) = tree.children(from).filter(|_| octant.level < level) {
+            let first = self.split(to);
+            (0..8).for_each(|i| self.copy_below(first + i, tree, children + i, level));
+            self.update_level_least(to);
+        } else if tree
+            .leaves_below(from, octant.extent(), |_, _| true)
+            .any(|(leaf, _)| tree.side(leaf) == Side::Crossing)
+        {
+            self.nodes[to].side = Side::Crossing;
         }
-        self.split(to);
-        for ((to, _), from) in self.children(to, octant).zip(tree.children(index, octant)) {
-            self.copy_below(to, tree, from, level);
-        }
-        self.update_level_least(to);
     }
 
     /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least
     /// level `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
-        self.refine_below((0, Octant::ROOT), extent, level);
+        if Octant::ROOT.extent().interiors_meet(extent) {
+            self.refine_below(0, Octant::ROOT, extent, level);
+        }
     }
 
-    fn refine_below(&mut self, (index, octant): (Index, Octant), extent: &Extent, level: u32) {
-        let node = &self.nodes[index];
-        if u32::from(node.level_least) >= level || !octant.extent().interiors_meet(extent) {
-            return;
+    /// Returns whether it split an octant. The interior of the given octant meets that of `extent`.
+    fn refine_below(&mut self, index: Index, octant: Octant, extent: &Extent, level: u32) -> bool {
+        if u32::from(self.nodes[index].level_least) >= level {
+            return false;
         }
-        if node.children.is_none() {
-            self.split(index);
+        let mut splits = self.is_leaf(index);
+        let first = self.children(index).unwrap_or_else(|| self.split(index));
+        octant.children_meeting(extent).for_each(|i| {
+            splits |= self.refine_below(first + i, octant.child(i), extent, level);
+        });
+        if splits {
+            self.update_level_least(index);
         }
-        for child in self.children(index, octant) {
-            self.refine_below(child, extent, level);
-        }
-        self.update_level_least(index);
+        splits
     }
 
-    fn split(&mut self, index: Index) {
-        let (octant, side) = (self.octants[index], self.nodes[index].side);
-        let first = u32::try_from(self.nodes.len()).expect("a tree that fits into memory");
-        self.nodes[index].children = NonZeroU32::new(first);
+    /// Splits a leaf, and returns the index of its first child.
+    fn split(&mut self, index: Index) -> Index {
+        let (octant, side, first) = (self.octants[index], self.nodes[index].side, self.nodes.len());
         let children = (0..8).map(|i| octant.child(i));
         self.nodes.extend(children.clone().map(|child| Node::leaf(&child, side)));
         self.octants.extend(children);
+        let first_u32 = u32::try_from(first).expect("a tree that fits into memory");
+        self.nodes[index].children = NonZeroU32::new(first_u32);
+        first
     }
 
     fn update_level_least(&mut self, index: Index) {
-        let children = self.children(index, self.octants[index]);
-        let levels = children.map(|(child, _)| self.nodes[child].level_least);
+        let children = self.children(index).map_or(0..0, |first| first..first + 8);
+        let levels = self.nodes[children].iter().map(|child| child.level_least);
         self.nodes[index].level_least = levels.min().unwrap_or(NOTHING_KEPT);
     }
 
@@ -145,14 +147,13 @@ impl Tree {
         }
     }
 
-    /// The children of an octant, in Morton order; none if it is a leaf.
-    fn children(
-        &self,
-        index: Index,
-        octant: Octant,
-    ) -> impl DoubleEndedIterator<Item = (Index, Octant)> + use<> {
-        let first = self.nodes[index].children.map(|first| first.get() as Index);
-        first.into_iter().flat_map(move |first| (0..8).map(move |i| (first + i, octant.child(i))))
+    /// The index of the first child of an octant; `None` if it is a leaf.
+    fn children(&self, index: Index) -> Option<Index> {
+        self.nodes[index].children.map(|first| first.get() as Index)
+    }
+
+    fn is_leaf(&self, index: Index) -> bool {
+        self.nodes[index].children.is_none()
     }
 
     /// Checks the invariants of this module.
@@ -168,33 +169,38 @@ impl Tree {
             "every octant except the root is the child of exactly one octant"
         );
         for (index, node) in self.nodes.iter().enumerate() {
-            let (kept, octant) = (node.level_least != NOTHING_KEPT, self.octants[index]);
-            if node.children.is_none() {
-                assert!(!kept || u32::from(node.level_least) == octant.level);
+            let kept = node.level_least != NOTHING_KEPT;
+            let Some(first) = self.children(index) else {
+                assert!(!kept || u32::from(node.level_least) == self.octants[index].level);
                 continue;
-            }
-            let children = || self.children(index, octant);
-            assert!(children().all(|(child, _)| child > index), "children follow their parent");
-            assert!(children().all(|(child, octant)| self.octants[child] == octant));
-            let levels = children().map(|(child, _)| self.nodes[child].level_least);
+            };
+            assert!(first > index, "children follow their parent");
+            assert!((0..8).all(|i| self.octants[first + i] == self.octants[index].child(i)));
+            let levels = self.nodes[first..first + 8].iter().map(|child| child.level_least);
             assert_eq!(Some(node.level_least), levels.min());
         }
     }
 
-    /// The leaves in `octant` that are `wanted`, as are all octants that contain them, in Morton order.
+    /// The leaves in an octant whose interior meets that of `extent`, if they and all octants that
+    /// contain them are `wanted`, in Morton order.
     fn leaves_below(
         &self,
-        octant: (Index, Octant),
+        index: Index,
+        extent: Extent,
         wanted: impl Fn(&Node, &Octant) -> bool,
     ) -> impl Iterator<Item = (Index, Octant)> {
-        let mut pending = vec![octant];
+        let octant = self.octants[index];
+        let meets = octant.extent().interiors_meet(&extent);
+        let mut pending = Vec::with_capacity(25);
+        pending.extend(meets.then_some((index, octant)));
         std::iter::from_fn(move || {
             while let Some((index, octant)) = pending.pop() {
                 if wanted(&self.nodes[index], &octant) {
-                    if self.nodes[index].children.is_none() {
+                    let Some(first) = self.children(index) else {
                         return Some((index, octant));
-                    }
-                    pending.extend(self.children(index, octant).rev());
+                    };
+                    let children = octant.children_meeting(&extent).rev();
+                    children.for_each(|i| pending.push((first + i, octant.child(i))));
                 }
             }
             None
@@ -210,25 +216,26 @@ impl Tree {
 
     /// All leaves, in Morton order.
     pub fn leaves(&self) -> impl Iterator<Item = (Index, Octant)> {
-        self.leaves_below((0, Octant::ROOT), |_, _| true)
+        self.leaves_meeting(Octant::ROOT.extent())
     }
 
     /// The leaves whose interior meets that of `extent`, in Morton order.
-    pub fn leaves_meeting(&self, extent: &Extent) -> impl Iterator<Item = (Index, Octant)> {
-        self.leaves_below((0, Octant::ROOT), |_, octant| octant.extent().interiors_meet(extent))
+    pub fn leaves_meeting(&self, extent: Extent) -> impl Iterator<Item = (Index, Octant)> {
+        self.leaves_below(0, extent, |_, _| true)
     }
 
     /// The leaves that share part of a face with a leaf, and this leaf itself.
     pub fn face_neighbours(&self, leaf: Index) -> impl Iterator<Item = Index> {
         let extent = self.octants[leaf].extent();
         let wanted = move |_: &Node, octant: &Octant| octant.extent().share_area(&extent);
-        self.leaves_below((0, Octant::ROOT), wanted).map(|(leaf, _)| leaf)
+        self.leaves_below(0, extent.enlarged(1), wanted).map(|(leaf, _)| leaf)
     }
 
     /// The kept leaves of at most level `level`, in Morton order, each with its side.
     pub fn kept_leaves(&self, level: u32) -> impl Iterator<Item = (Octant, Side)> {
-        let leaves = self
-            .leaves_below((0, Octant::ROOT), move |node, _| u32::from(node.level_least) <= level);
+        let leaves = self.leaves_below(0, Octant::ROOT.extent(), move |node, _| {
+            u32::from(node.level_least) <= level
+        });
         leaves.map(|(index, octant)| (octant, self.side(index)))
     }
 
