@@ -35,6 +35,10 @@ impl Point {
 /// Whether the closed triangle `facet` and the closed box `extent` share at least one point.
 #[must_use]
 pub fn crosses(facet: &Facet, extent: &Extent) -> bool {
+    let inside = |v: &[i64; 3]| (0..3).all(|a| (extent.min[a]..=extent.max[a]).contains(&v[a]));
+    if facet.iter().any(inside) {
+        return true;
+    }
     let vertices = facet.map(|numerator| Point { numerator, w: 1 });
     // A triangle between two parallel planes has at most five corners.
     let (mut clipped, mut corners) = ([vertices[0]; 5], 0);
