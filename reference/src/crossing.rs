@@ -5,16 +5,18 @@
 //! box. A clipped facet is represented by points whose convex hull it is. Facets that degenerate to
 //! points or segments are convex hulls too and need no special case.
 //!
-//! The coordinates of clipped points are fractions. Facet coordinates are at most
-//! 2^28 in absolute value and box planes lie in [0, 2^27], so the distance of a point from a plane
-//! is at most 2^28, and a coordinate with denominator w has a numerator of at most 2^28 w. Upper
-//! bounds:
+//! The coordinates of clipped points are fractions. Facet coordinates are at most 2^28 in absolute
+//! value and box planes lie in [0, 2^27], so the distance of a point from a plane is at most 2^28,
+//! and a coordinate with denominator w has a numerator of at most 2^28 w. Upper bounds:
 //!
 //! | | denominator | numerator | distance from a plane, times the denominator |
 //! |---|---|---|---|
 //! | vertex | 1 | 2^28 | 2^28 |
 //! | clipped in x | 2^29 | 2^57 | 2^57 |
 //! | clipped in x and y | 2 * 2^29 * 2^57 = 2^87 | 2^115 | 2^115 |
+//!
+//! The first two fit i64. Of a point clipped in x and y only the distances from two planes are
+//! needed, which fit i128.
 use crate::lattice::Facet;
 use crate::octant::Extent;
 
@@ -35,6 +37,7 @@ impl Point {
 /// Whether the closed triangle `facet` and the closed box `extent` share at least one point.
 #[must_use]
 pub fn crosses(facet: &Facet, extent: &Extent) -> bool {
+    // For speed only: most facets are smaller than most of the octants that they cross.
     let inside = |v: &[i64; 3]| (0..3).all(|a| (extent.min[a]..=extent.max[a]).contains(&v[a]));
     if facet.iter().any(inside) {
         return true;

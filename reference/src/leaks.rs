@@ -60,13 +60,12 @@ fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
     };
     let seeds = input.seeds.iter();
     let seeded: Vec<Index> = seeds.filter_map(|seed| leaf_at(&coarse, seed.point)).collect();
-    let has_seed =
-        |component: &Component| seeded.iter().any(|leaf| component.leaves.contains(leaf));
+    let has_seed = |region: &Component| seeded.iter().any(|leaf| region.leaves.contains(leaf));
     let mut leaks = Vec::new();
     for component in components {
         let first = coarse.octant(component.leaves[0]);
         // All leaves of T0 within a leaf of T0/k that no facet crosses have one side.
-        let within = leaf_at(tree, first.min).expect("a point of the root");
+        let within = leaf_at(tree, first.extent().min).expect("a point of the root");
         if leaked(component.side, tree.side(within)) && !has_seed(&component) {
             let edge = |level: u32| input.root.edge / f64::from(1_u32 << level);
             let volume = |level: u32| 1_u64 << (3 * (LEVEL_MAX - level));

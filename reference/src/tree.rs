@@ -15,9 +15,10 @@ pub type Index = usize;
 /// octant is never refined.
 const NOTHING_KEPT: u8 = u8::MAX;
 
-/// What every search reads of an octant. Eight siblings fill a cache line.
-#[derive(Clone, Copy, Debug)]
+/// An octant of the arena, in 24 bytes: most of the time is spent on reading nodes.
+#[derive(Clone, Debug)]
 struct Node {
+    octant: Octant,
     /// The first of eight children; `None` for a leaf. The root, which has index 0, is no child.
     children: Option<NonZeroU32>,
     /// Meaningful for leaves only.
@@ -29,88 +30,73 @@ struct Node {
 #[derive(Clone, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
-    /// The octants of `nodes`. Searches start at the root and compute the octants that they pass.
-    octants: Vec<Octant>,
 }
 
 impl Tree {
     /// The tree whose only leaf is the root.
     #[must_use]
     pub fn root() -> Self {
-        let root = Octant::ROOT;
-        Self { nodes: vec![Node::leaf(&root, Side::Outside)], octants: vec![root] }
+        Self { nodes: vec![Node::leaf(Octant::ROOT, Side::Outside)] }
     }
 
     /// Splits leaves until every leaf that `facet` crosses has at least level `level`, and marks
     /// these leaves `Crossing`.
     pub fn insert(&mut self, facet: &Facet, level: u32) {
-        self.insert_below(0, Octant::ROOT, facet, &Extent::around(facet).enlarged(1), level);
+        self.insert_below(0, facet, &Extent::around(facet).enlarged(1), level);
     }
 
-    /// `bounds` are for speed only: most octants are far away from the facet.
-    fn insert_below(
-        &mut self,
-        index: Index,
-        octant: Octant,
-        facet: &Facet,
-        bounds: &Extent,
-        level: u32,
-    ) {
+    /// `bounds`, which enclose the facet, are for speed only: most octants are far away from it.
+    fn insert_below(&mut self, index: Index, facet: &Facet, bounds: &Extent, level: u32) {
+        let octant = self.octant(index);
         if !crosses(facet, &octant.extent()) {
             return;
         }
-        if self.is_leaf(index) && octant.level >= level {
-            self.nodes[index].side = Side::Crossing;
-            return;
+        if self.children(index).is_none() && octant.level >= level {
+            return self.set_side(index, Side::Crossing);
         }
         let first = self.children(index).unwrap_or_else(|| self.split(index));
-        octant.children_meeting(bounds).for_each(|i| {
-            self.insert_below(first + i, octant.child(i), facet, bounds, level);
-        });
+        let children = octant.children_meeting(*bounds);
+        children.for_each(|i| self.insert_below(first + i, facet, bounds, level));
         self.update_level_least(index);
     }
 
     /// This tree cut at a level: an octant of that level that this tree splits is a leaf, which is
-    /// `Crossing` if it contains a crossing leaf.
-    #[must_use]
+    /// `Crossing` if it contains a crossing leaf. Other sides are not known yet.
     pub fn cut(&self, level: u32) -> Tree {
-        let mut cut = Tree::root();
-        cut.copy_below(0, self, 0, level);
-        cut
-    }
-
-    fn copy_below(&mut self, to: Index, tree: &Tree, from: Index, level: u32) {
-        let octant = tree.octants[from];
-        if let Some(children) = tree.children(from).filter(|_| octant.level < level) {
-            let first = self.split(to);
-            (0..8).for_each(|i| self.copy_below(first + i, tree, children + i, level));
-            self.update_level_least(to);
-        } else if tree
-            .leaves_below(from, octant.extent(), |_, _| true)
-            .any(|(leaf, _)| tree.side(leaf) == Side::Crossing)
-        {
-            self.nodes[to].side = Side::Crossing;
+        let (mut cut, mut originals, mut index) = (Tree::root(), vec![0], 0);
+        while let Some(&original) = originals.get(index) {
+            let octant = self.octant(original);
+            if let Some(first) = self.children(original).filter(|_| octant.level < level) {
+                cut.split(index);
+                originals.extend(first..first + 8);
+            } else if self.find(octant.extent(), |_| true).any(|i| self.side(i) == Side::Crossing) {
+                cut.set_side(index, Side::Crossing);
+            }
+            index += 1;
         }
+        // Deletes nothing, but determines every `level_least`.
+        cut.delete(|_, _| false);
+        cut
     }
 
     /// Splits kept leaves until every kept leaf whose interior meets that of `extent` has at least
     /// level `level`.
     pub fn refine(&mut self, extent: &Extent, level: u32) {
-        if Octant::ROOT.extent().interiors_meet(extent) {
-            self.refine_below(0, Octant::ROOT, extent, level);
+        if extent.interiors_meet(&Octant::ROOT.extent()) {
+            self.refine_below(0, extent, level);
         }
     }
 
-    /// Returns whether it split an octant. The interior of the given octant meets that of `extent`.
-    fn refine_below(&mut self, index: Index, octant: Octant, extent: &Extent, level: u32) -> bool {
+    /// As [`Tree::refine`], for an octant whose interior meets that of `extent`. Returns whether it
+    /// split an octant.
+    fn refine_below(&mut self, index: Index, extent: &Extent, level: u32) -> bool {
         if u32::from(self.nodes[index].level_least) >= level {
             return false;
         }
-        let mut splits = self.is_leaf(index);
+        let mut splits = self.children(index).is_none();
         let first = self.children(index).unwrap_or_else(|| self.split(index));
-        octant.children_meeting(extent).for_each(|i| {
-            splits |= self.refine_below(first + i, octant.child(i), extent, level);
-        });
+        let children = self.octant(index).children_meeting(*extent);
+        children.for_each(|i| splits |= self.refine_below(first + i, extent, level));
         if splits {
             self.update_level_least(index);
         }
@@ -119,12 +105,10 @@ impl Tree {
 
     /// Splits a leaf, and returns the index of its first child.
     fn split(&mut self, index: Index) -> Index {
-        let (octant, side, first) = (self.octants[index], self.nodes[index].side, self.nodes.len());
-        let children = (0..8).map(|i| octant.child(i));
-        self.nodes.extend(children.clone().map(|child| Node::leaf(&child, side)));
-        self.octants.extend(children);
-        let first_u32 = u32::try_from(first).expect("a tree that fits into memory");
+        let (octant, side, first) = (self.octant(index), self.side(index), self.nodes.len());
+        let first_u32 = u32::try_from(first).expect("fewer than 2^32 octants");
         self.nodes[index].children = NonZeroU32::new(first_u32);
+        self.nodes.extend((0..8).map(|i| Node::leaf(octant.child(i), side)));
         first
     }
 
@@ -152,16 +136,12 @@ impl Tree {
         self.nodes[index].children.map(|first| first.get() as Index)
     }
 
-    fn is_leaf(&self, index: Index) -> bool {
-        self.nodes[index].children.is_none()
-    }
-
     /// Checks the invariants of this module.
     ///
     /// # Panics
     /// If an invariant does not hold.
     pub fn check_invariants(&self) {
-        assert_eq!((self.octants[0], self.octants.len()), (Octant::ROOT, self.nodes.len()));
+        assert_eq!(self.nodes[0].octant, Octant::ROOT);
         let parents = self.nodes.iter().filter(|node| node.children.is_some()).count();
         assert_eq!(
             self.nodes.len(),
@@ -171,72 +151,57 @@ impl Tree {
         for (index, node) in self.nodes.iter().enumerate() {
             let kept = node.level_least != NOTHING_KEPT;
             let Some(first) = self.children(index) else {
-                assert!(!kept || u32::from(node.level_least) == self.octants[index].level);
+                assert!(!kept || u32::from(node.level_least) == node.octant.level);
                 continue;
             };
             assert!(first > index, "children follow their parent");
-            assert!((0..8).all(|i| self.octants[first + i] == self.octants[index].child(i)));
+            assert!((0..8).all(|i| self.octant(first + i) == node.octant.child(i)));
             let levels = self.nodes[first..first + 8].iter().map(|child| child.level_least);
             assert_eq!(Some(node.level_least), levels.min());
         }
     }
 
-    /// The leaves in an octant whose interior meets that of `extent`, if they and all octants that
-    /// contain them are `wanted`, in Morton order.
-    fn leaves_below(
-        &self,
-        index: Index,
-        extent: Extent,
-        wanted: impl Fn(&Node, &Octant) -> bool,
-    ) -> impl Iterator<Item = (Index, Octant)> {
-        let octant = self.octants[index];
-        let meets = octant.extent().interiors_meet(&extent);
-        let mut pending = Vec::with_capacity(25);
-        pending.extend(meets.then_some((index, octant)));
+    /// The leaves whose interior meets that of `extent`, if they and all octants that contain them
+    /// are `wanted`, in Morton order.
+    fn find(&self, extent: Extent, wanted: impl Fn(&Node) -> bool) -> impl Iterator<Item = Index> {
+        let mut pending = Vec::with_capacity(64);
+        pending.extend(extent.interiors_meet(&Octant::ROOT.extent()).then_some(0));
         std::iter::from_fn(move || {
-            while let Some((index, octant)) = pending.pop() {
-                if wanted(&self.nodes[index], &octant) {
+            while let Some(index) = pending.pop() {
+                if wanted(&self.nodes[index]) {
                     let Some(first) = self.children(index) else {
-                        return Some((index, octant));
+                        return Some(index);
                     };
-                    let children = octant.children_meeting(&extent).rev();
-                    children.for_each(|i| pending.push((first + i, octant.child(i))));
+                    let children = self.octant(index).children_meeting(extent).rev();
+                    children.for_each(|i| pending.push(first + i));
                 }
             }
             None
         })
     }
 
-    /// The number of octants, which is more than every index.
-    #[must_use]
-    #[allow(clippy::len_without_is_empty)]
-    pub fn len(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// All leaves, in Morton order.
-    pub fn leaves(&self) -> impl Iterator<Item = (Index, Octant)> {
+    pub fn leaves(&self) -> impl Iterator<Item = Index> {
         self.leaves_meeting(Octant::ROOT.extent())
     }
 
     /// The leaves whose interior meets that of `extent`, in Morton order.
-    pub fn leaves_meeting(&self, extent: Extent) -> impl Iterator<Item = (Index, Octant)> {
-        self.leaves_below(0, extent, |_, _| true)
+    pub fn leaves_meeting(&self, extent: Extent) -> impl Iterator<Item = Index> {
+        self.find(extent, |_| true)
     }
 
     /// The leaves that share part of a face with a leaf, and this leaf itself.
     pub fn face_neighbours(&self, leaf: Index) -> impl Iterator<Item = Index> {
-        let extent = self.octants[leaf].extent();
-        let wanted = move |_: &Node, octant: &Octant| octant.extent().share_area(&extent);
-        self.leaves_below(0, extent.enlarged(1), wanted).map(|(leaf, _)| leaf)
+        let extent = self.octant(leaf).extent();
+        let wanted = move |node: &Node| node.octant.extent().share_area(&extent);
+        self.find(extent.enlarged(1), wanted)
     }
 
     /// The kept leaves of at most level `level`, in Morton order, each with its side.
     pub fn kept_leaves(&self, level: u32) -> impl Iterator<Item = (Octant, Side)> {
-        let leaves = self.leaves_below(0, Octant::ROOT.extent(), move |node, _| {
-            u32::from(node.level_least) <= level
-        });
-        leaves.map(|(index, octant)| (octant, self.side(index)))
+        let wanted = move |node: &Node| u32::from(node.level_least) <= level;
+        let leaves = self.find(Octant::ROOT.extent(), wanted);
+        leaves.map(|leaf| (self.octant(leaf), self.side(leaf)))
     }
 
     /// The words of the kept leaves whose side satisfies `wanted`, in ascending order.
@@ -248,7 +213,7 @@ impl Tree {
     /// The octant at an index.
     #[must_use]
     pub fn octant(&self, index: Index) -> Octant {
-        self.octants[index]
+        self.nodes[index].octant
     }
 
     /// The side of a leaf.
@@ -264,7 +229,7 @@ impl Tree {
 }
 
 impl Node {
-    fn leaf(octant: &Octant, side: Side) -> Self {
-        Self { children: None, side, level_least: octant.level as u8 }
+    fn leaf(octant: Octant, side: Side) -> Self {
+        Self { octant, children: None, side, level_least: octant.level as u8 }
     }
 }
