@@ -1,7 +1,7 @@
 //! Gradation: for each level from the finest to the coarsest, a layer around every cell, then
 //! balance.
 use crate::lattice::Input;
-use crate::octant::{Octant, Side};
+use crate::octant::{LEVEL_MAX, Octant, Side};
 use crate::tree::Tree;
 
 /// Refines the kept leaves of `tree` until layers are at least `layer_cells_min` cells thick and
@@ -10,7 +10,7 @@ pub fn grade(tree: &mut Tree, input: &Input) {
     if !input.keep_crossing && input.layer_cells_min < 3 {
         extra_layer(tree, input.level_surface);
     }
-    let deepest = tree.kept_leaves().map(|(leaf, _)| leaf.level).max().unwrap_or(0);
+    let deepest = tree.kept_leaves(LEVEL_MAX).map(|(leaf, _)| leaf.level).max().unwrap_or(0);
     for level in (1..=deepest).rev() {
         layer(tree, level, input.layer_cells_min);
         balance(tree, level);
@@ -20,7 +20,8 @@ pub fn grade(tree: &mut Tree, input: &Input) {
 /// Refines every kept leaf that touches a crossing leaf to the level of the surface. The crossing
 /// leaves will be deleted and no longer contribute to the thickness of the layer.
 fn extra_layer(tree: &mut Tree, level_surface: u32) {
-    let leaves: Vec<_> = tree.kept_leaves().filter(|&(_, side)| side == Side::Crossing).collect();
+    let leaves = tree.kept_leaves(LEVEL_MAX);
+    let leaves: Vec<_> = leaves.filter(|&(_, side)| side == Side::Crossing).collect();
     for (leaf, _) in leaves {
         tree.refine(&leaf.extent().enlarged(1), level_surface);
     }
@@ -46,5 +47,5 @@ fn balance(tree: &mut Tree, level: u32) {
 /// The kept leaves of a level at this moment. The caller refines while it iterates over them, and
 /// leaves made by that refinement must not become sources.
 fn leaves_of_level(tree: &Tree, level: u32) -> Vec<Octant> {
-    tree.kept_leaves().map(|(leaf, _)| leaf).filter(|leaf| leaf.level == level).collect()
+    tree.kept_leaves(level).map(|(leaf, _)| leaf).filter(|leaf| leaf.level == level).collect()
 }

@@ -129,7 +129,7 @@ fn is_length(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// More cells than this, of some hundred bytes each, fit into no memory.
+/// More cells than this, of some fifty bytes each, take more memory than a serial run should.
 const CELLS_MAX: f64 = 1e9;
 
 /// The number of cells of a level that fill a box.

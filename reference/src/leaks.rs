@@ -1,10 +1,8 @@
 //! Leaks between spacings: regions that are closed at a coarser spacing and open at that of the mesh.
-use crate::base;
 use crate::case_file::Keep;
-use crate::lattice::{Facet, Input, LatticeBox, location};
+use crate::lattice::{Facet, Input, location};
 use crate::octant::{LEVEL_MAX, Side};
-use crate::sides::Component;
-use crate::sides::leaf_at;
+use crate::sides::{self, Component, leaf_at};
 use crate::tree::{Index, Tree};
 use serde::Serialize;
 use std::collections::HashSet;
@@ -49,12 +47,10 @@ fn is_closed(facets: &[Facet]) -> bool {
 /// The leaks between T0/k and T0.
 fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
     let level = input.level_surface - k;
-    let cut = |b: &LatticeBox| LatticeBox { level: b.level.min(level), ..*b };
-    let boxes = input.boxes.iter().map(cut).collect();
-    let seeded = Input { level_surface: level, boxes, ..input.clone() };
-    let by_rays = Input { seeds: Vec::new(), ..seeded.clone() };
+    let mut coarse = tree.cut(level);
     // If a seed lies in a crossing leaf of T0/k, rays decide.
-    let Ok((coarse, components)) = base(&seeded).or_else(|_| base(&by_rays)) else {
+    let by_seeds = sides::assign(&mut coarse, input, &input.seeds);
+    let Ok(components) = by_seeds.or_else(|_| sides::assign(&mut coarse, input, &[])) else {
         unreachable!("only seeds can be unusable");
     };
     let leaked = |coarse: Side, fine: Side| match (coarse, fine) {
@@ -64,13 +60,12 @@ fn between(tree: &Tree, input: &Input, k: u32) -> Vec<Leak> {
     };
     let seeds = input.seeds.iter();
     let seeded: Vec<Index> = seeds.filter_map(|seed| leaf_at(&coarse, seed.point)).collect();
-    let has_seed =
-        |component: &Component| seeded.iter().any(|leaf| component.leaves.contains(leaf));
+    let has_seed = |region: &Component| seeded.iter().any(|leaf| region.leaves.contains(leaf));
     let mut leaks = Vec::new();
     for component in components {
         let first = coarse.octant(component.leaves[0]);
         // All leaves of T0 within a leaf of T0/k that no facet crosses have one side.
-        let within = tree.leaves_meeting(&first.extent())[0];
+        let within = leaf_at(tree, first.extent().min).expect("a point of the root");
         if leaked(component.side, tree.side(within)) && !has_seed(&component) {
             let edge = |level: u32| input.root.edge / f64::from(1_u32 << level);
             let volume = |level: u32| 1_u64 << (3 * (LEVEL_MAX - level));

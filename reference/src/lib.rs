@@ -90,7 +90,7 @@ fn base(input: &Input) -> Result<(Tree, Vec<Component>), Error> {
     for facet in &input.facets {
         tree.insert(facet, input.level_surface);
     }
-    let components = sides::assign(&mut tree, input)?;
+    let components = sides::assign(&mut tree, input, &input.seeds)?;
     debug_check(&tree);
     Ok((tree, components))
 }

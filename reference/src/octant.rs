@@ -30,10 +30,24 @@ pub struct Extent {
 }
 
 impl Extent {
+    /// The least box that contains three points.
+    pub fn around([p, q, r]: &[[i64; 3]; 3]) -> Extent {
+        let min = std::array::from_fn(|a| p[a].min(q[a]).min(r[a]));
+        let max = std::array::from_fn(|a| p[a].max(q[a]).max(r[a]));
+        Extent { min, max }
+    }
+
     /// Whether the two interiors share a point. A box without volume has no interior.
     #[must_use]
     pub fn interiors_meet(&self, other: &Extent) -> bool {
         (0..3).all(|a| self.min[a].max(other.min[a]) < self.max[a].min(other.max[a]))
+    }
+
+    /// Whether two cubes that touch have an area in common, part of a face or of their interiors:
+    /// they do unless they lie side by side along two axes.
+    pub fn share_area(&self, other: &Extent) -> bool {
+        let side_by_side = |&a: &usize| self.max[a] == other.min[a] || self.min[a] == other.max[a];
+        (0..3).filter(side_by_side).count() < 2
     }
 
     /// The box enlarged by `margin` on every side.
@@ -50,7 +64,7 @@ impl Extent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Octant {
     /// The minimum corner.
-    pub min: [i64; 3],
+    pub min: [i32; 3],
     /// Number of bisections of the root that lead to this octant.
     pub level: u32,
 }
@@ -74,21 +88,33 @@ impl Octant {
     /// The octant's closed cube.
     #[must_use]
     pub fn extent(&self) -> Extent {
-        Extent { min: self.min, max: self.min.map(|x| x + self.edge()) }
+        let min = self.min.map(i64::from);
+        Extent { min, max: min.map(|x| x + self.edge()) }
     }
 
     /// The centre, a lattice point.
     #[must_use]
     pub fn centroid(&self) -> [i64; 3] {
-        self.min.map(|x| x + self.edge() / 2)
+        self.min.map(|x| i64::from(x) + self.edge() / 2)
     }
 
     /// Child `index`: bit 0 selects the upper half in x, bit 1 in y, bit 2 in z.
     #[must_use]
     pub fn child(&self, index: usize) -> Octant {
-        let half = self.edge() / 2;
-        let min = std::array::from_fn(|a| self.min[a] + half * (index >> a & 1) as i64);
+        let half = (self.edge() / 2) as i32;
+        let min = std::array::from_fn(|a| self.min[a] + half * (index >> a & 1) as i32);
         Octant { min, level: self.level + 1 }
+    }
+
+    /// The indices of the children whose interior meets that of `extent`, for an octant whose
+    /// interior does.
+    pub fn children_meeting(self, extent: Extent) -> impl DoubleEndedIterator<Item = usize> {
+        let middle = self.centroid();
+        let [x, y, z] = std::array::from_fn(|a| {
+            usize::from(extent.min[a] >= middle[a])..1 + usize::from(extent.max[a] > middle[a])
+        });
+        let columns = z.flat_map(move |k| y.clone().map(move |j| k << 2 | j << 1));
+        columns.flat_map(move |column| x.clone().map(move |i| column | i))
     }
 
     /// The Morton key: the interleaved coordinates of the minimum corner in level-19 cells, with x

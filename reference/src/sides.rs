@@ -46,26 +46,23 @@ impl Ambiguous {
 }
 
 /// Sets the side of every leaf that is not `Crossing` to the side of its component, and returns the
-/// components.
+/// components. Rays decide if `seeds` is empty.
 ///
 /// # Errors
 /// A seed lies outside the root or in a crossing leaf.
-pub fn assign(tree: &mut Tree, input: &Input) -> Result<Vec<Component>, Error> {
-    let seeded = seeded_leaves(tree, input)?;
+pub fn assign(tree: &mut Tree, input: &Input, seeds: &[Seed]) -> Result<Vec<Component>, Error> {
+    let seeded = seeded_leaves(tree, input, seeds)?;
     let mut assigned = Vec::new();
     for mut leaves in components(tree) {
         leaves.sort_by_cached_key(|&leaf| tree.octant(leaf).coarsest_first());
-        let verdict = if seeded.is_empty() {
+        let Verdict { side, unanimous } = if seeded.is_empty() {
             let candidates = leaves.iter().take(CANDIDATES_MAX).map(|&leaf| tree.octant(leaf));
             vote(candidates, &input.facets)
         } else {
             let is_flow = seeded.iter().any(|leaf| leaves.contains(leaf));
             Verdict { side: side_of_flow(is_flow, input.keep), unanimous: true }
         };
-        for &leaf in &leaves {
-            tree.set_side(leaf, verdict.side);
-        }
-        let Verdict { side, unanimous } = verdict;
+        leaves.iter().for_each(|&leaf| tree.set_side(leaf, side));
         assigned.push(Component { leaves, side, is_ambiguous: !unanimous });
     }
     Ok(assigned)
@@ -91,7 +88,7 @@ pub fn example(tree: &Tree, input: &Input, components: &[&Component]) -> Option<
 /// The components, each a set of leaves.
 fn components(tree: &Tree) -> Vec<Vec<Index>> {
     let mut components = Vec::new();
-    let leaves = tree.leaves();
+    let leaves: Vec<Index> = tree.leaves().collect();
     let mut reached = vec![false; leaves.iter().max().map_or(0, |last| last + 1)];
     for start in leaves {
         if reached[start] || tree.side(start) == Side::Crossing {
@@ -102,7 +99,7 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
         let mut visited = 0;
         while let Some(&leaf) = component.get(visited) {
             visited += 1;
-            for neighbour in face_neighbours(tree, leaf) {
+            for neighbour in tree.face_neighbours(leaf) {
                 if !reached[neighbour] && tree.side(neighbour) != Side::Crossing {
                     reached[neighbour] = true;
                     component.push(neighbour);
@@ -112,22 +109,6 @@ fn components(tree: &Tree) -> Vec<Vec<Index>> {
         components.push(component);
     }
     components
-}
-
-/// The leaves that share part of a face with `leaf`: those that meet the faces of its cube
-/// thickened outwards by one lattice unit, which is less than the edge of any leaf.
-fn face_neighbours(tree: &Tree, leaf: Index) -> Vec<Index> {
-    let Extent { min, max } = tree.octant(leaf).extent();
-    let mut neighbours = Vec::new();
-    for axis in 0..3 {
-        let mut below = Extent { min, max };
-        (below.min[axis], below.max[axis]) = (min[axis] - 1, min[axis]);
-        let mut above = Extent { min, max };
-        (above.min[axis], above.max[axis]) = (max[axis], max[axis] + 1);
-        neighbours.extend(tree.leaves_meeting(&below));
-        neighbours.extend(tree.leaves_meeting(&above));
-    }
-    neighbours
 }
 
 struct Verdict {
@@ -144,12 +125,8 @@ fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
         let point = candidate.centroid();
         let odd = (0..3).flat_map(|axis| ray::parities(facets, point, axis)).filter(|&odd| odd);
         match odd.count() {
-            0 => {
-                return Verdict { side: Side::Outside, unanimous: true };
-            }
-            6 => {
-                return Verdict { side: Side::Inside, unanimous: true };
-            }
+            0 => return Verdict { side: Side::Outside, unanimous: true },
+            6 => return Verdict { side: Side::Inside, unanimous: true },
             some => rays_odd += some,
         }
         rays += 6;
@@ -162,19 +139,17 @@ fn vote(candidates: impl Iterator<Item = Octant>, facets: &[Facet]) -> Verdict {
 ///
 /// # Errors
 /// A seed lies outside the root or in a crossing leaf.
-fn seeded_leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
+fn seeded_leaves(tree: &Tree, input: &Input, seeds: &[Seed]) -> Result<Vec<Index>, Error> {
     let mut leaves = Vec::new();
-    for (index, seed) in input.seeds.iter().enumerate() {
-        let nearest = || nearest_centroid(tree, input, seed);
+    for (index, seed) in seeds.iter().enumerate() {
         match leaf_at(tree, seed.point) {
             Some(leaf) if tree.side(leaf) != Side::Crossing => leaves.push(leaf),
-            Some(_) => {
-                let nearest = nearest();
-                return Err(Error::SeedCrossing { index, seed: seed.given, nearest });
-            }
-            None => {
-                let nearest = nearest();
-                return Err(Error::SeedOutside { index, seed: seed.given, nearest });
+            crossing => {
+                let (nearest, seed) = (nearest_centroid(tree, input, seed), seed.given);
+                return Err(match crossing {
+                    Some(_) => Error::SeedCrossing { index, seed, nearest },
+                    None => Error::SeedOutside { index, seed, nearest },
+                });
             }
         }
     }
@@ -185,7 +160,7 @@ fn seeded_leaves(tree: &Tree, input: &Input) -> Result<Vec<Index>, Error> {
 /// integers, so the unit cube at the point lies in one leaf.
 pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
     let cube = Extent { min: point, max: point.map(|x| x + 1) };
-    tree.leaves_meeting(&cube).first().copied()
+    tree.leaves_meeting(cube).next()
 }
 
 /// The centroid, in the user's unit, of the leaf that no facet crosses and whose centroid is
@@ -193,7 +168,7 @@ pub(crate) fn leaf_at(tree: &Tree, point: [i64; 3]) -> Option<Index> {
 /// `None` if facets cross every leaf.
 fn nearest_centroid(tree: &Tree, input: &Input, seed: &Seed) -> Option<[f64; 3]> {
     let point = seed.point.map(|x| x.clamp(0, ROOT_EDGE));
-    let free = tree.leaves().into_iter().filter(|&leaf| tree.side(leaf) != Side::Crossing);
+    let free = tree.leaves().filter(|&leaf| tree.side(leaf) != Side::Crossing);
     let nearest = free.map(|leaf| tree.octant(leaf)).min_by_key(|octant| {
         let centroid = octant.centroid();
         let square: i64 = (0..3).map(|a| (centroid[a] - point[a]).pow(2)).sum();

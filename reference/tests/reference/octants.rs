@@ -34,7 +34,7 @@ fn children_tile_their_parent_in_morton_order() {
         assert!(children.is_sorted_by_key(Octant::key));
         for (i, child) in children.iter().enumerate() {
             assert_eq!((child.level, child.edge() * 2), (octant.level + 1, octant.edge()));
-            assert!((0..3).all(|a| child.min[a] >= extent.min[a]));
+            assert!((0..3).all(|a| child.extent().min[a] >= extent.min[a]));
             assert!((0..3).all(|a| child.extent().max[a] <= extent.max[a]));
             for other in &children[..i] {
                 assert!(!child.extent().interiors_meet(&other.extent()));

@@ -69,7 +69,7 @@ fn digests_of_geometries_agree_with_the_vectors() {
 fn leaf_words_agree_with_the_vectors() {
     for case in cases("words") {
         let level = case["level"].as_u64().unwrap() as u32;
-        let min = lattice_point(&case["cell"]).map(|x| x * 256);
+        let min = lattice_point(&case["cell"]).map(|x| (x * 256) as i32);
         let side = match case["side"].as_str().unwrap() {
             "outside" => Side::Outside,
             "inside" => Side::Inside,
