@@ -1,11 +1,12 @@
 //! A positive quantity as a sum of few known terms, each times a positive coefficient.
 //!
-//! Errors are relative, because such quantities range over decades. Coefficients must be positive: a difference of two terms fits what was
-//! measured, and has no meaning beyond it. Terms are chosen for what the sum is needed for, which is to predict values further on: of all
-//! choices, the one is taken that best predicts the values beyond each place in the further half of the data from those up to it. A sum of
-//! many terms, and leave-one-out cross-validation, choose what interpolates best.
+//! Errors should be relative, because such quantities range over decades: the terms are then divided by the value, and it is 1. Coefficients must
+//! be positive: a difference of two terms fits what was measured, and has no meaning beyond it. Terms are chosen for what the sum is needed for,
+//! which is to predict values further on: of all choices, the one is taken that best predicts the values beyond each place in the further half of
+//! the data from those up to it. A sum of many terms, and leave-one-out cross-validation, choose what interpolates best. That is for exact values;
+//! so few predictions of noisy ones do not tell terms apart, and the sum of all terms is better.
 
-/// Where a value was measured, such as a number of ranks, which is also the weight of its square error; the value, which is positive; and the
+/// Where a value was measured, such as a number of ranks, which is also the weight of its square error; the value; and the
 /// values of all terms, none of which is negative.
 pub type Row = (f64, f64, Vec<f64>);
 
@@ -27,55 +28,61 @@ impl Sum {
         self.terms.iter().map(|(term, coefficient)| coefficient * terms[*term]).sum()
     }
 
-    /// The sum of at most so many terms that extrapolates best, the shortest one of several; `None` without values at three places.
-    pub fn fit(rows: &[Row], most: u32) -> Option<Self> {
+    /// The sum of at most so many terms that extrapolates best, the shortest one of several; if it may have all, that of all which are not
+    /// subtracted. `None` without values at three places.
+    pub fn fit(rows: &[Row], most: usize) -> Option<Self> {
         let mut places: Vec<f64> = rows.iter().map(|row| row.0).collect();
         places.sort_by(f64::total_cmp);
         places.dedup();
         let [_, .., before, last] = places[..] else { return None };
+        let count = rows[0].2.len();
+        if most >= count {
+            return Some(Self::of_terms(rows, (0..count).collect()));
+        }
         places.retain(|place| (before.min(0.5 * last)..last).contains(place));
         let split = |cut: &f64| rows.iter().cloned().partition(|row| row.0 <= *cut);
         let splits: Vec<(Vec<Row>, Vec<Row>)> = places.iter().map(split).collect();
         let candidate = |chosen: Vec<usize>| {
-            let beyond = |(known, further): &(Vec<Row>, Vec<Row>)| {
-                Some(Self::of_terms(known, &chosen)?.error(further))
-            };
-            let error = splits.iter().map(beyond).sum::<Option<f64>>()?.max(EXACT);
-            Some((error, Self::of_terms(rows, &chosen)?))
+            let sum = |rows: &[Row]| Self::of_terms(rows, chosen.clone());
+            let beyond = |(known, further): &(Vec<Row>, Vec<Row>)| sum(known).error(further);
+            (splits.iter().map(beyond).sum::<f64>().max(EXACT), sum(rows))
         };
-        let all = choices(rows[0].2.len(), most).filter_map(candidate);
+        let all = choices(count, most).into_iter().map(candidate);
         all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sum)| sum)
     }
 
-    /// The least squares of these terms, whose sum relative to the value should be 1 in every row; `None` unless all coefficients are positive.
-    fn of_terms(rows: &[Row], chosen: &[usize]) -> Option<Self> {
-        let relative = |(weight, value, terms): &Row| {
-            (*weight, 1.0, chosen.iter().map(|term| terms[*term] / value).collect())
-        };
-        let found = least_squares(&rows.iter().map(relative).collect::<Vec<Row>>());
-        let is_sum = found.iter().all(|coefficient| *coefficient > 0.0);
-        is_sum.then(|| Self { terms: chosen.iter().copied().zip(found).collect() })
+    /// The least squares of these terms: while some would be subtracted, the one of which most would be is left out.
+    fn of_terms(rows: &[Row], mut chosen: Vec<usize>) -> Self {
+        loop {
+            let only = |row: &Row| (row.0, row.1, chosen.iter().map(|term| row.2[*term]).collect());
+            let rows: Vec<Row> = rows.iter().map(only).collect();
+            let found = least_squares(&rows);
+            let added = |i: usize| found[i] * rows.iter().map(|row| row.0 * row.2[i]).sum::<f64>();
+            match (0..found.len()).min_by(|i, j| added(*i).total_cmp(&added(*j))) {
+                Some(least) if found[least] <= 0.0 => _ = chosen.remove(least),
+                _ => return Self { terms: chosen.into_iter().zip(found).collect() },
+            }
+        }
     }
 
-    /// Mean square of the relative errors.
+    /// Mean square of the errors.
     fn error(&self, rows: &[Row]) -> f64 {
-        let square = |(weight, value, terms): &Row| weight * (self.at(terms) / value - 1.0).powi(2);
+        let square = |(weight, value, terms): &Row| weight * (self.at(terms) - value).powi(2);
         rows.iter().map(square).sum::<f64>() / rows.iter().map(|row| row.0).sum::<f64>()
     }
 }
 
-/// All choices of one to so many terms, the shorter ones first; some repeatedly. The digits of a number say which: the terms from 1 on, and 0
-/// for none.
-fn choices(terms: usize, most: u32) -> impl Iterator<Item = Vec<usize>> {
-    let digit = move |number: usize, place: u32| number / (terms + 1).pow(place) % (terms + 1);
-    let choice = move |number: usize| -> Vec<usize> {
-        (0..most).rev().filter_map(|place| digit(number, place).checked_sub(1)).collect()
-    };
-    (1..(terms + 1).pow(most)).map(choice).filter(|of| of.is_sorted_by(|a, b| a < b))
+/// All choices of one to so many terms, the shorter ones first. The bits of a number say which.
+fn choices(terms: usize, most: usize) -> Vec<Vec<usize>> {
+    let choice = |number: u64| (0..terms).filter(|i| number >> i & 1 == 1).collect();
+    let mut all: Vec<Vec<usize>> = (1..1 << terms).map(choice).collect();
+    all.retain(|of| of.len() <= most);
+    all.sort_by_key(Vec::len);
+    all
 }
 
 /// The coefficients of terms whose sums have the least square errors, each with its row's weight; 0 for one that is the same as those before it.
-pub fn least_squares(rows: &[Row]) -> Vec<f64> {
+fn least_squares(rows: &[Row]) -> Vec<f64> {
     let count = rows.first().map_or(0, |row| row.2.len());
     // The value is the last column. The normal equations are solved by Gauss-Jordan elimination.
     let column = |row: &Row, i: usize| row.2.get(i).copied().unwrap_or(row.1);
@@ -102,29 +109,33 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Terms 1, x, x^2, 1/x.
+    /// Terms 1, x, x^2, 1/x, relative to the value.
     fn rows(all: &[[f64; 2]]) -> Vec<Row> {
-        all.iter().map(|[x, value]| (*x, *value, vec![1.0, *x, x * x, 1.0 / x])).collect()
+        let row = |[x, value]: &[f64; 2]| {
+            (*x, 1.0, [1.0, *x, x * x, 1.0 / x].map(|term| term / value).to_vec())
+        };
+        all.iter().map(row).collect()
     }
 
     proptest! {
         #[test]
         fn a_sum_of_three_terms_is_found_again(of in prop::array::uniform4(1e-2..1e2f64), absent in 0..4usize) {
-            let mut rows = rows(&[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0].map(|x| [x, 0.0]));
+            let mut rows = rows(&[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0].map(|x| [x, 1.0]));
             for row in &mut rows {
-                row.1 = (0..4).filter(|i| *i != absent).map(|i| of[i] * row.2[i]).sum();
+                let value: f64 = (0..4).filter(|i| *i != absent).map(|i| of[i] * row.2[i]).sum();
+                row.2.iter_mut().for_each(|term| *term /= value);
             }
             let sum = Sum::fit(&rows, 3).unwrap();
             // A term is left out only if the others predict as well.
             for (_, value, terms) in &rows {
-                prop_assert!((sum.at(terms) / value - 1.0).abs() < 1e-3, "{sum:?}");
+                prop_assert!((sum.at(terms) - value).abs() < 1e-3, "{sum:?}");
             }
         }
     }
 
     #[test]
-    fn errors_are_relative_and_weighted() {
-        let row = |place: f64, value: f64| (place, value, vec![1.0]);
+    fn errors_are_weighted() {
+        let row = |place: f64, value: f64| (place, 1.0, vec![1.0 / value]);
         // Of 2, of 4 twice and of 4 thrice, by a constant c: (c/2 - 1)^2 + 5 (c/4 - 1)^2 is least at c = 28/9.
         let sum = Sum::fit(&[row(1.0, 2.0), row(2.0, 4.0), row(3.0, 4.0)], 1).unwrap();
         assert!((sum.at(&[1.0]) - 28.0 / 9.0).abs() < 1e-12, "{sum:?}");
@@ -148,8 +159,20 @@ mod tests {
     }
 
     #[test]
+    fn a_sum_of_all_terms_has_none_that_is_subtracted() {
+        // 3 + 2x, but for 0.5/x that is missing at one end.
+        let rows = rows(&[[1.0, 4.5], [2.0, 7.0], [4.0, 11.0], [8.0, 19.0], [16.0, 35.0]]);
+        let sum = Sum::fit(&rows, 4).unwrap();
+        assert!(sum.terms.iter().all(|(_, coefficient)| *coefficient > 0.0), "{sum:?}");
+        assert!(rows.iter().all(|row| (sum.at(&row.2) - 1.0).abs() < 0.1), "{sum:?}");
+        let exact = Sum::fit(&rows[1..], 4).unwrap();
+        assert!(exact.terms.iter().all(|(i, of)| (of - [3.0, 2.0, 0.0, 0.0][*i]).abs() < 1e-6));
+        assert_eq!(Sum::fit(&[], 4), None);
+    }
+
+    #[test]
     fn choices_are_all_of_any_length_and_the_shorter_ones_come_first() {
-        let mut all: Vec<Vec<usize>> = choices(4, 3).collect();
+        let mut all = choices(4, 3);
         assert_eq!(all[..4], [[0], [1], [2], [3]]);
         all.sort();
         all.dedup();

@@ -1,6 +1,6 @@
 //! Models of strong scaling on simulated ranks: their formulas, what they predicted of runs that they had not seen, and figures with bands.
 
-use super::groups::{Subject, by_subject, cells_label, range};
+use super::groups::{Subject, cells_label, range};
 use super::numbers::digits;
 use crate::figure::{Axis, Figure, Point, Provenance, Series};
 use crate::table::Table;
@@ -17,14 +17,20 @@ const HELD_OUT: [f64; 2] = [1.0 / 16.0, 0.25];
 /// Of the prediction beyond all runs.
 const FAR: At = At { cells: 1e12, ranks: 1e5, facets: 0.0 };
 
-/// Every model of a record, with its subject and its runs on several simulated ranks.
-fn models(groups: &Groups) -> Vec<(Subject<'_>, Vec<&Group>, Tested)> {
+/// A model with its subject, its runs on several simulated ranks, and those around all cases, which have the same costs.
+type Modelled<'a> = (Subject<'a>, Vec<&'a Group>, Vec<&'a Group>, Tested);
+
+/// Every model of a record.
+fn models(groups: &Groups) -> Vec<Modelled<'_>> {
     let mut models = Vec::new();
-    for (subject, all) in by_subject(groups, "strong") {
-        let sims = all.into_iter().filter(|g| g.setup.comm == Comm::Sim && g.setup.ranks > 1);
-        for (_, of) in by_key(sims, |g| (g.setup.layer_cells_min, g.setup.division())) {
-            let tested = HELD_OUT.iter().find_map(|share| Tested::of(&of, *share));
-            models.extend(tested.map(|model| (subject, of, model)));
+    let is_sim = |g: &&Group| g.setup.comm == Comm::Sim && g.setup.ranks > 1;
+    let strong = groups.all.iter().filter(|g| g.setup.experiment == "strong").filter(is_sim);
+    let alike = |g: &Group| (g.setup.engine.clone(), g.setup.layer_cells_min, g.setup.division());
+    for (_, all) in by_key(strong, alike) {
+        for (subject, mut of) in by_key(all.iter().copied(), |group| Subject::of(&group.setup)) {
+            of.sort_by_key(|group| group.setup.ranks);
+            let tested = HELD_OUT.iter().find_map(|share| Tested::of(&all, subject.case, *share));
+            models.extend(tested.map(|model| (subject, of, all.clone(), model)));
         }
     }
     models
@@ -32,11 +38,11 @@ fn models(groups: &Groups) -> Vec<(Subject<'_>, Vec<&Group>, Tested)> {
 
 /// Two tables of every model: its phases, and its counters.
 pub fn tables(groups: &Groups) -> Vec<Table> {
-    let of = |(subject, all, model): &(Subject, Vec<&Group>, Tested)| {
+    let of = |modelled @ (subject, of, _, model): &Modelled| {
         let (counters, times): (Vec<_>, Vec<_>) =
             model.formulas().into_iter().partition(|((kind, _), _)| *kind == Kind::Counter);
-        let title = format!("model of {}", described(*subject, all));
-        let notes = notes(all, model);
+        let title = format!("model of {}", described(*subject, of));
+        let notes = notes(modelled);
         let times = Table { notes, ..table(format!("{title}: seconds"), &times, model) };
         [times, table(format!("{title}: counters"), &counters, model)]
     };
@@ -73,20 +79,20 @@ fn table(title: String, formulas: &[(Key, [String; 2])], model: &Tested) -> Tabl
         &[
             ("quantity", &|(key, _)| key.1.clone()),
             ("mean of the ranks", &|(_, [mean, _])| mean.clone()),
-            ("max / mean", &|(_, [_, imbalance])| imbalance.clone()),
+            ("max – mean, for\na mean of x", &|(_, [_, excess])| excess.clone()),
             ("errors of\nheld-out\nmaxima / %", &|(key, _)| errors(key)),
         ],
     )
 }
 
 /// What was fitted, how well it predicted, and what it predicts beyond.
-fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
+fn notes(modelled @ (_, of, _, model): &Modelled) -> Vec<String> {
     let runs = held_out(model).into_iter().map(|At { cells, ranks, .. }| {
         format!("{ranks} ranks and {} cells", grouped(cells as u64))
     });
     let mut notes = vec![format!(
         "N cells, F facets, p ranks. Fitted are runs on {} to {} simulated ranks. Errors are of these runs, which were held out: {}.",
-        all.iter().map(|group| group.setup.ranks).min().unwrap_or(0),
+        of.iter().map(|group| group.setup.ranks).min().unwrap_or(0),
         model.fitted,
         runs.collect::<Vec<_>>().join("; ")
     )];
@@ -95,20 +101,20 @@ fn notes(all: &[&Group], model: &Tested) -> Vec<String> {
         let ([mean, max], held, count) = model.summary(kind);
         notes.push(format!("Held-out {what}: means are {mean:.1} % off in the median, maxima {max:.1} %; of these, {held} of {count} are in their bands."));
     }
-    notes.extend(far(all));
+    notes.extend(far(modelled));
     notes
 }
 
 /// The prediction beyond all runs, by a model of all, if they are of several meshes and have smaller and larger parts.
-fn far(all: &[&Group]) -> Option<String> {
+fn far((subject, of, all, _): &Modelled) -> Option<String> {
     let is_larger = |g: &&Group| g.cells() as f64 / g.setup.ranks as f64 >= FAR.cells / FAR.ranks;
-    let cells = || all.iter().map(|group| group.cells());
+    let cells = || of.iter().map(|group| group.cells());
     let (least, most) = (cells().min()?, cells().max()?);
-    if !all.iter().any(is_larger) || all.iter().all(is_larger) || most < 2 * least {
+    if !of.iter().any(is_larger) || of.iter().all(is_larger) || most < 2 * least {
         return None;
     }
-    let model = Tested::of(all, 1.0)?;
-    let (facets, network) = (all[0].typical.facets as f64, all[0].network);
+    let model = Tested::of(all, subject.case, 1.0)?;
+    let (facets, network) = (of[0].typical.facets as f64, of[0].network);
     let [low, value, high] = model.run_s(&At { facets, ..FAR }, &network).map(digits);
     Some(format!(
         "A prediction, of a model of all runs on up to {} ranks: {:.0e} cells on {} ranks take {value} s ({low} to {high} s, a band for the ranks alone; parts of \
@@ -125,8 +131,8 @@ pub fn csv(groups: &Groups) -> String {
     let mut out =
         "model,kind,quantity,cells,ranks,held out,predicted,low,high,measured\n".to_owned();
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    for (subject, all, model) in models(groups) {
-        let of = quoted(&described(subject, &all));
+    for (subject, of, _, model) in models(groups) {
+        let of = quoted(&described(subject, &of));
         for c in &model.compared {
             let (At { cells, ranks, .. }, kind, name) = (c.at, c.key.0, quoted(&c.key.1));
             let ([_, predicted], [_, measured], width) = (c.predicted, c.measured, model.width(c));
@@ -142,8 +148,8 @@ pub fn csv(groups: &Groups) -> String {
 
 /// A figure of every model and mesh: run time over ranks.
 pub fn figures(groups: &Groups) -> Vec<Figure> {
-    let of_model = |(subject, all, model): &(Subject, Vec<&Group>, Tested)| {
-        let mut meshes = by_key(all.iter().copied(), |group| group.cells());
+    let of_model = |(subject, of, _, model): &Modelled| {
+        let mut meshes = by_key(of.iter().copied(), |group| group.cells());
         meshes.sort_by_key(|(cells, _)| *cells);
         let figure = |(cells, of): &(u64, Vec<&Group>)| figure(*subject, *cells, of, model);
         meshes.iter().map(figure).collect::<Vec<_>>()
