@@ -158,3 +158,28 @@ fn a_device_is_refused_without_reading_it() {
     let error = read(Path::new("/dev/zero")).unwrap_err();
     assert!(error.to_string().contains("a device"), "{error}");
 }
+
+#[test]
+fn trees_of_more_nodes_than_2_to_the_37th_are_read_back() {
+    let below = (1..=12).map(|level| 1 << (3 * level));
+    let nodes: Vec<u64> = [1].into_iter().chain(below).chain([(1 << 37) + 8]).collect();
+    let shape = Shape { origin: [0.0; 3], edge: 1.0, nodes };
+    let place = tempfile::NamedTempFile::new().unwrap();
+    let mut out = TreeWriter::new(place.reopen().unwrap(), shape.clone()).unwrap();
+    // Only the last group has a side.
+    let last = shape.windows() - 1;
+    let group = (shape.nodes_total() - 9) / 8;
+    let mut window = Window::new(last);
+    window.put(group, Siblings { inside: 0x81, ..Siblings::default() });
+    out.add(last, &window.compress(&shape, &mut Deflater::default())).unwrap();
+    drop(out.finish().unwrap());
+    let file = TreeReader::open(place.path()).unwrap();
+    assert_eq!((&file.shape, file.shape.windows()), (&shape, 823_882));
+    let mut chunk = Vec::new();
+    file.read_chunk(&file.sides, last as usize, &mut chunk).unwrap();
+    let first = (1 + 8 * group - last * WINDOW) as usize;
+    assert_eq!(chunk[first..first + 8], [1, 0, 0, 0, 0, 0, 0, 1]);
+    assert_eq!(chunk.iter().map(|&side| u64::from(side)).sum::<u64>(), 2);
+    file.read_chunk(&file.sides, last as usize / 2, &mut chunk).unwrap();
+    assert!(chunk.iter().all(|&side| side == 0) && chunk.len() as u64 == WINDOW);
+}

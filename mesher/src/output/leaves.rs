@@ -191,7 +191,34 @@ pub fn manifest(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Job;
     use bricks::octant::{Side, word};
+    use ranks::sim;
+
+    #[test]
+    fn more_leaves_than_2_to_the_37th_are_added_and_written() {
+        let entries = sim::run(3, 1, |comm| {
+            let (options, mut record) = (crate::tests::options(), Default::default());
+            let job = &mut Job::new(&options, comm, &mut record);
+            let quantised = crate::quantised(&crate::tests::case(), job).expect("a good case");
+            let mesh = crate::grow(quantised, job).expect("a good case");
+            let mut counts = Counts::default();
+            counts[19] = [1 << 37, 3 << 32, 5 + comm.rank() as u64];
+            let digests = Digests::default();
+            let entry = finish(&mesh, &counts, &digests, None, comm).expect("nothing is written");
+            let output = Output { directory: "mesh".into(), words: true, tree: true };
+            let parts = [(total(&counts), 1)];
+            (entry.leaves, manifest(&output, &entry, &digests, &parts))
+        });
+        let [outside, inside, crossing] = [3_u64 << 37, 9 << 32, 5 + 6 + 7];
+        for (rank, (leaves, manifest)) in (0..).zip(entries) {
+            assert_eq!(leaves, outside + inside + crossing);
+            assert_eq!(manifest["leaves_by_level"][19], leaves);
+            let by_side = json!({ "outside": outside, "inside": inside, "crossing": crossing });
+            assert_eq!(manifest["leaves_by_side"], by_side);
+            assert_eq!(manifest["parts"][0]["leaves"], (1_u64 << 37) + (3 << 32) + 5 + rank);
+        }
+    }
 
     #[test]
     fn leaves_are_counted_by_octant_whatever_the_pieces() {

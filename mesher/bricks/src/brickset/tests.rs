@@ -157,6 +157,25 @@ fn leading_elements_are_counted_for_every_length() {
 }
 
 #[test]
+fn more_octants_than_2_to_the_37th_are_counted_and_found() {
+    // All octants of level 0, 2, 4, ..., 18, each set stored as that before it.
+    let mut all: BrickSet = [Brick { key: 0, bits: 1 }].into_iter().collect();
+    for level in (2..=18).step_by(2) {
+        let mut finer = BrickSet::default();
+        assert!(finer.replace_full(all).is_empty());
+        all = finer;
+        assert_eq!(all.count(), 1 << (3 * level));
+    }
+    assert_eq!(all.bytes(), 12);
+    let last = (1 << (3 * 16)) - 1;
+    let mut cursor = all.cursor();
+    for (key, bits) in [(0, u64::MAX), (1 << 40, u64::MAX), (last, u64::MAX), (last + 1, 0)] {
+        assert_eq!((all.get(key), cursor.get(key)), (bits, bits), "{key:#x}");
+    }
+    assert!(all.bricks().take(100).eq((0..100).map(|key| Brick { key, bits: u64::MAX })));
+}
+
+#[test]
 #[should_panic(expected = "is only read")]
 fn a_condensed_set_is_not_changed() {
     let mut set: BrickSet = [Brick { key: 3, bits: u64::MAX }].into_iter().collect();
