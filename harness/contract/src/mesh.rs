@@ -20,7 +20,7 @@ use std::collections::BinaryHeap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of distinct nodes of a tree in memory. A node needs about 50 bytes: pages of tables that are larger than their contents are not
+/// Maximum number of distinct nodes of a tree in memory. A node needs about 50 bytes, and 20 more in the check of layers: pages of tables that are larger than their contents are not
 /// in memory.
 pub const NODES_MAX: usize = 128_000_000;
 
