@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::htg::Block;
 use crate::lattice::FacetLattice;
 
 /// Sum of [`mix`] over all leaf words, modulo 2^128.
@@ -13,6 +14,7 @@ use crate::lattice::FacetLattice;
 pub struct Digest(pub u128);
 
 /// The finaliser of SplitMix64.
+#[inline(always)]
 fn finalise(mut x: u64) -> u64 {
     x ^= x >> 30;
     x = x.wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -23,13 +25,37 @@ fn finalise(mut x: u64) -> u64 {
 
 /// The contribution of one word to a digest.
 pub fn mix(word: u64) -> u128 {
-    let a = finalise(word.wrapping_add(INCREMENT));
-    let b = finalise(a ^ word.rotate_left(32));
+    let (a, b) = halves(word);
     u128::from(a) << 64 | u128::from(b)
+}
+
+#[inline(always)]
+fn halves(word: u64) -> (u64, u64) {
+    let a = finalise(word.wrapping_add(INCREMENT));
+    (a, finalise(a ^ word.rotate_left(32)))
 }
 
 /// The increment of SplitMix64.
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The sum of [`mix`] of all words. The two parts of the low halves are summed separately, so that the loop needs no carry, and of so few words at
+/// once that they cannot overflow.
+#[inline(always)]
+fn sum_of(block: &Block) -> u128 {
+    let (mut sum, count, step) = (0u128, block.leaves().min(1 << 30), block.step());
+    for begin in (0..block.leaves()).step_by(1 << 30) {
+        let [mut high, mut low, mut low_top] = [0u64; 3];
+        for i in begin..begin + count {
+            let (a, b) = halves(block.first.wrapping_add(i.wrapping_mul(step)));
+            high = high.wrapping_add(a);
+            low += b & 0xffff_ffff;
+            low_top += b >> 32;
+        }
+        let of_low = u128::from(low).wrapping_add(u128::from(low_top) << 32);
+        sum = sum.wrapping_add(u128::from(high) << 64).wrapping_add(of_low);
+    }
+    sum
+}
 
 impl Digest {
     /// The digest of a geometry: that of one word per facet.
@@ -52,6 +78,20 @@ impl Digest {
     /// Adds one word.
     pub fn add(&mut self, word: u64) {
         self.0 = self.0.wrapping_add(mix(word));
+    }
+
+    /// Adds the words of a block: as many at once as the processor can.
+    pub fn add_block(&mut self, block: &Block) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            #[target_feature(enable = "avx512f,avx512dq")]
+            fn wide(block: &Block) -> u128 {
+                sum_of(block)
+            }
+            // SAFETY: the processor has the features that the function is compiled for.
+            return self.merge(Self(unsafe { wide(block) }));
+        }
+        self.merge(Self(sum_of(block)));
     }
 
     /// Adds the words of another digest.
@@ -87,6 +127,8 @@ impl TryFrom<String> for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::octant::Octant;
+    use crate::word::{Leaf, Side, encode};
 
     #[test]
     fn a_digest_depends_neither_on_order_nor_on_parts() {
@@ -95,6 +137,23 @@ mod tests {
         merged.merge(Digest::of(&[1 << 40, 900]));
         assert_eq!(merged, Digest::of(&words));
         assert_ne!(merged, Digest::of(&words[..3]));
+    }
+
+    #[test]
+    fn the_digest_of_a_block_is_that_of_its_words() {
+        for depth in 0..=4u8 {
+            for level in [depth + 3, 11, 19] {
+                let octant = Octant { corner: [1 << 18, 3 << 16, 5 << 16], level: level - depth };
+                let first = encode(&Leaf { octant, side: Side::Crossing });
+                let block = Block { first: first + (u64::from(depth) << 2), depth };
+                let words: Vec<u64> = block.words().collect();
+                let expected = octant.contains(&crate::word::octant(words[words.len() - 1]));
+                assert!(expected && words.len() as u64 == block.leaves(), "{block:?}");
+                let mut digest = Digest::of(&[7]);
+                digest.add_block(&block);
+                assert_eq!(digest, Digest::of(&[&words[..], &[7]].concat()), "{block:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,26 +1,66 @@
 //! Hyper-tree grids in VTKHDF, as `mesher --write htg` and `harness export` write them: the leaves of a tree of any size, in Morton
 //! order.
 //!
-//! The file has the nodes level by level ([`vtkhdf::tree`] describes it). Its bits, of which nodes are split and which leaves are not in the mesh,
-//! are in memory, at most 0.3 bytes per leaf. Sides are not: a walk from the root down reads those of each level once from its begin to its
-//! end, because the children of a level's split nodes are the next level. So one chunk of them is in memory for each level.
+//! The file has the nodes level by level ([`vtkhdf::tree`] describes it). A walk from the root down reads what each level has from its begin to
+//! its end, because the children of a level's split nodes are the next level. So memory holds a chunk or two of every array for each level, whatever
+//! the size of the tree. A [`Block`] of leaves is recognised by its bits: 64 of them are one word. So time grows with the blocks, not with the leaves.
 //!
 //! Opening a file verifies the whole structure: every node but the root has a parent, and masked nodes are leaves. Sides are verified as they are
 //! read. Damage to the file itself shows in its checksums.
 
 use crate::lattice::Root;
-use crate::word;
+use crate::octant::Octant;
+use crate::word::{self, Side};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use vtkhdf::format::Chunked;
 pub use vtkhdf::format::ReadError as TreeError;
 use vtkhdf::read::TreeReader;
 
-/// Number of words that are passed on at once, at least; at most seven more.
+/// Number of blocks that are passed on at once, at least; at most seven more.
 const RUN: usize = 4096;
+
+/// The level of the octants whose digests are in a manifest.
+const OCTANT_LEVEL: usize = 3;
 
 /// The cell data with the sides.
 pub use vtkhdf::tree::SIDE;
+
+/// All leaves of an octant, if they have one level and one side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// The word of the first leaf.
+    pub first: u64,
+    /// Number of levels from the octant down to its leaves.
+    pub depth: u8,
+}
+
+impl Block {
+    /// Number of leaves.
+    pub fn leaves(&self) -> u64 {
+        1 << (3 * self.depth)
+    }
+
+    /// The level of the octant.
+    pub fn level(&self) -> u8 {
+        word::level(self.first) - self.depth
+    }
+
+    /// The octant.
+    pub fn octant(&self) -> Octant {
+        Octant { corner: word::corner_of(word::key(self.first)), level: self.level() }
+    }
+
+    /// The difference of the words of a leaf and of the next. A word alone may be no leaf.
+    pub fn step(&self) -> u64 {
+        if self.depth == 0 { 0 } else { word::span(word::level(self.first)) << 7 }
+    }
+
+    /// The words of all leaves.
+    pub fn words(self) -> impl Iterator<Item = u64> {
+        (0..self.leaves()).map(move |i| self.first + i * self.step())
+    }
+}
 
 /// A hyper-tree grid whose structure was read and is valid.
 #[derive(Debug)]
@@ -34,9 +74,6 @@ pub struct TreeFile {
     pub leaves: u64,
     /// The nodes of each level.
     levels: Vec<Range<u64>>,
-    split: Bits,
-    /// Leaves that are not in the mesh.
-    masked: Bits,
 }
 
 type Result<T> = std::result::Result<T, TreeError>;
@@ -57,55 +94,149 @@ impl TreeFile {
             levels.push(end..end + count);
             end += count;
         }
-        let described = levels.last().map_or(0, |last| last.start);
-        let split = Bits::read(&file, &file.split, described)?;
-        let masked = Bits::read(&file, &file.masked, end)?;
-        if split.0.iter().zip(&masked.0).any(|(split, masked)| split & masked != 0) {
-            return Err(TreeError::Damaged("a node is masked and split".to_owned()));
-        }
-        let mut leaves = end - masked.ones(0..end);
-        for (level, pair) in levels.windows(2).enumerate() {
-            let (parents, children) = (split.ones(pair[0].clone()), pair[1].end - pair[1].start);
-            leaves -= parents;
+        let mut tree = Self { path: path.to_owned(), file, root, leaves: 0, levels };
+        tree.leaves = tree.verify()?;
+        Ok(tree)
+    }
+
+    /// Verifies the structure, 64 nodes at a time; returns the number of leaves.
+    fn verify(&self) -> Result<u64> {
+        let mut leaves = 0;
+        for (index, nodes) in self.levels.iter().enumerate() {
+            let (mut level, mut parents) = (self.level(index), 0);
+            while level.next < nodes.end {
+                let count = (nodes.end - level.next).min(64);
+                let [split, masked] = level.bits::<9>()?.map(|bits| bits >> (64 - count));
+                if split & masked != 0 {
+                    return Err(TreeError::Damaged("a node is masked and split".to_owned()));
+                }
+                parents += u64::from(split.count_ones());
+                leaves += count - u64::from((split | masked).count_ones());
+                level.next += count;
+            }
+            let children = self.levels.get(index + 1).map_or(0, |next| next.end - next.start);
             if 8 * parents != children {
                 let why = format!(
-                    "{parents} nodes of level {level} are split, and {children} are on the next"
+                    "{parents} nodes of level {index} are split, and {children} are on the next"
                 );
                 return Err(TreeError::Damaged(why));
             }
         }
-        Ok(Self { path: path.to_owned(), file, root, leaves, levels, split, masked })
+        Ok(leaves)
     }
 
-    /// Passes the words of all leaves to `run` in Morton order, some thousands at a time, until it returns false.
+    /// The beginning of a level.
+    fn level(&self, index: usize) -> Level<'_> {
+        let next = self.levels[index].start;
+        let bytes = |array, position| Bytes::of(&self.file, array, position);
+        let is_last = index + 1 == self.levels.len();
+        Level {
+            next,
+            split: (!is_last).then(|| bytes(&self.file.split, next / 8)),
+            masked: bytes(&self.file.masked, next / 8),
+            sides: bytes(&self.file.sides, next),
+        }
+    }
+
+    /// Passes all leaves to `run` in Morton order, some thousands of blocks at a time, until it returns false. Blocks are as large as
+    /// possible within a run, but not larger than the octants whose digests are in a manifest.
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn words(&self, run: &mut dyn FnMut(&[u64]) -> bool) -> Result<()> {
-        let level = |nodes: &Range<u64>| Level { next: nodes.start, ..Level::default() };
-        let levels = self.levels.iter().map(level).collect();
-        let mut walk = Walk { tree: self, levels, words: Vec::with_capacity(RUN + 8) };
+    pub fn blocks(&self, run: &mut dyn FnMut(&[Block]) -> bool) -> Result<()> {
+        let levels = (0..self.levels.len()).map(|index| self.level(index)).collect();
+        let mut walk = Walk { levels, blocks: Vec::with_capacity(RUN + 8) };
         if walk.siblings(0, 0, 1, run)? {
-            run(&walk.words);
+            run(&walk.blocks);
         }
         Ok(())
     }
 }
 
+/// The bytes of an array from a position on, which are read once.
+struct Bytes<'a> {
+    file: &'a TreeReader,
+    array: &'a Chunked,
+    /// The next chunk to be read.
+    next: usize,
+    /// Bytes in memory, and the position of the first.
+    bytes: Vec<u8>,
+    begin: u64,
+    chunk: Vec<u8>,
+}
+
+impl<'a> Bytes<'a> {
+    fn of(file: &'a TreeReader, array: &'a Chunked, position: u64) -> Self {
+        let chunk_len = u64::from(array.chunk_len);
+        let next = (position / chunk_len) as usize;
+        let begin = next as u64 * chunk_len;
+        Self { file, array, next, bytes: Vec::new(), begin, chunk: Vec::new() }
+    }
+
+    /// The bytes from a position on, which must not decrease. After the array, all are zero.
+    #[inline]
+    fn at<const N: usize>(&mut self, position: u64) -> Result<[u8; N]> {
+        if position + N as u64 > self.begin + self.bytes.len() as u64 {
+            self.read(position, N)?;
+        }
+        let offset = (position - self.begin) as usize;
+        Ok(*self.bytes[offset..].first_chunk().expect("the bytes were read"))
+    }
+
+    #[cold]
+    fn read(&mut self, position: u64, count: usize) -> Result<()> {
+        while position + count as u64 > self.begin + self.bytes.len() as u64 {
+            let passed = self.bytes.len().min((position - self.begin) as usize);
+            self.bytes.drain(..passed);
+            self.begin += passed as u64;
+            match self.next < self.array.chunks.len() {
+                true => self.file.read_chunk(self.array, self.next, &mut self.chunk)?,
+                false => self.chunk = vec![0; self.array.chunk_len as usize],
+            }
+            self.bytes.extend_from_slice(&self.chunk);
+            self.next += 1;
+        }
+        Ok(())
+    }
+
+    /// The bits of `N - 1` bytes from a node on, the first of them the most significant one.
+    #[inline]
+    fn bits<const N: usize>(&mut self, node: u64) -> Result<u64> {
+        let bytes: [u8; N] = self.at(node / 8)?;
+        let all = bytes.iter().fold(0, |all: u128, &byte| all << 8 | u128::from(byte));
+        Ok((all >> (8 - node % 8)) as u64 & (u64::MAX >> (64 - 8 * (N as u32 - 1))))
+    }
+}
+
 /// The position of a walk on a level.
-#[derive(Default)]
-struct Level {
+struct Level<'a> {
     next: u64,
-    /// The chunk of sides in memory, and the number of its first node.
-    sides: Vec<u8>,
-    first: u64,
+    /// The last level has none.
+    split: Option<Bytes<'a>>,
+    masked: Bytes<'a>,
+    sides: Bytes<'a>,
+}
+
+impl Level<'_> {
+    /// The bits of the next nodes, those of split and of masked ones; the first node has the most significant bit.
+    #[inline]
+    fn bits<const N: usize>(&mut self) -> Result<[u64; 2]> {
+        let split = self.split.as_mut().map_or(Ok(0), |split| split.bits::<N>(self.next))?;
+        Ok([split, self.masked.bits::<N>(self.next)?])
+    }
+
+    /// The side of the next 64 nodes, if they are leaves with one side.
+    fn side_of_64(&mut self) -> Result<Option<u8>> {
+        let (bits, sides) = (self.bits::<9>()?, self.sides.at::<64>(self.next)?);
+        let is_one = bits == [0; 2] && sides == [sides[0]; 64];
+        Ok((is_one && usize::from(sides[0]) < Side::ALL.len()).then_some(sides[0]))
+    }
 }
 
 /// A walk in Morton order.
 struct Walk<'a> {
-    tree: &'a TreeFile,
-    levels: Vec<Level>,
-    words: Vec<u64>,
+    levels: Vec<Level<'a>>,
+    blocks: Vec<Block>,
 }
 
 impl Walk<'_> {
@@ -115,80 +246,61 @@ impl Walk<'_> {
         level: usize,
         key: u64,
         count: u32,
-        run: &mut dyn FnMut(&[u64]) -> bool,
+        run: &mut dyn FnMut(&[Block]) -> bool,
     ) -> Result<bool> {
-        let first = self.levels[level].next;
-        self.levels[level].next += u64::from(count);
-        let [split, masked] =
-            [&self.tree.split, &self.tree.masked].map(|bits| bits.get(first, count));
-        for i in 0..count {
-            let key = key + u64::from(i) * word::span(level as u8);
-            if split >> i & 1 == 1 {
-                if !self.siblings(level + 1, key, 8, run)? {
-                    return Ok(false);
+        let at = &mut self.levels[level];
+        let [split, masked] = at.bits::<2>()?.map(|bits| bits as u8 & !(0xff >> count) as u8);
+        let (first, sides) = (at.next, at.sides.at::<8>(at.next)?);
+        at.next += u64::from(count);
+        // A block lies in one octant of level 3.
+        let may_be_block = level > OCTANT_LEVEL;
+        let of_64 = match may_be_block && split == 0xff {
+            true => self.levels[level + 1].side_of_64()?,
+            false => None,
+        };
+        let word =
+            |key: u64, level: usize, side: u8| key << 7 | (level as u64) << 2 | u64::from(side);
+        if let Some(side) = of_64 {
+            self.levels[level + 1].next += 64;
+            self.blocks.push(Block { first: word(key, level + 1, side), depth: 2 });
+        } else {
+            for (i, &side) in (0..count).zip(&sides) {
+                let (key, bit) = (key + u64::from(i) * word::span(level as u8), 0x80 >> i);
+                if split & bit != 0 {
+                    if !self.siblings(level + 1, key, 8, run)? {
+                        return Ok(false);
+                    }
+                } else if masked & bit == 0 {
+                    if usize::from(side) >= Side::ALL.len() {
+                        let node = first + u64::from(i);
+                        let why = format!("node {node} has the side {side}");
+                        return Err(TreeError::Damaged(why));
+                    }
+                    self.blocks.push(Block { first: word(key, level, side), depth: 0 });
                 }
-            } else if masked >> i & 1 == 0 {
-                let side = self.side(level, first + u64::from(i))?;
-                self.words.push(key << 7 | (level as u64) << 2 | u64::from(side));
+            }
+            if may_be_block {
+                self.join(level as u8, key);
             }
         }
-        if self.words.len() < RUN {
+        if self.blocks.len() < RUN {
             return Ok(true);
         }
-        let goes_on = run(&self.words);
-        self.words.clear();
+        let goes_on = run(&self.blocks);
+        self.blocks.clear();
         Ok(goes_on)
     }
 
-    /// The side of a node.
-    fn side(&mut self, level: usize, node: u64) -> Result<u8> {
-        let Level { sides, first, .. } = &mut self.levels[level];
-        let mut at = node.wrapping_sub(*first) as usize;
-        if at >= sides.len() {
-            let array = &self.tree.file.sides;
-            let length = u64::from(array.chunk_len);
-            self.tree.file.read_chunk(array, (node / length) as usize, sides)?;
-            (*first, at) = (node / length * length, (node % length) as usize);
+    /// Joins the last blocks if they are eight siblings of this level, the first with this Morton code, and have leaves of one level and side.
+    fn join(&mut self, level: u8, key: u64) {
+        let Some((others, last)) = self.blocks.split_last_chunk::<8>() else { return };
+        let Block { first, depth } = last[0];
+        let is_like = |block: &Block| block.depth == depth && (block.first ^ first) & 127 == 0;
+        if word::key(first) == key && last[0].level() == level && last.iter().all(is_like) {
+            let begin = others.len();
+            self.blocks.truncate(begin);
+            self.blocks.push(Block { first, depth: depth + 1 });
         }
-        match sides[at] {
-            side @ 0..=2 => Ok(side),
-            side => Err(TreeError::Damaged(format!("node {node} has the side {side}"))),
-        }
-    }
-}
-
-/// The first bits of an array, in bytes up to the last chunk that is stored. The first bit of a byte is the most significant one.
-#[derive(Debug)]
-struct Bits(Vec<u8>);
-
-impl Bits {
-    /// The first `count` bits of an array. Those after them have no meaning, and are zero here.
-    fn read(file: &TreeReader, array: &Chunked, count: u64) -> Result<Self> {
-        let (mut bits, mut chunk) = (Vec::new(), Vec::new());
-        let stored = array.chunks.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-        for index in 0..stored {
-            file.read_chunk(array, index, &mut chunk)?;
-            bits.extend_from_slice(&chunk);
-        }
-        bits.truncate(count.div_ceil(8) as usize);
-        if let Some(last) = bits.get_mut((count / 8) as usize) {
-            *last &= !(0xff >> (count % 8));
-        }
-        Ok(Self(bits))
-    }
-
-    /// Up to eight bits from a position on; the first becomes the lowest.
-    fn get(&self, first: u64, count: u32) -> u8 {
-        let byte = |at: u64| self.0.get(at as usize).copied().unwrap_or(0);
-        let pair = u16::from_be_bytes([byte(first / 8), byte(first / 8 + 1)]);
-        let bits = ((pair << (first % 8) >> 8) as u8).reverse_bits();
-        bits & ((1u16 << count) - 1) as u8
-    }
-
-    /// Number of bits that are set in a range.
-    fn ones(&self, Range { start, end }: Range<u64>) -> u64 {
-        let bits = |first: u64| self.get(first, (end - first).min(8) as u32).count_ones();
-        (start..end).step_by(8).map(|first| u64::from(bits(first))).sum()
     }
 }
 
@@ -280,8 +392,8 @@ mod tests {
 
     fn words_in(tree: &TreeFile) -> Result<Vec<u64>> {
         let mut all = Vec::new();
-        tree.words(&mut |run| {
-            all.extend_from_slice(run);
+        tree.blocks(&mut |run| {
+            all.extend(run.iter().flat_map(|block| block.words()));
             true
         })?;
         Ok(all)
@@ -298,13 +410,50 @@ mod tests {
         assert_eq!(words_in(&tree).unwrap(), words);
         assert_eq!(tree.leaves, words.len() as u64);
         let (mut runs, mut read) = (0, 0);
-        tree.words(&mut |run| {
+        tree.blocks(&mut |run| {
             assert!(run.len() < RUN + 8);
             (runs, read) = (runs + 1, read + run.len());
             runs < 2
         })
         .unwrap();
         assert!(runs == 2 && read >= 2 * RUN && read < words.len());
+    }
+
+    /// Blocks are leaves of all levels, and as large as possible, but not larger than an octant of level 3.
+    #[test]
+    fn equal_leaves_are_read_as_blocks() {
+        let words = words_with_sides(
+            |o| o.level < 6 || o.level < 8 && o.corner[0] < 1 << 14,
+            |o| match o.corner {
+                [.., 0] => Some(Side::Crossing),
+                [_, y, z] if y == z && o.corner[0] > 1 << 18 => None,
+                [x, ..] => Some(if x < 1 << 16 { Side::Inside } else { Side::Outside }),
+            },
+        );
+        let file = file_of(&nodes_of(&words));
+        let tree = TreeFile::open(file.path()).unwrap();
+        let (mut blocks, mut runs) = (Vec::new(), 0);
+        tree.blocks(&mut |run| {
+            blocks.extend_from_slice(run);
+            runs += 1;
+            true
+        })
+        .unwrap();
+        assert!(blocks.iter().flat_map(|block| block.words()).eq(words.iter().copied()));
+        assert!((0..4).all(|depth| blocks.iter().any(|block| block.depth == depth)));
+        let is_joined = |eight: &[Block]| {
+            let Block { first, depth } = eight[0];
+            let octant = eight[0].octant();
+            let alike = |b: &Block| b.depth == depth && (b.first ^ first) & 127 == 0;
+            let siblings = |b: &Block| {
+                b.octant().ancestor(octant.level - 1) == octant.ancestor(octant.level - 1)
+            };
+            octant.level > 3 && eight.iter().all(|b| alike(b) && siblings(b))
+        };
+        // The end of a run separates siblings, and those of their ancestors.
+        let separate = blocks.windows(8).filter(|eight| is_joined(eight)).count();
+        assert!(separate <= 6 * runs && 100 * runs < blocks.len(), "{separate} of {runs} runs");
+        assert!(blocks.iter().all(|block| block.level() >= 3));
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
     // A tree is one part.
     let mut parts = vec![Vec::new(); mesh.parts.len() + usize::from(mesh.tree_file.is_some())];
     mesh.stream(&mut |part, run| {
-        parts[part].extend_from_slice(run);
+        parts[part].extend(run.iter().flat_map(|block| block.words()));
         true
     })?;
     Ok(LeafSet::new(mesh.manifest, parts))

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::digest::Digest;
 use crate::failure::Failure;
 use crate::files;
+use crate::htg::Block;
 use crate::lattice::{FacetLattice, Root, UNITS_PER_EDGE};
 use crate::octant::{LEVEL_MAX, Octant};
 
@@ -301,7 +302,7 @@ impl Manifest {
     /// Replaces all entries that depend on the leaves, but for the parts, by those of these words.
     pub fn set_leaves(&mut self, words: &[u64]) {
         self.clear_leaves();
-        words.iter().for_each(|&word| self.add(word));
+        words.iter().for_each(|&first| self.add_block(&Block { first, depth: 0 }));
         self.finish();
     }
 
@@ -311,10 +312,10 @@ impl Manifest {
         self.octant_digests = vec![Digest::default(); OCTANTS];
     }
 
-    /// Adds one word to the counts and to the digest of its octant. Call [`Self::finish`] after the last.
-    pub fn add(&mut self, word: u64) {
-        self.count(word, 1);
-        self.octant_digests[octant_index(word)].add(word);
+    /// Adds all leaves of a block to the counts and to the digest of its octant. Call [`Self::finish`] after the last.
+    pub fn add_block(&mut self, block: &Block) {
+        self.count(block.first, block.leaves());
+        self.octant_digests[octant_index(block.first)].add_block(block);
     }
 
     /// Counts this many words of the level and side of one, and leaves the digests unchanged. An invalid level or side counts among all leaves alone.

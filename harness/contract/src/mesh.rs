@@ -9,7 +9,7 @@
 use crate::case::Case;
 use crate::digest::Digest;
 use crate::failure::Failure;
-use crate::htg::{TreeError, TreeFile};
+use crate::htg::{Block, TreeError, TreeFile};
 use crate::manifest::{Geometry, Manifest, Part, Sides};
 use crate::npy::PartFile;
 use crate::octant::Octant;
@@ -20,11 +20,9 @@ use std::collections::BinaryHeap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of distinct nodes of a tree in memory. A node needs up to 120 bytes while the tables grow.
-pub const NODES_MAX: usize = 32_000_000;
-
-/// Leaves between two checks whether to continue.
-const CHECKED: u64 = 1 << 16;
+/// Maximum number of distinct nodes of a tree in memory. A node needs about 50 bytes, and 20 more in the check of layers: pages of tables that are larger than their contents are not
+/// in memory.
+pub const NODES_MAX: usize = 128_000_000;
 
 /// A leaf-set directory whose manifest and files were opened. No leaf has been read.
 #[derive(Debug)]
@@ -50,6 +48,9 @@ pub struct Leaf {
     /// Index among all leaves of the mesh, in Morton order.
     pub index: u64,
 }
+
+/// Visits leaves of the part with an index.
+pub type Visit<'a> = &'a mut dyn FnMut(usize, &[Block]) -> Result<(), Failure>;
 
 /// Asks whether to continue; its error ends a visit.
 pub type Check<'a> = &'a dyn Fn() -> Result<(), Failure>;
@@ -104,51 +105,43 @@ impl Mesh {
         }
     }
 
-    /// Passes all words to `run`, until it returns false. Each run comes from the part with the given index. If every part is
-    /// sorted, so is the stream.
+    /// Passes all leaves to `run`, until it returns false: the blocks of a tree, and each word of a part, whatever it is, as a block. Each run comes
+    /// from the part with the given index. If every part is sorted, so is the stream.
     ///
     /// # Errors
     /// If a file cannot be read, or if the tree is damaged.
-    pub fn stream(&self, run: &mut dyn FnMut(usize, &[u64]) -> bool) -> Result<(), Failure> {
-        match &self.tree_file {
-            Some(tree) => {
-                let read = tree.words(&mut |words| run(0, words));
-                read.map_err(|why| damaged_tree(&tree.path, &why))
-            }
-            None => merge(&self.parts, run),
+    pub fn stream(&self, run: &mut dyn FnMut(usize, &[Block]) -> bool) -> Result<(), Failure> {
+        if let Some(tree) = &self.tree_file {
+            let read = tree.blocks(&mut |blocks| run(0, blocks));
+            return read.map_err(|why| damaged_tree(&tree.path, &why));
         }
-    }
-
-    /// Visits all leaf words in ascending order.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or if the words are not those of a linear oct-tree.
-    pub fn visit(&self, visit: &mut dyn FnMut(&[u64])) -> Result<(), Failure> {
-        self.visit_parts(|_, words| {
-            visit(words);
-            Ok(())
+        let mut blocks = Vec::new();
+        merge(&self.parts, &mut |part, words| {
+            blocks.clear();
+            blocks.extend(words.iter().map(|&first| Block { first, depth: 0 }));
+            run(part, &blocks)
         })
     }
 
-    /// The same with the index of the part, until an error of `visit`.
-    fn visit_parts(
-        &self,
-        mut visit: impl FnMut(usize, &[u64]) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    /// Visits all leaves in ascending order, each run with the index of its part.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or if the words are not those of a linear oct-tree; or the first error of `visit`, which ends the traversal.
+    pub fn visit(&self, visit: Visit<'_>) -> Result<(), Failure> {
         let (mut order, mut visited) = (Order::default(), Ok(()));
-        self.stream(&mut |part, words| {
-            let linear = words.iter().try_for_each(|&word| order.add(word));
+        self.stream(&mut |part, blocks| {
+            let linear = blocks.iter().try_for_each(|block| order.add(block.first));
             let linear = linear.map_err(|why| {
                 let why = format!("not a linear oct-tree, because {why}: run harness audit on it");
                 Failure::about(&self.dir, why)
             });
-            visited = linear.and_then(|()| visit(part, words));
+            visited = linear.and_then(|()| visit(part, blocks));
             visited.is_ok()
         })?;
         visited
     }
 
-    /// Visits all leaves in Morton order. `check` is called from time to time.
+    /// Visits the leaves in those octants that `takes` accepts, in Morton order. All are read. `check` is called from time to time.
     ///
     /// # Errors
     /// As [`Mesh::visit`], or if the leaves do not have the digest in the manifest; or the first error of `check` or `visit`, which ends
@@ -156,19 +149,24 @@ impl Mesh {
     pub fn leaves(
         &self,
         check: Check<'_>,
+        takes: &dyn Fn(&Octant) -> bool,
         visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let (mut index, mut digest) = (0u64, Digest::default());
-        let mut one = |word: u64, rank: u32| {
-            if index.is_multiple_of(CHECKED) {
-                check()?;
+        self.visit(&mut |part, blocks| {
+            check()?;
+            for block in blocks {
+                let (rank, side) = (part as u32, word::side(block.first));
+                if takes(&block.octant()) {
+                    for (index, word) in (index..).zip(block.words()) {
+                        visit(Leaf { octant: word::octant(word), side, rank, index })?;
+                    }
+                }
+                index += block.leaves();
+                digest.add_block(block);
             }
-            let leaf = Leaf { octant: word::octant(word), side: word::side(word), rank, index };
-            index += 1;
-            digest.add(word);
-            visit(leaf)
-        };
-        self.visit_parts(|part, words| words.iter().try_for_each(|&word| one(word, part as u32)))?;
+            Ok(())
+        })?;
         let stated = self.manifest.digest;
         let why = format!(
             "its leaves have the digest {digest}, and its manifest states {stated}: run harness audit on it"
@@ -182,10 +180,11 @@ impl Mesh {
     /// As [`Mesh::visit`], and if the tree has more distinct nodes than [`NODES_MAX`].
     pub fn tree(&self) -> Result<Tree, Failure> {
         let mut builder = Builder::default();
-        self.visit(&mut |words| {
+        self.visit(&mut |_, blocks| {
             if builder.nodes() <= NODES_MAX {
-                words.iter().for_each(|&w| builder.push(w).expect("a visit is linear"));
+                blocks.iter().for_each(|b| builder.push_block(b).expect("a visit is linear"));
             }
+            Ok(())
         })?;
         let why = "distinct octants, which is the limit: use a part of the mesh";
         match builder.nodes() <= NODES_MAX {
@@ -202,8 +201,13 @@ impl Mesh {
         let start = word::key_of(octant.corner);
         let keys = start..start + word::span(octant.level);
         let mut found = Vec::new();
-        let within = |word: &&u64| keys.contains(&word::key(**word));
-        self.visit(&mut |words| found.extend(words.iter().filter(within)))?;
+        let is_near =
+            |block: &&Block| block.octant().contains(octant) || octant.contains(&block.octant());
+        self.visit(&mut |_, blocks| {
+            let words = blocks.iter().filter(is_near).flat_map(|block| block.words());
+            found.extend(words.filter(|&word| keys.contains(&word::key(word))));
+            Ok(())
+        })?;
         Ok(found)
     }
 
@@ -345,7 +349,11 @@ mod tests {
             let (_dir, mesh) = opened(&in_parts(&words, &part_of));
             prop_assert_eq!(mesh.leaf_count(), words.len() as u64);
             let mut visited = Vec::new();
-            mesh.visit(&mut |run| visited.extend_from_slice(run)).unwrap();
+            mesh.visit(&mut |_, run| {
+                visited.extend(run.iter().flat_map(|block| block.words()));
+                Ok(())
+            })
+            .unwrap();
             prop_assert_eq!(&visited, &words);
             let (tree, expected) = (mesh.tree().unwrap(), Tree::of_words(&words));
             for octant in words.iter().step_by(7).map(|&w| word::octant(w)) {
@@ -368,7 +376,7 @@ mod tests {
                 _ => parts[0][i] |= 3,
             }
             let (_dir, mesh) = opened(&leaf_set(parts));
-            for error in [mesh.visit(&mut |_| {}).unwrap_err(), mesh.tree().unwrap_err()] {
+            for error in [mesh.visit(&mut |_, _| Ok(())).unwrap_err(), mesh.tree().unwrap_err()] {
                 prop_assert!(error.to_string().contains("not a linear oct-tree"), "{}", error);
                 prop_assert!(error.to_string().ends_with("run harness audit on it"), "{}", error);
             }

@@ -1,7 +1,7 @@
-//! An octant together with its 26 neighbours of the same level, and the search for the coarsest leaf near it.
+//! An octant together with its 26 neighbours of the same level.
 
 use crate::octant::Octant;
-use crate::tree::{Handle, NO_LEAF, Tree};
+use crate::tree::{Handle, Tree};
 use std::array;
 use std::sync::LazyLock;
 
@@ -82,32 +82,6 @@ impl Neighbourhood {
     pub fn at_face(&self, axis: usize, side: i32) -> Handle {
         self.handles[face(axis, side)]
     }
-
-    /// Level of the coarsest leaf in all 27 octants, deleted leaves excluded.
-    pub fn coarsest_level(&self, tree: &Tree) -> u8 {
-        let level = self.octant.level;
-        self.handles.iter().fold(NO_LEAF, |c, &h| c.min(tree.coarsest_level(h, level)))
-    }
-
-    /// The coarsest leaf that is coarser than level `bound` and whose interior meets the region, deleted leaves
-    /// excluded. The result is exact if the region lies within the 27 octants, or if this is the neighbourhood
-    /// of the root.
-    pub fn coarsest_within(&self, tree: &Tree, region: &Region, bound: u8) -> Option<Octant> {
-        let mut found: Option<Octant> = None;
-        for (&handle, &offset) in self.handles.iter().zip(OFFSETS.iter()) {
-            let Some(octant) = self.octant.neighbour(offset) else { continue };
-            tree.walk_below(octant, handle, &mut |part, content| {
-                let coarsest = tree.coarsest_level(content, part.level);
-                let is_coarser = coarsest < found.map_or(bound, |leaf| leaf.level);
-                let may_be_coarser = is_coarser && region.meets(&part);
-                if may_be_coarser && !content.is_node() {
-                    found = Some(part.ancestor(coarsest));
-                }
-                may_be_coarser
-            });
-        }
-        found
-    }
 }
 
 /// An open box, in level-19 cells.
@@ -124,17 +98,21 @@ impl Region {
         Self { low, high: std::array::from_fn(|a| low[a] + edge + 2 * margins[a]) }
     }
 
-    /// The smallest box that contains two.
-    pub fn hull(self, other: Self) -> Self {
+    /// A part of an octant, given by the first and the last 256th of its edge on each axis, enlarged by a margin.
+    pub fn around(octant: &Octant, [first, last]: [[u8; 3]; 2], margin: i64) -> Self {
+        let edge = i64::from(octant.edge());
+        let corner = octant.corner.map(i64::from);
+        // Rounded outwards to whole cells.
+        let low = |a: usize| (edge * i64::from(first[a])) >> 8;
+        let high = |a: usize| (edge * (1 + i64::from(last[a])) + 255) >> 8;
         Self {
-            low: std::array::from_fn(|a| self.low[a].min(other.low[a])),
-            high: std::array::from_fn(|a| self.high[a].max(other.high[a])),
+            low: std::array::from_fn(|a| corner[a] + low(a) - margin),
+            high: std::array::from_fn(|a| corner[a] + high(a) + margin),
         }
     }
 
-    /// Whether the interior of an octant meets the box.
-    fn meets(&self, octant: &Octant) -> bool {
-        let (low, edge) = (octant.corner.map(i64::from), i64::from(octant.edge()));
-        (0..3).all(|a| low[a] < self.high[a] && self.low[a] < low[a] + edge)
+    /// Whether the boxes have a common point.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|a| other.low[a] < self.high[a] && self.low[a] < other.high[a])
     }
 }

@@ -10,6 +10,7 @@
 #[cfg(test)]
 mod tests;
 
+use crate::htg::Block;
 use crate::octant::{LEVEL_MAX, Octant};
 use crate::word;
 use hashbrown::HashTable;
@@ -70,7 +71,11 @@ impl Handle {
         self.0 >= FIRST_NODE
     }
 
-    fn index(self) -> usize {
+    /// The index of a node, less than the number of distinct nodes.
+    ///
+    /// # Panics
+    /// If it is none.
+    pub fn index(self) -> usize {
         (self.0 - FIRST_NODE) as usize
     }
 
@@ -111,8 +116,8 @@ impl Tree {
     /// check `linear` reports them.
     pub fn of_words(words: &[u64]) -> Self {
         let mut builder = Builder::default();
-        for &w in words {
-            let _ = builder.push(w);
+        for &first in words {
+            let _ = builder.push_block(&Block { first, depth: 0 });
         }
         builder.finish()
     }
@@ -249,30 +254,41 @@ pub struct Builder {
     key: u64,
     /// End of the key range of the last leaf.
     end: u64,
+    /// The last content whose leaves have one kind, and their number of levels below it.
+    block: (Kind, u8, Handle),
 }
 
 impl Builder {
-    /// Adds a leaf word.
-    ///
-    /// # Errors
-    /// If it is rejected; the tree is unchanged.
-    pub fn push(&mut self, word: u64) -> Result<(), String> {
-        word::check(word)?;
-        self.push_leaf(word::key(word), word::level(word), (word & 3) as Kind)
-    }
-
     /// Adds a leaf of any kind, [`DELETED`] included.
     ///
     /// # Errors
     /// If it is rejected; the tree is unchanged.
     pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), String> {
+        self.push_content(key, level, Handle::leaf(kind))
+    }
+
+    /// Adds all leaves of a block.
+    ///
+    /// # Errors
+    /// If they are rejected; the tree is unchanged.
+    pub fn push_block(&mut self, block: &Block) -> Result<(), String> {
+        word::check(block.first)?;
+        let kind = (block.first & 3) as Kind;
+        if self.block.0 != kind || self.block.1 != block.depth || block.depth == 0 {
+            let of_depth = |content, _| self.tree.intern([content; 8]);
+            let content = (0..block.depth).fold(Handle::leaf(kind), of_depth);
+            self.block = (kind, block.depth, content);
+        }
+        self.push_content(word::key(block.first), block.level(), self.block.2)
+    }
+
+    fn push_content(&mut self, key: u64, level: u8, content: Handle) -> Result<(), String> {
         if key < self.end {
             return Err("it overlaps or precedes the leaf before it".to_owned());
         }
         self.end = key + word::span(level);
-        let leaf = Handle::leaf(kind);
         if level == 0 {
-            self.tree.root = leaf;
+            self.tree.root = content;
             return Ok(());
         }
         let parent = usize::from(level) - 1;
@@ -282,7 +298,7 @@ impl Builder {
             self.path[self.open] = [Handle::HOLE; 8];
             self.open += 1;
         }
-        self.path[parent][digit(key, parent)] = leaf;
+        self.path[parent][digit(key, parent)] = content;
         Ok(())
     }
 

@@ -52,12 +52,16 @@ impl Slice {
 }
 
 impl Selection {
+    /// Whether an octant is in the slice and in the box, at least in part.
+    fn meets(&self, octant: &Octant) -> bool {
+        let (low, high) = octant.bounds();
+        let meets = |[from, to]: [[i64; 3]; 2]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]);
+        self.slice.is_none_or(|slice| slice.cuts(octant)) && self.clip.is_none_or(meets)
+    }
+
     /// Whether the leaf is selected.
     pub fn has(&self, leaf: &Leaf) -> bool {
-        let (low, high) = leaf.octant.bounds();
-        let meets = |[from, to]: [[i64; 3]; 2]| (0..3).all(|a| low[a] < to[a] && from[a] < high[a]);
-        self.slice.is_none_or(|slice| slice.cuts(&leaf.octant))
-            && self.clip.is_none_or(meets)
+        self.meets(&leaf.octant)
             && self.level_max.is_none_or(|level| leaf.octant.level <= level)
             && self.side.is_none_or(|side| leaf.side == side)
             && self.rank.is_none_or(|rank| leaf.rank == rank)
@@ -73,7 +77,8 @@ impl Selection {
         check: Check<'_>,
         visit: &mut dyn FnMut(Leaf) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        mesh.leaves(check, &mut |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) })
+        let mut selected = |leaf| if self.has(&leaf) { visit(leaf) } else { Ok(()) };
+        mesh.leaves(check, &|octant| self.meets(octant), &mut selected)
     }
 }
 
@@ -112,7 +117,7 @@ mod tests {
             let selection = Selection { slice, level_max: Some(level), rank: Some(1), ..Selection::default() };
             let mut expected = Vec::new();
             let mut index = 0;
-            mesh.leaves(&|| Ok(()), &mut |leaf| {
+            mesh.leaves(&|| Ok(()), &|_| true, &mut |leaf| {
                 assert_eq!(leaf.index, index);
                 index += 1;
                 expected.extend(selection.has(&leaf).then(|| {

@@ -75,8 +75,8 @@ fn leaves(mesh: &Mesh, selection: &Selection) -> Vec<(u64, u64)> {
 
 fn words(tree: &TreeFile) -> Result<Vec<u64>, TreeError> {
     let mut words = Vec::new();
-    tree.words(&mut |run| {
-        words.extend_from_slice(run);
+    tree.blocks(&mut |run| {
+        words.extend(run.iter().flat_map(|block| block.words()));
         true
     })?;
     Ok(words)

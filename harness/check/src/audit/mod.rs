@@ -19,7 +19,6 @@ use std::{fmt, fs, io};
 use crate::checks::{self, CheckResult, Pass, Subject};
 use crate::promises::Promises;
 use contract::case::Case;
-use contract::digest::Digest;
 use contract::files::write_atomically;
 use contract::manifest::Manifest;
 use contract::mesh::{Mesh, NODES_MAX};
@@ -55,9 +54,10 @@ impl AuditReport {
         self.checks.iter().filter(|check| !check.was_run())
     }
 
-    /// Whether splits were not checked, because memory does not suffice.
+    /// Whether splits were not checked, or T0 was not made, because memory does not suffice.
     pub fn exceeds_memory(&self) -> bool {
-        self.leaves > 0 && self.not_run().any(|check| check.name == checks::SPLITS)
+        let needs_memory = [checks::SPLITS, checks::CAPACITY];
+        self.leaves > 0 && self.not_run().any(|check| needs_memory.contains(&check.name))
     }
 
     /// Whether any property of the leaves was checked, beyond their files and counts.
@@ -153,21 +153,18 @@ fn audit_within(
 /// Compares the tree of a mesh that also has parts with the manifest.
 fn tree_file(dir: &Path, name: &str, manifest: &Manifest) -> CheckResult {
     let mut result = CheckResult::new(TREE);
-    let mut digest = Digest::default();
-    let read = Mesh::of_tree(dir, name, manifest).and_then(|tree| {
-        tree.stream(&mut |_, run| {
-            result.examined += run.len() as u64;
-            run.iter().for_each(|&word| digest.add(word));
-            true
-        })
-    });
-    match read {
+    // Counts and digests are enough.
+    match Mesh::of_tree(dir, name, manifest).and_then(|tree| Pass::over(&tree, 0)) {
         Err(error) => result.report(error),
-        Ok(()) if digest != manifest.digest => result.report(format_args!(
-            "the leaves of the tree have the digest {digest}, but those of the manifest {}",
-            manifest.digest
-        )),
-        Ok(()) => {}
+        Ok(Pass { tally, .. }) => {
+            result.examined = tally.leaves;
+            let (digest, stated) = (tally.digest, manifest.digest);
+            if digest != stated {
+                result.report(format_args!(
+                    "the leaves of the tree have the digest {digest}, but those of the manifest {stated}"
+                ));
+            }
+        }
     }
     result
 }

@@ -1,10 +1,15 @@
 use super::*;
 use crate::checks::CAPACITY;
 use crate::promises::Touching;
+use contract::digest::Digest;
+use contract::htg::Block;
 use contract::import::ImportedTree;
 use contract::leafset::{self, LeafSet};
 use contract::manifest::{Keep, Sides};
+use contract::octant::Octant;
 use contract::testing::{leaf_set, random_words, words_of};
+use contract::tree::Builder;
+use contract::word;
 use proptest::prelude::*;
 
 fn audited(set: &LeafSet) -> AuditReport {
@@ -185,6 +190,81 @@ fn an_exceeded_memory_limit_is_a_finding() {
     set.write(dir.path()).unwrap();
     let report = audit_within(1, dir.path(), None, &Promises::of_definition());
     assert_eq!(found(&report), ["manifest", CAPACITY]);
+}
+
+/// The blocks of an octant in which all leaves have level 16; those on the path to one octant, which `change` replaces, are smaller.
+fn blocks(octant: Octant, to: &Octant, change: fn(Octant) -> Option<Block>) -> Vec<Block> {
+    let key = word::key_of(octant.corner) << 7;
+    if octant == *to {
+        return change(octant).into_iter().collect();
+    }
+    if octant.level >= 3 && !octant.contains(to) {
+        return vec![Block { first: key | 16 << 2, depth: 16 - octant.level }];
+    }
+    (0..8).flat_map(|digit| blocks(octant.child(digit), to, change)).collect()
+}
+
+/// All of 2^48 leaves are counted, and one corrupt one is found. Only their digest is not made, which takes a day.
+#[test]
+fn one_corrupt_leaf_of_more_than_2_to_the_37_is_found() {
+    fn leaves(o: Octant, level: u8, side: u64) -> Option<Block> {
+        let first = word::key_of(o.corner) << 7 | u64::from(level) << 2 | side;
+        Some(Block { first, depth: level - o.level })
+    }
+    let whole = |o: Octant| leaves(o, 16, 0);
+    let inside = |o: Octant| leaves(o, 16, 1);
+    let coarse = |o: Octant| leaves(o, o.level, 0);
+    type Change = fn(Octant) -> Option<Block>;
+    let cases: [(u8, Change, &[&str]); 6] = [
+        (16, whole, &[]),
+        (16, |_| None, &["manifest", "complete"]),
+        (16, inside, &["manifest", "sides"]),
+        (15, inside, &["manifest", "sides"]),
+        (14, coarse, &["manifest", "balance"]),
+        (15, coarse, &["manifest"]),
+    ];
+    for (level, change, expected) in cases {
+        let to = Octant { corner: [77_000, 300_008, 499_992], level: 19 }.ancestor(level);
+        let (mut tally, mut builder) = (leaf_set(vec![]).manifest, Builder::default());
+        tally.parts.clear();
+        for block in blocks(Octant::ROOT, &to, change) {
+            tally.count(block.first, block.leaves());
+            builder.push_block(&block).unwrap();
+        }
+        let mut manifest = Manifest { keep_crossing: true, ..leaf_set(vec![]).manifest };
+        manifest.parts.clear();
+        manifest.count(16 << 2, 1 << 48);
+        assert!(manifest.leaves > 1 << 37 && tally.leaves >= (1 << 48) - 511);
+        let pass = Pass { tally, linear: CheckResult::new("linear"), tree: Some(builder.finish()) };
+        assert!(pass.tree().nodes() < 60);
+        let results = checks::all(&Subject::of(&manifest, manifest.tree, pass, None));
+        let found: Vec<_> = results.iter().filter(|c| !c.holds()).map(|c| c.name).collect();
+        assert_eq!(found, expected, "level {level}");
+    }
+}
+
+/// A mesh that has the tree alone, as large meshes do.
+#[test]
+fn a_tree_alone_must_have_the_leaves_of_its_manifest() {
+    let sample = Path::new("../contract/tests/samples/sphere.vtkhdf");
+    let open = ImportedTree::open(sample, None, None, None, "test".to_owned());
+    let place = tempfile::tempdir().unwrap();
+    open.unwrap().expect("a tree").link(place.path()).unwrap();
+    let correct = Manifest::read(place.path()).unwrap();
+    let report = audit(place.path());
+    assert!(report.leaves == 9056 && report.nodes > 0 && !found(&report).contains(&"manifest"));
+    let changes: [fn(&mut Manifest); 3] = [
+        |m| m.octant_digests.swap(0, 511),
+        |m| m.digest = Digest(m.digest.0 ^ 1),
+        |m| m.leaves += 1 << 33,
+    ];
+    for change in changes {
+        let mut wrong = correct.clone();
+        change(&mut wrong);
+        wrong.write(place.path()).unwrap();
+        let manifest = audit(place.path()).checks.remove(1);
+        assert_eq!((manifest.name, manifest.holds()), ("manifest", false));
+    }
 }
 
 /// A mesh of the contract's samples as parts and as a tree, in one directory.

@@ -79,15 +79,13 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
     let surface = terms.level_surface;
     let requires = |handle: Handle, level: u8| {
         let is_source = tree.kinds(handle) & CROSSING_OR_DELETED != 0;
-        let (kind, of_level, own, below) = match handle.as_leaf().filter(|_| is_source) {
-            Some(kind) if level >= surface => (kind, level, Some(surface), None),
-            None if is_source && handle.is_node() => {
-                (Side::Crossing as Kind, surface, None, Some(surface))
-            }
+        let (kind, of_level, by_itself) = match handle.as_leaf().filter(|_| is_source) {
+            Some(kind) if level >= surface => (kind, level, true),
+            None if is_source && handle.is_node() => (Side::Crossing as Kind, surface, false),
             _ => return None,
         };
         let margin = surface_margin(terms, kind, of_level);
-        (margin > 0).then_some(Required { margin, own, below })
+        (margin > 0).then_some(Required { margin, by_itself })
     };
     let report = |[leaf, _, coarse]: [Octant; 3], result: &mut CheckResult| {
         let (_, kind) = tree.locate(leaf.corner).expect("the octant is a leaf");
@@ -98,7 +96,8 @@ fn check_surface_layer(tree: &Tree, terms: &Manifest, result: &mut CheckResult) 
             "a leaf less than {cells} cells from the {what} leaf {leaf} is coarser than the surface level: {coarse}"
         ));
     };
-    Clearance { tree, requires, directions: &ALL_AXES, report: &report }.check(result);
+    Clearance { tree, requires, bound: surface, directions: &ALL_AXES, report: &report }
+        .check(result);
 }
 
 #[cfg(test)]

@@ -82,8 +82,10 @@ fn run(subject: &Subject, choose: impl Fn(&Check) -> bool) -> Vec<CheckResult> {
         |check: &Check| [manifest::CHECK.name, pass::CHECK.name].contains(&check.name);
     let chosen = CHECKS.iter().filter(|check| choose(check));
     // Counts and digests need no tree.
-    let possible = chosen.filter(|check| subject.capacity().is_none() || is_of_files(check));
-    possible.map(|check| check.result(subject)).chain(subject.capacity()).collect()
+    let capacity = subject.capacity();
+    let is_possible = capacity.as_ref().is_none_or(CheckResult::holds);
+    let possible = chosen.filter(|check| is_possible || is_of_files(check));
+    possible.map(|check| check.result(subject)).chain(capacity.clone()).collect()
 }
 
 impl Check {

@@ -7,6 +7,7 @@ use super::identical::Named;
 use super::{Check, CheckResult};
 use contract::digest::Digest;
 use contract::failure::Failure;
+use contract::htg::Block;
 use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Part, octant_index};
@@ -46,8 +47,11 @@ impl Pass {
     /// Takes the leaves of a mesh in memory.
     pub(crate) fn of(set: &LeafSet) -> Self {
         let mut state = State::new(&set.manifest, NODES_MAX);
-        (0..).zip(&set.parts).for_each(|(part, words)| state.count(part, words));
-        state.build(&set.words);
+        let blocks = |words: &[u64]| -> Vec<Block> {
+            words.iter().map(|&first| Block { first, depth: 0 }).collect()
+        };
+        (0..).zip(&set.parts).for_each(|(part, words)| state.count(part, &blocks(words)));
+        state.build(&blocks(&set.words));
         state.finish()
     }
 }
@@ -81,20 +85,18 @@ impl State {
         Self { root, nodes_max, tally, linear, by_code, last_of_part, last, builder }
     }
 
-    /// Adds to counts and digests, and checks the order. Digests are summed per octant first, because this loop dominates the
-    /// time of the pass.
-    fn count(&mut self, part: usize, run: &[u64]) {
+    /// Adds to counts and digests, and checks the order.
+    fn count(&mut self, part: usize, run: &[Block]) {
         let Self { tally: Manifest { parts, octant_digests, .. }, .. } = self;
         let (last, Part { file, leaves, digest }) =
             (&mut self.last_of_part[part], &mut parts[part]);
-        *leaves += run.len() as u64;
-        for words in run.chunk_by(|&a, &b| octant_index(a) == octant_index(b)) {
-            let of_words = Digest::of(words);
-            digest.merge(of_words);
-            octant_digests[octant_index(words[0])].merge(of_words);
-        }
-        for &word in run {
-            self.by_code[(word & 127) as usize] += 1;
+        for block in run {
+            let (mut of_block, word) = (Digest::default(), block.first);
+            of_block.add_block(block);
+            digest.merge(of_block);
+            octant_digests[octant_index(word)].merge(of_block);
+            *leaves += block.leaves();
+            self.by_code[(word & 127) as usize] += block.leaves();
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
                 let [before, word] = [before, word].map(|word| Named(Some(word), self.root));
                 let finding = format_args!("{file} is not sorted: {word} follows {before}");
@@ -104,17 +106,17 @@ impl State {
     }
 
     /// Adds to the tree, unless it exceeds the limit: counts and digests continue without it.
-    fn build(&mut self, run: &[u64]) {
+    fn build(&mut self, run: &[Block]) {
         if self.builder.nodes() > self.nodes_max {
             return;
         }
-        for &word in run {
-            if self.builder.push(word).is_ok() {
-                self.last = word;
+        for block in run {
+            if self.builder.push_block(block).is_ok() {
+                self.last = block.first;
                 continue;
             }
-            let [leaf, last] = [word, self.last].map(|word| Named(Some(word), self.root));
-            match word::check(word) {
+            let [leaf, last] = [block.first, self.last].map(|word| Named(Some(word), self.root));
+            match word::check(block.first) {
                 Err(_) => self.linear.report(format_args!("not a leaf: {leaf}")),
                 Ok(()) => self.linear.report(format_args!("two leaves overlap: {leaf} and {last}")),
             }

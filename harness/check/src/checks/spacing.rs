@@ -65,7 +65,8 @@ fn boxes_met(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     tree.walk(&mut |octant, handle| {
         let has_crossing = tree.kinds(handle) & 1 << Side::Crossing as u8 != 0;
-        let may_be_coarse = has_crossing && octant.level < terms.level_surface;
+        let is_fine = tree.coarsest_level(handle, octant.level) >= terms.level_surface;
+        let may_be_coarse = has_crossing && !is_fine;
         if may_be_coarse && !handle.is_node() {
             let (leaf, level) = (terms.root.place(octant), terms.level_surface);
             result.report(format_args!("the crossing leaf {leaf} is coarser than level {level}"));

@@ -7,7 +7,7 @@
 
 use std::fs;
 
-use super::{Check, CheckResult, NO_GEOMETRY, Subject};
+use super::{Check, CheckResult, Subject};
 use crate::why::Mesh;
 use contract::number::labelled;
 
@@ -26,7 +26,9 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let Some(truth) = subject.truth() else { return result.lacks(NO_GEOMETRY) };
+    let Some(truth) = subject.truth() else {
+        return result.lacks("T0 does not fit its limit, as `capacity` states");
+    };
     let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
     if let Err(why) = refuse_too_large(subject.manifest.leaves, &meminfo) {
         return result.lacks(why);

@@ -15,6 +15,7 @@ use crate::checks::manifest::{differing, differing_inputs};
 use crate::why;
 use contract::case::Case;
 use contract::failure::Failure;
+use contract::htg::Block;
 use contract::manifest::{Manifest, Sides};
 use contract::mesh::Mesh;
 use contract::octant::Octant;
@@ -79,7 +80,10 @@ pub fn diff(a: &Path, b: &Path, case: Option<&Case>) -> Result<DiffReport, Failu
     for mesh in [&mut a, &mut b] {
         let mut manifest = mesh.manifest.clone();
         manifest.clear_leaves();
-        mesh.visit(&mut |words| words.iter().for_each(|&word| manifest.add(word & mask)))?;
+        mesh.visit(&mut |_, blocks| {
+            blocks.iter().for_each(|b| manifest.add_block(&Block { first: b.first & mask, ..*b }));
+            Ok(())
+        })?;
         manifest.finish();
         mesh.manifest = manifest;
     }

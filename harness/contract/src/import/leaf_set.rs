@@ -100,8 +100,8 @@ impl ImportedTree {
             Err(error) => return Err(Failure::input(error)),
         };
         let mut manifest = manifest_of(tree.root, case, program);
-        tree.words(&mut |run| {
-            run.iter().for_each(|&word| manifest.add(word));
+        tree.blocks(&mut |run| {
+            run.iter().for_each(|block| manifest.add_block(block));
             true
         })
         .map_err(Failure::input)?;
@@ -120,9 +120,10 @@ impl ImportedTree {
         leafset::create(dir, &Manifest { parts, ..self.manifest.clone() }, |_, out| {
             out.write_all(&npy::header("<u8", &format!("({leaves},)")))?;
             let (mut found, mut written) = (Digest::default(), Ok(()));
-            let read = self.tree.words(&mut |run| {
-                run.iter().for_each(|&word| found.add(word));
-                written = out.write_all(bytemuck::cast_slice(run));
+            let read = self.tree.blocks(&mut |run| {
+                run.iter().for_each(|block| found.add_block(block));
+                let mut words = run.iter().flat_map(|block| block.words());
+                written = words.try_for_each(|word| out.write_all(&word.to_le_bytes()));
                 written.is_ok()
             });
             written?;

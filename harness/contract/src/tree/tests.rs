@@ -1,5 +1,5 @@
 use super::*;
-use crate::neighbourhood::{Neighbourhood, OFFSETS, Region};
+use crate::neighbourhood::{Neighbourhood, OFFSETS};
 use crate::octant::CELLS_PER_EDGE;
 use crate::testing::{octants_of, random_words, words_of};
 use proptest::prelude::*;
@@ -66,7 +66,8 @@ fn a_deleted_leaf_bounds_no_level_from_above_and_is_a_kind() {
         }
     }
     assert!(builder.push_leaf(word::KEY_END - 1, 19, 0).unwrap_err().contains("overlaps"));
-    assert_eq!(builder.push(25 << 2), Err(word::check(25 << 2).unwrap_err()));
+    let invalid = Block { first: 25 << 2, depth: 0 };
+    assert_eq!(builder.push_block(&invalid), Err(word::check(25 << 2).unwrap_err()));
     let tree = builder.finish();
     let root = tree.root();
     assert_eq!(
@@ -124,25 +125,6 @@ proptest! {
     }
 
     #[test]
-    fn the_coarsest_leaf_in_a_region_agrees_with_a_linear_search(
-        words in random_words(3), at in any::<prop::sample::Index>(), margins in prop::array::uniform3(0i64..200_000), bound in 1u8..5,
-    ) {
-        prop_assume!(!words.is_empty());
-        let tree = Tree::of_words(&words);
-        let octant = word::octant(words[at.index(words.len())]);
-        let meets = |leaf: &Octant| (0..3).all(|a| {
-            let [from, to] = [octant, *leaf].map(|o| i64::from(o.corner[a]));
-            to < from + i64::from(octant.edge()) + margins[a] && from - margins[a] < to + i64::from(leaf.edge())
-        });
-        let levels = words.iter().map(|&w| word::octant(w)).filter(meets).map(|leaf| leaf.level);
-        let expected = levels.min().unwrap().min(bound);
-        let found = Neighbourhood::root(&tree).coarsest_within(&tree, &Region::along(&octant, margins), bound);
-        prop_assert_eq!(found.is_some(), expected < bound);
-        let is_leaf = |leaf: &Octant| tree.locate(leaf.corner).is_some_and(|(at, _)| at == *leaf);
-        prop_assert!(found.is_none_or(|leaf| meets(&leaf) && is_leaf(&leaf) && leaf.level == expected));
-    }
-
-    #[test]
     fn a_walk_enters_the_octants_that_it_is_asked_to(words in random_words(3), deepest in 0u8..4) {
         let tree = Tree::of_words(&words);
         let mut found = Vec::new();
@@ -179,8 +161,6 @@ proptest! {
             found.push(word::key_of(corner) << 7 | u64::from(level) << 2 | u64::from(kind));
             let same = Neighbourhood::of(&tree, neighbourhood.octant);
             assert_eq!(same.handles, neighbourhood.handles);
-            let levels = same.handles.iter().map(|&h| tree.coarsest_level(h, level));
-            assert_eq!(same.coarsest_level(&tree), levels.min().unwrap());
             let faces = |o: &[i32; 3]| o.iter().map(|c| c.abs()).sum::<i32>() == 1;
             for (i, offset) in OFFSETS.iter().enumerate().filter(|(_, o)| faces(o)) {
                 let axis = offset.iter().position(|c| *c != 0).unwrap();

@@ -119,8 +119,8 @@ pub(super) fn tree_file(scratch: &mut Scratch, bytes: &[u8]) -> bool {
         return false;
     };
     let mut words = Vec::new();
-    let whole = tree.words(&mut |run| {
-        words.extend_from_slice(run);
+    let whole = tree.blocks(&mut |run| {
+        words.extend(run.iter().flat_map(|block| block.words()));
         true
     });
     assert_eq!(matches!(imported, Ok(Some(_))), whole.is_ok());

@@ -288,8 +288,8 @@ fn tree_of(case: &Small, run: &Run, ungraded: bool, place: &Path) -> Vec<u8> {
 fn words_of(place: &Path) -> Vec<u64> {
     let tree = TreeFile::open(&place.join("last.vtkhdf")).expect("a tree");
     let mut words = Vec::new();
-    tree.words(&mut |run| {
-        words.extend_from_slice(run);
+    tree.blocks(&mut |run| {
+        words.extend(run.iter().flat_map(|block| block.words()));
         true
     })
     .expect("a tree");
@@ -366,8 +366,8 @@ fn the_command_writes_words_or_the_tree_or_both() {
         let tree = TreeFile::open(&workspace.path().join(folder).join(TREE));
         let mut words = Vec::new();
         tree.and_then(|tree| {
-            tree.words(&mut |run| {
-                words.extend_from_slice(run);
+            tree.blocks(&mut |run| {
+                words.extend(run.iter().flat_map(|block| block.words()));
                 true
             })
         })
