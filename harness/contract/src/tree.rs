@@ -191,6 +191,21 @@ impl Tree {
         }
     }
 
+    /// Visits the leaves and holes that satisfy a condition, in Morton order. A node must satisfy it if something in it does.
+    pub fn walk_where(
+        &self,
+        holds: impl Fn(&Octant, Handle) -> bool,
+        visit: &mut impl FnMut(Octant, Handle),
+    ) {
+        self.walk(&mut |octant, handle| {
+            let holds = holds(&octant, handle);
+            if holds && !handle.is_node() {
+                visit(octant, handle);
+            }
+            holds
+        });
+    }
+
     /// What the tree has at an octant: a node, a leaf, or a hole. Within a leaf it is the leaf's handle.
     pub fn at(&self, octant: &Octant) -> Handle {
         self.descend(octant).1
@@ -261,10 +276,10 @@ pub struct Builder {
 impl Builder {
     /// Adds a leaf of any kind, [`DELETED`] included.
     ///
-    /// # Errors
-    /// If it is rejected; the tree is unchanged.
-    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), String> {
-        self.push_content(key, level, Handle::leaf(kind))
+    /// # Panics
+    /// If it overlaps or precedes the leaf before it.
+    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) {
+        self.push_content(key, level, Handle::leaf(kind)).expect("leaves in order");
     }
 
     /// Adds all leaves of a block.

@@ -157,7 +157,7 @@ mod tests {
             for octant in words_of(split).into_iter().map(word::octant) {
                 let is_it = octant.level == 3 && octant.digit() == digit;
                 let kind = if is_it { kind } else { Side::Outside as Kind };
-                builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+                builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
             }
             let terms = terms(n, 3, Keep::Outside, keep_crossing);
             checked(&builder.finish(), &terms).findings_total
