@@ -244,14 +244,8 @@ impl Mesh<'_> {
     /// A leaf of the finest possible level that forces the split of an octant, which must be deep or not.
     fn finest_that_forces(&self, octant: &Octant, is_deep: bool) -> Option<(Rule, Octant)> {
         let coarsest = octant.level + if is_deep { 2 } else { 1 };
-        let mut found = None;
-        (coarsest..=self.level_deepest).rev().find(|&level| {
-            self.any_leaf_near(octant, level..=level, &mut |leaf| {
-                found = self.rule_of(&leaf, octant).map(|rule| (rule, leaf));
-                found.is_some()
-            })
-        });
-        found
+        let mut levels = (coarsest..=self.level_deepest).rev();
+        levels.find_map(|level| self.leaf_that_forces(octant, level..=level))
     }
 
     /// What splits an octant of T0, or makes a leaf of it a crossing one.
