@@ -343,10 +343,8 @@ impl Manifest {
     /// # Errors
     /// If it cannot be read, or does not follow its schema.
     pub fn read(dir: &Path) -> Result<Self, Failure> {
-        if dir.is_file() {
-            let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
-            return Err(Failure::input(format!("{} {why}", dir.display())));
-        }
+        let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
+        Failure::unless(!dir.is_file(), format_args!("{} {why}", dir.display()))?;
         let path = dir.join(FILE);
         let text = files::read_text(&path).map_err(|error| Failure::about(&path, error))?;
         let wrong = |why| Failure::about(&path, format!("not a leaf-set manifest: {why}"));

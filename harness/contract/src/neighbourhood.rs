@@ -37,7 +37,6 @@ fn face(axis: usize, side: i32) -> usize {
 }
 
 /// The contents of an octant and of its neighbours.
-#[derive(Clone, Copy, Debug)]
 pub struct Neighbourhood {
     /// The octant in the middle.
     pub octant: Octant,

@@ -105,15 +105,13 @@ impl Cells {
         let high = [0, 1, 2].map(|axis| ends(axis).fold(f64::NEG_INFINITY, f64::max));
         let depth = (edge / finest).log2().round();
         let finite = low.iter().chain(&high).all(|c| c.is_finite()) && finest > 0.0;
-        if !finite || !depth.is_finite() {
-            return Err(unusable("a coordinate is not finite, or an edge is not positive"));
-        }
-        if depth > f64::from(LEVEL_MAX) {
-            return Err(Failure::input(format!(
-                "has cells of {} levels, with edges from {finest} to {edge}, and the levels of a mesh are 0 to {LEVEL_MAX}",
-                depth + 1.0,
-            )));
-        }
+        let why = "a coordinate is not finite, or an edge is not positive";
+        Failure::unless(finite && depth.is_finite(), unusable(why))?;
+        let why = format!(
+            "has cells of {} levels, with edges from {finest} to {edge}, and the levels of a mesh are 0 to {LEVEL_MAX}",
+            depth + 1.0,
+        );
+        Failure::unless(depth <= f64::from(LEVEL_MAX), why)?;
         // The extent of all cells is known more precisely than the edge of one, and is a whole number of finest cells.
         let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         let scale = f64::from(1u32 << depth as u32);
