@@ -307,7 +307,9 @@ impl Builder {
             return Ok(());
         }
         let parent = usize::from(level) - 1;
-        self.close_down_to(shared_levels(self.key, key));
+        // The common ancestors of both leaves stay open.
+        let other_levels = (self.key ^ key).checked_ilog2().unwrap_or(0) as usize / 3;
+        self.close_down_to(usize::from(LEVEL_MAX) - other_levels);
         self.key = key;
         while self.open <= parent {
             self.path[self.open] = [Handle::HOLE; 8];
@@ -339,11 +341,6 @@ impl Builder {
         self.close_down_to(0);
         self.tree
     }
-}
-
-/// Number of common ancestors of two level-19 cells, themselves excluded.
-fn shared_levels(a: u64, b: u64) -> usize {
-    usize::from(LEVEL_MAX) - (a ^ b).checked_ilog2().unwrap_or(0) as usize / 3
 }
 
 /// The digit of the child that contains this cell, among the children of its ancestor at `level`.
