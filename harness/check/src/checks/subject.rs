@@ -141,9 +141,7 @@ impl<'a> Subject<'a> {
 
     /// What a check that compares the mesh with T0 examines: its leaves or, if there are none, those of T0.
     pub(super) fn examined_with(&self, truth: &Truth) -> u64 {
-        match self.pass.tally.leaves {
-            0 => truth.words.len() as u64,
-            leaves => leaves,
-        }
+        let leaves = self.pass.tally.leaves;
+        if leaves > 0 { leaves } else { truth.words.len() as u64 }
     }
 }

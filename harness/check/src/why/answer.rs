@@ -169,9 +169,7 @@ impl fmt::Display for Answer {
         if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|leaf| leaf.octant != *base)) {
             writeln!(f, "  leaf of T0: {}", place(&base))?;
         }
-        if let Some(rule) = deleted_by {
-            writeln!(f, "  deleted by {rule}")?;
-        }
+        deleted_by.iter().try_for_each(|rule| writeln!(f, "  deleted by {rule}"))?;
         if let Some(split) = split {
             writeln!(f, "size\n  its parent, {}, is split", place(&split.octant))?;
             let clauses = split.clauses(&self.root);
