@@ -11,7 +11,6 @@
 use crate::lattice::Root;
 use crate::octant::Octant;
 use crate::word::{self, Side};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use vtkhdf::format::Chunked;
 pub use vtkhdf::format::ReadError as TreeError;
@@ -72,8 +71,6 @@ pub struct TreeFile {
     pub root: Root,
     /// Number of leaves.
     pub leaves: u64,
-    /// The nodes of each level.
-    levels: Vec<Range<u64>>,
 }
 
 type Result<T> = std::result::Result<T, TreeError>;
@@ -89,23 +86,19 @@ impl TreeFile {
         if !root.is_cube() {
             return Err(TreeError::Unknown(format!("its root is no cube: {root}")));
         }
-        let (mut levels, mut end) = (Vec::new(), 0);
-        for count in &file.shape.nodes {
-            levels.push(end..end + count);
-            end += count;
-        }
-        let mut tree = Self { path: path.to_owned(), file, root, leaves: 0, levels };
+        let mut tree = Self { path: path.to_owned(), file, root, leaves: 0 };
         tree.leaves = tree.verify()?;
         Ok(tree)
     }
 
     /// Verifies the structure, 64 nodes at a time; returns the number of leaves.
     fn verify(&self) -> Result<u64> {
-        let mut leaves = 0;
-        for (index, nodes) in self.levels.iter().enumerate() {
+        let (mut leaves, nodes) = (0, &self.file.shape.nodes);
+        for (index, count) in nodes.iter().enumerate() {
             let (mut level, mut parents) = (self.level(index), 0);
-            while level.next < nodes.end {
-                let count = (nodes.end - level.next).min(64);
+            let end = level.next + count;
+            while level.next < end {
+                let count = (end - level.next).min(64);
                 let [split, masked] = level.bits::<9>()?.map(|bits| bits >> (64 - count));
                 if split & masked != 0 {
                     return Err(TreeError::Damaged("a node is masked and split".to_owned()));
@@ -114,7 +107,7 @@ impl TreeFile {
                 leaves += count - u64::from((split | masked).count_ones());
                 level.next += count;
             }
-            let children = self.levels.get(index + 1).map_or(0, |next| next.end - next.start);
+            let children = nodes.get(index + 1).copied().unwrap_or(0);
             if 8 * parents != children {
                 let why = format!(
                     "{parents} nodes of level {index} are split, and {children} are on the next"
@@ -127,14 +120,14 @@ impl TreeFile {
 
     /// The beginning of a level.
     fn level(&self, index: usize) -> Level<'_> {
-        let next = self.levels[index].start;
+        let (nodes, [split, masked, sides]) = (&self.file.shape.nodes, &self.file.arrays);
+        let next = nodes[..index].iter().sum();
         let bytes = |array, position| Bytes::of(&self.file, array, position);
-        let is_last = index + 1 == self.levels.len();
         Level {
             next,
-            split: (!is_last).then(|| bytes(&self.file.split, next / 8)),
-            masked: bytes(&self.file.masked, next / 8),
-            sides: bytes(&self.file.sides, next),
+            split: (index + 1 < nodes.len()).then(|| bytes(split, next / 8)),
+            masked: bytes(masked, next / 8),
+            sides: bytes(sides, next),
         }
     }
 
@@ -144,7 +137,7 @@ impl TreeFile {
     /// # Errors
     /// If the file is damaged.
     pub fn blocks(&self, run: &mut dyn FnMut(&[Block]) -> bool) -> Result<()> {
-        let levels = (0..self.levels.len()).map(|index| self.level(index)).collect();
+        let levels = (0..self.file.shape.nodes.len()).map(|index| self.level(index)).collect();
         let mut walk = Walk { levels, blocks: Vec::with_capacity(RUN + 8) };
         if walk.siblings(0, 0, 1, run)? {
             run(&walk.blocks);
@@ -254,13 +247,12 @@ impl Walk<'_> {
         at.next += u64::from(count);
         // A block lies in one octant of level 3.
         let may_be_block = level > OCTANT_LEVEL;
-        let of_64 = match may_be_block && split == 0xff {
-            true => self.levels[level + 1].side_of_64()?,
-            false => None,
-        };
         let word =
             |key: u64, level: usize, side: u8| key << 7 | (level as u64) << 2 | u64::from(side);
-        if let Some(side) = of_64 {
+        if may_be_block
+            && split == 0xff
+            && let Some(side) = self.levels[level + 1].side_of_64()?
+        {
             self.levels[level + 1].next += 64;
             self.blocks.push(Block { first: word(key, level + 1, side), depth: 2 });
         } else {

@@ -43,9 +43,8 @@ pub fn read(dir: &Path) -> Result<LeafSet, Failure> {
 /// If the directory or an array cannot be read, or if there is none.
 pub fn read_parts(dir: &Path) -> Result<Vec<(String, Vec<u64>)>, Failure> {
     let names = part_names(dir)?;
-    if names.is_empty() {
-        return Err(Failure::about(dir, "it has neither mesh.json nor an array of leaves"));
-    }
+    let why = Failure::about(dir, "it has neither mesh.json nor an array of leaves");
+    Failure::unless(!names.is_empty(), why)?;
     let read = |name: String| {
         let path = dir.join(&name);
         let part = PartFile::open(&path).map_err(|why| why.of_file(&path))?;

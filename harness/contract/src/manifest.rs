@@ -280,21 +280,16 @@ impl Manifest {
                     b.min[a] <= b.max[a] && [b.min[a], b.max[a]].iter().all(|c| lattice.contains(c))
                 })
         };
-        let Root { origin, edge } = self.root;
-        let range = 1e-100..1e100;
+        let are_seeds = self.seeds.as_flattened().iter().all(|c| lattice.contains(c));
+        let (Root { origin, edge }, range) = (self.root, 1e-100..1e100);
+        let is_root = range.contains(&edge) && origin.iter().all(|c| c.abs() < range.end);
         let faults = [
             (self.octant_digests.len() == OCTANTS, "octant_digests: give 512"),
             (self.level_surface <= LEVEL_MAX, "level_surface: give a level from 0 to 19"),
             (self.layer_cells_min > 0, "layer_cells_min: a layer has at least one cell"),
             (self.boxes.iter().all(is_box), "boxes: one is not in the root, or has no level"),
-            (
-                self.seeds.as_flattened().iter().all(|c| lattice.contains(c)),
-                "seeds: one is not in the root",
-            ),
-            (
-                range.contains(&edge) && origin.iter().all(|c| c.abs() < range.end),
-                "root: give a cube with an edge from 1e-100 to 1e100",
-            ),
+            (are_seeds, "seeds: one is not in the root"),
+            (is_root, "root: give a cube with an edge from 1e-100 to 1e100"),
         ];
         faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault.to_owned())
     }
@@ -343,10 +338,8 @@ impl Manifest {
     /// # Errors
     /// If it cannot be read, or does not follow its schema.
     pub fn read(dir: &Path) -> Result<Self, Failure> {
-        if dir.is_file() {
-            let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
-            return Err(Failure::input(format!("{} {why}", dir.display())));
-        }
+        let why = "is a file: give the directory of a mesh, which has mesh.json (`mesher CASE --out DIR` makes one)";
+        Failure::unless(!dir.is_file(), format_args!("{} {why}", dir.display()))?;
         let path = dir.join(FILE);
         let text = files::read_text(&path).map_err(|error| Failure::about(&path, error))?;
         let wrong = |why| Failure::about(&path, format!("not a leaf-set manifest: {why}"));

@@ -88,11 +88,9 @@ impl Mesh {
     pub fn of_tree(dir: &Path, name: &str, manifest: &Manifest) -> Result<Self, Failure> {
         let path = dir.join(name);
         let tree = TreeFile::open(&path).map_err(|why| damaged_tree(&path, &why))?;
-        if tree.root != manifest.root {
-            let (found, stated) = (tree.root, manifest.root);
-            let why = format!("the tree has the root {found}, but the manifest states {stated}");
-            return Err(Failure::about(&path, why));
-        }
+        let (found, stated) = (tree.root, manifest.root);
+        let why = format!("the tree has the root {found}, but the manifest states {stated}");
+        Failure::unless(found == stated, Failure::about(&path, why))?;
         let (dir, manifest) = (dir.to_owned(), manifest.clone());
         Ok(Self { dir, manifest, parts: Vec::new(), tree_file: Some(tree) })
     }
@@ -187,10 +185,9 @@ impl Mesh {
             Ok(())
         })?;
         let why = "distinct octants, which is the limit: use a part of the mesh";
-        match builder.nodes() <= NODES_MAX {
-            true => Ok(builder.finish()),
-            false => Err(Failure::about(&self.dir, format!("more than {NODES_MAX} {why}"))),
-        }
+        let why = Failure::about(&self.dir, format!("more than {NODES_MAX} {why}"));
+        Failure::unless(builder.nodes() <= NODES_MAX, why)?;
+        Ok(builder.finish())
     }
 
     /// The sorted words of the leaves in an octant, found among all.

@@ -37,7 +37,6 @@ fn face(axis: usize, side: i32) -> usize {
 }
 
 /// The contents of an octant and of its neighbours.
-#[derive(Clone, Copy, Debug)]
 pub struct Neighbourhood {
     /// The octant in the middle.
     pub octant: Octant,
@@ -91,23 +90,20 @@ pub struct Region {
 }
 
 impl Region {
-    /// An octant enlarged on both sides of each axis by the margin for that axis.
-    pub fn along(octant: &Octant, margins: [i64; 3]) -> Self {
-        let edge = i64::from(octant.edge());
-        let low = std::array::from_fn(|a| i64::from(octant.corner[a]) - margins[a]);
-        Self { low, high: std::array::from_fn(|a| low[a] + edge + 2 * margins[a]) }
-    }
+    /// All of an octant.
+    pub const WHOLE: [[u8; 3]; 2] = [[0; 3], [255; 3]];
 
-    /// A part of an octant, given by the first and the last 256th of its edge on each axis, enlarged by a margin.
-    pub fn around(octant: &Octant, [first, last]: [[u8; 3]; 2], margin: i64) -> Self {
+    /// A part of an octant, given by the first and the last 256th of its edge on each axis, enlarged on both sides of each axis by the margin for
+    /// that axis.
+    pub fn around(octant: &Octant, [first, last]: [[u8; 3]; 2], margins: [i64; 3]) -> Self {
         let edge = i64::from(octant.edge());
         let corner = octant.corner.map(i64::from);
         // Rounded outwards to whole cells.
         let low = |a: usize| (edge * i64::from(first[a])) >> 8;
         let high = |a: usize| (edge * (1 + i64::from(last[a])) + 255) >> 8;
         Self {
-            low: std::array::from_fn(|a| corner[a] + low(a) - margin),
-            high: std::array::from_fn(|a| corner[a] + high(a) + margin),
+            low: array::from_fn(|a| corner[a] + low(a) - margins[a]),
+            high: array::from_fn(|a| corner[a] + high(a) + margins[a]),
         }
     }
 

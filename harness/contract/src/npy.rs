@@ -33,22 +33,16 @@ impl PartFile {
         (&file).take(HEADER_BYTES_MAX).read_to_end(&mut head).map_err(unreadable)?;
         let (descr, shape, offset) =
             read_header(&head).map_err(|why| wrong(format!("has no npy header: {why}")))?;
-        if descr == ">u8" {
-            let why = "has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'";
-            return Err(wrong(why.to_owned()));
-        }
-        if descr != "<u8" {
-            return Err(wrong(format!("has type {descr}, not '<u8'")));
-        }
+        let why = "has big-endian words ('>u8'), whose bytes are swapped: write them as '<u8'";
+        Failure::unless(descr != ">u8", wrong(why.to_owned()))?;
+        Failure::unless(descr == "<u8", wrong(format!("has type {descr}, not '<u8'")))?;
         let [len] = shape[..] else {
             return Err(wrong(format!("has shape {shape:?}, but must have one dimension")));
         };
         let found = file.metadata().map_err(unreadable)?.len();
         let expected = u128::from(offset) + 8 * u128::from(len);
-        if u128::from(found) != expected {
-            let implied = format!("its header implies {expected} ({len} leaves)");
-            return Err(wrong(format!("has {found} bytes, but {implied}")));
-        }
+        let why = format!("has {found} bytes, but its header implies {expected} ({len} leaves)");
+        Failure::unless(u128::from(found) == expected, wrong(why))?;
         Ok(Self { path: path.to_owned(), file, offset, leaves: len })
     }
 

@@ -1,13 +1,19 @@
 //! What the inputs in a manifest require of a mesh (reference/DEFINITION.md, sections 3 to 5).
 
 use crate::lattice::FacetLattice;
-use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest};
+use crate::manifest::{Enclosed, ExtentBox, Keep, Manifest, Tree};
 use crate::octant::{LEVEL_MAX, Octant, UNITS_PER_CELL};
 use crate::tree::Kind;
 use crate::triangle::Triangle;
 use crate::word::Side;
 
 impl Manifest {
+    /// The inputs as far as they concern the leaves: T0 precedes deletion.
+    pub fn of_leaves(&self) -> Self {
+        let of_base = Self { keep: Keep::All, keep_crossing: true, ..self.clone() };
+        if self.tree == Tree::Base { of_base } else { self.clone() }
+    }
+
     /// Whether leaves of this kind belong in the final mesh.
     pub fn keeps(&self, kind: Kind) -> bool {
         match self.keep {

@@ -43,9 +43,7 @@ pub fn read(path: &Path) -> Result<Body, Failure> {
 /// # Errors
 /// If they are not an STL file.
 pub fn parse(bytes: &[u8]) -> Result<Body, Failure> {
-    if bytes.is_empty() {
-        return Err(wrong("it is empty"));
-    }
+    Failure::unless(!bytes.is_empty(), wrong("it is empty"))?;
     match binary(bytes) {
         Some(facets) => {
             let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
@@ -102,14 +100,11 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = Word<'_>> + Clone {
 
 /// The solids of an ASCII file (reference/DEFINITION.md, section 10).
 fn ascii(bytes: &[u8]) -> Result<Body, Failure> {
-    if bytes.contains(&0) {
-        return Err(damaged(bytes));
-    }
+    Failure::unless(!bytes.contains(&0), damaged(bytes))?;
     let mut words = words(bytes);
     let mut body = Body::default();
-    if words.clone().next().is_none_or(|(word, _)| !is(word, "solid")) {
-        return Err(wrong("it is not binary and does not begin with `solid`"));
-    }
+    let begins = words.clone().next().is_some_and(|(word, _)| is(word, "solid"));
+    Failure::unless(begins, wrong("it is not binary and does not begin with `solid`"))?;
     while words.clone().next().is_some() {
         let line = expect(&mut words, "solid")?;
         let name = Some(name(&mut words, line, true));
@@ -126,9 +121,8 @@ fn ascii(bytes: &[u8]) -> Result<Body, Failure> {
             }
         };
         self::name(&mut words, line, false);
-        if starts_facet(&words, line) {
-            return Err(wrong("a facet follows on the line of `endsolid`"));
-        }
+        let why = "a facet follows on the line of `endsolid`";
+        Failure::unless(!starts_facet(&words, line), wrong(why))?;
         let facets = body.facets.len() - facet_first;
         body.solids.push(Solid { name, facet_first, facets });
     }

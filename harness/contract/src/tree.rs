@@ -191,6 +191,21 @@ impl Tree {
         }
     }
 
+    /// Visits the leaves and holes that satisfy a condition, in Morton order. A node must satisfy it if something in it does.
+    pub fn walk_where(
+        &self,
+        holds: impl Fn(&Octant, Handle) -> bool,
+        visit: &mut impl FnMut(Octant, Handle),
+    ) {
+        self.walk(&mut |octant, handle| {
+            let holds = holds(&octant, handle);
+            if holds && !handle.is_node() {
+                visit(octant, handle);
+            }
+            holds
+        });
+    }
+
     /// What the tree has at an octant: a node, a leaf, or a hole. Within a leaf it is the leaf's handle.
     pub fn at(&self, octant: &Octant) -> Handle {
         self.descend(octant).1
@@ -261,10 +276,10 @@ pub struct Builder {
 impl Builder {
     /// Adds a leaf of any kind, [`DELETED`] included.
     ///
-    /// # Errors
-    /// If it is rejected; the tree is unchanged.
-    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) -> Result<(), String> {
-        self.push_content(key, level, Handle::leaf(kind))
+    /// # Panics
+    /// If it overlaps or precedes the leaf before it.
+    pub fn push_leaf(&mut self, key: u64, level: u8, kind: Kind) {
+        self.push_content(key, level, Handle::leaf(kind)).expect("leaves in order");
     }
 
     /// Adds all leaves of a block.
@@ -292,7 +307,9 @@ impl Builder {
             return Ok(());
         }
         let parent = usize::from(level) - 1;
-        self.close_down_to(shared_levels(self.key, key));
+        // The common ancestors of both leaves stay open.
+        let other_levels = (self.key ^ key).checked_ilog2().unwrap_or(0) as usize / 3;
+        self.close_down_to(usize::from(LEVEL_MAX) - other_levels);
         self.key = key;
         while self.open <= parent {
             self.path[self.open] = [Handle::HOLE; 8];
@@ -324,11 +341,6 @@ impl Builder {
         self.close_down_to(0);
         self.tree
     }
-}
-
-/// Number of common ancestors of two level-19 cells, themselves excluded.
-fn shared_levels(a: u64, b: u64) -> usize {
-    usize::from(LEVEL_MAX) - (a ^ b).checked_ilog2().unwrap_or(0) as usize / 3
 }
 
 /// The digit of the child that contains this cell, among the children of its ancestor at `level`.

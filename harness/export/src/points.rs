@@ -37,19 +37,10 @@ impl Points {
         self.numbers.clear();
     }
 
-    /// Appends the numbers of the points on the edges of a square with these corners, the first corner first.
-    pub fn polygon(&self, corners: [Point; 4], polygon: &mut Vec<u32>) {
-        for (i, corner) in corners.iter().enumerate() {
-            polygon.push(self.numbers[corner]);
-            self.hanging(*corner, corners[(i + 1) % 4], polygon);
-        }
-    }
-
     /// Twice the area vector of a polygon of these points, in level-19 cells.
     pub fn area(&self, polygon: &[u32]) -> [i64; 3] {
-        let corner = |&number: &u32| self.all[number as usize].map(i64::from);
-        let next = polygon.iter().cycle().skip(1);
-        let products = polygon.iter().zip(next).map(|(p, q)| cross(corner(p), corner(q)));
+        let corner = |number: u32| self.all[number as usize].map(i64::from);
+        let products = edges(polygon).map(|(p, q)| cross(corner(p), corner(q)));
         products.fold([0; 3], |sum, product| std::array::from_fn(|a| sum[a] + product[a]))
     }
 
@@ -65,5 +56,37 @@ impl Points {
             }
             _ => {}
         }
+    }
+}
+
+/// The edges of a polygon, each from one corner to the next.
+pub fn edges(polygon: &[u32]) -> impl Iterator<Item = (u32, u32)> {
+    let corners = polygon.iter().copied();
+    corners.clone().zip(corners.cycle().skip(1))
+}
+
+/// Polygons, each by the numbers of the points around it.
+#[derive(Clone, Debug, Default)]
+pub struct Polygons {
+    /// The corners of all polygons, one polygon after the other.
+    pub corners: Vec<u32>,
+    /// One past the last corner of each polygon.
+    pub ends: Vec<u64>,
+}
+
+impl Polygons {
+    /// Adds a square with these corners and the points on its edges, the first corner first.
+    pub fn push(&mut self, points: &Points, corners: [Point; 4]) {
+        for (i, corner) in corners.iter().enumerate() {
+            self.corners.push(points.numbers[corner]);
+            points.hanging(*corner, corners[(i + 1) % 4], &mut self.corners);
+        }
+        self.ends.push(self.corners.len() as u64);
+    }
+
+    /// The corners of each polygon.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let begins = std::iter::once(&0).chain(&self.ends);
+        begins.zip(&self.ends).map(|(&begin, &end)| &self.corners[begin as usize..end as usize])
     }
 }

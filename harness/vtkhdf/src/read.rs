@@ -34,12 +34,8 @@ pub struct TreeReader {
     source: Source,
     /// The root and the nodes.
     pub shape: Shape,
-    /// The bits of split nodes.
-    pub split: Chunked,
-    /// The bits of leaves that are not in the mesh.
-    pub masked: Chunked,
-    /// The sides of all nodes.
-    pub sides: Chunked,
+    /// The bits of split nodes, those of leaves that are not in the mesh, and the sides of all nodes.
+    pub arrays: [Chunked; 3],
 }
 
 impl TreeReader {
@@ -70,8 +66,7 @@ impl TreeReader {
             let error = if is_ours { ReadError::Damaged } else { ReadError::Unknown };
             return Err(error("its metadata are not those of its tree".to_owned()));
         }
-        let [split, masked, sides] = arrays;
-        Ok(Self { source, shape, split, masked, sides })
+        Ok(Self { source, shape, arrays })
     }
 
     /// The bytes of a chunk, as many as every chunk has.

@@ -45,7 +45,7 @@ fn small() -> Vec<u8> {
 fn read(path: &Path) -> Result<(Shape, Vec<Vec<u8>>), ReadError> {
     let file = TreeReader::open(path)?;
     let mut all = Vec::new();
-    for array in [&file.split, &file.masked, &file.sides] {
+    for array in &file.arrays {
         let (mut bytes, mut chunk) = (Vec::new(), Vec::new());
         for index in 0..array.chunks.len() {
             file.read_chunk(array, index, &mut chunk)?;
@@ -176,10 +176,10 @@ fn trees_of_more_nodes_than_2_to_the_37th_are_read_back() {
     let file = TreeReader::open(place.path()).unwrap();
     assert_eq!((&file.shape, file.shape.windows()), (&shape, 823_882));
     let mut chunk = Vec::new();
-    file.read_chunk(&file.sides, last as usize, &mut chunk).unwrap();
+    file.read_chunk(&file.arrays[2], last as usize, &mut chunk).unwrap();
     let first = (1 + 8 * group - last * WINDOW) as usize;
     assert_eq!(chunk[first..first + 8], [1, 0, 0, 0, 0, 0, 0, 1]);
     assert_eq!(chunk.iter().map(|&side| u64::from(side)).sum::<u64>(), 2);
-    file.read_chunk(&file.sides, last as usize / 2, &mut chunk).unwrap();
+    file.read_chunk(&file.arrays[2], last as usize / 2, &mut chunk).unwrap();
     assert!(chunk.iter().all(|&side| side == 0) && chunk.len() as u64 == WINDOW);
 }

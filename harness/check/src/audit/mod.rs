@@ -93,9 +93,7 @@ impl AuditReport {
 
 impl fmt::Display for AuditReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for check in &self.checks {
-            writeln!(f, "{check}")?;
-        }
+        self.checks.iter().try_for_each(|check| writeln!(f, "{check}"))?;
         if !self.checked_anything() {
             writeln!(f, "left out: the mesh gave no check of its leaves anything to check")?;
         }

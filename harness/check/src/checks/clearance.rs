@@ -84,7 +84,8 @@ impl<R: Fn(Handle, u8) -> Option<Required>> Clearance<'_, R> {
             let is_solid = self.tree.kinds(content) & HOLES == 0;
             if found.is_none() && is_solid {
                 found = self.directions.iter().find_map(|axes| {
-                    let region = Region::along(&part, axes.map(|axis| axis * margin));
+                    let region =
+                        Region::around(&part, Region::WHOLE, axes.map(|axis| axis * margin));
                     Some((part, coarse.first_in(wide, &region)?))
                 });
             }
@@ -121,7 +122,7 @@ impl<'a> Boxes<'a> {
     fn of(&self, at: Place) -> Option<[[u8; 3]; 2]> {
         let (Octant { level, .. }, handle) = at;
         if (self.matters)(handle, level)? {
-            return Some([[0; 3], [255; 3]]);
+            return Some(Region::WHOLE);
         }
         let [tag, empty, x, y, z, to @ ..] = self.known.borrow()[handle.index()].to_le_bytes();
         if tag == level + 1 {
@@ -143,7 +144,7 @@ impl<'a> Boxes<'a> {
     }
 
     fn around(&self, at: Place, margin: i64) -> Option<Region> {
-        Some(Region::around(&at.0, self.of(at)?, margin))
+        Some(Region::around(&at.0, self.of(at)?, [margin; 3]))
     }
 
     /// The first leaf that matters in the 27 octants and whose interior meets a region.
@@ -248,7 +249,7 @@ mod tests {
             let is_coarse = |handle: Handle, level| {
                 (tree.coarsest_level(handle, level) < bound).then_some(!handle.is_node())
             };
-            let region = Region::along(&octant, [margin; 3]);
+            let region = Region::around(&octant, Region::WHOLE, [margin; 3]);
             let found = Boxes::new(&tree, &is_coarse).first_in(&Neighbourhood::root(&tree), &region);
             let near = |leaf: &Octant| leaf.level < bound && meets(leaf);
             prop_assert_eq!(found, words.iter().map(|&w| word::octant(w)).find(near));

@@ -76,10 +76,8 @@ fn check_holes(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let finest = if terms.keep_crossing { LEVEL_MAX + 1 } else { terms.level_surface };
     contact::visit(tree, of, HOLES, &mut |octant, kind, across| {
         if across & HOLES != 0 && octant.level < finest {
-            let side = match terms.sides {
-                Sides::Known => format!("{} ", contact::name(1 << kind)),
-                Sides::Unknown => String::new(),
-            };
+            let side = (terms.sides == Sides::Known).then(|| contact::name(1 << kind) + " ");
+            let side = side.unwrap_or_default();
             let leaf = terms.root.place(octant);
             result.report(format_args!("the {side}leaf {leaf} has a hole across a face"));
         }

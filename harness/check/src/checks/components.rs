@@ -89,11 +89,10 @@ pub fn groups(words: &[u64]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(words.len());
     let free = || (0..).zip(words).filter(|(_, w)| !word::is_crossing(**w));
     for (i, &w) in free() {
-        for j in
-            coarse_neighbours(words, &word::octant(w)).filter(|&j| !word::is_crossing(words[j]))
-        {
-            sets.union(i, j as u32);
-        }
+        let octant = word::octant(w);
+        let neighbours = coarse_neighbours(words, &octant);
+        let free = neighbours.filter(|&j| !word::is_crossing(words[j]));
+        free.for_each(|j| sets.union(i, j as u32));
     }
     let mut members: Vec<(u32, u8, u32)> =
         free().map(|(i, &w)| (sets.root(i), word::level(w), i)).collect();
@@ -142,10 +141,8 @@ fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usi
 fn by_seeds(leaves: &[u32], seeded: &[(u32, usize)], inputs: &Manifest) -> (Side, Decision) {
     let flow = inputs.side_of_flow();
     let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
-    match seed_in(leaves, seeded) {
-        Some(seed) => (flow, Decision::Seed(seed)),
-        None => (other, Decision::NoSeed),
-    }
+    let seed = seed_in(leaves, seeded);
+    seed.map_or((other, Decision::NoSeed), |seed| (flow, Decision::Seed(seed)))
 }
 
 /// The first candidate whose rays agree decides. Without one, the majority of all rays decides.

@@ -63,12 +63,9 @@ fn surface_margin(terms: &Manifest, kind: Kind, level: u8) -> i64 {
     let layer = i64::from(terms.layer_cells_min) - 1;
     // One cell at least, if crossing leaves are deleted.
     let extra = i64::from(!terms.keep_crossing);
-    let cells = match kind {
-        // The leaf may have been refined before it was deleted, so only adjacent leaves are constrained.
-        DELETED => extra,
-        _ if level == terms.level_surface => layer.max(extra),
-        _ => extra,
-    };
+    // A deleted leaf may have been refined before it was deleted, so only adjacent leaves are constrained.
+    let has_layer = kind != DELETED && level == terms.level_surface;
+    let cells = if has_layer { layer.max(extra) } else { extra };
     cells * edge_of(level)
 }
 
@@ -157,7 +154,7 @@ mod tests {
             for octant in words_of(split).into_iter().map(word::octant) {
                 let is_it = octant.level == 3 && octant.digit() == digit;
                 let kind = if is_it { kind } else { Side::Outside as Kind };
-                builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+                builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
             }
             let terms = terms(n, 3, Keep::Outside, keep_crossing);
             checked(&builder.finish(), &terms).findings_total

@@ -78,13 +78,10 @@ fn of_neighbours(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
 /// Reports leaves whose side is deleted.
 fn not_kept(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     let kept = (0..3).filter(|&k| terms.keeps(k)).fold(HOLES, |all, k| all | 1 << k);
-    tree.walk(&mut |octant, handle| {
-        let deleted = tree.kinds(handle) & !kept;
-        if deleted != 0 && !handle.is_node() {
-            let (side, leaf) = (contact::name(deleted), terms.root.place(octant));
-            result.report(format_args!("{side} leaves are deleted, but one still exists: {leaf}"));
-        }
-        deleted != 0
+    let deleted = |handle| tree.kinds(handle) & !kept;
+    tree.walk_where(|_, handle| deleted(handle) != 0, &mut |octant, handle| {
+        let (side, leaf) = (contact::name(deleted(handle)), terms.root.place(octant));
+        result.report(format_args!("{side} leaves are deleted, but one still exists: {leaf}"));
     });
 }
 

@@ -47,31 +47,27 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 /// Every leaf that meets a box has at least the level of the box.
 fn boxes_met(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
     for extent in &terms.boxes {
-        tree.walk(&mut |octant, handle| {
-            let is_fine = tree.coarsest_level(handle, octant.level) >= extent.level;
-            let may_be_coarse = !is_fine && extent.meets(&octant);
-            if may_be_coarse && !handle.is_node() {
-                let (leaf, level) = (terms.root.place(octant), extent.level);
-                result.report(format_args!(
-                    "the leaf {leaf} meets a box that requires level {level}"
-                ));
-            }
-            may_be_coarse
+        let level = extent.level;
+        let is_coarse = |octant: &Octant, handle| {
+            tree.coarsest_level(handle, octant.level) < level && extent.meets(octant)
+        };
+        tree.walk_where(is_coarse, &mut |octant, _| {
+            let leaf = terms.root.place(octant);
+            result.report(format_args!("the leaf {leaf} meets a box that requires level {level}"));
         });
     }
 }
 
 /// Every crossing leaf has at least the level of the surface.
 fn crossing_fine(tree: &Tree, terms: &Manifest, result: &mut CheckResult) {
-    tree.walk(&mut |octant, handle| {
+    let level = terms.level_surface;
+    let is_coarse = |octant: &Octant, handle| {
         let has_crossing = tree.kinds(handle) & 1 << Side::Crossing as u8 != 0;
-        let is_fine = tree.coarsest_level(handle, octant.level) >= terms.level_surface;
-        let may_be_coarse = has_crossing && !is_fine;
-        if may_be_coarse && !handle.is_node() {
-            let (leaf, level) = (terms.root.place(octant), terms.level_surface);
-            result.report(format_args!("the crossing leaf {leaf} is coarser than level {level}"));
-        }
-        may_be_coarse
+        has_crossing && tree.coarsest_level(handle, octant.level) < level
+    };
+    tree.walk_where(is_coarse, &mut |octant, _| {
+        let leaf = terms.root.place(octant);
+        result.report(format_args!("the crossing leaf {leaf} is coarser than level {level}"));
     });
 }
 
@@ -140,9 +136,7 @@ impl<'a> Crossed<'a> {
             let is_of_surface = octant.level == self.terms.level_surface;
             let crossing = is_of_surface && self.reaching(&octant, near).is_some();
             let side = if crossing { Side::Crossing } else { Side::Outside };
-            builder
-                .push_leaf(word::key_of(octant.corner), octant.level, side as Kind)
-                .expect("the leaves of a tree are in order and do not overlap");
+            builder.push_leaf(word::key_of(octant.corner), octant.level, side as Kind);
         });
         builder.finish()
     }

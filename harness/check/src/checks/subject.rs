@@ -8,7 +8,7 @@ use super::{CheckResult, Pass};
 use crate::promises::Promises;
 use contract::case::Case;
 use contract::leafset::LeafSet;
-use contract::manifest::{Keep, Manifest, Sides, Tree as Kind};
+use contract::manifest::{Manifest, Sides, Tree as Kind};
 use contract::tree::{Builder, DELETED, HOLES, Kind as LeafKind, Tree};
 use contract::word::{self, Side};
 
@@ -51,15 +51,11 @@ impl<'a> Subject<'a> {
     ) -> Self {
         let inputs = case.map_or(manifest, |case| &case.rules);
         let inputs = Manifest { tree, sides: manifest.sides, ..inputs.clone() };
-        let terms = match tree {
-            Kind::Final => inputs.clone(),
-            Kind::Base => Manifest { keep: Keep::All, keep_crossing: true, ..inputs.clone() },
-        };
         Self {
             manifest,
             case,
+            terms: inputs.of_leaves(),
             inputs,
-            terms,
             promises: Promises::of_definition(),
             mesh: None,
             reference: None,
@@ -131,8 +127,7 @@ impl<'a> Subject<'a> {
                     _ if unknown => base.map_or(Side::Outside, Truth::side) as LeafKind,
                     kind => kind.trailing_zeros() as LeafKind,
                 };
-                let pushed = builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
-                pushed.expect("the leaves of a tree are in order and do not overlap");
+                builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
             });
             builder.finish()
         })
@@ -146,9 +141,7 @@ impl<'a> Subject<'a> {
 
     /// What a check that compares the mesh with T0 examines: its leaves or, if there are none, those of T0.
     pub(super) fn examined_with(&self, truth: &Truth) -> u64 {
-        match self.pass.tally.leaves {
-            0 => truth.words.len() as u64,
-            leaves => leaves,
-        }
+        let leaves = self.pass.tally.leaves;
+        if leaves > 0 { leaves } else { truth.words.len() as u64 }
     }
 }

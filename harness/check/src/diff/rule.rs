@@ -50,10 +50,8 @@ fn absence(leaf: &Leaf, has: &str, (lacks, mesh): Named) -> String {
         let right = if rule.ends_with(LOST) { has } else { lacks };
         return format!("{rule}: {right} is right");
     }
-    let (what, right) = match mesh.inputs.keeps(leaf.side as Kind) {
-        true => ("kept", has),
-        false => ("deleted", lacks),
-    };
+    let is_kept = mesh.inputs.keeps(leaf.side as Kind);
+    let (what, right) = if is_kept { ("kept", has) } else { ("deleted", lacks) };
     format!(
         "sections 5 and 7: a leaf that is {} is {what}, so {right} is right, unless its component has another side or is \
          enclosed (give the case file: --case)",
@@ -68,10 +66,8 @@ fn split(octant: &Octant, (coarse, _): Named, (fine, mesh): Named) -> String {
     if !clauses.is_empty() {
         return format!("{what} {}: {fine} is right", clauses.join("; "));
     }
-    let caveat = match mesh.knows_surface() {
-        true => "",
-        false => ", unless a facet does (give the case file: --case)",
-    };
+    let unless = ", unless a facet does (give the case file: --case)";
+    let caveat = if mesh.knows_surface() { "" } else { unless };
     format!(
         "{what}: no facet, box, layer or balance requires the split, and refinement is minimal (sections 3 and 6): {coarse} \
          is right{caveat}"

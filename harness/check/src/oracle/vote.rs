@@ -46,10 +46,9 @@ impl Ballot<'_> {
 
     /// Number of points where a vote can fail the mesh.
     pub fn decisive(&self) -> u64 {
-        match self.oracles.len() >= MAJORITY && !self.doubled {
-            true => self.mesh.len() as u64,
-            false => self.exact.iter().flatten().count() as u64,
-        }
+        let by_oracles = self.oracles.len() >= MAJORITY && !self.doubled;
+        let by_rays = || self.exact.iter().flatten().count();
+        if by_oracles { self.mesh.len() as u64 } else { by_rays() as u64 }
     }
 
     /// Indices of points that satisfy a predicate.

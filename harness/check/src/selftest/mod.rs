@@ -113,9 +113,8 @@ impl fmt::Display for SelftestReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let survivors: Vec<&Kill> = self.kills.iter().filter(|kill| !kill.killed()).collect();
         survivors.iter().try_for_each(|kill| writeln!(f, "SURVIVED: {kill:?}"))?;
-        for alarm in &self.alarms {
-            writeln!(f, "FALSE ALARM on a correct mesh: {alarm}")?;
-        }
+        let what = "FALSE ALARM on a correct mesh";
+        self.alarms.iter().try_for_each(|alarm| writeln!(f, "{what}: {alarm}"))?;
         let unused = self.unused();
         unused.iter().try_for_each(|name| writeln!(f, "applies to no case: {name}"))?;
         let corruptions = catalogue().len() - unused.len();

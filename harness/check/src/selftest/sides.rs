@@ -121,11 +121,7 @@ fn flipped(s: &SelftestCase, predicate: impl Fn(u64) -> bool) -> Option<Vec<u64>
 /// The mesh with leaves of T0 in enclosed components, at most `most`: leaves of the wanted side that the mesh does not have.
 fn enclosed_kept(s: &SelftestCase, most: usize) -> Option<Vec<u64>> {
     let mesh = &s.mesh.words;
-    let refined = |w: u64| {
-        let first = mesh.partition_point(|&m| word::key(m) < word::key(w));
-        let end = word::key(w) + word::span(word::level(w));
-        mesh.get(first).is_some_and(|&m| word::key(m) < end)
-    };
+    let refined = |w: u64| word::leaf_at(mesh, word::octant(w).bounds().0).is_some();
     let enclosed = |w: &u64| word::side(*w) == Side::Outside && !refined(*w);
     let restored: Vec<u64> = s.base.words.iter().copied().filter(enclosed).take(most).collect();
     let applies = s.case.keep == Keep::Outside && !restored.is_empty();

@@ -169,9 +169,7 @@ impl fmt::Display for Answer {
         if let Some(base) = base_leaf.filter(|base| leaf.is_none_or(|leaf| leaf.octant != *base)) {
             writeln!(f, "  leaf of T0: {}", place(&base))?;
         }
-        if let Some(rule) = deleted_by {
-            writeln!(f, "  deleted by {rule}")?;
-        }
+        deleted_by.iter().try_for_each(|rule| writeln!(f, "  deleted by {rule}"))?;
         if let Some(split) = split {
             writeln!(f, "size\n  its parent, {}, is split", place(&split.octant))?;
             let clauses = split.clauses(&self.root);
@@ -244,14 +242,8 @@ impl Mesh<'_> {
     /// A leaf of the finest possible level that forces the split of an octant, which must be deep or not.
     fn finest_that_forces(&self, octant: &Octant, is_deep: bool) -> Option<(Rule, Octant)> {
         let coarsest = octant.level + if is_deep { 2 } else { 1 };
-        let mut found = None;
-        (coarsest..=self.level_deepest).rev().find(|&level| {
-            self.any_leaf_near(octant, level..=level, &mut |leaf| {
-                found = self.rule_of(&leaf, octant).map(|rule| (rule, leaf));
-                found.is_some()
-            })
-        });
-        found
+        let mut levels = (coarsest..=self.level_deepest).rev();
+        levels.find_map(|level| self.leaf_that_forces(octant, level..=level))
     }
 
     /// What splits an octant of T0, or makes a leaf of it a crossing one.

@@ -22,6 +22,7 @@
 
 use super::Mesh;
 use crate::checks::truth::Truth;
+use contract::manifest::Tree as MeshKind;
 use contract::neighbourhood::OFFSETS;
 use contract::octant::{LEVEL_MAX, Octant, edge_of};
 use contract::tree::Handle;
@@ -60,18 +61,17 @@ impl Mesh<'_> {
         self.is_deep(octant)
             || self.remembered(octant, false, || {
                 let level = octant.level + 1;
-                let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
-                level <= self.level_deepest && self.any_leaf_near(octant, level..=level, forces)
+                level <= self.level_deepest
+                    && self.leaf_that_forces(octant, level..=level).is_some()
             })
     }
 
     /// Whether T0, the extra layer or a leaf of a level from `first` on forces an octant to split. The answer is not remembered: about a leaf it is
     /// asked once.
     pub(super) fn is_forced(&self, octant: &Octant, first: u8) -> bool {
-        let forces = &mut |leaf: Octant| self.rule_of(&leaf, octant).is_some();
         self.base_splits(octant)
             || self.extra_layer(octant).is_some()
-            || self.any_leaf_near(octant, first..=self.level_deepest, forces)
+            || self.leaf_that_forces(octant, first..=self.level_deepest).is_some()
     }
 
     /// Whether an octant is deep, or justified, which is sought once.
@@ -86,7 +86,7 @@ impl Mesh<'_> {
     }
 
     /// The rule by which a finer leaf forces an octant to split.
-    pub(super) fn rule_of(&self, leaf: &Octant, octant: &Octant) -> Option<Rule> {
+    fn rule_of(&self, leaf: &Octant, octant: &Octant) -> Option<Rule> {
         let (from, distance) = (parent(leaf), octant.distance(leaf));
         if distance < self.layer_reach(leaf.level) && self.is_deep(&from) {
             Some(Rule::Layer)
@@ -97,26 +97,25 @@ impl Mesh<'_> {
         }
     }
 
-    /// Visits the leaves of these levels outside an octant that may force it to split, until `visit` returns true.
-    /// Returns whether it did. The order is fixed.
-    pub(super) fn any_leaf_near(
+    /// The first leaf of these levels outside an octant that forces it to split, with the rule. The order is fixed.
+    pub(super) fn leaf_that_forces(
         &self,
         octant: &Octant,
         levels: RangeInclusive<u8>,
-        visit: &mut dyn FnMut(Octant) -> bool,
-    ) -> bool {
-        if self.is_base || levels.is_empty() {
-            return false;
+    ) -> Option<(Rule, Octant)> {
+        // T0 precedes gradation.
+        if self.inputs.tree == MeshKind::Base || levels.is_empty() {
+            return None;
         }
         let (first, last) = (*levels.start(), *levels.end());
         let mut start = octant.level;
         while start > 0 && edge_of(start) < self.layer_reach(first) {
             start -= 1;
         }
-        let mut search = Search { mesh: self, octant, first, last, visit };
+        let search = Search { mesh: self, octant, first, last };
         let centre = octant.ancestor(start);
-        let starts = OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset));
-        starts.into_iter().any(|start| {
+        let mut starts = OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset));
+        starts.find_map(|start| {
             // A leaf of the octant's level or a coarser one contains no leaf that is sought.
             let found = Some(self.tree.at(&start)).filter(|handle| handle.is_node());
             search.enter(start, found.unwrap_or(Handle::HOLE), false)
@@ -185,46 +184,42 @@ impl Mesh<'_> {
     }
 }
 
-/// A search for leaves of levels `first` to `last` near an octant.
-struct Search<'a, 'b> {
+/// A search for a leaf of levels `first` to `last` that forces an octant to split.
+struct Search<'a> {
     mesh: &'a Mesh<'a>,
     octant: &'a Octant,
     first: u8,
     last: u8,
-    visit: &'b mut dyn FnMut(Octant) -> bool,
 }
 
-impl Search<'_, '_> {
+impl Search<'_> {
     /// Searches an octant with this content. `in_deleted` states that it lies in a crossing leaf of T0 that was deleted.
-    fn enter(&mut self, at: Octant, content: Handle, in_deleted: bool) -> bool {
-        if at == *self.octant || self.is_far(&at) {
-            return false;
-        }
-        if content.as_leaf().is_some() {
-            self.leaf(at)
-        } else if !content.is_node() {
-            self.mesh.has_deleted_crossing() && self.hole(at, content, in_deleted)
-        } else if self.counts_as_split(&at) {
+    fn enter(&self, at: Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
+        let is_hole = !content.is_node() && content.as_leaf().is_none();
+        if at == *self.octant || self.is_far(&at) || is_hole && !self.mesh.has_deleted_crossing() {
+            None
+        } else if is_hole {
+            self.hole(at, content, in_deleted)
+        } else if content.is_node() && self.counts_as_split(&at) {
             self.descend(&at, content, false)
         } else {
             self.leaf(at)
         }
     }
 
-    fn descend(&mut self, at: &Octant, content: Handle, in_deleted: bool) -> bool {
+    fn descend(&self, at: &Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
         let child = |digit| self.mesh.tree.child(content, digit, at.level);
-        let children: [Handle; 8] = std::array::from_fn(|digit| child(digit as u8));
-        at.level < self.last
-            && (0..).zip(children).any(|(d, below)| self.enter(at.child(d), below, in_deleted))
+        let digits = if at.level < self.last { 0..8 } else { 0..0 };
+        digits.into_iter().find_map(|d| self.enter(at.child(d), child(d), in_deleted))
     }
 
     /// Searches an octant without leaves for deleted crossing leaves.
-    fn hole(&mut self, at: Octant, content: Handle, in_deleted: bool) -> bool {
+    fn hole(&self, at: Octant, content: Handle, in_deleted: bool) -> Option<(Rule, Octant)> {
         if !in_deleted {
             match self.mesh.base_leaf(&at) {
-                None => return self.mesh.is_crossed(&at) && self.descend(&at, content, false),
-                Some(leaf) if !self.mesh.is_crossed(&leaf) => return false,
-                Some(_) => {}
+                None if self.mesh.is_crossed(&at) => return self.descend(&at, content, false),
+                Some(leaf) if self.mesh.is_crossed(&leaf) => {}
+                _ => return None,
             }
         }
         match self.mesh.inputs.has_box_finer_than_surface() && self.counts_as_split(&at) {
@@ -247,8 +242,9 @@ impl Search<'_, '_> {
         }
     }
 
-    fn leaf(&mut self, at: Octant) -> bool {
-        (self.first..=self.last).contains(&at.level) && (self.visit)(at)
+    fn leaf(&self, at: Octant) -> Option<(Rule, Octant)> {
+        let is_sought = (self.first..=self.last).contains(&at.level);
+        is_sought.then(|| self.mesh.rule_of(&at, self.octant)).flatten().map(|rule| (rule, at))
     }
 
     /// Whether no leaf of the searched levels in an octant can force the split.

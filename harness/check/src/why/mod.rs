@@ -65,8 +65,6 @@ pub struct Mesh<'a> {
     pub(crate) inputs: Manifest,
     /// The facets and T0, if the case is known.
     body: Option<&'a Truth>,
-    /// Whether the leaves are those of T0, which precedes gradation.
-    is_base: bool,
     /// Deepest level of a leaf that can force an octant to split; no search goes deeper, because only needless splits do.
     level_deepest: u8,
     /// Answers to questions that were asked before.
@@ -76,13 +74,8 @@ pub struct Mesh<'a> {
 impl<'a> Mesh<'a> {
     /// A mesh of this body. Without it, facets are not known.
     pub fn of(manifest: &Manifest, tree: &'a Tree, body: Option<&'a Truth>) -> Self {
-        let mut inputs = manifest.clone();
-        let is_base = inputs.tree == manifest::Tree::Base;
-        if is_base {
-            (inputs.keep, inputs.keep_crossing) = (manifest::Keep::All, true);
-        }
-        let level_deepest = inputs.level_deepest();
-        Self { tree, inputs, body, is_base, level_deepest, known: RefCell::default() }
+        let (inputs, level_deepest) = (manifest.of_leaves(), manifest.level_deepest());
+        Self { tree, inputs, body, level_deepest, known: RefCell::default() }
     }
 
     /// Whether it is known where the surface is: from the facets, or from the crossing leaves of the mesh.

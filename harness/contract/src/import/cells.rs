@@ -105,15 +105,13 @@ impl Cells {
         let high = [0, 1, 2].map(|axis| ends(axis).fold(f64::NEG_INFINITY, f64::max));
         let depth = (edge / finest).log2().round();
         let finite = low.iter().chain(&high).all(|c| c.is_finite()) && finest > 0.0;
-        if !finite || !depth.is_finite() {
-            return Err(unusable("a coordinate is not finite, or an edge is not positive"));
-        }
-        if depth > f64::from(LEVEL_MAX) {
-            return Err(Failure::input(format!(
-                "has cells of {} levels, with edges from {finest} to {edge}, and the levels of a mesh are 0 to {LEVEL_MAX}",
-                depth + 1.0,
-            )));
-        }
+        let why = "a coordinate is not finite, or an edge is not positive";
+        Failure::unless(finite && depth.is_finite(), unusable(why))?;
+        let why = format!(
+            "has cells of {} levels, with edges from {finest} to {edge}, and the levels of a mesh are 0 to {LEVEL_MAX}",
+            depth + 1.0,
+        );
+        Failure::unless(depth <= f64::from(LEVEL_MAX), why)?;
         // The extent of all cells is known more precisely than the edge of one, and is a whole number of finest cells.
         let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         let scale = f64::from(1u32 << depth as u32);
@@ -131,33 +129,29 @@ impl Cells {
 }
 
 /// The octant of a cell.
-fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, String> {
-    let wrong = |why: &str| Err(why.to_owned());
-    if !(Root { origin: corner, edge }).is_cube() {
-        return wrong("has an edge that is not positive, or coordinates that are not finite");
-    }
+fn octant(corner: [f64; 3], edge: f64, root: &Root) -> Result<Octant, Failure> {
+    let why = "has an edge that is not positive, or coordinates that are not finite";
+    Failure::unless(Root { origin: corner, edge }.is_cube(), why)?;
     let depth = (root.edge / edge).log2().round();
     if !(0.0..=f64::from(LEVEL_MAX)).contains(&depth) {
-        return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist"));
+        return Err(format!("needs level {depth} of the 0 to {LEVEL_MAX} that exist").into());
     }
     let level = depth as u8;
     let edge_of_level = root.edge_of(level);
-    if (edge / edge_of_level - 1.0).abs() > TOLERANCE {
-        return wrong("has an edge that is not the root's edge halved a whole number of times");
-    }
+    let why = "has an edge that is not the root's edge halved a whole number of times";
+    Failure::unless((edge / edge_of_level - 1.0).abs() <= TOLERANCE, why)?;
     let mut cell = [0; 3];
     for axis in 0..3 {
         let position = (corner[axis] - root.origin[axis]) / edge_of_level;
         let index = position.round();
         if (position - index).abs() > TOLERANCE {
-            return Err(format!(
-                "is not aligned: it is {position} of its edges from the root along axis {}",
-                axis + 1
-            ));
+            let axis = axis + 1;
+            return Err(Failure::input(format_args!(
+                "is not aligned: it is {position} of its edges from the root along axis {axis}"
+            )));
         }
-        if !(0.0..f64::from(1u32 << level)).contains(&index) {
-            return wrong("lies outside the root");
-        }
+        let is_inside = (0.0..f64::from(1u32 << level)).contains(&index);
+        Failure::unless(is_inside, "lies outside the root")?;
         cell[axis] = index as u32 * (CELLS_PER_EDGE >> level);
     }
     Ok(Octant { corner: cell, level })

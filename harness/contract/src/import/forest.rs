@@ -105,18 +105,15 @@ pub fn read(path: &Path) -> Result<Forest, Failure> {
     }
     input.align()?;
     let [own_format, coordinate_bytes, _, data_bytes, _, ranks] = input.array::<6>()?;
-    if own_format != format || coordinate_bytes != 4 {
-        return Err(damaged("the header of the forest has another format than the connectivity"));
-    }
+    let why = "the header of the forest has another format than the connectivity";
+    Failure::unless(own_format == format && coordinate_bytes == 4, damaged(why))?;
     // Numbers of quadrants up to the end of each rank's part, and of each tree.
     let of_ranks: Vec<u64> = input.numbers(ranks, 1)?;
     let ends: Vec<u64> = input.numbers(forest.connectivity.trees as u64, 1)?;
-    if data_bytes > bytes.len() as u64 {
-        return Err(damaged(&format!("it states {data_bytes} bytes of data per quadrant")));
-    }
-    if of_ranks.last() != ends.last() {
-        return Err(damaged("ranks and trees have different numbers of quadrants"));
-    }
+    let why = format!("it states {data_bytes} bytes of data per quadrant");
+    Failure::unless(data_bytes <= bytes.len() as u64, damaged(&why))?;
+    let why = "ranks and trees have different numbers of quadrants";
+    Failure::unless(of_ranks.last() == ends.last(), damaged(why))?;
     input.align()?;
     forest.data_bytes = data_bytes;
     let (dimension, mut begin) = (forest.connectivity.dimension, 0);
@@ -136,10 +133,9 @@ pub fn read(path: &Path) -> Result<Forest, Failure> {
         forest.leaves.push(records.map(quadrant).collect());
         begin = end;
     }
-    match input.at == bytes.len() {
-        true => Ok(forest),
-        false => Err(damaged(&format!("{} bytes follow its quadrants", bytes.len() - input.at))),
-    }
+    let why = format!("{} bytes follow its quadrants", bytes.len() - input.at);
+    Failure::unless(input.at == bytes.len(), damaged(&why))?;
+    Ok(forest)
 }
 
 pub(super) fn damaged(why: &str) -> Failure {
@@ -200,14 +196,12 @@ fn connectivity(input: &mut Input) -> Result<(Connectivity, u64), Failure> {
     let [format, index_bytes] = input.array()?;
     let [vertices, trees, edges, edge_trees] = input.array()?;
     let [corners, corner_trees, attribute_bytes, _] = input.array()?;
-    if format.swap_bytes() == expected {
-        return Err(damaged("its bytes are swapped: a big-endian machine wrote it"));
-    }
-    if format != expected || index_bytes != 4 {
-        return Err(damaged(&format!(
-            "its format is {format:#x} with indices of {index_bytes} bytes, and {expected:#x} with 4 is supported"
-        )));
-    }
+    let why = "its bytes are swapped: a big-endian machine wrote it";
+    Failure::unless(format.swap_bytes() != expected, damaged(why))?;
+    let why = format!(
+        "its format is {format:#x} with indices of {index_bytes} bytes, and {expected:#x} with 4 is supported"
+    );
+    Failure::unless(format == expected && index_bytes == 4, damaged(&why))?;
     let if_any = |count: u64| if count > 0 { trees } else { 0 };
     let (children, faces) = (1 << dimension, 2 * dimension as u64);
     let coordinates = input.numbers(vertices, 1)?;

@@ -29,9 +29,7 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     let forest = forest::read(path)?;
     let why = "has quadrants of two dimensions, and a mesh has three: harness audit and harness diff read such forests";
     Failure::unless(forest.connectivity.dimension == 3, why)?;
-    if forest.leaves.is_empty() {
-        return Err(damaged("it is a connectivity without leaves"));
-    }
+    Failure::unless(!forest.leaves.is_empty(), damaged("it is a connectivity without leaves"))?;
     let trees = placed_trees(&forest.connectivity)?;
     let with_sides = match (request.sides.as_deref(), forest.data_bytes) {
         (None, _) => false,
@@ -52,11 +50,10 @@ pub fn read(path: &Path, request: &Request) -> Result<Cells, Failure> {
     let ends = |root: &Root| [root.origin[0], root.origin[1], root.origin[2], root.edge];
     let is_there = ends(&stated).iter().zip(ends(&placed)).all(|(a, b)| (a - b).abs() <= units);
     // The root of most forests is the unit cube, whatever the size of the body.
-    if request.is_root_of_case && stated != Root::UNIT && !is_there {
-        return Err(Failure::input(format!(
-            "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
-        )));
-    }
+    let why = format!(
+        "states the root {stated}, and the case has {placed}: give --root to move the forest into that"
+    );
+    Failure::unless(!request.is_root_of_case || stated == Root::UNIT || is_there, why)?;
     let scale = placed.edge / stated.edge;
     let sides = with_sides.then(Vec::new);
     let mut cells = Cells { root: Some(placed), sides, ..Cells::default() };
@@ -74,9 +71,8 @@ fn placed_trees(connectivity: &Connectivity) -> Result<Cells, Failure> {
     let Connectivity { vertices, tree_to_vertex, attributes, .. } = connectivity;
     let mut trees = Cells::default();
     if vertices.is_empty() {
-        if connectivity.trees != 1 {
-            return Err(damaged("it has several trees and no vertices that place them"));
-        }
+        let why = "it has several trees and no vertices that place them";
+        Failure::unless(connectivity.trees == 1, damaged(why))?;
         trees.push([0.0; 3], 1.0);
     }
     let vertex = |&index: &i32| vertices.get(usize::try_from(index).ok()?);

@@ -62,10 +62,11 @@ fn a_deleted_leaf_bounds_no_level_from_above_and_is_a_kind() {
         let octants =
             if digit == 5 { (0..8).map(|d| child.child(d)).collect() } else { vec![child] };
         for octant in octants {
-            builder.push_leaf(word::key_of(octant.corner), octant.level, kind).unwrap();
+            builder.push_leaf(word::key_of(octant.corner), octant.level, kind);
         }
     }
-    assert!(builder.push_leaf(word::KEY_END - 1, 19, 0).unwrap_err().contains("overlaps"));
+    let last = Block { first: (word::KEY_END - 1) << 7 | 19 << 2, depth: 0 };
+    assert!(builder.push_block(&last).unwrap_err().contains("overlaps"));
     let invalid = Block { first: 25 << 2, depth: 0 };
     assert_eq!(builder.push_block(&invalid), Err(word::check(25 << 2).unwrap_err()));
     let tree = builder.finish();

@@ -12,7 +12,7 @@ use contract::word;
 use super::Patches;
 use crate::leaves::Leaves;
 use crate::options::Options;
-use crate::points::Points;
+use crate::points::{Points, Polygons, edges};
 use contract::failure::Failure;
 
 /// The faces.
@@ -25,9 +25,7 @@ pub struct Faces {
     /// Index of the first face of every patch, and the number of all faces.
     pub starts: Vec<usize>,
     /// The vertices of all faces, around normals that point away from the owners.
-    vertices: Vec<u32>,
-    /// Where the vertices of each face end.
-    ends: Vec<u64>,
+    pub vertices: Polygons,
 }
 
 impl Faces {
@@ -52,50 +50,33 @@ impl Faces {
                     Some(across) => owned.extend(square.is_high.then_some((across, i))),
                     None => {
                         let patch = &mut of_patches[patches.of(square)];
-                        points.polygon(square.corners(square.is_high), &mut patch.vertices);
-                        patch.end(cell);
+                        patch.vertices.push(points, square.corners(square.is_high));
+                        patch.owner.push(cell);
                     }
                 }
             }
             owned.sort_unstable();
             for &(across, i) in &owned {
-                points.polygon(squares[i].corners(true), &mut all.vertices);
-                all.end(cell);
+                all.vertices.push(points, squares[i].corners(true));
+                all.owner.push(cell);
                 all.neighbour.push(across);
             }
             Ok(())
         })?;
         for patch in of_patches {
             all.starts.push(all.count());
-            let before = all.vertices.len() as u64;
+            let before = all.vertices.corners.len() as u64;
             all.owner.extend(patch.owner);
-            all.vertices.extend(patch.vertices);
-            all.ends.extend(patch.ends.iter().map(|end| before + end));
+            all.vertices.corners.extend(patch.vertices.corners);
+            all.vertices.ends.extend(patch.vertices.ends.iter().map(|end| before + end));
         }
         all.starts.push(all.count());
         Ok(all)
     }
 
-    /// Ends a face of a cell, whose vertices have been appended.
-    fn end(&mut self, owner: u32) {
-        self.owner.push(owner);
-        self.ends.push(self.vertices.len() as u64);
-    }
-
     /// Number of faces.
     pub fn count(&self) -> usize {
         self.owner.len()
-    }
-
-    /// The vertices of all faces.
-    pub fn all(&self) -> impl Iterator<Item = &[u32]> {
-        (0..self.count()).map(|face| self.vertices(face))
-    }
-
-    /// The vertices of a face.
-    pub fn vertices(&self, face: usize) -> &[u32] {
-        let begin = face.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.vertices[begin as usize..self.ends[face] as usize]
     }
 
     /// Asserts the invariants.
@@ -113,11 +94,10 @@ impl Faces {
         let mut volume = 0;
         let is_beyond = points.all.as_flattened().iter().any(|&c| c > CELLS_PER_EDGE);
         assert!(!is_beyond, "a point outside of the root");
-        for (face, &owner) in self.owner.iter().enumerate() {
-            let vertices = self.vertices(face);
+        for (face, (&owner, vertices)) in self.owner.iter().zip(self.vertices.iter()).enumerate() {
             assert!(vertices.len() >= 4, "face {face} of cell {owner} has {vertices:?} only");
             vertices.iter().for_each(|&v| used[v as usize] = true);
-            let sum = edges(vertices);
+            let sum = sum_of_edges(vertices);
             let to = &mut sums[owner as usize];
             *to = to.wrapping_add(sum);
             match self.neighbour.get(face) {
@@ -138,14 +118,13 @@ impl Faces {
 }
 
 /// A sum over the edges of a polygon, in which the edges of a closed surface cancel, and others practically never.
-fn edges(vertices: &[u32]) -> u64 {
-    let next = vertices.iter().cycle().skip(1);
-    let edge = |(&from, &to): (&u32, &u32)| {
+fn sum_of_edges(vertices: &[u32]) -> u64 {
+    let edge = |(from, to): (u32, u32)| {
         let mixed =
             |a: u32, b: u32| contract::digest::mix(u64::from(a) << 32 | u64::from(b)) as u64;
         if from < to { mixed(from, to) } else { mixed(to, from).wrapping_neg() }
     };
-    vertices.iter().zip(next).map(edge).fold(0, u64::wrapping_add)
+    edges(vertices).map(edge).fold(0, u64::wrapping_add)
 }
 
 #[cfg(test)]
@@ -178,20 +157,20 @@ mod tests {
         assert_noticed("or beyond", |f| *f.neighbour.last_mut().unwrap() = 15);
         // A hanging node is missing in one face.
         assert_noticed("not closed", |f| {
-            let face = (0..f.count()).find(|&face| f.vertices(face).len() == 5).unwrap();
-            let begin = f.ends[face - 1] as usize;
-            f.vertices.remove(begin + 4);
-            f.ends[face..].iter_mut().for_each(|end| *end -= 1);
+            let face = f.vertices.iter().position(|face| face.len() == 5).unwrap();
+            let begin = f.vertices.ends[face - 1] as usize;
+            f.vertices.corners.remove(begin + 4);
+            f.vertices.ends[face..].iter_mut().for_each(|end| *end -= 1);
         });
         assert_noticed("no face", |f| {
-            let last = f.vertices.iter().copied().max().unwrap();
-            f.vertices.iter_mut().filter(|v| **v == last).for_each(|v| *v -= 1);
+            let last = f.vertices.corners.iter().copied().max().unwrap();
+            f.vertices.corners.iter_mut().filter(|v| **v == last).for_each(|v| *v -= 1);
         });
         // All cells are closed, but inside out.
         assert_noticed("the volume within", |f| {
             let mut begin = 0;
-            for &end in &f.ends {
-                f.vertices[begin..end as usize].reverse();
+            for &end in &f.vertices.ends {
+                f.vertices.corners[begin..end as usize].reverse();
                 begin = end as usize;
             }
         });

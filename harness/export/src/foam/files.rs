@@ -22,7 +22,7 @@ impl Mesh {
     pub fn write(&self, export: &Export<'_>, dir: &Path) -> Result<(), Failure> {
         let (faces, options, manifest) = (&self.faces, export.options, &export.mesh.manifest);
         let (points, cells) = (self.points.all.len() as u64, self.leaves.count());
-        let vertices: u64 = faces.all().map(|vertices| vertices.len() as u64).sum();
+        let vertices = faces.vertices.corners.len() as u64;
         let fits = options.label == Label::Bits64 || vertices.max(points) <= i32::MAX as u64;
         let why = "the mesh has more faces than 32-bit labels can number: choose --label 64";
         Failure::unless(fits, why)?;
@@ -44,14 +44,10 @@ impl Mesh {
         if let Some(ranks) = &self.ranks {
             labels("rank", "", &mut ranks.iter().map(|&rank| rank.into()))?;
         }
-        let mut position = 0;
-        let ends = faces.all().map(|vertices| {
-            position += vertices.len() as i64;
-            position
-        });
+        let ends = faces.vertices.ends.iter().map(|&end| end as i64);
         let mut file = ListFile::create(dir, options, "faceCompactList", "faces", "")?;
         file.labels(count as u64 + 1, std::iter::once(0).chain(ends))?;
-        file.labels(vertices, faces.all().flatten().map(|&point| point.into()))?;
+        file.labels(vertices, faces.vertices.corners.iter().map(|&point| point.into()))?;
         file.finish()?;
         let mut file = ListFile::create(dir, options, "vectorField", "points", "")?;
         file.list(points, self.points.all.iter().map(|at| to_user(at, &manifest.root)))?;

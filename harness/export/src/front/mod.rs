@@ -6,7 +6,7 @@
 //! a face is exposed. A face that is exposed in part is divided into quarters, and these again, until each is exposed or
 //! not; so no two squares of the front overlap, and a whole face is one square whatever the crossing leaves are like.
 //!
-//! [`Polygons`] are the same squares, so that they fit together: where a large square borders smaller ones, their corners on its edges become
+//! Polygons are the same squares, so that they fit together: where a large square borders smaller ones, their corners on its edges become
 //! corners of its polygon, as in a mesh of polyhedra. Then every edge belongs to an even number of polygons, except where the front ends at the
 //! root's boundary or at the limits of a selection.
 //!
@@ -35,7 +35,7 @@ use vtkio::model::{Attributes, PolyDataPiece, VertexNumbers};
 
 use crate::leaves::{Content, Leaves, Square};
 use crate::options::{Export, Options, Summary, require_new};
-use crate::points::{Points, to_user};
+use crate::points::{Points, Polygons, edges, to_user};
 use crate::polydata::{self, array};
 
 /// A square of the front.
@@ -54,8 +54,15 @@ impl Face {
     }
 }
 
-/// A front: its root, faces and polygons.
-type Front = (Root, Vec<Face>, Polygons);
+/// A front.
+struct Front {
+    root: Root,
+    faces: Vec<Face>,
+    /// The corners of all squares.
+    points: Points,
+    /// The polygon of each face, counterclockwise as seen from the leaf.
+    polygons: Polygons,
+}
 
 /// The faces of the selected leaves that belong to the front.
 ///
@@ -81,9 +88,9 @@ fn front(export: &Export<'_>) -> Result<Vec<Face>, Failure> {
 pub fn vtp(export: &Export<'_>, path: &Path) -> Result<Summary, Failure> {
     let Export { mesh, options, .. } = export;
     options.case.iter().try_for_each(|case| mesh.require_case(case))?;
-    write(export, path, &|(root, faces, polygons), out| {
+    write(export, path, &|Front { root, faces, points, polygons }, out| {
         let gaps = options.case.map(|case| gaps(case, faces, options)).transpose()?;
-        let points = polygons.points.all.iter().flat_map(|at| to_user(at, root));
+        let points = points.all.iter().flat_map(|at| to_user(at, root));
         let spacing = |face: &Face| root.edge_of(word::level(face.leaf));
         let mut cell = vec![
             array("level", faces.iter().map(|face| word::level(face.leaf)).collect::<Vec<u8>>()),
@@ -124,11 +131,11 @@ fn write(
     let faces = front(export)?;
     let why = "no selected cell borders a crossing cell, deleted or not, so there is no surface";
     Failure::unless(!faces.is_empty(), why)?;
-    let (root, polygons) = (export.mesh.manifest.root, Polygons::new(&faces));
-    let open = polygons.edges_open();
-    polygons.check_invariants(&faces, export.is_of_all() && open == 0);
-    let area: f64 = faces.iter().map(|face| root.edge_of(face.square.level).powi(2)).sum();
-    let front = (root, faces, polygons);
+    let front = Front::new(export.mesh.manifest.root, faces);
+    let open = front.edges_open();
+    front.check_invariants(export.is_of_all() && open == 0);
+    let edges = front.faces.iter().map(|face| front.root.edge_of(face.square.level));
+    let area: f64 = edges.map(|edge| edge.powi(2)).sum();
     let bytes = fill_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         fill(&front, &mut out).map_err(|failure| failure.of_file(path))?;
@@ -142,12 +149,12 @@ fn write(
         ),
     };
     let notes = vec![format!("a surface of area {}, {closed}", number(area))];
-    Ok(Summary { leaves: front.1.len() as u64, bytes, notes })
+    Ok(Summary { leaves: front.faces.len() as u64, bytes, notes })
 }
 
 /// The polygons as triangles.
-fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
-    let point = |index: u32| to_user(&polygons.points.all[index as usize], root).map(|c| c as f32);
+fn triangles(Front { root, faces, points, polygons }: &Front) -> io::Result<Vec<Facet>> {
+    let point = |index: u32| to_user(&points.all[index as usize], root).map(|c| c as f32);
     let mut triangles: Vec<Facet> = Vec::with_capacity(2 * faces.len());
     for (face, corners) in faces.iter().zip(polygons.iter()) {
         let corner = |i: usize| point(corners[i % corners.len()]);
@@ -159,16 +166,14 @@ fn triangles((root, faces, polygons): &Front) -> io::Result<Vec<Facet>> {
         let middle = root.to_user(face.square.centre()).map(|c| c as f32);
         triangles.extend((0..corners.len()).map(|i| [middle, corner(i), corner(i + 1)]));
     }
-    match triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
-        None => Ok(triangles),
-        Some([at, ..]) => {
-            let why = format!(
-                "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
-                 origin, or write a .vtp file"
-            );
-            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
-        }
+    if let Some([at, ..]) = triangles.iter().find(|[a, b, c]| a == b || b == c || c == a) {
+        let why = format!(
+            "the coordinates of an STL file have seven digits, which do not resolve the faces at {at:?}: move the body towards the \
+             origin, or write a .vtp file"
+        );
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
+    Ok(triangles)
 }
 
 /// The gap of each face in the user's units; infinite if the case has no facets.
@@ -188,56 +193,33 @@ fn gaps(case: &Case, faces: &[Face], options: &Options<'_>) -> Result<Vec<f64>, 
     (0..).zip(faces).map(gap).collect()
 }
 
-/// The polygons of a front.
-#[derive(Debug, Default)]
-pub struct Polygons {
-    /// The corners of all squares.
-    pub points: Points,
-    /// The corners of all polygons, one polygon after the other, counterclockwise as seen from the leaf.
-    pub corners: Vec<u32>,
-    /// One past the last corner of each polygon, in the order of the faces.
-    pub ends: Vec<u64>,
-}
-
-impl Polygons {
-    /// The polygons of some faces.
-    pub fn new(faces: &[Face]) -> Self {
-        let mut polygons = Self::default();
+impl Front {
+    /// The front with these faces.
+    fn new(root: Root, faces: Vec<Face>) -> Self {
+        let (mut points, mut polygons) = (Points::default(), Polygons::default());
         for corner in faces.iter().flat_map(Face::corners) {
-            polygons.points.add(corner);
+            points.add(corner);
         }
-        for face in faces {
-            polygons.points.polygon(face.corners(), &mut polygons.corners);
-            polygons.ends.push(polygons.corners.len() as u64);
-        }
-        polygons
-    }
-
-    /// The corners of each polygon.
-    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
-        let begins = std::iter::once(&0).chain(&self.ends);
-        begins.zip(&self.ends).map(|(&begin, &end)| &self.corners[begin as usize..end as usize])
+        faces.iter().for_each(|face| polygons.push(&points, face.corners()));
+        Self { root, faces, points, polygons }
     }
 
     /// Number of edges that belong to an odd number of polygons: 0 if the front is closed.
-    pub fn edges_open(&self) -> u64 {
-        let mut edges = Vec::with_capacity(self.corners.len());
-        for corners in self.iter() {
-            let next = corners.iter().cycle().skip(1);
-            edges.extend(corners.iter().zip(next).map(|(&a, &b)| (a.min(b), a.max(b))));
-        }
+    fn edges_open(&self) -> u64 {
+        let edges = self.polygons.iter().flat_map(edges);
+        let mut edges: Vec<_> = edges.map(|(a, b)| (a.min(b), a.max(b))).collect();
         edges.sort_unstable();
         edges.chunk_by(|a, b| a == b).filter(|same| same.len() % 2 == 1).count() as u64
     }
 
-    /// Asserts the invariants of the polygons of these faces.
+    /// Asserts the invariants.
     ///
     /// # Panics
     /// If one is violated.
-    pub fn check_invariants(&self, faces: &[Face], is_closed: bool) {
-        assert_eq!(self.ends.len(), faces.len(), "a polygon for every face");
+    fn check_invariants(&self, is_closed: bool) {
+        assert_eq!(self.polygons.ends.len(), self.faces.len(), "a polygon for every face");
         let mut sum = [0i64; 3];
-        for (face, corners) in faces.iter().zip(self.iter()) {
+        for (face, corners) in self.faces.iter().zip(self.polygons.iter()) {
             let area = self.points.area(corners);
             let edge = edge_of(face.square.level);
             let mut expected = [0; 3];

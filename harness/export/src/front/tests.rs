@@ -185,17 +185,15 @@ fn closed_words() -> impl Strategy<Value = Vec<u64>> {
     })
 }
 
-fn front_of(words: &[u64]) -> (Vec<Face>, Polygons) {
+fn front_of(words: &[u64]) -> Front {
     let (_dir, mesh) = on_disk(words, 1, |_| 0);
-    let faces = front(&whole(&mesh, &options())).unwrap();
-    let polygons = Polygons::new(&faces);
-    (faces, polygons)
+    Front::new(mesh.manifest.root, front(&whole(&mesh, &options())).unwrap())
 }
 
 proptest! {
     #[test]
     fn every_edge_belongs_to_an_even_number_of_polygons(words in closed_words()) {
-        let (_, polygons) = front_of(&words);
+        let Front { polygons, .. } = front_of(&words);
         let mut counts: FxHashMap<(u32, u32), u32> = FxHashMap::default();
         for corners in polygons.iter() {
             for (i, &from) in corners.iter().enumerate() {
@@ -209,11 +207,11 @@ proptest! {
 
     #[test]
     fn the_volume_within_is_what_the_leaves_on_a_side_leave_empty(words in closed_words()) {
-        let (_, polygons) = front_of(&words);
+        let Front { points, polygons, .. } = front_of(&words);
         // Six times the volume, from the tetrahedra of a fan and the origin.
         let mut volume = 0i128;
         for corners in polygons.iter() {
-            let p = |i: usize| polygons.points.all[corners[i] as usize].map(i128::from);
+            let p = |i: usize| points.all[corners[i] as usize].map(i128::from);
             for i in 2..corners.len() {
                 let (a, b, c) = (p(0), p(i - 1), p(i));
                 volume += (0..3).map(|x| {
@@ -235,20 +233,20 @@ fn planted_wrong_surfaces_are_noticed() {
         |o| o.level < 2 || o.level < 3 && o.corner[0] == 0,
         |o| (o.ancestor(2).corner.map(|c| c >> 17) != [1, 2, 1]).then_some(Side::Outside),
     );
-    let noticed = |why: &str, change: &dyn Fn(&mut Vec<Face>, &mut Polygons)| {
-        let (mut faces, mut polygons) = front_of(&words);
-        assert_eq!(polygons.edges_open(), 0);
-        polygons.check_invariants(&faces, true);
-        change(&mut faces, &mut polygons);
-        let check = std::panic::AssertUnwindSafe(|| polygons.check_invariants(&faces, true));
+    let noticed = |why: &str, change: &dyn Fn(&mut Front)| {
+        let mut front = front_of(&words);
+        assert_eq!(front.edges_open(), 0);
+        front.check_invariants(true);
+        change(&mut front);
+        let check = std::panic::AssertUnwindSafe(|| front.check_invariants(true));
         let caught = std::panic::catch_unwind(check).unwrap_err();
         let message = caught.downcast_ref::<String>().expect("a message with values");
         assert!(message.contains(why), "{message}");
     };
-    noticed("a polygon for every face", &|faces, _| faces.truncate(3));
-    noticed("twice the area", &|faces, _| faces[0].square.is_high ^= true);
-    noticed("twice the area", &|_, polygons| polygons.corners.swap(0, 1));
-    noticed("that add up to", &|faces, polygons| {
+    noticed("a polygon for every face", &|front| front.faces.truncate(3));
+    noticed("twice the area", &|front| front.faces[0].square.is_high ^= true);
+    noticed("twice the area", &|front| front.polygons.corners.swap(0, 1));
+    noticed("that add up to", &|Front { faces, polygons, .. }| {
         faces.pop();
         polygons.ends.pop();
         polygons.corners.truncate(*polygons.ends.last().unwrap() as usize);
@@ -260,7 +258,7 @@ fn an_edge_may_be_divided_more_than_once() {
     let half = Octant::ROOT.edge() / 2;
     // The lower half of the root is filled: one child with leaves of level 4, three leaves of level 1.
     let is_fine = |o: &Octant| o.corner[0] >= half && o.corner[1] < half && o.corner[2] < half;
-    let (faces, polygons) = front_of(&words_with_sides(
+    let Front { faces, polygons, .. } = front_of(&words_with_sides(
         |o| o.level == 0 || o.level < 4 && is_fine(o),
         |o| (o.corner[2] < half).then_some(Side::Outside),
     ));

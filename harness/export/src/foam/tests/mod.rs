@@ -96,11 +96,10 @@ impl Leaves {
 fn complex_of(words: &[u64]) -> Complex {
     let options = options();
     let mesh = mesh_of(words, |_| false, &options);
-    let vertices = |face| mesh.faces.vertices(face).iter().map(|&v| v as usize).collect();
     let indices = |cells: &[u32]| cells.iter().map(|&cell| cell as usize).collect();
     Complex {
         points: mesh.points.all.iter().map(|p| p.map(f64::from)).collect(),
-        faces: (0..mesh.faces.count()).map(vertices).collect(),
+        faces: mesh.faces.vertices.iter().map(indices).collect(),
         owner: indices(&mesh.faces.owner),
         neighbour: indices(&mesh.faces.neighbour),
     }
