@@ -24,7 +24,6 @@ const METIS: &str = "metis";
 const SEED: u64 = 1;
 
 /// Settings that all runs of a session share.
-#[derive(Debug)]
 pub struct Runner<'a> {
     /// The programs.
     pub programs: &'a Programs,

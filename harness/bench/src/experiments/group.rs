@@ -21,7 +21,6 @@ use statistics::{Median, median, median_of};
 use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.
-#[derive(Clone, Debug)]
 pub struct Group {
     /// The parameters of the runs.
     pub setup: Setup,
@@ -148,7 +147,6 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
 }
 
 /// The runs of a record, grouped.
-#[derive(Clone, Debug)]
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
@@ -355,7 +353,6 @@ fn apart(
 }
 
 /// The runs of one case and n by several programs.
-#[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     /// Of at least two programs in the order of the record, each with its runs by cells.
     pub groups: Vec<&'a Group>,

@@ -34,7 +34,6 @@ const WORKING_TREE: &str = ".";
 pub type Counted = Result<CaseMeasures, Ended>;
 
 /// A program under comparison.
-#[derive(Clone, Debug)]
 pub struct Subject {
     /// The engine that runs it.
     pub engine: Engine,

@@ -27,7 +27,6 @@ pub const WALL: &str = "wall time";
 const CANDIDATE: usize = 2;
 
 /// A time that the gate compares, over all rounds of a case on some ranks.
-#[derive(Debug)]
 struct Quantity {
     /// Its name in the report.
     metric: String,

@@ -27,7 +27,6 @@ use crate::figure::{Axis, Figure, svg};
 type Planar = [f64; 2];
 
 /// What a picture shows.
-#[derive(Clone, Debug)]
 pub struct Request<'a> {
     /// The leaves. Without a slice, that of [`middle`] is taken; the window is that of the clip box, if there is one.
     pub selection: Selection,

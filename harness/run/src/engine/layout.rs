@@ -99,7 +99,6 @@ impl fmt::Display for Layout {
 }
 
 /// Files, choices and limits of a run.
-#[derive(Clone, Copy, Debug)]
 pub struct RunOptions<'a> {
     /// Directory for the run report, the status and the logs, which is made; no other run may use it at the same time.
     pub place: &'a Path,
