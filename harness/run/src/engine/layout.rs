@@ -89,12 +89,9 @@ impl fmt::Display for Layout {
         write!(f, "{}", self.ranks)?;
         let choices =
             [("", &self.partitioner), ("base ", &self.level_base), ("weights ", &self.weights)];
-        for (label, choice) in choices {
-            if let Some(choice) = choice {
-                write!(f, ", {label}{choice}")?;
-            }
-        }
-        Ok(())
+        let mut chosen =
+            choices.iter().filter_map(|(label, choice)| Some((label, choice.as_ref()?)));
+        chosen.try_for_each(|(label, choice)| write!(f, ", {label}{choice}"))
     }
 }
 
