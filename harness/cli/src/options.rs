@@ -112,16 +112,13 @@ impl SelectionArguments {
     pub fn of(&self, mesh: &Mesh) -> Result<Selection, Failure> {
         let Self { clip, level_max, side, rank, slice } = *self;
         let (root, ranks) = (&mesh.manifest.root, mesh.parts.len());
-        if rank.is_some() {
+        if let Some(rank) = rank {
             mesh.require_ranks()?;
-        }
-        if let Some(rank) = rank.filter(|&rank| rank as usize >= ranks) {
             let why = format!("--rank {rank}: the mesh has ranks 0 to {}", ranks - 1);
-            return Err(Failure::input(why));
+            Failure::unless((rank as usize) < ranks, why)?;
         }
-        if side.is_some() && mesh.manifest.sides == Sides::Unknown {
-            return Err(Failure::input("--side: the sides of this mesh are unknown, so omit it"));
-        }
+        let are_known = side.is_none() || mesh.manifest.sides == Sides::Known;
+        Failure::unless(are_known, "--side: the sides of this mesh are unknown, so omit it")?;
         let plane = |(axis, at)| {
             let (name, low) = (AXES[axis], root.origin[axis]);
             let high = low + root.edge;
@@ -172,10 +169,8 @@ impl MeshArguments {
             let case = self.case.as_deref().map(Case::read).transpose()?;
             return Ok((Meshed { dir: given.to_owned(), made: None }, case));
         }
-        if self.case.is_some() {
-            let why = "is not a leaf-set directory, which --case requires";
-            return Err(Failure::input(format!("{} {why}", given.display())));
-        }
+        let why = format!("{} is not a leaf-set directory, which --case requires", self.mesh);
+        Failure::unless(self.case.is_none(), why)?;
         let Programs { engine, paths, .. } = self.engine.find()?;
         let path = paths.catalogue.case_file(&self.mesh, Path::new(""))?;
         let case = Case::read(&path)?;

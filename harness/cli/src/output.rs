@@ -50,13 +50,9 @@ fn note(written: io::Result<()>) {
 /// The exit code of a command that returned `code`: [`EXIT_OUTPUT`] if the command succeeded, but its output was lost.
 pub fn finish(code: u8) -> u8 {
     note(stdout().flush());
-    match FAILURE.get() {
-        Some(error) => {
-            eprintln!("harness: standard output cannot be written: {error}");
-            if code == EXIT_HOLDS { EXIT_OUTPUT } else { code }
-        }
-        None => code,
-    }
+    let Some(error) = FAILURE.get() else { return code };
+    eprintln!("harness: standard output cannot be written: {error}");
+    if code == EXIT_HOLDS { EXIT_OUTPUT } else { code }
 }
 
 /// Writes a file and creates its missing parent directories.

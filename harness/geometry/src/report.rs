@@ -98,41 +98,7 @@ impl Diagnosis {
     pub fn finding(&self, kind: Kind) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.kind == kind)
     }
-}
 
-impl Finding {
-    fn check_invariants(&self, facets: u64, cell: f64) {
-        let Self { kind, count, count_changing, places, .. } = self;
-        assert!(count_changing <= count, "{count_changing} of {count} change the region: {kind:?}");
-        assert_eq!(places.is_empty(), *count == 0, "places of {count}: {kind:?}");
-        assert!(places.len() as u64 <= *count, "{} places of {count}: {kind:?}", places.len());
-        assert_eq!(self.meaning.is_empty(), *count == 0, "the meaning of {count}: {kind:?}");
-        let numbers = || places.iter().flat_map(|place| &place.facets);
-        assert!(numbers().all(|&facet| u64::from(facet) < facets), "facets of {kind:?}");
-        let widths: Vec<f64> = places.iter().filter_map(|place| place.width).collect();
-        assert!(widths.is_sorted_by(|a, b| a >= b), "widths of {kind:?}: {widths:?}");
-        if matches!(kind, Kind::ThinWalls | Kind::ThinGaps) {
-            let are_thin = widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w));
-            assert!(are_thin, "{widths:?} of {kind:?} in cells of {cell}");
-        }
-    }
-}
-
-impl fmt::Display for Diagnosis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.head().iter().try_for_each(|(name, text)| writeln!(f, "{name:<10}{text}"))?;
-        for finding in self.findings.iter().filter(|finding| finding.count > 0) {
-            self.details(finding, f)?;
-        }
-        let verdict = match self.changes_region {
-            true => "at least one finding can change the mesh's region",
-            false => "no finding that changes the mesh's region",
-        };
-        write!(f, "\n{verdict}")
-    }
-}
-
-impl Diagnosis {
     fn head(&self) -> Vec<(&str, String)> {
         let Self { facets, vertices, solids, shells, extent, root, cell, .. } = self;
         let mut rows = vec![("facets", format!("{facets}, with {vertices} distinct vertices"))];
@@ -184,6 +150,38 @@ impl Diagnosis {
     fn with_cells(&self, word: &str, length: f64) -> String {
         let cells = self.cell.map(|cell| format!(" ({} cells)", number(length / cell)));
         format!("{}{word}{}", number(length), cells.unwrap_or_default())
+    }
+}
+
+impl Finding {
+    fn check_invariants(&self, facets: u64, cell: f64) {
+        let Self { kind, count, count_changing, places, .. } = self;
+        assert!(count_changing <= count, "{count_changing} of {count} change the region: {kind:?}");
+        assert_eq!(places.is_empty(), *count == 0, "places of {count}: {kind:?}");
+        assert!(places.len() as u64 <= *count, "{} places of {count}: {kind:?}", places.len());
+        assert_eq!(self.meaning.is_empty(), *count == 0, "the meaning of {count}: {kind:?}");
+        let numbers = || places.iter().flat_map(|place| &place.facets);
+        assert!(numbers().all(|&facet| u64::from(facet) < facets), "facets of {kind:?}");
+        let widths: Vec<f64> = places.iter().filter_map(|place| place.width).collect();
+        assert!(widths.is_sorted_by(|a, b| a >= b), "widths of {kind:?}: {widths:?}");
+        if matches!(kind, Kind::ThinWalls | Kind::ThinGaps) {
+            let are_thin = widths.iter().all(|w| (0.0..=1.000_001 * cell).contains(w));
+            assert!(are_thin, "{widths:?} of {kind:?} in cells of {cell}");
+        }
+    }
+}
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.head().iter().try_for_each(|(name, text)| writeln!(f, "{name:<10}{text}"))?;
+        for finding in self.findings.iter().filter(|finding| finding.count > 0) {
+            self.details(finding, f)?;
+        }
+        let verdict = match self.changes_region {
+            true => "at least one finding can change the mesh's region",
+            false => "no finding that changes the mesh's region",
+        };
+        write!(f, "\n{verdict}")
     }
 }
 

@@ -1,7 +1,7 @@
 //! The metadata of an archive that can be replayed: an RO-Crate 1.1 (Research Object Crate).
 
 use crate::benchmark::machines;
-use bench::experiments::entry::{Entry, Line, now_utc};
+use bench::experiments::entry::{Line, now_utc};
 use bench::order::{by_key, distinct};
 use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;
@@ -49,11 +49,9 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
     let id = |id: &str| json!({ "@id": id });
     let file = |(path, bytes): &Member| json!({"@id": address(path), "@type": "File", "name": path, "contentSize": bytes.to_string()});
     let files: Vec<Value> = members.iter().map(file).collect();
-    let of_run = |line: &&Line| match &line.entry {
-        Entry::Run(run) if !run.program.is_empty() => {
-            Some((run.setup.engine.clone(), run.program.clone()))
-        }
-        _ => None,
+    let of_run = |line: &&Line| {
+        let run = line.run().filter(|run| !run.program.is_empty())?;
+        Some((run.setup.engine.clone(), run.program.clone()))
     };
     let programs = |of: &[&Line]| distinct(of.iter().filter_map(of_run));
     let program_id = |digest: &str| format!("#program-{digest}");
@@ -131,7 +129,7 @@ fn address(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Comm, Machine, Session};
+    use bench::experiments::entry::{Comm, Entry, Machine, Session};
     use bench::testing::{line, run};
 
     #[test]

@@ -218,11 +218,9 @@ pub(crate) fn complete(
     if let Some(format) = engine.run.format {
         let written = path_in(command, &foreign(options.place));
         if !written.exists() {
-            return unusable(format!(
-                "wrote no {}, which {{out}} stands for in [run] of {}",
-                written.display(),
-                engine.name
-            ));
+            let (written, name) = (written.display(), &engine.name);
+            let why = format!("wrote no {written}, which {{out}} stands for in [run] of {name}");
+            return unusable(why);
         }
         let case = read_case()?;
         let (sides, position) = (engine.run.sides.clone(), engine.run.position);

@@ -5,7 +5,6 @@ use contract::failure::Watch;
 use std::io::{IsTerminal, Write, stderr};
 
 /// The line, which is empty at first.
-#[derive(Debug)]
 pub struct Progress;
 
 impl Progress {

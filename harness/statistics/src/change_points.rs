@@ -86,7 +86,6 @@ pub fn change_points(values: &[f64], alpha: f64) -> Vec<Change> {
 }
 
 /// A model of values without outliers.
-#[derive(Clone)]
 struct Model<'a> {
     values: &'a [f64],
     /// A variance that is added to that of the noise, so that numbers that repeat exactly do not have an infinite likelihood.

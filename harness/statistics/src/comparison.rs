@@ -13,9 +13,8 @@ use super::random::Random;
 /// each end, no p-value is below 3^-(n - n/4): relabelling an ignored round does not change the effect. At least 8.
 pub fn rounds_min(alpha: f64) -> usize {
     let p_min = |n: &usize| 3f64.powi((n / 4) as i32 - *n as i32);
-    (8..)
-        .find(|n| p_min(n) < alpha)
-        .expect("p-values decrease without limit, and alpha is positive")
+    let least = (8..).find(|n| p_min(n) < alpha);
+    least.expect("p-values decrease without limit, and alpha is positive")
 }
 
 /// Sign patterns for the noise floor: enough to resolve probabilities of 0.001. The interval takes a quarter as many

@@ -4,7 +4,6 @@
 //! crate `rand` promises that for none of its default generators, so the eight lines stay ours.
 
 /// The SplitMix64 generator; the field is the seed.
-#[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
 impl Random {

@@ -32,7 +32,6 @@ pub(super) struct Series<'a> {
 }
 
 /// The least-squares fit of a segment.
-#[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     /// Sum of squares of the whitened residuals.
     pub cost: f64,

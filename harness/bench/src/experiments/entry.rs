@@ -54,26 +54,20 @@ impl Line {
 
     /// Returns the session that the line begins, if it begins one.
     pub fn session(&self) -> Option<&Session> {
-        match &self.entry {
-            Entry::Session(session) => Some(session),
-            _ => None,
-        }
+        let Entry::Session(session) = &self.entry else { return None };
+        Some(session)
     }
 
     /// Returns the network of the line, if it states one, with its session.
     pub fn network(&self) -> Option<(&str, Network)> {
-        match &self.entry {
-            Entry::Network(network) => Some((&self.session, *network)),
-            _ => None,
-        }
+        let Entry::Network(network) = &self.entry else { return None };
+        Some((&self.session, *network))
     }
 
     /// Returns the run of the line, if it has one.
     pub fn run(&self) -> Option<&Run> {
-        match &self.entry {
-            Entry::Run(run) => Some(run),
-            _ => None,
-        }
+        let Entry::Run(run) = &self.entry else { return None };
+        Some(run)
     }
 }
 

@@ -24,7 +24,6 @@ const METIS: &str = "metis";
 const SEED: u64 = 1;
 
 /// Settings that all runs of a session share.
-#[derive(Debug)]
 pub struct Runner<'a> {
     /// The programs.
     pub programs: &'a Programs,
@@ -129,10 +128,8 @@ fn keeps_promises(engine: &Engine, case: &Path, mesh: &Path) -> Result<(), Strin
     let case = Case::read(case).map_err(|error| error.to_string())?;
     let promises = &engine.description.promises;
     let report = audit_against(mesh, Some(&case), promises);
-    match report.checks.iter().find(|check| !check.holds()) {
-        Some(check) => Err(format!("the mesh breaks the promise {check}")),
-        None => Ok(()),
-    }
+    let broken = report.checks.iter().find(|check| !check.holds());
+    broken.map_or(Ok(()), |check| Err(format!("the mesh breaks the promise {check}")))
 }
 
 /// How a setup is distributed over ranks.

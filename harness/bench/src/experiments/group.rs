@@ -21,7 +21,6 @@ use statistics::{Median, median, median_of};
 use std::collections::{BTreeMap, HashMap};
 
 /// The repetitions of one run.
-#[derive(Clone, Debug)]
 pub struct Group {
     /// The parameters of the runs.
     pub setup: Setup,
@@ -148,7 +147,6 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
 }
 
 /// The runs of a record, grouped.
-#[derive(Clone, Debug)]
 pub struct Groups {
     /// In the order of their first runs.
     pub all: Vec<Group>,
@@ -278,6 +276,7 @@ impl Groups {
         let networks = groups.into_iter().map(|group| group.network.to_string());
         distinct(networks).join("; in another session ")
     }
+
     /// Returns simulated groups, each with that of the same mesh on equally many ranks of MPI without oversubscription.
     pub fn projections(&self) -> Vec<[&Group; 2]> {
         let measured = |sim: &Group| {
@@ -286,6 +285,41 @@ impl Groups {
         };
         let sims = self.all.iter().filter(|g| g.setup.comm == Comm::Sim);
         sims.filter_map(|sim| Some([sim, measured(sim)?])).collect()
+    }
+
+    /// Returns the comparisons of programs, in the order of the record.
+    pub fn comparisons(&self) -> Vec<Comparison<'_>> {
+        let is_compared = |g: &&Group| {
+            let by_size = ["strong", "spacing"].contains(&g.setup.experiment.as_str());
+            by_size && is_on_one_core(&g.setup) && g.cpu_s().is_some()
+        };
+        let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
+        let by_case = by_key(self.all.iter().filter(is_compared), of_case);
+        by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
+    }
+
+    /// Returns the comparison of the programs that have these groups, if there are several.
+    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
+        let (case, n) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
+        let mut programs = by_key(groups, |g| g.setup.engine.as_str());
+        programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
+        let left_out = self.left_out.iter().filter(|left| {
+            let s = &left.setup;
+            (&s.case, s.layer_cells_min) == (case, n) && is_on_one_core(s)
+        });
+        let left_out = left_out.map(|left| {
+            let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
+            let what = if is_repeated { "A run is missing" } else { "No mesh" };
+            format!("{what} at spacing {:.2e}: {}", left.setup.spacing_min, left.why)
+        });
+        let lacks = programs.iter().filter_map(|(name, _)| {
+            let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
+            Some(format!("{name} does not provide: {}", lacks.join(", ")))
+        });
+        let notes = left_out.chain(lacks).collect();
+        let is_compared = programs.len() > 1;
+        let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
+        is_compared.then_some(Comparison { groups, notes })
     }
 }
 
@@ -355,7 +389,6 @@ fn apart(
 }
 
 /// The runs of one case and n by several programs.
-#[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     /// Of at least two programs in the order of the record, each with its runs by cells.
     pub groups: Vec<&'a Group>,
@@ -365,43 +398,6 @@ pub struct Comparison<'a> {
 
 fn is_on_one_core(setup: &Setup) -> bool {
     setup.ranks == 1 && setup.comm != Comm::Sim
-}
-
-impl Groups {
-    /// Returns the comparisons of programs, in the order of the record.
-    pub fn comparisons(&self) -> Vec<Comparison<'_>> {
-        let is_compared = |g: &&Group| {
-            let by_size = ["strong", "spacing"].contains(&g.setup.experiment.as_str());
-            by_size && is_on_one_core(&g.setup) && g.cpu_s().is_some()
-        };
-        let of_case = |g: &Group| (g.setup.case.clone(), g.setup.layer_cells_min);
-        let by_case = by_key(self.all.iter().filter(is_compared), of_case);
-        by_case.into_iter().filter_map(|(_, groups)| self.comparison(groups)).collect()
-    }
-
-    /// Returns the comparison of the programs that have these groups, if there are several.
-    fn comparison<'a>(&'a self, groups: Vec<&'a Group>) -> Option<Comparison<'a>> {
-        let (case, n) = (&groups[0].setup.case, groups[0].setup.layer_cells_min);
-        let mut programs = by_key(groups, |g| g.setup.engine.as_str());
-        programs.iter_mut().for_each(|(_, groups)| groups.sort_by_key(|group| group.cells()));
-        let left_out = self.left_out.iter().filter(|left| {
-            let s = &left.setup;
-            (&s.case, s.layer_cells_min) == (case, n) && is_on_one_core(s)
-        });
-        let left_out = left_out.map(|left| {
-            let is_repeated = self.all.iter().any(|group| group.setup == left.setup);
-            let what = if is_repeated { "A run is missing" } else { "No mesh" };
-            format!("{what} at spacing {:.2e}: {}", left.setup.spacing_min, left.why)
-        });
-        let lacks = programs.iter().filter_map(|(name, _)| {
-            let lacks = self.lacks.get(*name).filter(|lacks| !lacks.is_empty())?;
-            Some(format!("{name} does not provide: {}", lacks.join(", ")))
-        });
-        let notes = left_out.chain(lacks).collect();
-        let is_compared = programs.len() > 1;
-        let groups = programs.into_iter().flat_map(|(_, groups)| groups).collect();
-        is_compared.then_some(Comparison { groups, notes })
-    }
 }
 
 #[cfg(test)]

@@ -131,7 +131,6 @@ impl Sample {
 }
 
 /// A mean over the ranks, and the excess of the maximum.
-#[derive(Clone, Debug)]
 struct Law {
     mean: Sum,
     /// Of [`excesses`].
@@ -172,7 +171,6 @@ impl Law {
 }
 
 /// A model of the runs of one program around one geometry with one n.
-#[derive(Clone, Debug)]
 struct Model {
     /// The most cells and ranks that were fitted.
     most: At,
@@ -282,7 +280,6 @@ impl Compared {
 const HELD: f64 = 0.9;
 
 /// A model and what it predicted of runs that it did not see.
-#[derive(Clone, Debug)]
 pub struct Tested {
     model: Model,
     /// The greatest number of ranks that was fitted.

@@ -54,7 +54,7 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
                 _ => of_case.clone_from(new),
             }
         }
-        let (verdict, why) = match (old, new) {
+        let (verdict, who, why) = match (old, new) {
             (Some(Ok(old)), Ok(new)) => {
                 layer.findings.extend(judged(bench, case, name, [old, new]));
                 continue;
@@ -67,15 +67,12 @@ pub(super) fn layer(bench: &Bench, measures: &mut Measures, layer: &mut Layer) {
                 layer.findings.push(GateFinding { compared, ..found });
                 continue;
             }
-            (Some(Err(why)), Ok(_)) => {
-                (Verdict::Missing, format!("the baseline has no result: {why}"))
-            }
-            (Some(Err(_)), Err(why)) => {
-                (Verdict::Missing, format!("neither program has a result: {why}"))
-            }
-            (_, Err(why)) => (Verdict::Regression, format!("the candidate has no result: {why}")),
+            (Some(Err(why)), Ok(_)) => (Verdict::Missing, "the baseline has no", why),
+            (Some(Err(_)), Err(why)) => (Verdict::Missing, "neither program has a", why),
+            (_, Err(why)) => (Verdict::Regression, "the candidate has no", why),
         };
-        layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, why));
+        let note = format!("{who} result: {why}");
+        layer.findings.push(GateFinding::noted(&case.name, "runs", verdict, note));
     }
 }
 

@@ -34,7 +34,6 @@ const WORKING_TREE: &str = ".";
 pub type Counted = Result<CaseMeasures, Ended>;
 
 /// A program under comparison.
-#[derive(Clone, Debug)]
 pub struct Subject {
     /// The engine that runs it.
     pub engine: Engine,
@@ -81,28 +80,22 @@ impl Subject {
             let mode = fs::metadata(named)?.permissions().mode();
             // One that another program interprets need not be executable.
             let is_started = description.run.serial.first().is_some_and(|word| word == "{program}");
-            if is_started && mode & 0o111 == 0 {
-                let why = "is neither a program that can be executed nor a revision";
-                return Err(Failure::input(format!("{named} {why}")));
-            }
+            let why = format!("{named} is neither a program that can be executed nor a revision");
+            Failure::unless(!is_started || mode & 0o111 != 0, why)?;
             // A link may lead to a program that behaves by its own name, as those of a virtual environment do.
             let program = std::path::absolute(named)?;
             return Ok(Self::new(engine.with_program(program)?, named.to_owned(), None));
         }
+        let (name, repository) = (&description.name, &options.repository);
         let build = description.build.as_ref().ok_or_else(|| {
-            let name = &description.name;
-            Failure::input(format!(
-                "{named} is not a file, and {name} does not describe how to build a revision"
-            ))
+            format!("{named} is not a file, and {name} does not describe how to build a revision")
         })?;
-        let repository = &options.repository;
         let head = if named == WORKING_TREE { "HEAD" } else { named };
         let commit = format!("{head}^{{commit}}");
         let arguments = ["rev-parse", "--verify", "--quiet", "--end-of-options", &commit];
-        let revision = git(repository, &arguments).ok_or_else(|| {
-            let repository = repository.display();
-            Failure::input(format!("{named} is neither a file nor a revision in {repository}"))
-        })?;
+        let shown = repository.display();
+        let why = || format!("{named} is neither a file nor a revision in {shown}");
+        let revision = git(repository, &arguments).ok_or_else(why)?;
         let built = (named != WORKING_TREE).then_some(revision.as_str());
         let program = program(build, built, repository)?;
         Ok(Self::new(engine.with_program(program)?, named.to_owned(), Some(revision)))
@@ -115,9 +108,9 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let place = cache.join(revision.unwrap_or("working-tree"));
     let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));
     let mut values = Values::default();
-    for (name, path) in
-        [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)]
-    {
+    let places =
+        [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)];
+    for (name, path) in places {
         let made = fs::create_dir_all(&path).and_then(|()| fs::canonicalize(&path));
         let made = made.map_err(|error| Failure::at(&path, error))?;
         values.insert(name, made.to_string_lossy().into_owned());
@@ -148,11 +141,9 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
         let why = format!("{label}: {failure} (full output: {}/build.stderr)", place.display());
         Failure { why, ..failure.into() }
     })?;
-    if !program.is_file() {
-        let program = program.display();
-        let why = "is missing: check [build] program";
-        return Err(Failure::input(format!("{label}: the build succeeded, but {program} {why}")));
-    }
+    let why = format!("the build succeeded, but {} is missing", program.display());
+    let why = format!("{label}: {why}: check [build] program");
+    Failure::unless(program.is_file(), why)?;
     fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
 }

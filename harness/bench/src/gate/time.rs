@@ -27,7 +27,6 @@ pub const WALL: &str = "wall time";
 const CANDIDATE: usize = 2;
 
 /// A time that the gate compares, over all rounds of a case on some ranks.
-#[derive(Debug)]
 struct Quantity {
     /// Its name in the report.
     metric: String,
@@ -164,9 +163,7 @@ impl Quantity {
         if let Some(first) = self.first {
             let answer = if self.is_change(rules) { "confirms" } else { "does not confirm" };
             let first = first * 100.0;
-            note.push_str(&format!(
-                "; a second measurement, which {answer} {first:+.1} % in the first"
-            ));
+            note += &format!("; a second measurement, which {answer} {first:+.1} % in the first");
         }
         GateFinding::noted(case, &self.metric, verdict, note).of_values(self.times())
     }

@@ -90,9 +90,8 @@ pub fn shrink(
     };
     let trial = reduce::reduce(given.clone(), &mut fails);
     let minimal = !is_over();
-    let fault = same(&trial)?.ok_or_else(|| {
-        Failure::input("the failure does not repeat: it depends on more than the case")
-    })?;
+    let why = "the failure does not repeat: it depends on more than the case";
+    let fault = same(&trial)?.ok_or_else(|| Failure::input(why))?;
     let facets_before = given.case.facets.len();
     let shrunk = Shrunk { trial, fault, facets_before, trials, minimal };
     shrunk.check_invariants(&given, first);

@@ -69,7 +69,6 @@ impl fmt::Display for Fault {
 }
 
 /// Runs trials.
-#[derive(Debug)]
 pub struct Probe {
     engine: Engine,
     reference: Engine,

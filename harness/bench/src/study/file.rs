@@ -246,9 +246,8 @@ impl Study {
     }
 
     fn check(&self) -> Result<(), String> {
-        if self.row.is_empty() && self.series.is_empty() {
-            return Err("it has no [[series]] and no [[row]]".to_owned());
-        }
+        let is_empty = self.row.is_empty() && self.series.is_empty();
+        refuse(&[(is_empty, "it has no [[series]] and no [[row]]")])?;
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
         for Series { case, .. } in &self.series {

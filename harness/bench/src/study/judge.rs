@@ -70,11 +70,9 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
     let judged = measured(study, row, lines).unwrap_or_else(|why| {
-        let failure = |name: &String, line: &Line| match &line.entry {
-            Entry::Failure(f) if study.is_run(name, &f.setup) => {
-                Some(format!("run {name} failed: {}", f.why))
-            }
-            _ => None,
+        let failure = |name: &String, line: &Line| {
+            let Entry::Failure(failed) = &line.entry else { return None };
+            study.is_run(name, &failed.setup).then(|| format!("run {name} failed: {}", failed.why))
         };
         let failed = row.runs().find_map(|name| lines.iter().find_map(|line| failure(name, line)));
         unjudged(row, failed.is_some(), failed.unwrap_or(why))
@@ -111,9 +109,8 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
         efficiencies.filter(|e| row.measure.is_efficiency() && e.is_above_one()).collect();
     let why = above_one(&efficiencies).unwrap_or_default();
     // The least trustworthy run counts.
-    let rank = |how: &&str| {
-        ["serial", "measured", "oversubscribed", "projected"].iter().position(|h| h == how)
-    };
+    let ranking = ["serial", "measured", "oversubscribed", "projected"];
+    let rank = |how: &&str| ranking.iter().position(|h| h == how);
     let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
@@ -123,17 +120,14 @@ impl Judged {
     /// Returns the verdict.
     pub fn verdict(&self) -> Verdict {
         let Row { at_least, at_most, .. } = self.row;
+        // NaN is within no bounds.
+        let is_high = |value: f64| at_least.is_none_or(|least| value >= least);
+        let is_low = |value: f64| at_most.is_none_or(|most| value <= most);
         match self.measured {
             None if self.failed => Verdict::Failed,
             None => Verdict::LeftOut,
             Some(_) if at_least.or(at_most).is_none() => Verdict::ForComparison,
-            // NaN is within no bounds.
-            Some((value, _))
-                if at_least.is_none_or(|least| value >= least)
-                    && at_most.is_none_or(|most| value <= most) =>
-            {
-                Verdict::Met
-            }
+            Some((value, _)) if is_high(value) && is_low(value) => Verdict::Met,
             Some(_) => Verdict::Missed,
         }
     }

@@ -33,7 +33,6 @@ pub(super) enum Input {
 }
 
 /// The input of a row's measure.
-#[derive(Clone, Copy, Debug)]
 pub(super) struct Sample<'a> {
     /// The runs: one, unless the measure is that of a series.
     pub runs: &'a [&'a Group],

@@ -73,7 +73,6 @@ impl Planned {
 }
 
 /// The result of a session.
-#[derive(Debug)]
 pub struct Outcome {
     /// The rows, in the order of the file.
     pub rows: Vec<Judged>,

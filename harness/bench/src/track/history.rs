@@ -86,12 +86,9 @@ impl Record {
     /// # Errors
     /// One sentence, if they cannot.
     pub fn check(&self) -> Result<(), String> {
-        match self.metrics.iter().find(|(_, value)| value.abs() > VALUE_MAX) {
-            Some((name, value)) => {
-                Err(format!("{name} is {value:e}, and at most {VALUE_MAX:e} is possible"))
-            }
-            None => Ok(()),
-        }
+        let beyond = self.metrics.iter().find(|(_, value)| value.abs() > VALUE_MAX);
+        let Some((name, value)) = beyond else { return Ok(()) };
+        Err(format!("{name} is {value:e}, and at most {VALUE_MAX:e} is possible"))
     }
 
     /// Returns the record with the machine, geometries and metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a

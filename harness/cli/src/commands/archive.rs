@@ -40,14 +40,11 @@ pub struct Arguments {
 /// If the record has no run, the study or a file of it cannot be read, or the directory cannot be made.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let Arguments { report, study, out, about } = arguments;
-    if out.exists() {
-        return Err(Failure::input(format!("{} exists: name another directory", out.display())));
-    }
-    let inside = nearest_directory(out).canonicalize()?.starts_with(report.canonicalize()?);
-    if inside {
-        let why = format!("{} is in the report: name a directory beside it", out.display());
-        return Err(Failure::input(why));
-    }
+    let shown = out.display();
+    Failure::unless(!out.exists(), format!("{shown} exists: name another directory"))?;
+    let is_inside = nearest_directory(out).canonicalize()?.starts_with(report.canonicalize()?);
+    let why = format!("{shown} is in the report: name a directory beside it");
+    Failure::unless(!is_inside, why)?;
     let records = records_in(report)?;
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
@@ -88,8 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         let bytes = fs::metadata(place.join(&name))?.len();
         members.push((name, bytes));
     }
-    let described = metadata(about, &members, &lines);
-    put(METADATA, pretty(&described))?;
+    put(METADATA, pretty(&metadata(about, &members, &lines)))?;
     staging.publish(|staged| fs::rename(staged, out)).map_err(wrong)?;
     let (values, files) = (expected.values.len(), members.len() + 1);
     println!("{}: {files} files, {values} values to be met by a replay", out.display());

@@ -55,10 +55,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         && let Some(forest) = source.forest(mesh)?
         && (balance.is_some() || !forest.is_one_cube())
     {
-        if forest.connectivity.dimension == 2 && *balance == Some(Touching::Edge) {
-            let why = "quadrants have no edges but their faces: choose --balance faces or corners";
-            return Err(Failure::input(why));
-        }
+        let has_edges = forest.connectivity.dimension != 2;
+        let why = "quadrants have no edges but their faces: choose --balance faces or corners";
+        Failure::unless(has_edges || *balance != Some(Touching::Edge), why)?;
         let touching = balance.unwrap_or(Touching::Corner);
         let report = forest::audit(&forest, touching, start);
         return publish(&report, arguments);

@@ -118,9 +118,8 @@ pub(super) fn execute(
 /// Finds the programs, and replaces the names in the series by those of the results.
 fn programs(given: &Given, study: &mut Study) -> Result<Programs, Failure> {
     let names = study.engines();
-    if names.len() > 1 && given.mesher.is_some() {
-        return Err(Failure::input("--mesher replaces the program of one engine: name one"));
-    }
+    let is_one = names.len() <= 1 || given.mesher.is_none();
+    Failure::unless(is_one, "--mesher replaces the program of one engine: name one")?;
     let mut foreign = names.iter().filter(|name| !is_own(name));
     let mut programs = Programs::find(foreign.next().map_or("mesher", String::as_str), given)?;
     for name in foreign {

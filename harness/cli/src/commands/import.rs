@@ -60,11 +60,9 @@ impl Source {
             || root.is_some()
             || sides.is_some()
             || *position != Position::default();
-        if is_given && meshes.iter().all(|mesh| has_manifest(mesh)) {
-            let why = "has a manifest, which states root and sides: omit the options for them";
-            return Err(Failure::input(format!("{} {why}", meshes[0].display())));
-        }
-        Ok(())
+        let is_used = !is_given || !meshes.iter().all(|mesh| has_manifest(mesh));
+        let why = "has a manifest, which states root and sides: omit the options for them";
+        Failure::unless(is_used, format!("{} {why}", meshes[0].display()))
     }
 
     /// The trees of a file of p4est, unless options ask for one mesh in a root.
@@ -90,15 +88,11 @@ impl Source {
 
     /// Reads the mesh.
     fn read(&self, mesh: &Path, case: Option<&Case>) -> Result<Imported, Failure> {
-        let Self { format, root, sides, position, timeout, case: _ } = self;
-        let request = Request {
-            sides: sides.clone(),
-            root: *root,
-            position: *position,
-            ..Request::default()
-        };
+        let Self { format, root, position, timeout, .. } = *self;
+        let sides = self.sides.clone();
+        let request = Request { sides, root, position, ..Request::default() };
         let program = format!("harness {} import", env!("CARGO_PKG_VERSION"));
-        let mut imported = import(mesh, *format, &request, case, program, *timeout)?;
+        let mut imported = import(mesh, format, &request, case, program, timeout)?;
         if matches!(imported, Imported::Words { is_root_derived: true, .. }) {
             let Root { origin: [x, y, z], edge } = imported.manifest().root;
             eprintln!(

@@ -10,9 +10,8 @@ use contract::leafset::LeafSet;
 use contract::manifest::{Keep, Leak};
 use contract::plain::{PlainCase, StlForm};
 use export::polydata;
-use geometry::leak::Leaks;
-use geometry::leak::Target;
 use geometry::leak::report::{Answers, Passage};
+use geometry::leak::{Leaks, Target};
 use report::json::pretty;
 use run::engine::interrupt;
 use run::engine::layout::SERIAL;
@@ -55,9 +54,8 @@ pub struct Arguments {
 /// If the case cannot be read or meshed, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let is_vtp = |file: &Output| file.extension().is_some_and(|extension| extension == "vtp");
-    if !arguments.vtk.as_ref().is_none_or(is_vtp) {
-        return Err(Failure::input("the file name of --vtk must end in .vtp"));
-    }
+    let is_named = arguments.vtk.as_ref().is_none_or(is_vtp);
+    Failure::unless(is_named, "the file name of --vtk must end in .vtp")?;
     let programs = Programs::find("mesher", &arguments.programs)?;
     let path = programs.paths.catalogue.case_file(&arguments.case, Path::new(""))?;
     let case = Case::read(&path)?;

@@ -43,9 +43,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             all += compared;
         }
         if all == 0 {
-            let (shown, why) = (main.display(), "so nothing was compared");
-            let why = format!("{shown} has no number that the record could have, {why}");
-            return Err(Failure::missing(why));
+            let why = "has no number that the record could have, so nothing was compared";
+            return Err(Failure::missing(format!("{} {why}", main.display())));
         }
     }
     Ok(code)
@@ -86,19 +85,15 @@ pub fn write(directory: &Path, given: &[PathBuf]) -> Result<Vec<Number>, String>
     let records = if given.is_empty() { records_in(directory)? } else { given.to_vec() };
     let lines = read(&records)?;
     if lines.is_empty() {
-        let shown = directory.display();
-        return Err(format!(
-            "no results to report: {shown} has no record; make one with harness bench"
-        ));
+        let why = "has no record; make one with harness bench";
+        return Err(format!("no results to report: {} {why}", directory.display()));
     }
     let written = report(directory, &lines).map_err(|error| error.to_string())?;
     if lines.iter().all(|line| line.run().is_none()) {
         return Err(format!("no run succeeded; {} lists the reasons", written.page.display()));
     }
     written.notes.iter().for_each(|note| println!("{note}"));
-    for (rule, why) in &written.broken {
-        println!("rule {rule} broken: {why}");
-    }
+    written.broken.iter().for_each(|(rule, why)| println!("rule {rule} broken: {why}"));
     if !cfg!(feature = "figures") {
         println!("PNG and PDF are left out: the harness was built without its feature figures");
     }

@@ -65,28 +65,21 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
 /// # Errors
 /// If the history cannot be read or continued, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+    let shown = arguments.history.display();
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
-    } else if !arguments.history.exists() {
-        let history = arguments.history.display();
-        return Err(Failure::input(format!(
-            "{history} is missing: give a history, or the first values with --add or --value"
-        )));
+    } else {
+        let why = "is missing: give a history, or the first values with --add or --value";
+        Failure::unless(arguments.history.exists(), format!("{shown} {why}"))?;
     }
-    for commit in &arguments.accept {
-        history::accept(&arguments.history, commit)?;
-    }
+    arguments.accept.iter().try_for_each(|commit| history::accept(&arguments.history, commit))?;
     let History { records, warnings } = history::read(&arguments.history)?;
-    for warning in &warnings {
-        eprintln!("harness: {}: {warning}", arguments.history.display());
-    }
+    warnings.iter().for_each(|warning| eprintln!("harness: {shown}: {warning}"));
     let all = analyse(&records, arguments.alpha);
     println!("{} commits, {} metrics", records.len(), all.len());
     if all.is_empty() {
-        return Err(Failure::missing(format!(
-            "{}: no record has a metric, so nothing was compared",
-            arguments.history.display()
-        )));
+        let why = "no record has a metric, so nothing was compared";
+        return Err(Failure::missing(format!("{shown}: {why}")));
     }
     let last_record = records.len() - 1;
     let ended = || all.iter().filter(|s| s.points.last().is_none_or(|p| p.0 < last_record));

@@ -27,12 +27,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let (made, case) = arguments.source.open(&SERIAL, false)?;
     let disk = mesh::Mesh::open(&made.dir)?;
     let tree = disk.tree()?;
-    if case.is_none() && disk.manifest.lacks_inputs {
-        let why = "states no inputs, from which all leaves follow: give --case";
-        return Err(Failure::input(format!("{} {why}", made.dir.display())));
-    }
+    let (has_inputs, shown) = (!disk.manifest.lacks_inputs, made.dir.display());
+    let why = format!("{shown} states no inputs, from which all leaves follow: give --case");
+    Failure::unless(has_inputs || case.is_some(), why)?;
     let body = case.as_ref().map(|case| why::body(case, &disk.manifest)).transpose();
-    let body = body.map_err(|why| format!("{}: {why}", made.dir.display()))?;
+    let body = body.map_err(|why| format!("{shown}: {why}"))?;
     let mesh = Mesh::of(&disk.manifest, &tree, body.as_ref());
     print!("{}", mesh.at(arguments.point)?);
     Ok(EXIT_HOLDS)

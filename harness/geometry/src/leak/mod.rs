@@ -230,11 +230,9 @@ fn on_lattice(what: &str, at: [f64; 3], root: &Root) -> Result<Point, String> {
     let inside = |q: &[i64; 3]| q.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
     let found = root.quantise(at).filter(inside);
     found.map(|q| Point::from_array(q.map(|c| c as f64))).ok_or_else(|| {
-        let far = root.rounded(root.to_user([UNITS_PER_EDGE; 3]));
-        format!(
-            "{what} {at:?} is outside the root, which extends from {:?} to {far:?}",
-            root.rounded(root.origin)
-        )
+        let ends = [root.origin, root.to_user([UNITS_PER_EDGE; 3])];
+        let [low, high] = ends.map(|end| root.rounded(end));
+        format!("{what} {at:?} is outside the root, which extends from {low:?} to {high:?}")
     })
 }
 
@@ -259,11 +257,8 @@ fn why_crossed(what: &str, at: Point, words: &[u64], root: &Root) -> String {
     let distance = |centre: &[i64; 3]| Point::from_array(centre.map(|c| c as f64)).distance(at);
     let nearest = free.min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let place = format!("{what} {:?} is in a leaf that facets cross", to_user(root, at));
-    match nearest {
-        Some(near) => format!(
-            "{place}; the nearest centre of a free leaf is {:?}",
-            root.rounded(root.to_user(near))
-        ),
+    match nearest.map(|centre| root.rounded(root.to_user(centre))) {
+        Some(centre) => format!("{place}; the nearest centre of a free leaf is {centre:?}"),
         None => format!("{place}, and there are no free leaves: use a smaller spacing_min"),
     }
 }

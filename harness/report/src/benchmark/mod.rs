@@ -22,7 +22,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// The files of a report.
-#[derive(Debug)]
 pub struct Written {
     /// The page.
     pub page: PathBuf,

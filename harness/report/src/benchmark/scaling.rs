@@ -58,9 +58,8 @@ fn with<'a>(all: &[&'a Group], how: &str) -> Vec<&'a Group> {
 /// The figures of a mesh, or of those of weak scaling, on simulated ranks.
 fn projected(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Vec<Figure> {
     let simulated = with(all, "projected");
-    let figures =
-        [efficiency(groups, subject, &simulated, file), phases(subject, &simulated, file)];
-    figures.into_iter().flatten().collect()
+    let efficiency = efficiency(groups, subject, &simulated, file);
+    efficiency.into_iter().chain(phases(subject, &simulated, file)).collect()
 }
 
 /// The base cases of efficiencies with their run times, without repetitions.

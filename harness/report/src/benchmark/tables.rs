@@ -37,9 +37,8 @@ pub fn causes(groups: &Groups) -> Vec<String> {
     let cause = |group: &Group| {
         let (s, cells, how) = (&group.setup, grouped(group.cells()), group.how());
         let reference = &groups.reference(group).typical;
-        let (subject, cause) =
-            (Subject::of(s), pop::cause(&group.typical, reference, &group.network));
-        format!("{subject}, {}, {cells} cells, {how}: {cause}", s.experiment)
+        let cause = pop::cause(&group.typical, reference, &group.network);
+        format!("{}, {}, {cells} cells, {how}: {cause}", Subject::of(s), s.experiment)
     };
     groups.all.iter().filter(|group| group.setup.ranks > 1).map(cause).collect()
 }

@@ -214,9 +214,8 @@ pub fn check_invariants(figures: &[Figure]) {
     for figure in figures {
         let id = &figure.id;
         assert!(!id.is_empty() && *id == file_name(id), "figure {id:?}: not a name of a file");
-        for axis in [&figure.x, &figure.y] {
-            assert!(!axis.label.is_empty(), "figure {id}: an axis has no label");
-        }
+        let are_labelled = [&figure.x, &figure.y].iter().all(|axis| !axis.label.is_empty());
+        assert!(are_labelled, "figure {id}: an axis has no label");
         figure.series.iter().for_each(|s| check_series(figure, s));
         check_ideal(figure);
     }

@@ -175,12 +175,8 @@ fn chart(
         if s.provenance == Provenance::Modelled {
             let low = s.points.iter().map(|p| at(p.x, p.low));
             let around = low.chain(s.points.iter().rev().map(|p| at(p.x, p.high))).collect();
-            chart
-                .draw_series([Polygon::<Place>::new::<Vec<Place>, _>(
-                    around,
-                    colour(s.style).mix(0.2),
-                )])
-                .expect(DRAWN);
+            let band = Polygon::<Place>::new::<Vec<Place>, _>(around, colour(s.style).mix(0.2));
+            chart.draw_series([band]).expect(DRAWN);
             continue;
         }
         for p in s.points.iter().filter(|p| p.low < p.high) {

@@ -27,7 +27,6 @@ use crate::figure::{Axis, Figure, svg};
 type Planar = [f64; 2];
 
 /// What a picture shows.
-#[derive(Clone, Debug)]
 pub struct Request<'a> {
     /// The leaves. Without a slice, that of [`middle`] is taken; the window is that of the clip box, if there is one.
     pub selection: Selection,
@@ -118,10 +117,8 @@ impl Picture {
     /// If the mesh cannot be read, or the picture would be empty.
     pub fn collect(mesh: &Mesh, request: &Request) -> Result<Self, Failure> {
         let (root, colour) = (mesh.manifest.root, request.colour);
-        if colour == Colour::Side && mesh.manifest.sides == Sides::Unknown {
-            let why = "the sides of this mesh are unknown: choose another colour";
-            return Err(Failure::input(why));
-        }
+        let is_known = colour != Colour::Side || mesh.manifest.sides == Sides::Known;
+        Failure::unless(is_known, "the sides of this mesh are unknown: choose another colour")?;
         if colour == Colour::Rank {
             mesh.require_ranks()?;
         }
@@ -129,10 +126,9 @@ impl Picture {
         let axes = plane_axes(slice.axis);
         let mut clip = request.selection.clip.unwrap_or(zoomed(&root, request.body, request.zoom));
         let window = clip.map(|corner| axes.map(|a| root.to_user(corner)[a]));
-        if (0..2).any(|i| window[0][i] >= window[1][i]) {
-            let why = "the clip box has no area in the plane of the slice: give a larger one";
-            return Err(Failure::input(why));
-        }
+        let has_area = (0..2).all(|i| window[0][i] < window[1][i]);
+        let why = "the clip box has no area in the plane of the slice: give a larger one";
+        Failure::unless(has_area, why)?;
         let section = request.body.map(|facets| section(&root, slice, &window, facets));
         // The window may end within the root, but the plane need not be in the box.
         (clip[0][slice.axis], clip[1][slice.axis]) = (0, UNITS_PER_EDGE);
@@ -141,10 +137,8 @@ impl Picture {
         let scales = [0, 1].map(|i| PAGE[i] / (window[1][i] - window[0][i]));
         let levels = squares::deepest(root.edge * scales[0].min(scales[1]));
         let squares = Squares::collect(mesh, &selection, colour, levels, SQUARES_MAX)?;
-        if squares.squares.is_empty() {
-            let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
-            return Err(Failure::input(why));
-        }
+        let why = if mesh.manifest.leaves == 0 { "the mesh has no leaves" } else { NO_LEAF };
+        Failure::unless(!squares.squares.is_empty(), why)?;
         let key = colour.key(&squares.squares.iter().map(|s| s.value).collect());
         let picture = Self { root, slice, colour, window, squares, key, section };
         picture.check_invariants();

@@ -177,11 +177,8 @@ impl Description {
             if description.program.is_empty() {
                 // So that another program can be run.
                 let Templates { serial, parallel, simulated, .. } = templates;
-                for word in [serial, parallel, simulated].into_iter().flatten() {
-                    if *word == first {
-                        *word = "{program}".to_owned();
-                    }
-                }
+                let words = [serial, parallel, simulated].into_iter().flatten();
+                words.filter(|word| **word == first).for_each(|word| *word = "{program}".into());
                 description.program = first;
             }
         }
@@ -206,26 +203,17 @@ impl Description {
         let (takes, limits) = (&self.takes, &self.limits);
         let (level, facets) = (case.level_deepest(), case.facets.len() as u64);
         let keep = format!("{:?}", case.keep).to_lowercase();
-        let is_enclosed_kept = case.enclosed == Enclosed::Keep;
+        let is_deeper = limits.level_max.is_some_and(|max| level > max);
+        let has_more = limits.facets_max.is_some_and(|max| facets > max);
+        let drops_crossing = !case.keep_crossing && !takes.drop_crossing;
+        let keeps_enclosed = case.enclosed == Enclosed::Keep && !takes.keep_enclosed;
         let beyond = [
-            (
-                limits.level_max.is_some_and(|max| level > max),
-                format!("level {level} (level_max in [limits])"),
-            ),
-            (
-                limits.facets_max.is_some_and(|max| facets > max),
-                format!("{facets} facets (facets_max in [limits])"),
-            ),
+            (is_deeper, format!("level {level} (level_max in [limits])")),
+            (has_more, format!("{facets} facets (facets_max in [limits])")),
             (!case.boxes.is_empty() && !takes.boxes, "extent boxes (boxes in [takes])".to_owned()),
-            (
-                !case.keep_crossing && !takes.drop_crossing,
-                "keep_crossing = false (drop_crossing in [takes])".to_owned(),
-            ),
+            (drops_crossing, "keep_crossing = false (drop_crossing in [takes])".to_owned()),
             (!case.seeds.is_empty() && !takes.seeds, "seeds (seeds in [takes])".to_owned()),
-            (
-                is_enclosed_kept && !takes.keep_enclosed,
-                "enclosed = keep (keep_enclosed in [takes])".to_owned(),
-            ),
+            (keeps_enclosed, "enclosed = keep (keep_enclosed in [takes])".to_owned()),
             (!takes.keep.contains(&case.keep), format!("keep = {keep} (keep in [takes])")),
         ];
         let (_, what) = beyond.into_iter().find(|(is_beyond, _)| *is_beyond)?;

@@ -54,7 +54,10 @@ pub fn install() -> io::Result<()> {
             // A second signal, or the time limit.
             let _ = received.set_read_timeout(Some(GRACE));
             let _ = received.read_exact(&mut byte);
-            end();
+            // Whatever other threads do.
+            clean();
+            announce();
+            exit(INTERRUPTED);
         }
     };
     thread::Builder::new().name("signals".into()).spawn(wait)?;
@@ -92,13 +95,6 @@ pub fn requested() -> bool {
 pub fn announce() {
     static SAID: Once = Once::new();
     SAID.call_once(|| _ = writeln!(io::stderr(), "harness: interrupted"));
-}
-
-/// Ends the harness, whatever its other threads do.
-fn end() -> ! {
-    clean();
-    announce();
-    exit(INTERRUPTED)
 }
 
 /// Ends the child processes, and removes unfinished files and temporary directories. Then the process must end.

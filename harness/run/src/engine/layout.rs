@@ -89,17 +89,13 @@ impl fmt::Display for Layout {
         write!(f, "{}", self.ranks)?;
         let choices =
             [("", &self.partitioner), ("base ", &self.level_base), ("weights ", &self.weights)];
-        for (label, choice) in choices {
-            if let Some(choice) = choice {
-                write!(f, ", {label}{choice}")?;
-            }
-        }
-        Ok(())
+        let mut chosen =
+            choices.iter().filter_map(|(label, choice)| Some((label, choice.as_ref()?)));
+        chosen.try_for_each(|(label, choice)| write!(f, ", {label}{choice}"))
     }
 }
 
 /// Files, choices and limits of a run.
-#[derive(Clone, Copy, Debug)]
 pub struct RunOptions<'a> {
     /// Directory for the run report, the status and the logs, which is made; no other run may use it at the same time.
     pub place: &'a Path,

@@ -45,7 +45,6 @@ pub struct Finished {
 }
 
 /// A child's name and limits, and where its output goes.
-#[derive(Clone, Debug)]
 pub struct Watch<'a> {
     /// The child's name in messages, and the `NAME` of its output files.
     pub name: &'a str,

@@ -100,9 +100,7 @@ impl RunReport {
         let text = contract::files::read_text(path).map_err(|error| wrong(error.to_string()))?;
         let mut report: Self =
             serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-        if let Some(why) = report.fault() {
-            return Err(wrong(why));
-        }
+        report.fault().map_or(Ok(()), |why| Err(wrong(why)))?;
         // A clock that is too coarse for the run shows nothing.
         report.time_wall_s = report.time_wall_s.filter(|time| *time > 0.0);
         Ok(report)

@@ -124,12 +124,9 @@ impl Engine {
             return Some(format!("the engine file of {} has no command `parallel`", self.label()));
         }
         let is_ours = parallel.iter().any(|word| [LAUNCHER, "{mpirun}"].contains(&word.as_str()));
-        (is_ours && !self.launcher.is_found()).then(|| {
-            format!(
-                "{} is not on the PATH (ci/setup installs it)",
-                self.launcher.program().display()
-            )
-        })
+        let program = self.launcher.program();
+        (is_ours && !self.launcher.is_found())
+            .then(|| format!("{} is not on the PATH (ci/setup installs it)", program.display()))
     }
 
     /// The leaf-set directory of the mesh of a run, if it writes one.
@@ -217,13 +214,8 @@ impl Engine {
         (place, limit): (&Path, Duration),
     ) -> Result<PathBuf, Failure> {
         let mesh = place.join("mesh");
-        let options = RunOptions {
-            mesh: Some(&mesh),
-            report: false,
-            ungraded,
-            ..RunOptions::new(place, limit)
-        };
-        self.run(case, layout, &options)?;
+        let plain = RunOptions { report: false, ..RunOptions::new(place, limit) };
+        self.run(case, layout, &RunOptions { mesh: Some(&mesh), ungraded, ..plain })?;
         Ok(mesh)
     }
 

@@ -32,10 +32,9 @@ const PAUSE: Duration = Duration::from_millis(20);
 pub type Start = (Command, Option<TempDir>);
 
 /// Services by name. All end with it.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Services(RefCell<BTreeMap<String, Service>>);
 
-#[derive(Debug)]
 struct Service {
     session: Session,
     /// Its end is the end of the service.

@@ -36,7 +36,6 @@ pub(super) type Ended = (ExitStatus, f64);
 pub(super) type Pipes = (Option<ChildStdin>, Option<ChildStdout>);
 
 /// The session of a child.
-#[derive(Debug)]
 pub(super) struct Session {
     pub(super) leader: Pid,
     /// What the thread sends that waits for the leader. A pause of fixed length would round the leader's wall time up to a multiple of it.

@@ -206,13 +206,10 @@ fn placeholders(word: &str) -> impl Iterator<Item = &str> {
 
 /// A word with its placeholders replaced by their values; those without a value are left as they are.
 pub fn fill(word: &str, values: &Values) -> String {
-    let mut filled = word.to_owned();
-    for name in placeholders(word) {
-        if let Some(value) = values.get(name) {
-            filled = filled.replace(&format!("{{{name}}}"), value);
-        }
-    }
-    filled
+    let known = placeholders(word).filter_map(|name| Some((name, values.get(name)?)));
+    let replaced =
+        |word: String, (name, value): (_, &String)| word.replace(&format!("{{{name}}}"), value);
+    known.fold(word.to_owned(), replaced)
 }
 
 #[cfg(test)]

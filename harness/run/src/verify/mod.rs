@@ -39,10 +39,8 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
         programs.reference.require()?;
     }
     let selected = programs.paths.catalogue.select(&options.cases, &options.size)?;
-    if selected.is_empty() {
-        let why = format!("no case in {} has this size", programs.paths.catalogue.path.display());
-        return Err(Failure::input(why));
-    }
+    let why = format!("no case in {} has this size", programs.paths.catalogue.path.display());
+    Failure::unless(!selected.is_empty(), why)?;
     let verification = Verification {
         options,
         programs,
@@ -58,6 +56,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
     let interrupted = interrupt::requested();
     workplace.close(cases.iter().any(|case| case.kept.is_some()) && (options.keep || !interrupted));
     let engine = &programs.engine.description;
+    let subjects = case::steps(engine).iter().map(|((subject, _), _)| (*subject).to_owned());
     let report = Report {
         schema: report::SCHEMA.to_owned(),
         program: format!("harness {}", env!("CARGO_PKG_VERSION")),
@@ -66,10 +65,7 @@ pub fn verify(options: &Options, programs: &Programs) -> Result<Report, Failure>
             cases: selected.iter().map(|case| case.name.clone()).collect(),
             named: !options.cases.is_empty(),
             ranks: options.rank_counts(engine),
-            subjects: case::steps(engine)
-                .iter()
-                .map(|((subject, _), _)| (*subject).into())
-                .collect(),
+            subjects: subjects.collect(),
         },
         missing: needs.missing(options, engine, &cases, interrupted),
         cases,

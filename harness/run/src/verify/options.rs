@@ -143,7 +143,7 @@ impl Options {
 pub(super) const GEOMETRY: &str = "geometry";
 
 /// The programs that stay for the whole verification, and why others are not used.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Needs {
     pub services: Services,
     /// Why something is not used.

@@ -83,17 +83,9 @@ pub struct Check {
 impl Check {
     /// A check without remarks.
     pub fn new(subject: impl Into<String>, name: impl Into<String>, outcome: Outcome) -> Self {
-        let (subject, name) = (subject.into(), name.into());
-        Self {
-            subject,
-            ranks: None,
-            name,
-            outcome,
-            time_s: 0.0,
-            notes: Vec::new(),
-            figures: None,
-            findings: 0,
-        }
+        let (subject, name, notes) = (subject.into(), name.into(), Vec::new());
+        let (ranks, figures, time_s, findings) = (None, None, 0.0, 0);
+        Self { subject, ranks, name, outcome, time_s, notes, figures, findings }
     }
 
     /// The result of a check of the crate `check`.
@@ -190,10 +182,8 @@ impl CaseReport {
                 assert!(named, "{name}: {ranks} ranks were asked for and are not in the report");
             }
             for subject in &asked.subjects {
-                assert!(
-                    self.has(subject),
-                    "{name}: {subject} was asked for and is not in the report"
-                );
+                let has = self.has(subject);
+                assert!(has, "{name}: {subject} was asked for and is not in the report");
             }
         }
         let held = |subject: &str, name: &str| {
