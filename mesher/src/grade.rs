@@ -54,9 +54,9 @@ use bricks::octant::Level;
 use bricks::tree::{Kept, PerLevel, Tree};
 use ranks::Comm;
 
-/// Bricks of a level from which on those that are full are stored as the octants that they fill. With fewer it would cost more time than it
-/// saves. In debug builds all are, so that small cases test it.
-const BRICKS_MANY: usize = if cfg!(debug_assertions) { 1 } else { 1 << 16 };
+/// Bricks of a level from which on those that are full are stored as the octants that they fill; with fewer it takes more time than the memory
+/// is worth. In debug builds few, so that in small cases some ranks do so and others do not.
+const BRICKS_MANY: usize = if cfg!(debug_assertions) { 8 } else { 1 << 16 };
 
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
 /// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
@@ -84,9 +84,8 @@ pub fn grade(
             g.split_where_kept(l - 1, reached);
         }
         // Splits of this level are complete.
-        let complete = &mut g.split[l as usize - 1];
-        if complete.len() >= BRICKS_MANY {
-            complete.condense();
+        if g.split[l as usize - 1].len() >= BRICKS_MANY {
+            g.split[l as usize - 1].condense();
         }
         touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
     }
@@ -119,8 +118,8 @@ impl Gradation<'_> {
         self.split_kept(l - 1, touched);
     }
 
-    /// The octants of level `to`, `l - 1` or `l - 2`, that the kept leaves of level `l` in bricks that this rank owns
-    /// reach within `radius` cells.
+    /// The octants of level `to`, `l - 1` or `l - 2`, that the sources of level `l` in bricks that this rank owns reach within `radius` cells:
+    /// kept leaves, or whole groups (see above). Groups without kept leaves are among these: to find them takes as long as to dilate them.
     fn reach(&mut self, l: Level, radius: u32, to: Level) -> BrickSet {
         if l > self.surface {
             let parents = self.reached(l - 1, |g, reach| {

@@ -191,11 +191,10 @@ fn of_base_mesh(
 
 /// Repartitions by the numbers of leaves. Collective.
 fn repartition_by_leaves(mesh: &mut Mesh, comm: &dyn Comm) {
-    let gone = [mesh.sides.deleted(), &mesh.crossing];
-    let gone = &gone[..if mesh.rules.keep_crossing { 1 } else { 2 }];
-    let (split, before) = (&mesh.split, &mesh.ownership);
-    let new = repartition::after_gradation(split, gone, before, mesh.level_base, comm);
-    let others = [&mut mesh.crossing, &mut mesh.sides.stored];
-    repartition::migrate(&mut mesh.split, others, &mesh.ownership, &new, comm);
-    mesh.ownership = new;
+    let Mesh { split, crossing, sides, ownership, level_base, rules, .. } = mesh;
+    let gone = [sides.deleted(), &*crossing];
+    let gone = &gone[..if rules.keep_crossing { 1 } else { 2 }];
+    let new = repartition::after_gradation(split, gone, ownership, *level_base, comm);
+    repartition::migrate(split, crossing, &mut sides.stored, ownership, &new, comm);
+    *ownership = new;
 }

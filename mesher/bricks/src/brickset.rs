@@ -147,9 +147,11 @@ impl BrickSet {
         self.full.as_ref().map_or(0, |full| u64::from(full.contains(key)) * u64::MAX)
     }
 
-    /// Stores full bricks as the octants that they fill, 64 of them in the memory of one. After that the set can only be read.
+    /// Stores full bricks as the octants that they fill, 64 of them in the memory of one, beside those that are. After that the set can only be
+    /// read.
     pub fn condense(&mut self) {
         let mut full = Self::default();
+        let before = self.replace_full(Self::EMPTY);
         self.retain(|b| {
             let is_full = b.bits == u64::MAX;
             full.push(b.key >> 6, u64::from(is_full) << (b.key & 63));
@@ -157,10 +159,11 @@ impl BrickSet {
         });
         self.low.shrink_to_fit();
         self.bits.shrink_to_fit();
-        self.replace_full(full);
+        self.replace_full(full.union(before));
     }
 
-    /// Replaces the octants that full bricks are stored as, of which the set must have no others. Without any, the set can be changed again.
+    /// Replaces the octants that full bricks are stored as, and returns those before. If there are none, the set can be changed; if there are
+    /// some, full bricks that are stored otherwise must be [condensed](Self::condense).
     pub fn replace_full(&mut self, octants: Self) -> Self {
         let new = Some(Box::new(octants)).filter(|full| !full.is_empty());
         std::mem::replace(&mut self.full, new).map_or(Self::EMPTY, |full| *full)

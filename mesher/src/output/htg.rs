@@ -37,8 +37,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
     let begin = || TreeWriter::new(out.file(TREE)?, shape.clone());
     let failed = out.failed(TREE);
-    let file = (comm.rank() == 0).then(begin).transpose().map_err(&failed);
-    let mut file = ranks::agree(comm, file)?;
+    let mut file = ranks::agree(comm, (comm.rank() == 0).then(begin).transpose().map_err(&failed))?;
     let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
@@ -77,7 +76,8 @@ fn messages(
     for (to, window) in windows.enumerate() {
         let end = groups(window).end;
         let more = std::iter::from_fn(|| own.next_if(|(first, _)| *first < end));
-        for (first, siblings) in last.take().into_iter().chain(more) {
+        let again = last.take().filter(|(first, _)| first + 8 > groups(window).start);
+        for (first, siblings) in again.into_iter().chain(more) {
             let Siblings { split, deleted, crossing, inside } = siblings;
             messages.write(to, [first, split, deleted, crossing, inside]);
             *last = Some((first, siblings));
@@ -131,7 +131,9 @@ impl Numbering {
         let intervals = ownership.boundaries().len();
         let (mut nodes, mut first) = (vec![1], vec![0; LEVELS * intervals]);
         for l in 1..LEVELS as Level {
+            let mut before = None;
             for b in Tree::exists(&mesh.split, l).filter(|b| ownership.owns(l, b.key)) {
+                assert!(before.replace(b.key) < Some(b.key), "level {l}: bricks must ascend");
                 first[place(ownership, l, b.key)] += u64::from(b.bits.count_ones() / 8);
             }
         }

@@ -64,10 +64,11 @@ pub fn after_gradation(
     leaves.repartition(TOLERANCE_LEAVES, comm)
 }
 
-/// Sends the bricks of `split` and other sets to the ranks that hold them in another partition. Collective.
+/// Sends the bricks of three sets to the ranks that hold them in another partition; `split` may be condensed on some ranks and not on others. Collective.
 pub fn migrate(
     split: &mut PerLevel,
-    others: [&mut PerLevel; 2],
+    crossing: &mut PerLevel,
+    stored: &mut PerLevel,
     from: &Ownership,
     to: &Ownership,
     comm: &dyn Comm,
@@ -75,24 +76,23 @@ pub fn migrate(
     // Bricks that are stored as the octants that they fill move so.
     let mut full = PerLevel::default();
     (2..LEVELS).for_each(|l| full[l - 2] = split[l].replace_full(BrickSet::EMPTY));
-    let [crossing, stored] = others;
     for set in [&mut *split, &mut *crossing, &mut *stored] {
         for (l, bricks) in (0..).zip(set).filter(|(l, _)| from.is_replicated(*l)) {
-            // Of the replicas of a brick, only its owner's is sent.
+            // Of the other replicas of a brick, only its owner's is sent.
             bricks.retain(|b| if from.owns(l, b.key) { b.bits } else { 0 });
         }
     }
     to.synchronise_replicas(&mut [split, crossing, stored, &mut full], comm);
     for (l, mut octants) in (0..).zip(full).filter(|(_, octants)| !octants.is_empty()) {
-        if to.is_replicated(l) {
-            // Other octants of these fill bricks that this rank does not hold.
-            let is_held = |key| !matches!(to.placement(l + 2, key), Placement::Remote(_));
-            octants.retain(|b| {
-                let keys = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
-                keys.filter(|key| is_held(*key)).map(|key| 1 << (key & 63)).sum()
-            });
-        }
+        // Other octants of these fill bricks that this rank does not hold.
+        let is_held = |key| !matches!(to.placement(l + 2, key), Placement::Remote(_));
+        octants.retain(|b| {
+            let keys = ones(b.bits).map(|bit| b.key << 6 | u64::from(bit));
+            keys.filter(|key| is_held(*key)).map(|key| 1 << (key & 63)).sum()
+        });
+        // Ranks that had not condensed their part of the level have sent full bricks as such, perhaps the same ones.
         split[l as usize + 2].replace_full(octants);
+        split[l as usize + 2].condense();
     }
 }
 
