@@ -5,9 +5,9 @@
 //! box. A clipped facet is represented by points whose convex hull it is. Facets that degenerate to
 //! points or segments are convex hulls too and need no special case.
 //!
-//! The coordinates of clipped points are fractions. Facet coordinates are at most 2^28 in absolute
-//! value and box planes lie in [0, 2^27], so the distance of a point from a plane is at most 2^28,
-//! and a coordinate with denominator w has a numerator of at most 2^28 w. Upper bounds:
+//! The coordinates of clipped points are fractions. Facet coordinates lie in [-2^27, 2^28] and
+//! box planes in [0, 2^27], so the distance of a point from a plane is at most 2^28, and a
+//! coordinate with denominator w has a numerator of at most 2^28 w. Upper bounds:
 //!
 //! | | denominator | numerator | distance from a plane, times the denominator |
 //! |---|---|---|---|

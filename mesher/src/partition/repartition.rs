@@ -211,7 +211,9 @@ fn weight_of_brick(open: u64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bricks::brick::Brick;
     use bricks::octant::start57;
+    use ranks::sim;
 
     const LEVEL: Level = 5;
 
@@ -281,6 +283,36 @@ mod tests {
             };
             let (some, all) = (sum(&within(&some)), sum(&within(&all)));
             assert!(some.abs_diff(all) < all / 10, "eighth {eighth}: {some} for {all}");
+        }
+    }
+
+    #[test]
+    fn bricks_move_whether_ranks_have_condensed_them_or_not() {
+        let l = 6;
+        // A boundary in a brick, which both ranks hold.
+        let along =
+            |rank, key: u64| Ownership::along(rank, 2, [(0, 0), (start57(l, key * 64 + 24), 1)]);
+        for (condensed, [begin, end]) in (0..4)
+            .flat_map(|condensed| [[1000, 777], [777, 1000], [5, 5]].map(|at| (condensed, at)))
+        {
+            let moved = sim::run(2, 1, |comm| {
+                let (from, to) = (along(comm.rank(), begin), along(comm.rank(), end));
+                let held = |of: &Ownership| -> BrickSet {
+                    let is_held =
+                        |key: &u64| !matches!(of.placement(l, *key), Placement::Remote(_));
+                    let bits = |key| if key % 100 == 77 { 5 } else { u64::MAX };
+                    (0..4096).filter(is_held).map(|key| Brick { key, bits: bits(key) }).collect()
+                };
+                let (mut split, mut other) = (PerLevel::default(), PerLevel::default());
+                split[l as usize] = held(&from);
+                if condensed >> comm.rank() & 1 == 1 {
+                    split[l as usize].condense();
+                }
+                migrate(&mut split, &mut other, &mut PerLevel::default(), &from, &to, comm);
+                split[l as usize].check_invariants();
+                split[l as usize].bricks().eq(held(&to).bricks())
+            });
+            assert_eq!(moved, [true, true], "{condensed:02b} from {begin} to {end}");
         }
     }
 
