@@ -4,7 +4,7 @@
 //! be positive: a difference of two terms fits what was measured, and has no meaning beyond it. Terms are chosen for what the sum is needed for,
 //! which is to predict values further on: of all choices, the one is taken that best predicts the values beyond each place in the further half of
 //! the data from those up to it. A sum of many terms, and leave-one-out cross-validation, choose what interpolates best. That is for exact values;
-//! so few predictions of noisy ones do not tell terms apart, and the sum of all terms is better.
+//! so few predictions of noisy ones do not distinguish terms, and the sum of all terms is better.
 
 /// Where a value was measured, such as a number of ranks, which is also the weight of its square error; the value; and the
 /// values of all terms, none of which is negative.

@@ -64,7 +64,8 @@ pub fn after_gradation(
     leaves.repartition(TOLERANCE_LEAVES, comm)
 }
 
-/// Sends the bricks of three sets to the ranks that hold them in another partition; `split` may be condensed on some ranks and not on others. Collective.
+/// Sends the bricks of three sets to the ranks that hold them in another partition. `split` may be condensed on some ranks and not on others.
+/// Collective.
 pub fn migrate(
     split: &mut PerLevel,
     crossing: &mut PerLevel,

@@ -62,7 +62,7 @@ const TERMS: [Term; 9] = [
 /// Terms of times beside counters.
 const OTHER_CAUSES: [Term; 3] = [TERMS[1], TERMS[4], TERMS[6]];
 
-/// The most terms of a counter, which is exact, and of a time, which is not: predictions among its runs cannot tell terms apart.
+/// The most terms of a counter, which is exact, and of a time, which is not: predictions among its runs cannot distinguish terms.
 const TERMS_MAX: [usize; 2] = [3, usize::MAX];
 /// Counters are of runs on more ranks than these, or than the most ranks over them: few ranks communicate in other ways, such as without groups.
 const FEW: f64 = 8.0;
