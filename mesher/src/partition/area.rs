@@ -20,7 +20,7 @@ pub fn leaves_per_surface_cell(rules: &Rules) -> u64 {
 }
 
 /// The number of leaves that the boxes ask for in an octant.
-fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
+pub fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
     let (min, h) = (corner(l, code), edge(l));
     let leaves = |b: &ExtentBox| {
         let span = |a: usize| (b.max[a].min(min[a] + h) - b.min[a].max(min[a])).max(0);

@@ -81,7 +81,7 @@ impl Estimate<'_> {
         let comm = self.comm;
         let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
         let level = level.min(level_last(self.rules));
-        let (mut leaves, _) =
+        let (_, mut leaves) =
             self.all_bins(&area::of(self.facets, self.rules, level), level, FINE_PER_RANK);
         if division.weights == Weights::Unit {
             leaves.iter_mut().for_each(|leaf| leaf[1] = 1);
@@ -101,7 +101,7 @@ impl Estimate<'_> {
     /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
-        let (bins, light) = self.all_bins(&local, coarse, 1);
+        let (light, bins) = self.all_bins(&local, coarse, 1);
         let boundaries = curve::partition(&bins, comm.size(), &Solo);
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
@@ -114,19 +114,19 @@ impl Estimate<'_> {
         Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
     }
 
-    /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; with the number of leaves
-    /// that need not be resolved further. Collective.
-    fn all_bins(&self, local: &[Bin], level: Level, per_rank: u64) -> (Vec<Bin>, u64) {
+    /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; before them the number of
+    /// leaves that need not be resolved further. Collective.
+    fn all_bins(&self, local: &[Bin], level: Level, per_rank: u64) -> (u64, Vec<Bin>) {
         let comm = self.comm;
         let shift = 3 * (LEVEL_MAX - level);
         let coarse = local.iter().map(|b| [b[0] >> shift << shift, b[1]]).collect();
         let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
-        let light = leaves(&bins) / (comm.size() as u64 * per_rank);
+        let estimated = leaves(&bins) + area::leaves_in_boxes(0, 0, self.rules);
+        let light = estimated / (comm.size() as u64 * per_rank);
         area::add_boxes(&mut bins, self.rules, level, light, &curve::ALL);
         combine(&mut bins, u64::wrapping_add);
-        let light = leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK);
-        (bins, light)
+        (leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK), bins)
     }
 }
 
@@ -239,6 +239,19 @@ mod tests {
                 coarse.ownership.boundaries().iter().all(is_between) && coarse.level_base == level
             );
         }
+    }
+
+    #[test]
+    fn boxes_are_resolved_to_the_parts_of_ranks_where_facets_are_few() {
+        let h = ROOT_EDGE / 2;
+        let half = ExtentBox { min: [0; 3], max: [2 * h, 2 * h, h], level: 9 };
+        let rules = rules(vec![half]);
+        let facets = &sheet()[..1];
+        let bins = sim::run(RANKS, 5, |comm| {
+            let local = area::of(facets, &rules, FINE);
+            Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, 1).1.len()
+        });
+        assert!(bins.iter().all(|n| (RANKS..=8 * RANKS + 8).contains(n)), "{bins:?}");
     }
 
     #[test]
