@@ -22,7 +22,7 @@ use crate::partition::ownership::{Ownership, brick_start};
 use crate::record::Counters;
 use bricks::brick;
 use bricks::brickset::ones;
-use bricks::facet::{Facet, crossed};
+use bricks::facet::{Facet, Tested, crossed};
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use bricks::tree::Tree;
 use ranks::{Comm, MessageBuffer};
@@ -150,6 +150,7 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
+        tested: vec![Tested::default(); TESTED],
         counters: Counters::default(),
     };
     let all = [0..binned.facets.len(), 0..0];
@@ -157,6 +158,9 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
     v.brick(rules.level_surface & 1, 0, all, &rules.boxes);
     (v.tree, v.counters)
 }
+
+/// Number of facets that are kept prepared. Depth first, the bricks that a facet reaches follow each other closely.
+const TESTED: usize = 256;
 
 struct Voxeliser<'a> {
     binned: &'a BinnedFacets,
@@ -167,6 +171,8 @@ struct Voxeliser<'a> {
     lists: Vec<u32>,
     /// Tested facets of the bricks on the path from the root, with the octants that they cross.
     pairs: Vec<(u32, u64)>,
+    /// Recently tested facets, each at its index modulo the length.
+    tested: Vec<Tested>,
     counters: Counters,
 }
 
@@ -245,7 +251,8 @@ impl Voxeliser<'_> {
     #[inline]
     fn test(&mut self, f: u32, l: Level, min_corner: [i64; 3]) -> u64 {
         self.counters.facet_brick_tests += 1;
-        let mask = crossed(&self.binned.facets[f as usize], min_corner, l);
+        let facet = &self.binned.facets[f as usize];
+        let mask = self.tested[f as usize % TESTED].octants(facet, min_corner, l);
         if mask != 0 {
             self.pairs.push((f, mask));
         }

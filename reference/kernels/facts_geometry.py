@@ -22,9 +22,9 @@ def abs_at_most(n, bound): return z3.And(-bound <= n.x, n.x <= bound)
 
 
 @fact(FACET, ("let first = (lo - corner[axis] - 1) >> shift;", "let first = (lo - corner[axis]) >> shift;"), ("let last = (hi - corner[axis]) >> shift;", "let last = (hi - corner[axis] - 1) >> shift;"),
-      ("let shift = ROOT_BITS - l;\n    let mut wide", "let shift = ROOT_BITS - l - 1;\n    let mut wide"))
+      ("let shift = ROOT_BITS - l;\n        let mut wide", "let shift = ROOT_BITS - l - 1;\n        let mut wide"))
 def extents(k):
-    """The coordinate axes of `crossed`: an octant is left out if and only if its closed cube and the facet's extent are disjoint, for all
+    """The coordinate axes of `octants`: an octant is left out if and only if its closed cube and the facet's extent are disjoint, for all
     facets, bricks and levels up to 20."""
     every = {"separated": lambda *_: Number("u64", (1 << 64) - 1)}
     for l in range(21):
@@ -32,7 +32,7 @@ def extents(k):
         extent = [[k.integer("i64", *VERTEX), k.integer("i64", *VERTEX)] for _ in AXES]
         k.given.append(z3.And([low.x <= high.x for low, high in extent]))
         corner = [k.integer("i64", 0, ROOT) for _ in AXES]
-        mask = k("crossed", Struct(), corner, u32(l), file=FACET, replaced={**every, "range": lambda run, f, axis: extent[axis]})
+        mask = k("octants", Struct(), Struct(), corner, u32(l), file=FACET, replaced={**every, "prepared": lambda *_: Struct(), "range": lambda run, f, axis: extent[axis]})
         meets = [[z3.And(extent[a][0].x <= corner[a].x + (i + 1) * h, extent[a][1].x >= corner[a].x + i * h) for i in range(4)] for a in AXES]
         yield z3.And([has(mask, i) == z3.And([meets[a][p[a]] for a in AXES]) for i, p in enumerate(OCTANTS)])
 
@@ -60,24 +60,29 @@ def columns(k):
 def square(i, a): return OCTANTS[i][(a + 1) % 3] + 4 * OCTANTS[i][(a + 2) % 3]
 
 
-def extruded(half, a):
-    """The same as a function of a byte that is a term."""
-    return lambda byte: Number("u64", word(bit(byte, square(i, a) % 8) if square(i, a) // 8 == half else no(i) for i in range(64)))
-
-
 # The instructions of AVX-512 that the lanes use, by their manual.
 def lanes_where(run, op, a, b):
     lanes = [run.compared(op, x, y) for x, y in zip(a, b)]
-    return Number("u8", sum(lane << i for i, lane in enumerate(lanes)) if all(isinstance(lane, bool) for lane in lanes) else word(lanes))
+    return Number(f"u{len(lanes)}", sum(lane << i for i, lane in enumerate(lanes)) if all(isinstance(lane, bool) for lane in lanes) else word(lanes))
+
+
+def without_sign(n):
+    return Number("i64", n.x % (1 << 64) if n.is_known else z3.If(n.x < 0, n.x + (1 << 64), n.x))
 
 
 AVX512 = {
     "_mm512_set1_epi64": lambda run, v: [v] * 8,
+    "_mm512_set1_epi32": lambda run, v: [v] * 16,
+    "_mm512_setr_epi32": lambda run, *v: [coerced(x, "i32") for x in v],
+    "_mm512_add_epi32": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
+    "_mm512_mullo_epi32": lambda run, a, b: [run.binary("*", x, y) for x, y in zip(a, b)],
+    "_mm512_cmpge_epi32_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
     "_mm512_setr_epi64": lambda run, *v: [coerced(x, "i64") for x in v],
     "_mm512_maskz_set1_epi64": lambda run, m, v: [v if plain(m) >> i & 1 else i64(0) for i in range(8)],
     "_mm512_add_epi64": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
     "_mm512_cmpge_epi64_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
-    "_mm512_mask_cmple_epi64_mask": lambda run, m, a, b: run.binary("&", m, lanes_where(run, "<=", a, b)),
+    "_mm512_cmple_epu64_mask": lambda run, a, b: lanes_where(run, "<=", map(without_sign, a), map(without_sign, b)),
+    **{f"_mm512_kunpack{size}": lambda run, high, low, width=width: run.binary("|", run.binary("<<", high, width), low) for size, width in (("b", 8), ("w", 16), ("d", 32))},
 }
 SHIFTS = range(7, 28)  # of octants of levels 20 to 0
 
@@ -85,50 +90,63 @@ SHIFTS = range(7, 28)  # of octants of levels 20 to 0
 def half_plane(k, lanes):
     for shift in SHIFTS:
         h = 1 << shift
-        for a in AXES:
-            u, w = (a + 1) % 3, (a + 2) % 3
-            start = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
-            eu, ew = (k.integer("i64", -(3 << 27), 3 << 27) for _ in range(2))
-            mask = k("half_plane", start, eu, ew, usize(a), u32(shift), function(lanes), file=FACET, replaced={**AVX512, "COLUMNS": [[extruded(half, a) for half in range(2)] for a in AXES]})
-            def edge(i, j): return eu.x * (h * j - start[w].x) - ew.x * (h * i - start[u].x)
-            meets = {(i, j): maximum([edge(i + di, j + dj) for di in range(2) for dj in range(2)]) >= 0 for i in range(4) for j in range(4)}
-            yield z3.And([has(mask, i) == meets[p[u], p[w]] for i, p in enumerate(OCTANTS)])
+        ci, cj = (k.integer("i32", -(3 << 27), 3 << 27) for _ in range(2))
+        start, corner = [k.integer("i64", *VERTEX) for _ in range(2)], [k.integer("i64", 0, ROOT) for _ in range(2)]
+        growth = ci.x + cj.x + maximum([ci.x, z3.IntVal(0)]) + maximum([cj.x, z3.IntVal(0)])
+        side = Struct(ci=ci, cj=cj, at_origin=Number("i64", -(ci.x * start[0].x) - cj.x * start[1].x), growth=Number("i32", growth))
+        mask = k("half_plane", side, corner, u32(shift), function(lanes), file=FACET, replaced=AVX512)
+        def edge(i, j): return ci.x * (h * i + corner[0].x - start[0].x) + cj.x * (h * j + corner[1].x - start[1].x)
+        for i in range(4):
+            for j in range(4):
+                yield has(mask, i + 4 * j) == (maximum([edge(i + di, j + dj) for di in range(2) for dj in range(2)]) >= 0)
 
 
-@fact(FACET, ("let qw = if eu > 0 { h - from[w] }", "let qw = if eu < 0 { h - from[w] }"), ("let c = (eu * qw - ew * qu) >> shift;", "let c = -((ew * qu - eu * qw) >> shift);"),
-      ("let v = ci * (k & 3) as i64 + cj * (k >> 2) as i64 + c;", "let v = cj * (k & 3) as i64 + ci * (k >> 2) as i64 + c;"))
+@fact(FACET, ("+ i64::from(side.growth);", "+ i64::from(side.growth) - 1;"), ("let v = ci * ((k & 3) - 1) + cj * ((k >> 2) - 1);", "let v = cj * ((k & 3) - 1) + ci * ((k >> 2) - 1);"),
+      ("let v = ci * ((k & 3) - 1) + cj * ((k >> 2) - 1);", "let v = ci * ((k & 3) - 2) + cj * ((k >> 2) - 2);"))
 def half_planes(k):
-    """`half_plane` with `edge_lanes`: an octant's projection meets the closed half-plane if and only if some corner of its square does, and
-    all terms fit i64, for all edges, starts, axes and levels up to 20."""
+    """`half_plane` with `edge_lanes`: a square meets the closed half-plane if and only if some corner of it does, and all terms fit their
+    types, for all edges, starts, corners of bricks, and levels up to 20."""
     yield from half_plane(k, "edge_lanes")
 
 
-@fact(FACET, ("_mm512_set1_epi64(-c - 2 * cj)", "_mm512_set1_epi64(-c - cj)"), ("cj, ci + cj, 2 * ci + cj, 3 * ci + cj)", "cj, ci + cj, 2 * ci + cj, 2 * ci + cj)"))
+@fact(FACET, ("along(ci, i), along(cj, j)", "along(cj, i), along(ci, j)"), ("-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2)", "-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 1)"))
 def half_planes_avx512(k):
     """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
     yield from half_plane(k, "edge")
 
 
-@fact(FACET, ("if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() {", "if eu.abs() + ew.abs() > best.0.abs() + best.1.abs() + 1 {"), ("best = (eu, ew, from);", "best = (ew, eu, from);"),
-      ("let mut best = (0i64, 0i64, p[0]);", "let mut best = (0i64, 1i64, p[0]);"))
+def projected(k): return [[k.integer("i32", *VERTEX) for _ in AXES] for _ in range(3)]
+def value(side, q, u, w): return side["ci"].x * q[u].x + side["cj"].x * q[w].x + side["at_origin"].x
+
+
+@fact(FACET, ("let (ci, cj) = (-ew * sign, eu * sign);", "let (ci, cj) = (ew * sign, eu * sign);"), ("ci.max(0) + cj.max(0)", "ci.max(0) + cj.min(0)"), ("at_origin: -at(ci, u) - at(cj, w)", "at_origin: -at(ci, w) - at(cj, u)"))
+def edges(k):
+    """The `sides` of a facet whose projection has an area are the edge functions of its edges, with the sign that makes them positive
+    inside; `growth` is what `half_planes` takes it for, and coefficients are at most 3 * 2^27."""
+    for sign in (1, -1):
+        for a in AXES:
+            (u, w), v, q = ((a + 1) % 3, (a + 2) % 3), projected(k), [k.integer("i64", *VERTEX) for _ in AXES]
+            for i, side in enumerate(k("sides", v, i64(sign), usize(a), file=FACET)):
+                start, to, ci, cj = v[i], v[(i + 1) % 3], side["ci"].x, side["cj"].x
+                yield value(side, q, u, w) == sign * ((to[u].x - start[u].x) * (q[w].x - start[w].x) - (to[w].x - start[w].x) * (q[u].x - start[u].x))
+                yield side["growth"].x == ci + cj + z3.If(ci > 0, ci, 0) + z3.If(cj > 0, cj, 0)
+                yield z3.And([z3.And(-(3 << 27) <= c, c <= 3 << 27) for c in (ci, cj)])
+
+
+@fact(FACET, ("max_by_key(|e| e.0.abs() + e.1.abs())", "max_by_key(|e| e.0.abs())"), ("max_by_key(|e| e.0.abs() + e.1.abs())", "max_by_key(|e| e.0 + e.1)"),
+      ("[side(longest, 1), side(longest, -1), side(longest, -1)]", "[side(longest, 1), side(longest, 1), side(longest, -1)]"))
 def degenerate(k):
-    """The line that `degenerate_mask` tests, of a facet whose projection has no area, contains all three projected vertices; it has no
-    direction only if they are one point. Both half-planes of the line are tested."""
+    """The line of the `sides` of a facet whose projection has no area contains all three projected vertices; it has no direction only if
+    they are one point. Both of its half-planes are among the sides."""
     for a in AXES:
-        u, w = (a + 1) % 3, (a + 2) % 3
-        p = [[k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES] for _ in range(3)]
+        (u, w), p = ((a + 1) % 3, (a + 2) % 3), projected(k)
         def turn(a, b, c): return (b[u].x - a[u].x) * (c[w].x - a[w].x) - (b[w].x - a[w].x) * (c[u].x - a[u].x)
         collinear = turn(*p) == 0
-        tested = []
-        def half_plane(run, start, eu, ew, *_):
-            tested.append((z3.And(run.path), start, eu, ew))
-            return Number("u64", (1 << 64) - 1)
-        k.paths("degenerate_mask", p, usize(a), u32(8), lambda run: None, file=FACET, replaced={"half_plane": half_plane})
-        for (path, start, eu, ew), (_, other, *back) in zip(tested[::2], tested[1::2]):
+        for path, (side, other, last) in k.paths("sides", p, i64(0), usize(a), file=FACET):
             yield z3.Implies(z3.And(path, collinear), z3.And(
-                *[eu.x * (q[w].x - start[w].x) - ew.x * (q[u].x - start[u].x) == 0 for q in p],
-                z3.Implies(z3.And(eu.x == 0, ew.x == 0), z3.And([z3.And(q[u].x == p[0][u].x, q[w].x == p[0][w].x) for q in p])),
-                back[0].x == -eu.x, back[1].x == -ew.x, start[u].x == other[u].x, start[w].x == other[w].x))
+                *[value(side, q, u, w) == 0 for q in p],
+                z3.Implies(z3.And(side["ci"].x == 0, side["cj"].x == 0), z3.And([z3.And(q[u].x == p[0][u].x, q[w].x == p[0][w].x) for q in p])),
+                *[back[of].x == -side[of].x for of in ("ci", "cj", "at_origin") for back in (other, last)]))
 
 
 def plane(k, lanes):
@@ -136,22 +154,24 @@ def plane(k, lanes):
         h = 1 << shift
         n = [k.integer("i64", -18 << 54, 18 << 54) for _ in AXES]
         vertex = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
-        mask = k("plane_mask", [vertex] * 3, n, u32(shift), function(lanes), file=FACET, replaced=AVX512)
+        mask = k("plane_mask", vertex, n, u32(shift), function(lanes), file=FACET, replaced=AVX512)
         offset = sum(n[a].x * vertex[a].x for a in AXES)
         most, least = [sum(h * each([n[a].x, z3.IntVal(0)]) for a in AXES) for each in (maximum, minimum)]
         def meets(p): at = sum(h * p[a] * n[a].x for a in AXES) - offset; return z3.And(at + most >= 0, at + least <= 0)
-        yield z3.And([has(mask, i) == meets(p) for i, p in enumerate(OCTANTS)])
+        # Always so, which is lost where products become unknowns.
+        is_plane = z3.Or([offset == 0] + [c.x != 0 for c in n])
+        yield z3.Implies(is_plane, z3.And([has(mask, i) == meets(p) for i, p in enumerate(OCTANTS)]))
 
 
-@fact(FACET, ("let bound = 4 * i128::from(up - down) + 4;", "let bound = 3 * i128::from(up - down) - 4;"), ("let ceil = clamp(-((-offset) >> shift));", "let ceil = clamp(offset >> shift);"),
-      ("let bound = 4 * i128::from(up - down) + 4;", "let bound = 16 * i128::from(up - down) + 4;"))
+@fact(FACET, ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 3 * i128::from(up - down) {"), ("let ceil = (offset + ((1 << shift) - 1)) >> shift;", "let ceil = offset >> shift;"),
+      ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 16 * i128::from(up - down) {"))
 def planes(k):
     """`plane_mask` with `plane_lanes`: an octant meets the facet's plane if and only if its corners are not all on one side, for all normals,
-    vertices and levels up to 20. Clamping changes no answer, and all lanes fit i64."""
+    vertices and levels up to 20. What is decided without lanes is decided so, and all lanes fit i64."""
     yield from plane(k, "plane_lanes")
 
 
-@fact(FACET, ("let base = 2 * (n[0] * (byte & 1)", "let base = 2 * (n[0] * (byte & 3)"), ("lane(0xf0, n[2])", "lane(0xf8, n[2])"))
+@fact(FACET, ("let base = 2 * (n[0] * (byte & 1)", "let base = 2 * (n[0] * (byte & 3)"), ("lane(0xf0, n[2])", "lane(0xf8, n[2])"), ("_mm512_set1_epi64(most - least)", "_mm512_set1_epi64(most)"))
 def planes_avx512(k):
     """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
     yield from plane(k, "plane")

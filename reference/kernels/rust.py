@@ -234,6 +234,7 @@ class Run:
     def on_array(self, scope, items): return [self.evaluate(i, scope) for i in items]
     def on_repeat(self, scope, item, count): return [self.evaluate(item, scope) for _ in range(plain(self.evaluate(count, scope)))]
     def on_field(self, scope, e, name): v = self.evaluate(e, scope); return getattr(v, name) if isinstance(v, Range) else v[int(name)] if isinstance(v, list) else v[name]
+    def on_struct(self, scope, fields): return Struct({name: self.evaluate(e, scope) for name, e in fields})
     def on_closure(self, scope, parameters, body): return lambda *args: self.apply(("", [], parameters, "", body), args, scope)
     def on_return(self, scope, e): raise Leave("return", self.evaluate(e, scope))
     def on_continue(self, scope): raise Leave("continue")
@@ -486,6 +487,9 @@ class Run:
     def list_filter(self, v, f): return [x for x in v if self.truth(f(x))]
     def list_enumerate(self, v): return [[i, x] for i, x in enumerate(v)]
     def list_find(self, v, f): return next((x for x in v if self.truth(f(x))), None)
+
+    def list_max_by_key(self, v, f): return self.list_fold(v[1:], v[0], lambda best, x: x if self.truth(self.binary(">=", f(x), f(best))) else best)
+    def list_expect(self, v): return v
 
     def list_fold(self, v, value, f):
         for x in v:

@@ -205,4 +205,7 @@ class Parser:
             return ("continue",)
         if kind != "name":
             raise SyntaxError(f"{[t[1] for t in self.tokens[self.at:self.at + 8]]}")
-        return "path", *self.path()
+        names, generics = self.path()
+        if re.fullmatch("[A-Z][a-z]+", names[-1]) and self.take("{"):
+            return "struct", self.list("}", lambda: (name := self.next()[1], self.expression() if self.take(":") else ("path", [name], [])))
+        return "path", names, generics

@@ -82,8 +82,9 @@ def ray(r):
 def separated(plane, edge):
     """The tests by lanes, without asking which the processor has."""
     def generic(run, f, corner, shift):
+        f = f if "facet" in f else run.call("new", [f], FACET)
         return run.call("generic", [f, corner, shift, lambda *a: run.call(plane, a, FACET), lambda *a: run.call(edge, a, FACET)], FACET)
-    return {"separated": generic, **AVX512}
+    return {"separated": generic, "default": lambda run: Struct(), "prepared": lambda run, _, f: run.call("new", [f], FACET), **AVX512}
 
 
 PORTABLE, WIDE = separated("plane_lanes", "edge_lanes"), separated("plane", "edge")
