@@ -12,11 +12,13 @@ use crate::input::lattice::Keep;
 use crate::mesh::Mesh;
 use bricks::brick;
 use bricks::brickset::{Cursor, ones};
-use bricks::octant::{Level, Side, start57};
+use bricks::octant::{Level, start57};
 use bricks::tree::LEVELS;
+use bricks::widest;
+use std::array::from_fn;
 
-/// Number of words that are buffered before they are passed to the sink.
-const CHUNK: usize = 4096;
+/// Number of parts of bricks whose words are passed to the sink at a time.
+const WAITING: usize = 256;
 
 /// Number of leaves, `[level][side]`.
 pub type Counts = [[u64; 3]; LEVELS];
@@ -36,13 +38,16 @@ impl Mesh {
         let mut walk = Walk {
             levels: (0..LEVELS).map(|l| LevelCursors::new(self, l)).collect(),
             mesh: self,
-            buffer: Vec::with_capacity(CHUNK + 512),
+            waiting: Vec::with_capacity(WAITING + 65),
+            // A brick that is not emitted yet may add 65 parts.
+            words: vec![0; 64 * (WAITING + 66)],
             counts: Counts::default(),
+            bits: from_fn(|byte| from_fn(|o| byte as u64 >> o & 1)),
             sink,
         };
         let root = walk.load(0, 0, 1, 0, 0);
-        walk.group(0, &root, 0)?;
-        walk.flush(1)?;
+        walk.emit(&root, 1)?;
+        walk.flush()?;
         Ok(walk.counts)
     }
 }
@@ -80,7 +85,7 @@ impl<'a> LevelCursors<'a> {
     }
 
     /// Reads a brick, to which the octants above pass on that they cross or are inside. Keys must ascend.
-    #[inline]
+    #[inline(always)]
     pub fn read(&mut self, key: u64, crossing: u64, inside: u64) -> Octants {
         let stored = self.stored.get(key);
         let (inside, deleted) = match self.mesh.sides.keep {
@@ -94,8 +99,9 @@ impl<'a> LevelCursors<'a> {
     }
 }
 
-/// A brick on the path from the root.
+/// A brick on the path from the root, or leaves of it that follow each other in the stream.
 struct Loaded {
+    level: Level,
     key: u64,
     /// Leaves to emit.
     leaves: u64,
@@ -106,81 +112,98 @@ struct Loaded {
 struct Walk<'a, S> {
     levels: Vec<LevelCursors<'a>>,
     mesh: &'a Mesh,
-    buffer: Vec<u64>,
+    /// Leaves whose words have not been made.
+    waiting: Vec<Loaded>,
+    words: Vec<u64>,
     counts: Counts,
+    /// The bits of every byte, one to a word: the compiler makes poor vector code of shifts by constants.
+    bits: [[u64; 8]; 256],
     sink: S,
 }
 
 impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     /// Reads a brick whose octants `exists` exist; `crossing` and `inside` are inherited from base leaves.
-    #[inline]
-    fn load(&mut self, l: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
-        let (ownership, cursors) = (&self.mesh.ownership, &mut self.levels[l as usize]);
-        let mut octants = cursors.read(key, crossing, inside);
+    #[inline(always)]
+    fn load(&mut self, level: Level, key: u64, exists: u64, crossing: u64, inside: u64) -> Loaded {
+        let mut octants = self.levels[level as usize].read(key, crossing, inside);
         octants.split &= exists;
-        let Octants { split, crossing, inside, deleted } = octants;
-        let leaves = if ownership.owns(l, key) { exists & !split & !deleted } else { 0 };
-        let counts = &mut self.counts[l as usize];
-        let count = |side: u64| u64::from((leaves & side).count_ones());
-        counts[Side::Crossing as usize] += count(crossing);
-        counts[Side::Inside as usize] += count(inside);
-        counts[Side::Outside as usize] += count(!(crossing | inside));
-        Loaded { key, leaves, octants }
+        let is_owned = self.mesh.ownership.owns(level, key);
+        let leaves = if is_owned { exists & !octants.split & !octants.deleted } else { 0 };
+        Loaded { level, key, leaves, octants }
     }
 
-    /// Emits eight siblings and their descendants.
-    fn group(&mut self, l: Level, brick: &Loaded, j: u64) -> Result<(), E> {
+    /// Emits the groups of eight siblings `groups` of a brick, and their descendants.
+    fn emit(&mut self, brick: &Loaded, groups: u64) -> Result<(), E> {
         let Octants { split, crossing, inside, .. } = brick.octants;
-        let split = brick::byte(split, j);
-        let parent = brick.key << 3 | j;
-        if split == 0 {
-            self.put(l, parent, brick, j, 0xff);
-            return self.flush(CHUNK);
-        }
-        let below = |sides: u64| brick::children(brick::byte(sides, j) & split);
-        let exists = brick::children(split);
-        let child = self.load(l + 1, parent, exists, below(crossing), below(inside));
-        for o in 0..8 {
-            if split >> o & 1 == 0 {
-                self.put(l, parent, brick, j, 1 << o);
-            } else if child.octants.split == 0 {
-                // The usual case at the finest level: saves a call per group.
-                self.put(l + 1, parent << 3 | o, &child, o, 0xff);
-            } else {
-                self.group(l + 1, &child, o)?;
+        let mut rest = groups;
+        for j in ones(brick::parents(split & groups).into()).map(u64::from) {
+            let below = |sides: u64| brick::children(brick::byte(split & sides, j));
+            let (level, key) = (brick.level + 1, brick.key << 3 | j);
+            let child = self.load(level, key, below(u64::MAX), below(crossing), below(inside));
+            let mut split = u32::from(brick::byte(split, j));
+            while split != 0 {
+                // Siblings that follow each other: the groups of their children do, too.
+                let first = split.trailing_zeros();
+                let run = split & !(split + (1 << first));
+                split &= !run;
+                let after = u64::MAX << (8 * j + u64::from(first));
+                self.put(brick, rest & !after);
+                rest &= after;
+                self.emit(&child, brick::children(run as u8))?;
             }
         }
-        self.flush(CHUNK)
+        self.put(brick, rest);
+        if self.waiting.len() < WAITING { Ok(()) } else { self.flush() }
     }
 
-    /// Appends the words of the leaves among the children, of level `l`, of octant `parent`. The children are
-    /// byte `j` of a brick; only those in the mask `within` are considered.
-    #[inline]
-    fn put(&mut self, l: Level, parent: u64, brick: &Loaded, j: u64, within: u8) {
-        let leaves = brick::byte(brick.leaves, j) & within;
-        let (crossing, inside) =
-            (brick::byte(brick.octants.crossing, j), brick::byte(brick.octants.inside, j));
-        // The root has no parent; its code is 0 all the same.
-        let base = start57(l, parent << 3) << 7 | u64::from(l) << 2;
-        let step = start57(l, 1) << 7;
-        let side = |o: u32| u64::from(crossing >> o & 1) << 1 | u64::from(inside >> o & 1);
-        let word = |o: u32| (base + u64::from(o) * step) | side(o);
-        match (leaves, crossing | inside) {
-            (0xff, 0) => {
-                self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| base + o as u64 * step))
-            }
-            (0xff, _) => self.buffer.extend::<[u64; 8]>(std::array::from_fn(|o| word(o as u32))),
-            _ => self.buffer.extend(ones(u64::from(leaves)).map(word)),
+    /// Appends the leaves of a brick that are in the mask `within`.
+    #[inline(always)]
+    fn put(&mut self, brick: &Loaded, within: u64) {
+        let leaves = brick.leaves & within;
+        if leaves != 0 {
+            self.waiting.push(Loaded { leaves, ..*brick });
         }
     }
 
-    /// Passes the buffer to the sink if it has as many words.
-    #[inline]
-    fn flush(&mut self, words: usize) -> Result<(), E> {
-        if self.buffer.len() >= words {
-            (self.sink)(&self.buffer)?;
-            self.buffer.clear();
-        }
-        Ok(())
+    /// Passes the words of the waiting leaves to the sink.
+    fn flush(&mut self) -> Result<(), E> {
+        let number = put(&self.waiting, &self.bits, &mut self.words, &mut self.counts);
+        self.waiting.clear();
+        (self.sink)(&self.words[..number])
     }
+}
+
+widest! {
+    /// Puts the words of some leaves, eight at a time though fewer may count, and counts them. Returns the number of words.
+    fn put(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize = put_lanes;
+}
+
+#[inline(always)]
+fn put_lanes(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize {
+    let mut written = 0;
+    for &Loaded { level, key, leaves, octants: Octants { crossing, inside, .. } } in parts {
+        // In the order of the sides' numbers.
+        let sides = [!(crossing | inside), inside, crossing];
+        for (count, side) in counts[level as usize].iter_mut().zip(sides) {
+            *count += u64::from((leaves & side).count_ones());
+        }
+        let steps: [u64; 8] = from_fn(|o| start57(level, o as u64) << 7 | u64::from(level << 2));
+        let mut rest = leaves;
+        while rest != 0 {
+            // Leaves that follow each other.
+            let first = rest.trailing_zeros();
+            let number = (rest >> first).trailing_ones();
+            rest &= rest.wrapping_add(1 << first);
+            let to = &mut to[written..written + number.next_multiple_of(8) as usize];
+            for (at, eight) in (first..).step_by(8).zip(to.as_chunks_mut::<8>().0) {
+                let start = start57(level, key << 6 | u64::from(at)) << 7;
+                let of = |side: u64| &bits[(side >> at & 0xff) as usize];
+                // Those after the run do not count, and may be beyond the root.
+                let side = |o: usize| 2 * of(crossing)[o] + of(inside)[o];
+                *eight = from_fn(|o| start.wrapping_add(steps[o]) + side(o));
+            }
+            written += number as usize;
+        }
+    }
+    written
 }
