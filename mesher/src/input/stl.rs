@@ -177,24 +177,20 @@ impl<'a> Text<'a> {
 
     fn expect(&mut self, wanted: &str) -> Result<(), String> {
         let word = self.word();
-        match word.eq_ignore_ascii_case(wanted.as_bytes()) {
-            true => Ok(()),
-            false => Err(unexpected(word, wanted)),
-        }
+        let is_wanted = word.eq_ignore_ascii_case(wanted.as_bytes());
+        if is_wanted { Ok(()) } else { Err(unexpected(word, wanted)) }
     }
 
     fn solid(&mut self, facets: &mut Vec<Facet>) -> Result<(), String> {
         self.expect("solid")?;
         self.skip_name(|words| words[0].eq_ignore_ascii_case(b"endsolid") || starts_facet(words));
-        loop {
-            let word = self.word();
-            if word.eq_ignore_ascii_case(b"facet") {
-                facets.push(self.facet()?);
-            } else if word.eq_ignore_ascii_case(b"endsolid") {
-                break;
-            } else {
-                return Err(unexpected(word, "facet or endsolid"));
-            }
+        let mut word = self.word();
+        while word.eq_ignore_ascii_case(b"facet") {
+            facets.push(self.facet()?);
+            word = self.word();
+        }
+        if !word.eq_ignore_ascii_case(b"endsolid") {
+            return Err(unexpected(word, "facet or endsolid"));
         }
         match self.skip_name(starts_facet) {
             true => Err("a facet follows on the line of endsolid".to_owned()),
@@ -258,10 +254,8 @@ fn starts_facet(words: &[&[u8]; NAME_AHEAD]) -> bool {
 
 fn unexpected(word: &[u8], wanted: &str) -> String {
     let shown = String::from_utf8_lossy(&word[..word.len().min(40)]);
-    match word.is_empty() {
-        true => format!("it ends where {wanted} was expected"),
-        false => format!("it has {shown:?} where {wanted} was expected"),
-    }
+    let found = if word.is_empty() { "ends".to_owned() } else { format!("has {shown:?}") };
+    format!("it {found} where {wanted} was expected")
 }
 
 #[cfg(test)]
