@@ -11,7 +11,7 @@ pub mod splits;
 
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
-use crate::input::lattice::{Root, Rules};
+use crate::input::lattice::Root;
 use crate::input::quantise::Quantised;
 use crate::mesh::Mesh;
 use crate::output::stream::{Counts, total};
@@ -25,6 +25,7 @@ use bricks::tree::{PerLevel, check_existing, check_split};
 use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::iter::once;
 
 /// Splits from which on debug builds leave out the checks that take more memory than the mesh. `--check` always runs them.
 const SPLITS_MANY: u64 = 1 << 16;
@@ -46,12 +47,6 @@ pub fn slices(slice: &Slice, comm: &dyn Comm) {
     assert_eq!(end, slice.total, "slices of facets must add up to the total");
 }
 
-/// All ranks have the same rules.
-pub fn rules(rules: &Rules, comm: &dyn Comm) {
-    // Formatted floating-point numbers round-trip.
-    same(&format!("{rules:?}"), "rules", comm);
-}
-
 /// All ranks have the same map from octants to owners.
 pub fn ownership(ownership: &Ownership, comm: &dyn Comm) {
     let intervals: Vec<_> = ownership.intervals().collect();
@@ -68,9 +63,12 @@ fn same(value: &impl Hash, name: &str, comm: &dyn Comm) {
     assert_eq!(first_other(comm, value), None, "{name} must be the same on all ranks");
 }
 
-/// The rules and the facets are those of the case, each coordinate on the nearest lattice point, of two the even one.
-pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised) {
+/// All ranks have the same rules. These and the facets are those of the case, each coordinate on the nearest lattice point, of two the
+/// even one.
+pub fn lattice(given: &[geometries::Facet], case: &Case, quantised: &Quantised, comm: &dyn Comm) {
     let Quantised { rules, facets, .. } = quantised;
+    // Formatted floating-point numbers round-trip.
+    same(&format!("{rules:?}"), "rules", comm);
     let Root { origin, edge } = rules.root;
     let is_nearest = |x: f64, a: usize, q: f64| {
         let off = ((x - origin[a]) * (ROOT_EDGE as f64 / edge) - q).abs();
@@ -168,10 +166,8 @@ fn replicas(sets: &[&PerLevel], ownership: &Ownership, comm: &dyn Comm) {
         let first = boundaries.partition_point(|b| b.0 <= start) - 1;
         let within = boundaries[first..].iter().take_while(|b| b.0 < end);
         let owners: Vec<usize> = within.map(|b| b.1).collect();
-        let is_full = l < 2 || owners.len() >= OWNERS_MANY;
-        let all =
-            if is_full { (0..comm.size()).collect() } else { owners.iter().copied().collect() };
-        (owners[0], all)
+        let (owner, is_full) = (owners[0], l < 2 || owners.len() >= OWNERS_MANY);
+        (owner, if is_full { (0..comm.size()).collect() } else { owners.into_iter().collect() })
     };
     let mut out = Vec::new();
     for (number, set) in sets.iter().enumerate() {
@@ -245,15 +241,11 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!(total(counts), number, "counts must add up");
-    let mut add = |sets| {
-        let owned = bricks_of(sets).filter(|(l, b)| mesh.ownership.owns(*l, b.key));
-        volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
-    };
     // T0 has no deleted leaves.
-    add(mesh.sides.deleted());
-    if mesh.drops_crossing() {
-        add(&mesh.crossing);
-    }
+    let dropped = mesh.drops_crossing().then_some(&mesh.crossing);
+    let deleted = once(mesh.sides.deleted()).chain(dropped).flat_map(bricks_of);
+    let owned = deleted.filter(|(l, b)| mesh.ownership.owns(*l, b.key));
+    volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
     assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
 }
 

@@ -86,10 +86,7 @@ pub fn quantised(case: &Case, job: &mut Job) -> Result<Quantised, Error> {
     // 2. Quantise: the facets and the rules on the lattice.
     let given = if job.options.checks() { slice.facets.clone() } else { Vec::new() };
     let quantised = job.phase("quantise", |comm| quantise::quantise(case, slice, comm))?;
-    job.check(|comm| {
-        check::rules(&quantised.rules, comm);
-        check::lattice(&given, case, &quantised);
-    });
+    job.check(|comm| check::lattice(&given, case, &quantised, comm));
     Ok(quantised)
 }
 

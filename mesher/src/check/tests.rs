@@ -1,7 +1,7 @@
 use super::*;
 use crate::input::case::{BoxSpec, Case, RootSpec};
 use crate::input::ingest::{self, Source};
-use crate::input::lattice::{Bounds, Enclosed, ExtentBox, Keep, Seed};
+use crate::input::lattice::{Bounds, Enclosed, ExtentBox, Keep, Rules, Seed};
 use crate::output::leaves as finished;
 use crate::partition::ownership::Placement;
 use crate::record::Recorder;
@@ -126,7 +126,10 @@ fn a_facet_in_two_slices_is_found() {
 #[test]
 #[should_panic(expected = "rules must be the same on all ranks")]
 fn different_rules_are_found() {
-    run(true, |m| m.rules.root.edge *= 1.0 + f64::EPSILON, |m, comm| rules(&m.rules, comm));
+    sim::run(RANKS, 1, |comm| {
+        let factor = 1.0 + comm.rank() as f64 * f64::EPSILON;
+        check_lattice(|q| q.rules.root.edge *= factor, comm);
+    });
 }
 
 #[test]
@@ -167,19 +170,19 @@ fn a_facet_on_the_wrong_rank_is_found() {
 }
 
 /// Checks the quantised case after a change.
-fn check_lattice(corrupt: impl Fn(&mut Quantised)) {
+fn check_lattice(corrupt: impl Fn(&mut Quantised), comm: &dyn Comm) {
     let box_spec = BoxSpec { min: [-9.0, 0.0, 0.0], max: [0.1; 3], spacing: 0.04 };
     let case = Case { boxes: vec![box_spec], seeds: vec![[0.7, 0.0, 0.0]], ..case() };
-    let slice = ingest::read(&case.source, &Solo).expect("a good case");
+    let slice = ingest::read(&case.source, comm).expect("a good case");
     let given = slice.facets.clone();
-    let mut quantised = crate::input::quantise::quantise(&case, slice, &Solo).expect("a good case");
+    let mut quantised = crate::input::quantise::quantise(&case, slice, comm).expect("a good case");
     corrupt(&mut quantised);
-    lattice(&given, &case, &quantised);
+    lattice(&given, &case, &quantised, comm);
 }
 
 #[test]
 fn whatever_is_not_at_the_nearest_lattice_point_is_found() {
-    check_lattice(|_| ());
+    check_lattice(|_| (), &Solo);
     let corruptions: [&dyn Fn(&mut Quantised); 6] = [
         &|q| q.facets[7].v[1][2] += 1,
         &|q| q.rules.level_surface += 1,
@@ -189,7 +192,7 @@ fn whatever_is_not_at_the_nearest_lattice_point_is_found() {
         &|q| q.rules.boxes[0].level -= 1,
     ];
     for (number, corrupt) in corruptions.into_iter().enumerate() {
-        let check = std::panic::AssertUnwindSafe(|| check_lattice(corrupt));
+        let check = std::panic::AssertUnwindSafe(|| check_lattice(corrupt, &Solo));
         assert!(std::panic::catch_unwind(check).is_err(), "corruption {number}");
     }
 }
