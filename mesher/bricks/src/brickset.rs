@@ -112,7 +112,12 @@ impl BrickSet {
     /// The bricks in order.
     #[inline]
     pub fn bricks(&self) -> Cursor<'_> {
-        Cursor::new(self)
+        let rest = Brick { key: 0, bits: 0 };
+        let full = self.full.as_ref().map(|full| Box::new(Full { cursor: full.cursor(), rest }));
+        let runs = &self.runs;
+        let mut cursor = Cursor { full, set: self, low: &[], end: 0, high: u64::MAX, runs };
+        cursor.next_run();
+        cursor
     }
 
     /// Number of bricks. Full ones must not be stored apart.
@@ -176,7 +181,7 @@ impl BrickSet {
 
     /// A reader for queries with ascending keys. It is not for reading the bricks in order, too.
     pub fn cursor(&self) -> Cursor<'_> {
-        Cursor::new(self)
+        self.bricks()
     }
 
     /// Replaces the bits of every brick, in order, by what `keep` returns for it.
@@ -348,18 +353,7 @@ fn leading(low: &[u32], leads: impl Fn(u32) -> bool) -> usize {
     step / 2 + near.partition_point(|&low| leads(low))
 }
 
-impl<'a> Cursor<'a> {
-    #[inline]
-    fn new(set: &'a BrickSet) -> Self {
-        let full = set
-            .full
-            .as_ref()
-            .map(|full| Box::new(Full { cursor: full.cursor(), rest: Brick { key: 0, bits: 0 } }));
-        let mut cursor = Self { full, set, low: &[], end: 0, high: u64::MAX, runs: &set.runs };
-        cursor.next_run();
-        cursor
-    }
-
+impl Cursor<'_> {
     /// The bits of brick `key`, 0 if the set has none. Keys of consecutive queries must not descend.
     #[inline(always)]
     pub fn get(&mut self, key: u64) -> u64 {

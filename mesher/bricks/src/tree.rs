@@ -132,14 +132,13 @@ impl<'a> Kept<'a> {
         if !self.is_partial || set.is_empty() {
             return set;
         }
-        let mut deleted = self.deleted[l as usize].cursor();
         if l == 0 {
-            set.retain(|b| b.bits & !deleted.get(b.key));
-            return set;
+            return set.without(self.deleted(l));
         }
         let parents = set.coarsen().without(&split[l as usize - 1]);
         let parents = self.only(split, l - 1, parents);
         let (mut below_leaf, mut split) = (parents.cursor(), split[l as usize - 1].cursor());
+        let mut deleted = self.deleted(l).cursor();
         set.retain(|b| {
             let children = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
             let in_tree = children(split.get(b.key >> 3)) & !deleted.get(b.key);
