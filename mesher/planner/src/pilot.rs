@@ -9,7 +9,6 @@
 use bricks::brick;
 use bricks::brickset::{BrickSet, ones};
 use bricks::octant::{Level, corner, edge};
-use bricks::tree::PerLevel;
 use bytemuck::{Pod, Zeroable};
 use mesher::input::lattice::{ExtentBox, Rules};
 use mesher::{Job, Mesh};
@@ -76,13 +75,9 @@ pub fn coarser(rules: &Rules, shift: Level) -> Rules {
     }
 }
 
-fn bytes(sets: &PerLevel) -> f64 {
-    sets.iter().map(BrickSet::bytes).sum::<usize>() as f64
-}
-
 /// What this rank needs for a pilot run of some cells of a case with some boxes.
 pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amounts {
-    let stored = bytes(&mesh.crossing) + bytes(&mesh.sides.stored);
+    let stored: usize = mesh.crossing.iter().chain(&mesh.sides.stored).map(BrickSet::bytes).sum();
     let time = |of: &[&str]| -> f64 {
         let phases = job.record.phases.iter();
         phases.filter(|p| of.contains(&p.name)).map(|p| p.time_cpu_s).sum()
@@ -96,7 +91,7 @@ pub fn amounts(mesh: &Mesh, cells: u64, job: &Job, boxes: &[ExtentBox]) -> Amoun
         tests: job.counters.facet_brick_tests as f64
             + job.counters.bricks_voxelised as f64 / VISITS_PER_TEST,
         bytes_sides: mesh.sides.bytes as f64,
-        bytes_graded: stored + mesh.bytes_graded as f64,
+        bytes_graded: (stored + mesh.bytes_graded) as f64,
         time_refine_s,
         time_cells_s,
         time_fixed_s: all - time_refine_s - time_cells_s,

@@ -144,8 +144,7 @@ impl Report {
         assert!(is_right, "{a:?} of all components");
         for p in &self.phases {
             let times = [&p.time_wall_s, &p.time_cpu_s, &p.time_comm_wall_s, &p.time_comm_cpu_s];
-            let mut times = times.into_iter().flatten();
-            let are_times = times.all(|t| t.is_finite() && *t >= 0.0);
+            let are_times = times.into_iter().flatten().all(|t| t.is_finite() && *t >= 0.0);
             assert!(are_times, "{p:?} must have times");
         }
     }

@@ -83,11 +83,9 @@ impl OutDir {
         let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
         let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
-        let claim = match created {
-            Some(claim) => Ok(claim),
-            None => Claim::join(path, MANIFEST, mine, is_new == 1).map_err(failed),
-        };
-        Ok(Self { output: files.clone(), claim: agree(comm, claim)? })
+        let join = || Claim::join(path, MANIFEST, mine, is_new == 1).map_err(failed);
+        let claim = agree(comm, created.map_or_else(join, Ok))?;
+        Ok(Self { output: files.clone(), claim })
     }
 
     /// Begins a file of the mesh.
