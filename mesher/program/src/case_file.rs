@@ -96,14 +96,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
     let case = || {
         let mut keys: Keys = toml::from_str(text).map_err(|e| explain(text, &e))?;
         let source = match (keys.geometry.take(), keys.generator.take()) {
-            (Some(file), None) => Source::Stl(path.with_file_name(file)),
-            (None, Some(generator)) => Source::Generated(generator),
-            (Some(_), Some(_)) => return Err("give geometry or [generator], not both".to_owned()),
-            (None, None) => {
-                let why = "no geometry: give geometry = \"file.stl\" or a [generator] table";
-                return Err(why.to_owned());
-            }
-        };
+            (Some(file), None) => Ok(Source::Stl(path.with_file_name(file))),
+            (None, Some(generator)) => Ok(Source::Generated(generator)),
+            (Some(_), Some(_)) => Err("give geometry or [generator], not both"),
+            (None, None) => Err("no geometry: give geometry = \"file.stl\" or a [generator] table"),
+        }?;
         if keys.root_scale.is_some() && keys.root.is_some() {
             return Err("give root_scale or [root], not both".to_owned());
         }

@@ -120,11 +120,9 @@ pub enum CommChoice {
 }
 
 fn level_base(s: &str) -> Result<LevelBase, String> {
-    let level = || s.parse().ok().filter(|l| *l <= LEVEL_MAX);
-    match s {
-        "auto" => Ok(None),
-        _ => level().map(Some).ok_or_else(|| "give auto or a level from 0 to 19".into()),
-    }
+    let level = s.parse().ok().filter(|l| *l <= LEVEL_MAX);
+    let is_right = level.is_some() || s == "auto";
+    if is_right { Ok(level) } else { Err("give auto or a level from 0 to 19".into()) }
 }
 
 fn seconds(s: &str) -> Result<Duration, String> {
@@ -216,11 +214,9 @@ pub fn case(args: &Args, comm: &dyn Comm) -> Result<Case, Error> {
                 "{input} is a case file: set the spacing, layers, sides, root, boxes and seeds there, not on the command line"
             )));
         }
-        let text = match comm.rank() {
-            0 => case_file::read_text(args.input()),
-            _ => Ok(String::new()),
-        };
-        let text = uncounted(comm, || agree(comm, text).map(|text| text_of_first(comm, &text)))?;
+        let text = (comm.rank() == 0).then(|| case_file::read_text(args.input())).transpose();
+        let of_first = |text: Option<String>| text_of_first(comm, &text.unwrap_or_default());
+        let text = uncounted(comm, || agree(comm, text).map(of_first))?;
         return case_file::parse(&text, args.input());
     }
     let case =

@@ -194,10 +194,8 @@ fn serve(comm: &dyn Comm) -> i32 {
     loop {
         interrupt::begin();
         // A line that is not UTF-8 is refused like others that are no JSON. Without a line feed, it is the end.
-        let line = match (comm.rank() == 0).then(|| lines.next()).flatten() {
-            Some(line) => line.unwrap_or_default() + "\n",
-            None => String::new(),
-        };
+        let next = (comm.rank() == 0).then(|| lines.next()).flatten();
+        let line = next.map_or(String::new(), |line| line.unwrap_or_default() + "\n");
         comm.next_run();
         let line = uncounted(comm, || text_of_first(comm, &line));
         let Some(line) = line.strip_suffix('\n') else { return 0 };
@@ -239,9 +237,9 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
     if let Some(limit) = args.stall_limit {
         comm.limit_calls(limit);
     }
-    let progress = first && !args.quiet && std::io::stderr().is_terminal();
+    let prints = first && !args.quiet;
     let mut record = Recorder::default();
-    record.progress = progress;
+    record.progress = prints && stderr().is_terminal();
     let result = work(args, comm, &mut record);
     // Launchers send a signal to the other ranks when the first one ends with an error.
     interrupt::decide(true);
@@ -254,16 +252,12 @@ fn run(args: &Args, comm: &dyn Comm) -> i32 {
         end_within(limit);
     }
     interrupt::stop_at(format_args!("end:{}", comm.rank()));
-    if progress {
+    if record.progress {
         let _ = write!(stderr(), "\r\x1b[K");
     }
-    let done = match result {
-        Ok(done) => done,
-        Err(e) => return fail(&e, first),
-    };
-    match (if first && !args.quiet { print(&done) } else { 0 }, done.refusal) {
-        (0, Some(refusal)) => fail(&refusal, first),
-        (code, _) => code,
+    match result.map(|done| (if prints { print(&done) } else { 0 }, done.refusal)) {
+        Err(e) | Ok((0, Some(e))) => fail(&e, first),
+        Ok((code, _)) => code,
     }
 }
 
