@@ -102,11 +102,14 @@ pub const fn spread_faces(w: u64) -> u64 {
 pub const fn flood(seed: u64, within: u64) -> u64 {
     let mut w = seed & within;
     loop {
-        let next = spread_faces(w) & within;
-        if next == w {
-            return w;
+        // Axis by axis it takes fewer steps than over all faces at once.
+        let x = w | (moved(w, 0, false) | moved(w, 0, true)) & within;
+        let y = x | (moved(x, 1, false) | moved(x, 1, true)) & within;
+        let z = y | (moved(y, 2, false) | moved(y, 2, true)) & within;
+        if z == w || z == within {
+            return z;
         }
-        w = next;
+        w = z;
     }
 }
 

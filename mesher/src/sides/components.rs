@@ -1,8 +1,8 @@
 //! Merges the local components of bricks, within the bricks that this rank holds.
 //!
 //! A depth-first walk keeps, for each level, the brick on the path from the root and its six face
-//! neighbours, so that no neighbour needs a search. Two leaves of one level are merged from the lower
-//! side of their common face. Two leaves of different levels are merged from the finer one: the walk
+//! neighbours, so that no neighbour needs a search. Two leaves of one level are merged from the upper
+//! side of their common face, as the walk has met the lower one recently. Two leaves of different levels are merged from the finer one: the walk
 //! ascends the path until it finds the leaf that covers the octant across the face.
 
 use super::nodes::{Component, Family, Node, Nodes};
@@ -188,7 +188,7 @@ impl Walk<'_> {
                 }
             }
             Across::Here(n, exists) => {
-                if up == 1 {
+                if up == 0 {
                     self.unite(c, l, n, faced);
                 }
                 if faced & !exists != 0 {

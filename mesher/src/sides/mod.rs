@@ -32,7 +32,7 @@ use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree};
 use components::LocalMerge;
 use global::Label;
-use nodes::{Component, Nodes};
+use nodes::{Component, Node, Nodes};
 use ranks::Comm;
 use serde::Serialize;
 use std::collections::HashSet;
@@ -235,9 +235,9 @@ impl Sides {
         let mut leaves_enclosed = 0;
         for l in 0..LEVELS as Level {
             let mut crossing = base.tree.crossing[l as usize].cursor();
-            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
+            Tree::exists(&base.tree.split, l).enumerate().for_each(|(n, Brick { key, .. })| {
                 let (mut open, mut within, mut enclosed) = (0, 0, 0);
-                for (c, part) in nodes.components(l, n) {
+                for (c, part) in nodes.components(l, n as Node) {
                     open |= part;
                     match of_local[c as usize] {
                         Class::Outside => {}
@@ -257,7 +257,7 @@ impl Sides {
                 if enclosed != 0 && base.ownership.owns(l, key) {
                     leaves_enclosed += u64::from(enclosed.count_ones());
                 }
-            }
+            });
         }
         leaves_enclosed
     }

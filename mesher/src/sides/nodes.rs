@@ -94,19 +94,19 @@ impl Nodes {
             let mut out = LevelNodes::default();
             let splits = !tree.split[l as usize].is_empty();
             let mut children = 0;
-            for (n, b) in open_bricks(tree, ownership, l).enumerate() {
+            open_bricks(tree, ownership, l).for_each(|b| {
                 if splits {
                     out.split.push(b.split);
                     out.first_child.push(children);
                     children += brick::parents(b.split).count_ones();
                 }
                 if b.placement != Placement::Local {
-                    out.placements.resize(n, Placement::Local);
+                    out.placements.resize(out.components.len(), Placement::Local);
                     out.placements.push(b.placement);
                 }
                 out.components.push(masks.len() as Component);
                 masks.extend(brick::components(b.open));
-            }
+            });
             let end = Component::try_from(masks.len()).expect("fewer than 2^32 components");
             out.components.push(end);
             levels.push(out);
