@@ -55,22 +55,22 @@ impl Estimate<'_> {
         Ok(Partition { ownership, level_base: levels[1], partitioner })
     }
 
-    /// The coarse and the fine level, of which octants near facets and in boxes number about [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] on
-    /// each rank, where the facets are densest. Collective.
+    /// The coarse and the fine level: the least deep ones of which an octant at a surface or in a box has no more leaves than one of about
+    /// [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] equal parts on each rank. Collective.
     fn levels(&self) -> [Level; 2] {
         let &Self { facets, rules, comm } = self;
+        let each = area::leaves_per_surface_cell(rules) as f64;
         // Whole faces of finest cells: a sum of integers does not depend on its order.
         let face = (edge(rules.level_surface) as f64).powi(2);
-        let area = comm.sum((area::total(facets) / face) as u64) as f64 * face;
-        let side = |b: &ExtentBox, a: usize| (b.max[a] - b.min[a]) as f64;
-        let volumes = rules.boxes.iter().map(|b| (0..3).map(|a| side(b, a)).product::<f64>());
-        let volume = volumes.fold(0.0, f64::max);
+        let faces = comm.sum((area::total(facets) / face) as u64) as f64;
+        let leaves = each * faces + area::leaves_in_boxes(0, 0, rules) as f64;
         [COARSE_PER_RANK, FINE_PER_RANK as f64].map(|per_rank| {
             // Four sheets of facets in one octant are not unusual: wings, fins.
-            let octants = comm.size() as f64 * per_rank * 4.0;
+            let most = leaves / (comm.size() as f64 * per_rank * 4.0);
             let small = |l: &Level| {
                 let h = edge(*l) as f64;
-                h * h <= area / octants && (volume == 0.0 || h.powi(3) <= volume / octants)
+                let in_box = |b: &ExtentBox| (h / edge(b.level) as f64).powi(3);
+                each * h * h / face <= most && rules.boxes.iter().all(|b| in_box(b) <= most)
             };
             (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
         })
@@ -82,7 +82,7 @@ impl Estimate<'_> {
         let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
         let level = level.min(level_last(self.rules));
         let (_, mut leaves) =
-            self.all_bins(&area::of(self.facets, self.rules, level), level, FINE_PER_RANK);
+            self.all_bins(&area::of(self.facets, self.rules, level), level, 0, FINE_PER_RANK);
         if division.weights == Weights::Unit {
             leaves.iter_mut().for_each(|leaf| leaf[1] = 1);
         }
@@ -101,7 +101,8 @@ impl Estimate<'_> {
     /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
     fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
-        let (light, bins) = self.all_bins(&local, coarse, 1);
+        let in_boxes = area::leaves_in_boxes(0, 0, self.rules);
+        let (light, bins) = self.all_bins(&local, coarse, in_boxes, 1);
         let boundaries = curve::partition(&bins, comm.size(), &Solo);
         let rough = Ownership::along(comm.rank(), comm.size(), boundaries);
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
@@ -114,16 +115,22 @@ impl Estimate<'_> {
         Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
     }
 
-    /// The bins of all ranks by octants of a level, the same on all ranks, about `per_rank` for each in boxes; before them the number of
-    /// leaves that need not be resolved further. Collective.
-    fn all_bins(&self, local: &[Bin], level: Level, per_rank: u64) -> (u64, Vec<Bin>) {
+    /// The bins of all ranks by octants of a level, the same on all ranks; before them the number of leaves that need not be resolved
+    /// further. That is here one part in `per_rank` for each rank of the leaves near facets and of `in_boxes` leaves in boxes, which are none for base
+    /// leaves: METIS takes them for octants of one level. Collective.
+    fn all_bins(
+        &self,
+        local: &[Bin],
+        level: Level,
+        in_boxes: u64,
+        per_rank: u64,
+    ) -> (u64, Vec<Bin>) {
         let comm = self.comm;
         let shift = 3 * (LEVEL_MAX - level);
         let coarse = local.iter().map(|b| [b[0] >> shift << shift, b[1]]).collect();
         let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
-        let estimated = leaves(&bins) + area::leaves_in_boxes(0, 0, self.rules);
-        let light = estimated / (comm.size() as u64 * per_rank);
+        let light = (leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank);
         area::add_boxes(&mut bins, self.rules, level, light, &curve::ALL);
         combine(&mut bins, u64::wrapping_add);
         (leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK), bins)
@@ -249,7 +256,8 @@ mod tests {
         let facets = &sheet()[..1];
         let bins = sim::run(RANKS, 5, |comm| {
             let local = area::of(facets, &rules, FINE);
-            Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, 1).1.len()
+            let in_boxes = area::leaves_in_boxes(0, 0, &rules);
+            Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, in_boxes, 1).1.len()
         });
         assert!(bins.iter().all(|n| (RANKS..=8 * RANKS + 8).contains(n)), "{bins:?}");
     }
