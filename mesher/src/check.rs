@@ -241,10 +241,10 @@ pub fn leaves(mesh: &Mesh, counts: &Counts, comm: &dyn Comm) {
         Ok::<(), std::convert::Infallible>(())
     });
     assert_eq!(total(counts), number, "counts must add up");
-    // T0 has no deleted leaves.
     let dropped = mesh.drops_crossing().then_some(&mesh.crossing);
-    let deleted = once(mesh.sides.deleted()).chain(dropped).flat_map(bricks_of);
-    let owned = deleted.filter(|(l, b)| mesh.ownership.owns(*l, b.key));
+    // T0 has no deleted leaves.
+    let left_out = once(mesh.sides.deleted()).chain(dropped).flat_map(bricks_of);
+    let owned = left_out.filter(|(l, b)| mesh.ownership.owns(*l, b.key));
     volume += owned.map(|(l, b)| volume_of(l, b.bits)).sum::<u64>();
     assert_eq!(comm.sum(volume), volume_of(0, 1), "leaves and deleted leaves must tile the root");
 }

@@ -159,7 +159,7 @@ def across(k):
 
 @fact(BRICK, ("moved(w, 2, false)", "moved(w, 1, false)"), ("w | x | y | z", "x | y | z"))
 def spread_faces(k):
-    """`spread_faces` is the union of the octants and their face neighbours in the brick: a step of the flood."""
+    """`spread_faces` is the union of the octants and their face neighbours in the brick."""
     w = k.bits("u64")
     yield k("spread_faces", w).x == union(w, lambda i: [i] + [j for a in AXES for up in (False, True) for j, beyond in [beside(i, a, up)] if not beyond])
 

@@ -77,10 +77,8 @@ AVX512 = {
     "_mm512_add_epi32": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
     "_mm512_mullo_epi32": lambda run, a, b: [run.binary("*", x, y) for x, y in zip(a, b)],
     "_mm512_cmpge_epi32_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
-    "_mm512_setr_epi64": lambda run, *v: [coerced(x, "i64") for x in v],
     "_mm512_maskz_set1_epi64": lambda run, m, v: [v if plain(m) >> i & 1 else i64(0) for i in range(8)],
     "_mm512_add_epi64": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
-    "_mm512_cmpge_epi64_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
     "_mm512_cmple_epu64_mask": lambda run, a, b: lanes_where(run, "<=", map(without_sign, a), map(without_sign, b)),
     **{f"_mm512_kunpack{size}": lambda run, high, low, width=width: run.binary("|", run.binary("<<", high, width), low) for size, width in (("b", 8), ("w", 16), ("d", 32))},
 }

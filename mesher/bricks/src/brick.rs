@@ -229,6 +229,25 @@ mod tests {
     }
 
     #[test]
+    fn flood_fill_is_what_steps_over_all_faces_come_to() {
+        let mut random = 1u64;
+        let mut draw = || {
+            random = random.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            random ^ random >> 29
+        };
+        for _ in 0..10_000 {
+            for within in [draw(), draw() | draw(), draw() & draw()] {
+                let seed = draw() & draw() & draw();
+                let mut filled = seed & within;
+                while filled != spread_faces(filled) & within {
+                    filled = spread_faces(filled) & within;
+                }
+                assert_eq!(flood(seed, within), filled, "{seed:#x} {within:#x}");
+            }
+        }
+    }
+
+    #[test]
     fn flood_fill_stops_at_walls() {
         let x = SPANS[0];
         let wall = !x[1][1];

@@ -171,7 +171,7 @@ mod kernel {
     pub fn separated(f: &Tested, corner: [i64; 3], shift: u32) -> u64 {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: the features that the function is compiled for have just been detected.
+            // SAFETY: the features that the function is compiled for have just been detected; these imply AVX-512 F.
             return unsafe { avx512::separated(f, corner, shift) };
         }
         generic(f, corner, shift, plane_lanes, edge_lanes)
@@ -342,6 +342,14 @@ mod tests {
             let f = Facet { v };
             let moved = Facet { v: v.map(|p| [0, 1, 2].map(|a| p[a] + far[a])) };
             prop_assert_eq!(crossed(&f, [0; 3], 17), crossed(&moved, far.map(i64::from), 17));
+        }
+
+        #[test]
+        fn the_facet_before_changes_nothing(v in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)], w in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)]) {
+            let mut tested = Tested::default();
+            for f in [v, w, v].map(|v| Facet { v }) {
+                prop_assert_eq!(tested.octants(&f, [0; 3], 17), crossed(&f, [0; 3], 17));
+            }
         }
 
         #[test]

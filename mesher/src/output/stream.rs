@@ -38,9 +38,9 @@ impl Mesh {
         let mut walk = Walk {
             levels: (0..LEVELS).map(|l| LevelCursors::new(self, l)).collect(),
             mesh: self,
-            waiting: Vec::with_capacity(WAITING + 65),
-            // A brick that is not emitted yet may add 65 parts.
-            words: vec![0; 64 * (WAITING + 66)],
+            // Each level on the way down may add a part before their number is compared again.
+            waiting: Vec::with_capacity(WAITING + LEVELS),
+            words: vec![0; 64 * (WAITING + LEVELS)],
             counts: Counts::default(),
             bits: from_fn(|byte| from_fn(|o| byte as u64 >> o & 1)),
             sink,
@@ -169,7 +169,7 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
     fn flush(&mut self) -> Result<(), E> {
         let number = put(&self.waiting, &self.bits, &mut self.words, &mut self.counts);
         self.waiting.clear();
-        (self.sink)(&self.words[..number])
+        if number > 0 { (self.sink)(&self.words[..number]) } else { Ok(()) }
     }
 }
 
@@ -206,4 +206,42 @@ fn put_lanes(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut C
         }
     }
     written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::case::Case;
+    use crate::record::Recorder;
+    use crate::{Job, grow, quantised};
+    use bricks::wide::widths;
+    use ranks::Solo;
+    use std::convert::Infallible;
+
+    #[test]
+    fn all_vector_widths_make_the_same_words_and_they_tile_the_root() {
+        let (options, mut record) = (crate::tests::options(), Recorder::default());
+        let mut job = Job::new(&options, &Solo, &mut record);
+        let case = Case { keep: Keep::All, ..crate::tests::case() };
+        let mesh = quantised(&case, &mut job).and_then(|q| grow(q, &mut job)).expect("a good case");
+        let all = widths(|| {
+            let mut all = Vec::new();
+            let add = |words: &[u64]| {
+                all.extend_from_slice(words);
+                Ok::<(), Infallible>(())
+            };
+            let Ok(counts) = mesh.emit(add);
+            (all, counts)
+        });
+        for (width, (words, counts)) in &all {
+            assert!((words, counts) == (&all[0].1.0, &all[0].1.1), "{width:?}");
+            assert_eq!(total(counts), words.len() as u64, "{width:?}");
+            let mut end = 0;
+            for word in words {
+                assert_eq!(word >> 7, end, "{width:?}");
+                end += start57((word >> 2 & 31) as Level, 1);
+            }
+            assert_eq!(end, start57(0, 1), "{width:?}");
+        }
+    }
 }
