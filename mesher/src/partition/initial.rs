@@ -55,8 +55,8 @@ impl Estimate<'_> {
         Ok(Partition { ownership, level_base: levels[1], partitioner })
     }
 
-    /// The coarse and the fine level: the least deep ones of which an octant at a surface or in a box has no more leaves than one of about
-    /// [`COARSE_PER_RANK`] and [`FINE_PER_RANK`] equal parts on each rank. Collective.
+    /// The coarse and the fine level, each the coarsest of which an octant at a surface or in a box has at most a rank's share of the leaves
+    /// divided by [`COARSE_PER_RANK`] or [`FINE_PER_RANK`]. Collective.
     fn levels(&self) -> [Level; 2] {
         let &Self { facets, rules, comm } = self;
         let each = area::leaves_per_surface_cell(rules) as f64;
@@ -68,9 +68,14 @@ impl Estimate<'_> {
             // Four sheets of facets in one octant are not unusual: wings, fins.
             let most = leaves / (comm.size() as f64 * per_rank * 4.0);
             let small = |l: &Level| {
-                let h = edge(*l) as f64;
-                let in_box = |b: &ExtentBox| (h / edge(b.level) as f64).powi(3);
-                each * h * h / face <= most && rules.boxes.iter().all(|b| in_box(b) <= most)
+                let h = edge(*l);
+                let in_box = |b: &ExtentBox| {
+                    let side =
+                        |a: usize| (b.max[a] - b.min[a]).min(h) as f64 / edge(b.level) as f64;
+                    (0..3).map(side).product::<f64>()
+                };
+                let at_surface = each * (h as f64).powi(2) / face;
+                at_surface <= most && rules.boxes.iter().all(|b| in_box(b) <= most)
             };
             (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
         })
@@ -115,9 +120,9 @@ impl Estimate<'_> {
         Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
     }
 
-    /// The bins of all ranks by octants of a level, the same on all ranks; before them the number of leaves that need not be resolved
-    /// further. That is here one part in `per_rank` for each rank of the leaves near facets and of `in_boxes` leaves in boxes, which are none for base
-    /// leaves: METIS takes them for octants of one level. Collective.
+    /// The bins of all ranks, the same on all ranks, by octants of a level; in boxes by larger ones as far as these have no more leaves than a
+    /// `per_rank`-th of a rank's share. In that, leaves in boxes count as `in_boxes`: as none for base leaves, which METIS takes for octants of
+    /// one level. Before the bins the number of leaves that need not be resolved further after that. Collective.
     fn all_bins(
         &self,
         local: &[Bin],
@@ -260,6 +265,25 @@ mod tests {
             Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, in_boxes, 1).1.len()
         });
         assert!(bins.iter().all(|n| (RANKS..=8 * RANKS + 8).contains(n)), "{bins:?}");
+    }
+
+    #[test]
+    fn levels_follow_from_the_leaves_of_facets_and_boxes_together() {
+        let levels = |facets: &[Facet], boxes: Vec<ExtentBox>| {
+            let rules = rules(boxes);
+            let of_rank = |comm: &dyn Comm| {
+                let mine = if comm.rank() == 0 { facets } else { &[] };
+                Estimate { facets: mine, rules: &rules, comm }.levels()
+            };
+            sim::run(RANKS, 5, |comm| of_rank(comm))
+        };
+        let (all, h) = (sheet(), ROOT_EDGE / 2);
+        let box_of = |edge: i64| ExtentBox { min: [0; 3], max: [edge; 3], level: 9 };
+        assert_eq!(levels(&all, vec![box_of(h >> 6)]), levels(&all, vec![]), "a small box");
+        // An eighth of the root for nine ranks, with a quarter and with sixteen parts each, in octants a quarter as large.
+        for [coarse, fine] in levels(&all[..1], vec![box_of(h)]) {
+            assert!(coarse <= 3 && (4..=5).contains(&fine), "few facets: {coarse} {fine}");
+        }
     }
 
     #[test]
