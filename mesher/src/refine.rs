@@ -22,7 +22,7 @@ use crate::partition::ownership::{Ownership, brick_start};
 use crate::record::Counters;
 use bricks::brick;
 use bricks::brickset::ones;
-use bricks::facet::{Facet, Tested, crossed};
+use bricks::facet::{Facet, FacetTest, crossed};
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
 use bricks::tree::Tree;
 use ranks::{Comm, MessageBuffer};
@@ -150,7 +150,7 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
         tree: Tree::default(),
         lists: Vec::new(),
         pairs: Vec::new(),
-        tested: vec![Tested::default(); TESTED],
+        tests: vec![FacetTest::default(); TESTS_KEPT],
         counters: Counters::default(),
     };
     let all = [0..binned.facets.len(), 0..0];
@@ -159,8 +159,8 @@ pub fn refine(binned: &BinnedFacets, rules: &Rules, own: &[Range<u64>]) -> (Tree
     (v.tree, v.counters)
 }
 
-/// Number of facets that are kept prepared. Depth first, the bricks that a facet reaches follow each other closely.
-const TESTED: usize = 256;
+/// Number of facets whose tests are kept. In depth-first order, the bricks that a facet reaches follow each other closely.
+const TESTS_KEPT: usize = 256;
 
 struct Voxeliser<'a> {
     binned: &'a BinnedFacets,
@@ -169,10 +169,10 @@ struct Voxeliser<'a> {
     tree: Tree,
     /// Straddling facets of the bricks on the path from the root, concatenated.
     lists: Vec<u32>,
-    /// Tested facets of the bricks on the path from the root, with the octants that they cross.
+    /// FacetTest facets of the bricks on the path from the root, with the octants that they cross.
     pairs: Vec<(u32, u64)>,
-    /// Recently tested facets, each at its index modulo the length.
-    tested: Vec<Tested>,
+    /// Tests of the last facets, each at the facet's index modulo the length.
+    tests: Vec<FacetTest>,
     counters: Counters,
 }
 
@@ -252,7 +252,7 @@ impl Voxeliser<'_> {
     fn test(&mut self, f: u32, l: Level, min_corner: [i64; 3]) -> u64 {
         self.counters.facet_brick_tests += 1;
         let facet = &self.binned.facets[f as usize];
-        let mask = self.tested[f as usize % TESTED].octants(facet, min_corner, l);
+        let mask = self.tests[f as usize % TESTS_KEPT].octants(facet, min_corner, l);
         if mask != 0 {
             self.pairs.push((f, mask));
         }

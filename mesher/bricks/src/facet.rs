@@ -84,12 +84,13 @@ const fn columns(a: usize) -> [[u64; 256]; 2] {
 /// (lattice units).
 #[inline]
 pub fn crossed(f: &Facet, corner: [i64; 3], l: Level) -> u64 {
-    Tested::default().octants(f, corner, l)
+    FacetTest::default().octants(f, corner, l)
 }
 
-/// A facet, and what its tests by plane and edges have in common for all bricks. By default that of a facet at the origin.
+/// A facet, and what its tests against all bricks have in common: its normal and its edges in three projections. By default that of a facet whose
+/// vertices are all at the origin.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Tested {
+pub struct FacetTest {
     facet: Facet,
     normal: [i64; 3],
     /// By axis, the half-planes whose intersection is the projection of the facet along it.
@@ -106,13 +107,13 @@ struct Side {
     growth: i32,
 }
 
-impl Tested {
+impl FacetTest {
     fn new(f: &Facet) -> Self {
         let normal = f.normal();
         Self { facet: *f, normal, sides: [0, 1, 2].map(|a| sides(&f.v, normal[a], a)) }
     }
 
-    /// The tests of facet `f`, which are prepared unless the last ones were of the same facet.
+    /// The test of facet `f`, which is prepared unless the last one was of the same facet.
     #[inline]
     fn prepared(&mut self, f: &Facet) -> &Self {
         if self.facet != *f {
@@ -121,7 +122,7 @@ impl Tested {
         self
     }
 
-    /// The same as [`crossed`], for less if the last facet was the same.
+    /// The same as [`crossed`]; faster if the last facet was the same.
     #[inline]
     pub fn octants(&mut self, f: &Facet, corner: [i64; 3], l: Level) -> u64 {
         let shift = ROOT_BITS - l;
@@ -163,12 +164,12 @@ fn sides(v: &[[i32; 3]; 3], normal: i64, a: usize) -> [Side; 3] {
 
 /// The ten tests by plane and edges, in the widest vectors that the processor supports.
 mod kernel {
-    use super::{COLUMNS, Side, Tested};
+    use super::{COLUMNS, FacetTest, Side};
 
     /// Octants that neither the normal nor a cross product separates from the facet. To be intersected with the
     /// mask of the coordinate axes.
     #[inline]
-    pub fn separated(f: &Tested, corner: [i64; 3], shift: u32) -> u64 {
+    pub fn separated(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512dq") {
             // SAFETY: the features that the function is compiled for have just been detected; these imply AVX-512 F.
@@ -180,7 +181,7 @@ mod kernel {
     /// The tests, with the evaluation of lanes as parameters: all vector widths share the rest.
     #[inline(always)]
     pub fn generic(
-        f: &Tested,
+        f: &FacetTest,
         corner: [i64; 3],
         shift: u32,
         plane: impl Fn([i64; 3], i64, i64) -> u64,
@@ -270,11 +271,11 @@ mod kernel {
     /// 512 bits at a time.
     #[cfg(target_arch = "x86_64")]
     mod avx512 {
-        use super::Tested;
+        use super::FacetTest;
         use std::arch::x86_64::*;
 
         #[target_feature(enable = "avx512bw,avx512dq")]
-        pub fn separated(f: &Tested, corner: [i64; 3], shift: u32) -> u64 {
+        pub fn separated(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
             let plane = |n, most, least| plane(n, most, least);
             super::generic(f, corner, shift, plane, |ci, cj, least| edge(ci, cj, least))
         }
@@ -346,7 +347,7 @@ mod tests {
 
         #[test]
         fn the_facet_before_changes_nothing(v in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)], w in [vertex(-40..3000), vertex(-40..3000), vertex(-40..3000)]) {
-            let mut tested = Tested::default();
+            let mut tested = FacetTest::default();
             for f in [v, w, v].map(|v| Facet { v }) {
                 prop_assert_eq!(tested.octants(&f, [0; 3], 17), crossed(&f, [0; 3], 17));
             }
@@ -357,8 +358,8 @@ mod tests {
             let f = Facet { v };
             let corner = position(at).map(|p| i64::from(p) << 25);
             let shift = ROOT_BITS - l;
-            let portable = kernel::generic(&Tested::new(&f), corner, shift, kernel::plane_lanes, kernel::edge_lanes);
-            prop_assert_eq!(kernel::separated(&Tested::new(&f), corner, shift), portable);
+            let portable = kernel::generic(&FacetTest::new(&f), corner, shift, kernel::plane_lanes, kernel::edge_lanes);
+            prop_assert_eq!(kernel::separated(&FacetTest::new(&f), corner, shift), portable);
         }
     }
 
@@ -386,7 +387,10 @@ mod tests {
                 ("normal", &|a| facet(a).normal().map(i128::from).to_vec()),
                 ("crossed", &|a| vec![crossed(&facet(a), corner(a), a[12] as Level).into()]),
                 ("separated", &|a| {
-                    vec![kernel::separated(&Tested::new(&facet(a)), corner(a), a[12] as u32).into()]
+                    vec![
+                        kernel::separated(&FacetTest::new(&facet(a)), corner(a), a[12] as u32)
+                            .into(),
+                    ]
                 }),
             ],
         );

@@ -1,7 +1,7 @@
 //! The leaf stream: the mesh's leaves in Morton order, as digest, counts, files and exports read them.
 //!
 //! A depth-first merge of the levels: each level's sets are read once in order, so a mesh larger than
-//! memory can be written. The walk proceeds by groups of eight siblings.
+//! memory can be written. Leaves wait as parts of bricks until the words of many are made at once, in vectors.
 //!
 //! Invariants of the stream of a rank, which [`check::leaves`](crate::check::leaves) executes:
 //! - it is *linear*: leaf words ascend, and no leaf overlaps the one before it;
@@ -167,19 +167,20 @@ impl<E, S: FnMut(&[u64]) -> Result<(), E>> Walk<'_, S> {
 
     /// Passes the words of the waiting leaves to the sink.
     fn flush(&mut self) -> Result<(), E> {
-        let number = put(&self.waiting, &self.bits, &mut self.words, &mut self.counts);
+        let number = words(&self.waiting, &self.bits, &mut self.words, &mut self.counts);
         self.waiting.clear();
         if number > 0 { (self.sink)(&self.words[..number]) } else { Ok(()) }
     }
 }
 
 widest! {
-    /// Puts the words of some leaves, eight at a time though fewer may count, and counts them. Returns the number of words.
-    fn put(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize = put_lanes;
+    /// Writes the words of some leaves, always eight at a time, so that the last ones are overwritten or without meaning; and counts the leaves.
+    /// Returns the number of words.
+    fn words(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize = words_lanes;
 }
 
 #[inline(always)]
-fn put_lanes(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize {
+fn words_lanes(parts: &[Loaded], bits: &[[u64; 8]], to: &mut [u64], counts: &mut Counts) -> usize {
     let mut written = 0;
     for &Loaded { level, key, leaves, octants: Octants { crossing, inside, .. } } in parts {
         // In the order of the sides' numbers.
