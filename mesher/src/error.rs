@@ -3,6 +3,7 @@
 //! Exit codes: 0 success, 1 a geometry that leaks, on request, 2 unusable input, 4 output could not be written, 70 a bug, 71 too little memory, 130 interrupted.
 
 use files::OUT_OF_MEMORY;
+use ranks::{Comm, pack_bytes, unpack_bytes};
 use thiserror::Error;
 
 /// An error with a message of one sentence: what, where, what to do.
@@ -15,36 +16,71 @@ pub struct Error {
 }
 
 impl Error {
+    fn new(exit_code: i32, message: impl Into<String>) -> Self {
+        Self { exit_code, message: message.into() }
+    }
+
     /// The geometry leaks, and the user wants no mesh then.
     pub fn leak(message: impl Into<String>) -> Self {
-        Self::from((1, message.into()))
+        Self::new(1, message)
     }
 
     /// The case, the geometry or an option is unusable.
     pub fn input(message: impl Into<String>) -> Self {
-        Self::from((2, message.into()))
+        Self::new(2, message)
     }
 
     /// Output could not be written.
     pub fn output(message: impl Into<String>) -> Self {
-        Self::from((4, message.into()))
+        Self::new(4, message)
     }
 
     /// The memory does not suffice.
     pub fn memory(message: impl Into<String>) -> Self {
-        Self::from((OUT_OF_MEMORY, message.into()))
+        Self::new(OUT_OF_MEMORY, message)
     }
 }
 
-/// For ranks to [agree](ranks::agree) on.
-impl From<Error> for (i32, String) {
-    fn from(error: Error) -> Self {
-        (error.exit_code, error.message)
+/// Makes ranks agree on errors: all return the error of the lowest rank that has one. Collective.
+///
+/// # Errors
+/// The same on all ranks.
+///
+/// # Panics
+/// Never: a rank without a value has an error.
+pub fn agree<T>(comm: &dyn Comm, mine: Result<T, Error>) -> Result<T, Error> {
+    let mut packed = Vec::new();
+    let value = mine.map_err(|error| {
+        packed.push(error.exit_code as u64);
+        pack_bytes(error.message.as_bytes(), &mut packed);
+    });
+    match comm.all_gather(&packed).messages().next() {
+        None => Ok(value.expect("no rank has an error")),
+        Some((_, words)) => {
+            let (message, _) = unpack_bytes(&words[1..]);
+            Err(Error::new(words[0] as i32, String::from_utf8_lossy(message)))
+        }
     }
 }
 
-impl From<(i32, String)> for Error {
-    fn from((exit_code, message): (i32, String)) -> Self {
-        Self { exit_code, message }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ranks::sim;
+
+    #[test]
+    fn all_ranks_have_the_error_of_the_lowest_rank_that_has_one() {
+        for sentence in ["", "no space", "häßlich: 'x'", "12345678"] {
+            let results = sim::run(4, 1, |comm| {
+                let mine = match comm.rank() {
+                    0 | 2 => Ok(comm.rank()),
+                    rank => Err(Error::new(rank as i32, sentence)),
+                };
+                agree(comm, mine)
+            });
+            assert!(results.iter().all(|r| *r == Err(Error::new(1, sentence))), "{results:?}");
+        }
+        let results = sim::run(3, 1, |comm| agree(comm, Ok(comm.rank())));
+        assert_eq!(results, [Ok(0), Ok(1), Ok(2)]);
     }
 }

@@ -1,7 +1,7 @@
 //! Phases 3 to 8: from facets and rules on the lattice to the tree.
 
 use crate::check;
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::grade;
 use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
@@ -16,7 +16,7 @@ use crate::sides::{self, Base, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::octant::{Level, Side};
 use bricks::tree::{Kept, Tree};
-use ranks::{Comm, Solo, agree, gather, uncounted};
+use ranks::{Comm, Solo, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
 

@@ -3,13 +3,13 @@
 use bricks::octant::{LEVEL_MAX, Level};
 use clap::Parser;
 use mesher::Options;
-use mesher::error::Error;
+use mesher::error::{Error, agree};
 use mesher::input::case::Case;
 use mesher::input::ingest::Source;
 use mesher::output::write::Output;
 use mesher::partition::{Division, Partitioner, Weights};
 use program::case_file::{self, Keys};
-use ranks::{Comm, agree, launch, text_of_first, uncounted};
+use ranks::{Comm, launch, text_of_first, uncounted};
 use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Collective operations made of the calls of [`Comm`]: errors and texts that all ranks agree on, and an allgather with reduction by key.
+//! Collective operations made of the calls of [`Comm`]: texts that all ranks agree on, and an allgather with reduction by key.
 //!
 //! Slices of a file of facets overlap in space: dozens of ranks have entries with the same key. A plain allgather would bring dozens of
 //! times the result to every rank, and every rank would reduce it. Here *reducer ranks*, each for its part of the keys,
@@ -6,30 +6,6 @@
 
 use crate::{Comm, MessageBuffer, gather};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash};
-
-/// Makes ranks agree on errors: all return the error of the lowest rank that has one. An error is an exit code and a sentence.
-/// Collective.
-///
-/// # Panics
-/// Never: a rank without a value has an error.
-pub fn agree<T, E>(comm: &dyn Comm, mine: Result<T, E>) -> Result<T, E>
-where
-    E: Into<(i32, String)> + From<(i32, String)>,
-{
-    let mut packed = Vec::new();
-    let value = mine.map_err(|error| {
-        let (code, sentence) = error.into();
-        packed.push(code as u64);
-        pack_bytes(sentence.as_bytes(), &mut packed);
-    });
-    match comm.all_gather(&packed).messages().next() {
-        None => Ok(value.expect("no rank has an error")),
-        Some((_, words)) => {
-            let (sentence, _) = unpack_bytes(&words[1..]);
-            Err(E::from((words[0] as i32, String::from_utf8_lossy(sentence).into_owned())))
-        }
-    }
-}
 
 /// The first rank with another value than rank 0, by its hash. Collective.
 pub fn first_other(comm: &dyn Comm, value: &impl Hash) -> Option<usize> {
@@ -132,22 +108,6 @@ pub fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
 mod tests {
     use super::*;
     use crate::sim;
-
-    #[test]
-    fn all_ranks_have_the_error_of_the_lowest_rank_that_has_one() {
-        for sentence in ["", "no space", "häßlich: 'x'", "12345678"] {
-            let results = sim::run(4, 1, |comm| {
-                let mine = match comm.rank() {
-                    0 | 2 => Ok(comm.rank()),
-                    rank => Err((rank as i32, sentence.to_owned())),
-                };
-                agree(comm, mine)
-            });
-            assert!(results.iter().all(|r| *r == Err((1, sentence.to_owned()))), "{results:?}");
-        }
-        let results = sim::run(3, 1, |comm| agree::<_, (i32, String)>(comm, Ok(comm.rank())));
-        assert_eq!(results, [Ok(0), Ok(1), Ok(2)]);
-    }
 
     #[test]
     fn all_ranks_get_the_sums_over_all() {

@@ -5,10 +5,10 @@
 //!
 //! Invariant: the slices of the ranks are contiguous, in the order of the ranks, and add up to all facets.
 
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::input::stl;
 use geometries::{Facet, Generator};
-use ranks::{Comm, MessageBuffer, agree, first_other, uncounted};
+use ranks::{Comm, MessageBuffer, first_other, uncounted};
 use std::hash::Hash;
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;

@@ -1,13 +1,13 @@
 //! Quantisation: the rules of a case and its facets on the lattice of the root.
 
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::input::case::Case;
 use crate::input::ingest::Slice;
 use crate::input::lattice::{Bounds, Rules};
 use bricks::digest;
 use bricks::facet::Facet;
 use bricks::octant::ROOT_EDGE;
-use ranks::{Comm, agree, gather, uncounted};
+use ranks::{Comm, gather, uncounted};
 
 /// The facets of all ranks, in numbers.
 #[derive(Clone, Copy, Debug)]

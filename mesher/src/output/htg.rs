@@ -6,7 +6,7 @@
 //! compresses one window, so memory does not grow with the mesh, and the file does not depend on the number of ranks.
 
 use crate::Mesh;
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::output::stream::{LevelCursors, Octants};
 use crate::output::write::{OutDir, TREE};
 use crate::partition::ownership::{Ownership, brick_start};
@@ -37,7 +37,7 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
     let shape = Shape { origin, edge, nodes: numbering.nodes.clone() };
     let begin = || TreeWriter::new(out.file(TREE)?, shape.clone());
     let failed = out.failed(TREE);
-    let mut file = ranks::agree(comm, (comm.rank() == 0).then(begin).transpose().map_err(&failed))?;
+    let mut file = agree(comm, (comm.rank() == 0).then(begin).transpose().map_err(&failed))?;
     let (mut own, mut last) = (own_siblings(mesh, &numbering).peekable(), None);
     let mut deflater = Deflater::default();
     let round = WINDOWS_MAX.min(comm.size() as u64);
@@ -56,10 +56,10 @@ pub fn write(mesh: &Mesh, out: &OutDir, comm: &dyn Comm) -> Result<(), Error> {
         }
         let compressed = comm.sparse_all_to_all(chunks);
         let written = file.as_mut().map_or(Ok(()), |file| add(&compressed, file));
-        ranks::agree(comm, written.map_err(&failed))?;
+        agree(comm, written.map_err(&failed))?;
     }
     let publish = |file: TreeFile| file.finish()?.into_inner()?.publish();
-    ranks::agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
+    agree(comm, file.map_or(Ok(()), publish).map_err(&failed))
 }
 
 /// Groups of siblings with the number of the first.

@@ -2,7 +2,7 @@
 //! the mesh in numbers.
 
 use crate::Mesh;
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::input::lattice::Rules;
 use crate::output::stream::{Counts, total};
 use crate::output::write::{OutDir, Output, Part, TREE, part_name};
@@ -11,7 +11,7 @@ use crate::sides::{Ambiguous, Summary};
 use bricks::digest::{Digests, hex};
 use bricks::octant::{LEVEL_MAX, Level};
 use files::interrupt::stop_at;
-use ranks::{Comm, agree};
+use ranks::Comm;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

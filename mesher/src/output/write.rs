@@ -6,9 +6,9 @@
 //! - the manifest is written last, so all files that it names exist;
 //! - after an error or an interrupt, none of the mesh's files remains.
 
-use crate::error::Error;
+use crate::error::{Error, agree};
 use files::{Claim, Draft};
-use ranks::{Comm, agree, uncounted};
+use ranks::{Comm, uncounted};
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};

@@ -1,9 +1,9 @@
 //! METIS: parts of equal weight with few faces between them.
 
-use crate::error::Error;
+use crate::error::{Error, agree};
 use crate::partition::curve::{Bin, Boundary};
 use bricks::octant::{LEVEL_MAX, Level, neighbour, start57};
-use ranks::{Comm, agree, gather};
+use ranks::{Comm, gather};
 use std::sync::{Mutex, PoisonError};
 
 /// Fewest base leaves per rank that METIS partitions, of equal ones or of their equivalent in unequal ones.
