@@ -49,9 +49,9 @@ use crate::partition::ownership::Ownership;
 use crate::record::Counters;
 use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
-use bricks::dilate::{Reach, Tile};
+use bricks::dilate::{Reached, dilate, dilate_children};
 use bricks::octant::Level;
-use bricks::tree::{Kept, PerLevel, Tree};
+use bricks::tree::{PerLevel, Tree, kept};
 use ranks::Comm;
 
 /// Bricks of a level from which on those that are full are stored as the octants that they fill; with fewer it takes more time than the memory
@@ -60,18 +60,19 @@ const BRICKS_MANY: usize = if cfg!(debug_assertions) { 8 } else { 1 << 16 };
 
 /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
 /// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
-/// `crossing` are the base tree's crossing leaves. Adds its work to the counters; also returns the bytes of split octants at most. Collective.
+/// `crossing` are the base tree's crossing leaves, and `deleted` those of its leaves that the mesh does not keep. Adds its work to the counters; also returns the bytes of split octants at most. Collective.
 pub fn grade(
     split: PerLevel,
     crossing: &PerLevel,
-    kept: &Kept,
+    deleted: &PerLevel,
     rules: &Rules,
     ownership: &Ownership,
     counters: Counters,
     comm: &dyn Comm,
 ) -> (PerLevel, Counters, usize) {
     let surface = rules.level_surface;
-    let mut g = Gradation { split, crossing, kept, surface, ownership, comm, counters, bytes: 0 };
+    let mut g =
+        Gradation { split, crossing, deleted, surface, ownership, comm, counters, bytes: 0 };
     if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
         g.extra_layer();
     }
@@ -95,7 +96,7 @@ pub fn grade(
 struct Gradation<'a> {
     split: PerLevel,
     crossing: &'a PerLevel,
-    kept: &'a Kept<'a>,
+    deleted: &'a PerLevel,
     surface: Level,
     ownership: &'a Ownership,
     comm: &'a dyn Comm,
@@ -122,39 +123,33 @@ impl Gradation<'_> {
     /// kept leaves, or whole groups (see above). Groups without kept leaves are among these: to find them takes as long as to dilate them.
     fn reach(&mut self, l: Level, radius: u32, to: Level) -> BrickSet {
         if l > self.surface {
-            let parents = self.reached(l - 1, |g, reach| {
-                let mut split = g.split[l as usize].cursor();
-                let mut deleted = g.kept.deleted(l).cursor();
-                let leaves = Tree::exists(&g.split, l)
-                    .filter(|b| g.ownership.owns(l, b.key))
-                    .map(|b| Brick { bits: b.bits & !split.get(b.key) & !deleted.get(b.key), ..b })
-                    .filter(|b| b.bits != 0);
-                reach.dilate_children(leaves, radius);
-            });
+            let mut split = self.split[l as usize].cursor();
+            let mut deleted = self.deleted[l as usize].cursor();
+            let leaves = Tree::exists(&self.split, l)
+                .filter(|b| self.ownership.owns(l, b.key))
+                .map(|b| Brick { bits: b.bits & !split.get(b.key) & !deleted.get(b.key), ..b })
+                .filter(|b| b.bits != 0);
+            let reached = dilate_children(l - 1, leaves, radius);
+            let parents = self.counted(reached);
             return if to < l - 1 { parents.coarsen() } else { parents };
         }
-        self.reached(to, |g, reach| {
-            let groups = g.split[l as usize - 1].bricks();
-            let groups = groups.filter(|b| g.ownership.owns(l - 1, b.key));
-            let radius = radius.div_ceil(2);
-            // What is reached is the greatest set of all: its parents are made without it.
-            match to < l - 1 {
-                true => reach.dilate_children(groups, radius),
-                false => reach.dilate(groups, radius),
-            }
-        })
+        let groups = self.split[l as usize - 1].bricks();
+        let groups = groups.filter(|b| self.ownership.owns(l - 1, b.key));
+        let radius = radius.div_ceil(2);
+        // What is reached is the greatest set of all: its parents are made without it.
+        let reached = match to < l - 1 {
+            true => dilate_children(to, groups, radius),
+            false => dilate(to, groups, radius),
+        };
+        self.counted(reached)
     }
 
-    /// The octants of level `l` that `dilate` reaches; counts the work.
-    fn reached(&mut self, l: Level, dilate: impl FnOnce(&Self, &mut Reach)) -> BrickSet {
-        let mut tile = Tile::default();
-        let mut reach = Reach::new(l, &mut tile);
-        dilate(self, &mut reach);
-        let (reached, words, bytes) = reach.finish();
-        self.counters.words_dilated += words;
+    /// The octants that a dilation has reached; counts its work.
+    fn counted(&mut self, reached: Reached) -> BrickSet {
+        self.counters.words_dilated += reached.words;
         let split: usize = self.split.iter().map(BrickSet::bytes).sum();
-        self.bytes = self.bytes.max(split + bytes);
-        reached
+        self.bytes = self.bytes.max(split + reached.bytes);
+        reached.octants
     }
 
     /// The paper's exchange of extent boxes: sends the octants that were reached to the ranks that hold
@@ -168,7 +163,7 @@ impl Gradation<'_> {
     /// Splits those of the octants that are kept, in bricks that this rank holds.
     fn split_kept(&mut self, l: Level, reached: BrickSet) {
         let fresh = reached.without(&self.split[l as usize]);
-        self.split_more(l, self.kept.only(&self.split, l, fresh));
+        self.split_more(l, kept(&self.split, self.deleted, l, fresh));
     }
 
     /// Splits octants that are not split yet, in bricks that this rank holds.
@@ -186,10 +181,10 @@ impl Gradation<'_> {
     fn extra_layer(&mut self) {
         let surface = self.surface;
         for m in (surface..self.crossing.len() as Level).rev() {
-            let mut touched = self.reached(m - 1, |g, reach| {
-                let leaves = g.crossing[m as usize].bricks();
-                reach.dilate_children(leaves.filter(|b| g.ownership.owns(m, b.key)), 1);
-            });
+            let leaves = self.crossing[m as usize].bricks();
+            let leaves = leaves.filter(|b| self.ownership.owns(m, b.key));
+            let reached = dilate_children(m - 1, leaves, 1);
+            let mut touched = self.counted(reached);
             for _ in surface..m {
                 touched = touched.coarsen();
             }

@@ -15,7 +15,7 @@ use crate::refine::{self, BinnedFacets};
 use crate::sides::{self, Base, Decided, leaks, openness};
 use bricks::facet::Facet;
 use bricks::octant::{Level, Side};
-use bricks::tree::{Kept, Tree};
+use bricks::tree::Tree;
 use ranks::{Comm, Solo, gather, uncounted};
 use std::borrow::Borrow;
 use std::convert::Infallible;
@@ -128,8 +128,8 @@ pub fn grow<F: Borrow<[Facet]>>(
     let base = is_whole.then(|| mesh.split.clone());
     (mesh.split, job.counters, mesh.bytes_graded) = job.phase("grade", |comm| {
         let split = std::mem::take(&mut mesh.split);
-        let kept = Kept::new(mesh.sides.deleted());
-        grade::grade(split, &mesh.crossing, &kept, &mesh.rules, &mesh.ownership, work, comm)
+        let Mesh { crossing, sides, rules, ownership, .. } = &mesh;
+        grade::grade(split, crossing, sides.deleted(), rules, ownership, work, comm)
     });
     let mut fingerprint = 0;
     job.check(|comm| {

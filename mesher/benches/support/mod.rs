@@ -4,10 +4,10 @@
 use bricks::brick::{flood, valid};
 use bricks::brickset::BrickSet;
 use bricks::digest;
-use bricks::dilate::{Reach, Tile};
+use bricks::dilate::dilate_children;
 use bricks::facet::{Facet, crossed};
 use bricks::octant::ROOT_BITS;
-use bricks::tree::{Kept, Tree};
+use bricks::tree::Tree;
 use mesher::input::case::{Case, RootSpec};
 use mesher::input::ingest::{Slice, Source, read};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
@@ -84,11 +84,10 @@ impl Phases {
         let binned = BinnedFacets::new(&facets);
         let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
-        let kept = Kept::new(sides.deleted());
         let (graded, ..) = grade::grade(
             tree.split.clone(),
             &tree.crossing,
-            &kept,
+            sides.deleted(),
             &rules,
             &ownership,
             Counters::default(),
@@ -156,11 +155,10 @@ pub fn kernels() -> Vec<Kernel> {
             "grade",
             leaves,
             Box::new(|| {
-                let kept = Kept::new(p.mesh.sides.deleted());
                 grade::grade(
                     p.tree.split.clone(),
                     &p.tree.crossing,
-                    &kept,
+                    p.mesh.sides.deleted(),
                     &p.rules,
                     &p.ownership,
                     Counters::default(),
@@ -221,10 +219,7 @@ fn floods(set: &BrickSet, l: u32) -> u64 {
 }
 
 fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
-    let mut tile = Tile::default();
-    let mut reach = Reach::new(l - 1, &mut tile);
-    reach.dilate_children(set.bricks(), radius);
-    reach.finish().0.len() as u64
+    dilate_children(l - 1, set.bricks(), radius).octants.len() as u64
 }
 
 fn drop_counted<T>(made: T) -> u64 {

@@ -17,7 +17,7 @@ use crate::brick::{self, Brick};
 use crate::brickset::BrickSet;
 use crate::octant::{Level, morton};
 use rustc_hash::FxHashMap;
-pub use tile::Tile;
+use tile::pass;
 
 /// Octants along a tile's edge.
 const TILE: usize = 32;
@@ -26,61 +26,40 @@ const MARGIN: usize = 16;
 /// log2 of the number of bricks along a tile's edge.
 const TILE_BRICKS_LOG2: u32 = 3;
 
-/// Number of words dilated: rows of tiles that sources can reach along y, in each layer with sources.
-pub type Words = u64;
-
-/// The union of several dilations: octants of one level inside the root.
-pub struct Reach<'t> {
-    level: Level,
-    tile: &'t mut Tile,
-    out: Gathered,
-    words: Words,
+/// What a dilation reaches, octants of one level inside the root, and what that took.
+pub struct Reached {
+    /// The octants.
+    pub octants: BrickSet,
+    /// Number of words dilated: rows of tiles that sources can reach along y, in each layer with sources.
+    pub words: u64,
+    /// Bytes that it took at most: passes on the way reach less.
+    pub bytes: usize,
 }
 
-impl<'t> Reach<'t> {
-    /// The empty union, of octants of level `level`. `tile` is scratch; it must be empty and is left empty.
-    pub fn new(level: Level, tile: &'t mut Tile) -> Self {
-        Self { level, tile, out: Gathered::new(level), words: 0 }
-    }
+/// All octants of level `l` within `radius` of a source of the same level. Sources come in Morton order.
+pub fn dilate(l: Level, sources: impl Iterator<Item = Brick>, radius: u32) -> Reached {
+    // A radius greater than the root's width reaches no more than the root.
+    let radius = radius.min(1 << l);
+    let first = radius.min(MARGIN as u32);
+    further(l, pass(l, sources, first, false), radius - first)
+}
 
-    /// Adds all octants within `radius` of a source of the same level. Sources come in Morton order.
-    pub fn dilate(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
-        // A radius greater than the root's width reaches no more than the root.
-        let radius = radius.min(1 << self.level);
-        let first = radius.min(MARGIN as u32);
-        self.pass(sources, first, false, radius - first);
-    }
+/// The octants of level `l` that are parents of those within `radius` of a source, with sources and radius one level deeper. Sources
+/// come in Morton order.
+pub fn dilate_children(l: Level, sources: impl Iterator<Item = Brick>, radius: u32) -> Reached {
+    further(l, pass(l, sources, radius & 1, true), radius / 2)
+}
 
-    /// Adds the parents of all octants within `radius` of a source, with sources and radius one level deeper than
-    /// the union. Sources come in Morton order.
-    pub fn dilate_children(&mut self, sources: impl Iterator<Item = Brick>, radius: u32) {
-        self.pass(sources, radius & 1, true, radius / 2);
+/// All octants within `radius` of those that a pass has reached by dilating some words.
+fn further(l: Level, (near, words): (Gathered, u64), radius: u32) -> Reached {
+    let bytes = near.bytes();
+    let mut octants = near.into_set();
+    if radius == 0 {
+        return Reached { octants, words, bytes };
     }
-
-    /// Adds all octants within `rest` of those that a pass reaches.
-    fn pass(
-        &mut self,
-        sources: impl Iterator<Item = Brick>,
-        radius: u32,
-        to_parents: bool,
-        rest: u32,
-    ) {
-        if rest == 0 {
-            self.words += self.tile.pass(sources, radius, to_parents, &mut self.out);
-            return;
-        }
-        let mut near = Gathered::new(self.level);
-        self.words += self.tile.pass(sources, radius, to_parents, &mut near);
-        let mut near = near.into_set();
-        near.condense();
-        self.dilate(near.bricks(), rest);
-    }
-
-    /// The octants reached, the work done, and the bytes that it took at most: passes on the way reach less.
-    pub fn finish(self) -> (BrickSet, Words, usize) {
-        let bytes = self.out.bytes();
-        (self.out.into_set(), self.words, bytes)
-    }
+    octants.condense();
+    let reached = dilate(l, octants.bricks(), radius);
+    Reached { words: words + reached.words, ..reached }
 }
 
 /// log2 of the bricks in a block, in which results are gathered: 2 x 2 x 2, most of which a layer fills.
@@ -227,13 +206,8 @@ mod tests {
             let codes: BTreeSet<u64> = seeds.iter().map(|s| s % (1 << (3 * l))).collect();
             let grown = naive(l, &codes, i64::from(r));
             let all = widths(|| {
-                let mut tile = Tile::default();
-                let mut same = Reach::new(l, &mut tile);
-                same.dilate(set(&codes).bricks(), r);
-                let same = same.finish().0;
-                let mut parents = Reach::new(l - 1, &mut tile);
-                parents.dilate_children(set(&codes).bricks(), r);
-                [same, parents.finish().0]
+                let same = dilate(l, set(&codes).bricks(), r).octants;
+                [same, dilate_children(l - 1, set(&codes).bricks(), r).octants]
             });
             let parents: BTreeSet<u64> = grown.iter().map(|c| c >> 3).collect();
             for (width, [same, above]) in all {

@@ -7,8 +7,8 @@
 //! - an octant that exists is split if and only if a facet crosses it and it is shallower than the surface level, or its interior meets
 //!   that of an extent box of a deeper level; it is crossing if and only if a facet crosses it and it is not split.
 //!
-//! Invariant of [`Kept`]: `deleted[l]` holds leaves of the base tree, none of them crossing. If everything is kept, it is empty at
-//! all levels.
+//! Invariant of the kept region, which is stored as its complement: `deleted[l]` holds leaves of the base tree, none of them crossing.
+//! If everything is kept, it is empty at all levels.
 //!
 //! On several ranks, each rank stores the bricks that it holds. A rank that holds a brick holds all
 //! its ancestors, so [`Tree::check_structure`] needs no communication; the checks of the mesher execute the last invariant of the
@@ -103,49 +103,30 @@ pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
     }
 }
 
-/// The kept region of a base tree, stored as its complement.
-#[derive(Clone, Copy, Debug)]
-pub struct Kept<'a> {
-    deleted: &'a PerLevel,
-    is_partial: bool,
-}
-
-impl<'a> Kept<'a> {
-    /// The region that remains when these leaves are deleted.
-    pub fn new(deleted: &'a PerLevel) -> Self {
-        Self { deleted, is_partial: deleted.iter().any(|s| !s.is_empty()) }
+/// The octants of `set`, of level `l`, that lie in a kept leaf of the base tree or are split in it. `deleted` are its other leaves.
+///
+/// An octant whose parent is split in the base tree is an octant of that tree and is looked up.
+/// Any other octant is kept if its parent is. So the question passes to coarser levels, for ever
+/// fewer octants, and reads each level's sets once in order. `split` may be the graded tree's as
+/// well as the base tree's: an octant that gradation has split lies in a kept leaf, so all its
+/// descendants are kept.
+pub fn kept(split: &PerLevel, deleted: &PerLevel, l: Level, mut set: BrickSet) -> BrickSet {
+    if set.is_empty() || deleted.iter().all(BrickSet::is_empty) {
+        return set;
     }
-
-    /// The deleted leaves of level `l`.
-    pub fn deleted(&self, l: Level) -> &'a BrickSet {
-        &self.deleted[l as usize]
+    if l == 0 {
+        return set.without(&deleted[0]);
     }
-
-    /// The octants of `set`, of level `l`, that lie in a kept leaf of the base tree or are split in it.
-    ///
-    /// An octant whose parent is split in the base tree is an octant of that tree and is looked up.
-    /// Any other octant is kept if its parent is. So the question passes to coarser levels, for ever
-    /// fewer octants, and reads each level's sets once in order. `split` may be the graded tree's as
-    /// well as the base tree's: an octant that gradation has split lies in a kept leaf, so all its
-    /// descendants are kept.
-    pub fn only(&self, split: &PerLevel, l: Level, mut set: BrickSet) -> BrickSet {
-        if !self.is_partial || set.is_empty() {
-            return set;
-        }
-        if l == 0 {
-            return set.without(self.deleted(l));
-        }
-        let parents = set.coarsen().without(&split[l as usize - 1]);
-        let parents = self.only(split, l - 1, parents);
-        let (mut below_leaf, mut split) = (parents.cursor(), split[l as usize - 1].cursor());
-        let mut deleted = self.deleted(l).cursor();
-        set.retain(|b| {
-            let children = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
-            let in_tree = children(split.get(b.key >> 3)) & !deleted.get(b.key);
-            b.bits & (in_tree | children(below_leaf.get(b.key >> 3)))
-        });
-        set
-    }
+    let parents = set.coarsen().without(&split[l as usize - 1]);
+    let parents = kept(split, deleted, l - 1, parents);
+    let (mut below_leaf, mut split) = (parents.cursor(), split[l as usize - 1].cursor());
+    let mut deleted = deleted[l as usize].cursor();
+    set.retain(|b| {
+        let children = |parents: u64| brick::children(brick::byte(parents, b.key & 7));
+        let in_tree = children(split.get(b.key >> 3)) & !deleted.get(b.key);
+        b.bits & (in_tree | children(below_leaf.get(b.key >> 3)))
+    });
+    set
 }
 
 #[cfg(test)]
@@ -193,8 +174,7 @@ mod tests {
     fn nothing_is_kept_below_a_deleted_root() {
         let (mut deleted, split) = (PerLevel::default(), PerLevel::default());
         deleted[0] = set(&[0]);
-        let kept = Kept::new(&deleted);
-        assert!(kept.only(&split, 0, set(&[0])).is_empty());
-        assert!(kept.only(&split, 2, set(&[0, 63])).is_empty());
+        assert!(kept(&split, &deleted, 0, set(&[0])).is_empty());
+        assert!(kept(&split, &deleted, 2, set(&[0, 63])).is_empty());
     }
 }

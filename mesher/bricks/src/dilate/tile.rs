@@ -1,18 +1,17 @@
 //! One tile: 32 x 32 x 32 octants and a margin, one word per row.
 
-use super::{Gathered, MARGIN, TILE, TILE_BRICKS_LOG2, Words};
+use super::{Gathered, MARGIN, TILE, TILE_BRICKS_LOG2};
 use crate::brick::{self, Brick};
 use crate::brickset::ones;
-use crate::octant::position;
+use crate::octant::{Level, position};
 use crate::widest;
 use std::ops::Range;
 
 /// A tile and its margin, one word per row. Tiles are mostly empty at coarse levels, so only rows that can hold a
-/// result are touched. A tile is reused, to avoid zeroing its memory.
+/// result are touched. One tile serves a whole pass, to avoid zeroing its memory.
 ///
-/// Invariant between dilations: the tile is empty, so `rows` and `half` are zero.
-#[derive(Debug, Default)]
-pub struct Tile {
+/// Invariant between tiles of a pass: it is empty, so `rows` and `half` are zero.
+struct Tile {
     radius: usize,
     /// Rows on either side of the tile's own along y and z: the radius, rounded up to whole bricks of parents.
     margin: usize,
@@ -36,37 +35,37 @@ fn span(bits: u32) -> Range<usize> {
     bits.trailing_zeros() as usize..(u32::BITS - bits.leading_zeros()) as usize
 }
 
-impl Tile {
-    /// Adds the octants within `radius` of a source to `out`, or their parents if `to_parents`, tile by tile. Returns the work done.
-    pub(super) fn pass(
-        &mut self,
-        sources: impl Iterator<Item = Brick>,
-        radius: u32,
-        to_parents: bool,
-        out: &mut Gathered,
-    ) -> Words {
-        self.set_radius(radius as usize);
-        let (mut words, mut now) = (0, None);
-        for b in sources {
-            let key = b.key >> (3 * TILE_BRICKS_LOG2);
-            if let Some(done) = now.filter(|n| *n != key) {
-                words += self.dilate(done, to_parents, out);
-            }
-            now = Some(key);
-            self.put(b);
+/// The octants of level `l` within `radius` of a source, or their parents if `to_parents`, made tile by tile; and the number of words
+/// dilated.
+pub(super) fn pass(
+    l: Level,
+    sources: impl Iterator<Item = Brick>,
+    radius: u32,
+    to_parents: bool,
+) -> (Gathered, u64) {
+    let (mut tile, mut out) = (Tile::new(radius as usize), Gathered::new(l));
+    let (mut words, mut now) = (0, None);
+    for b in sources {
+        let key = b.key >> (3 * TILE_BRICKS_LOG2);
+        if let Some(done) = now.filter(|n| *n != key) {
+            words += tile.dilate(done, to_parents, &mut out);
         }
-        words + now.map_or(0, |done| self.dilate(done, to_parents, out))
+        now = Some(key);
+        tile.put(b);
     }
+    words += now.map_or(0, |done| tile.dilate(done, to_parents, &mut out));
+    (out, words)
+}
 
-    /// Sets the radius of an empty tile.
-    fn set_radius(&mut self, radius: usize) {
+impl Tile {
+    /// An empty tile.
+    fn new(radius: usize) -> Self {
         assert!(radius <= MARGIN, "one pass reaches {MARGIN} octants");
-        self.radius = radius;
-        self.margin = radius.next_multiple_of(8);
-        self.side = TILE + 2 * self.margin;
-        self.rows.resize(self.side * self.side, 0);
-        self.spread.resize(self.side * self.side, 0);
-        self.half.resize(self.side * self.side / 4, 0);
+        let margin = radius.next_multiple_of(8);
+        let side = TILE + 2 * margin;
+        let (rows, half) = (vec![0; side * side], vec![0; side * side / 4]);
+        let (spread, columns_at) = (rows.clone(), [0; TILE]);
+        Self { radius, margin, side, rows, layers: 0, columns: 0, columns_at, spread, half }
     }
 
     /// The ranges of rows, along y and along z, that can hold results. The tile must not be empty.
@@ -109,7 +108,7 @@ impl Tile {
     }
 
     /// Dilates the sources along x, then y, then z, adds the result, or its parents, to `out`, and empties the tile.
-    fn dilate(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) -> Words {
+    fn dilate(&mut self, tile: u64, to_parents: bool, out: &mut Gathered) -> u64 {
         let words = self.along_y().map(|(_, y)| y.len() as u64).sum();
         if self.radius > 0 {
             dilate_rows(self);
