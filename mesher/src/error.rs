@@ -4,6 +4,8 @@
 
 use files::OUT_OF_MEMORY;
 use ranks::{Comm, pack_bytes, unpack_bytes};
+use std::fmt::Display;
+use std::path::Path;
 use thiserror::Error;
 
 /// An error with a message of one sentence: what, where, what to do.
@@ -16,28 +18,33 @@ pub struct Error {
 }
 
 impl Error {
-    fn new(exit_code: i32, message: impl Into<String>) -> Self {
-        Self { exit_code, message: message.into() }
+    fn new(exit_code: i32, message: impl Display) -> Self {
+        Self { exit_code, message: message.to_string() }
     }
 
     /// The geometry leaks, and the user wants no mesh then.
-    pub fn leak(message: impl Into<String>) -> Self {
+    pub fn leak(message: impl Display) -> Self {
         Self::new(1, message)
     }
 
     /// The case, the geometry or an option is unusable.
-    pub fn input(message: impl Into<String>) -> Self {
+    pub fn input(message: impl Display) -> Self {
         Self::new(2, message)
     }
 
     /// Output could not be written.
-    pub fn output(message: impl Into<String>) -> Self {
+    pub fn output(message: impl Display) -> Self {
         Self::new(4, message)
     }
 
     /// The memory does not suffice.
-    pub fn memory(message: impl Into<String>) -> Self {
+    pub fn memory(message: impl Display) -> Self {
         Self::new(OUT_OF_MEMORY, message)
+    }
+
+    /// The same error of a file or a directory.
+    pub fn at(self, path: &Path) -> Self {
+        Self { message: format!("{}: {}", path.display(), self.message), ..self }
     }
 }
 

@@ -6,8 +6,6 @@
 //! check of the invariants of what it has made ([`check`]). The mesh is a function of the facets and the rules alone (see
 //! `reference/DEFINITION.md`), not of the ranks, the partitioner or the base level.
 
-#![deny(missing_docs)]
-
 pub mod check;
 pub mod error;
 pub mod grade;

@@ -1,7 +1,5 @@
 //! Octants of an oct-tree as bits of bricks, 64 to a word. This crate knows no ranks.
 
-#![deny(missing_docs)]
-
 pub mod brick;
 pub mod brickset;
 pub mod digest;

@@ -84,7 +84,7 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
     files::read_text(path).map_err(|e| {
         let is_output = e.kind() == ErrorKind::InvalidInput;
         let advice = if is_output { "" } else { ": give a readable case file" };
-        Error::input(format!("{}: {e}{advice}", path.display()))
+        Error::input(format!("{e}{advice}")).at(path)
     })
 }
 
@@ -106,7 +106,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Case, Error> {
         }
         keys.case_of(source).ok_or_else(|| "missing field `spacing_min`".to_owned())
     };
-    case().map_err(|e| Error::input(format!("{}: {e}", path.display())))
+    case().map_err(|e| Error::input(e).at(path))
 }
 
 impl Keys {

@@ -1,7 +1,5 @@
 //! The program: chooses the communication between ranks, meshes, reports.
 
-#![deny(missing_docs)]
-
 mod cli;
 
 use cli::{Args, CommChoice, UNPRINTED, case, options, parse};
@@ -16,7 +14,7 @@ use std::env::args_os;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdin, stdout};
 use std::iter::once;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::exit;
 use std::sync::Once;
 use std::thread::sleep;
@@ -278,15 +276,14 @@ fn end_within(limit: Duration) {
 /// Makes the geometry known as an input: no output of the run may be that file.
 fn registered(source: &Source) -> Result<(), Error> {
     let Source::Stl(path) = source else { return Ok(()) };
-    files::register_input(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
+    files::register_input(path).map_err(|e| Error::input(e).at(path))
 }
 
 /// Finds out that two options name one output, or one in the directory of another.
 fn named_apart(args: &Args) -> Result<(), Error> {
     let outputs = [&args.out, &args.json, &args.status];
-    outputs.into_iter().flatten().try_for_each(|path| {
-        files::name_output(path).map_err(|e| Error::input(format!("{}: {e}", path.display())))
-    })
+    let name = |path: &PathBuf| files::name_output(path).map_err(|e| Error::input(e).at(path));
+    outputs.into_iter().flatten().try_for_each(name)
 }
 
 const WRITABLE: &str = "a report is JSON";
@@ -295,8 +292,8 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
     // Checked before meshing, so that a path that cannot be written to ends the run at once.
     let json = args.json.as_deref().filter(|_| comm.rank() == 0);
     let on_json = |advice: &str, write: &dyn Fn(&Path) -> io::Result<()>| {
-        let named = |path: &Path, e| Error::output(format!("{}: {e}: {advice}", path.display()));
-        json.map_or(Ok(()), |path| write(path).map_err(|e| named(path, e)))
+        let Some(path) = json else { return Ok(()) };
+        write(path).map_err(|e| Error::output(format!("{e}: {advice}")).at(path))
     };
     let apart = if comm.rank() == 0 { named_apart(args) } else { Ok(()) };
     agree(comm, apart.and_then(|()| on_json("choose another --json", &check_writable)))?;
@@ -308,8 +305,8 @@ fn work(args: &Args, comm: &dyn Comm, record: &mut Recorder) -> Result<Done, Err
         let path = dir.join(format!("rank-{:05}.txt", comm.rank()));
         let begin = std::fs::create_dir_all(dir).and_then(|()| record.keep_status(path));
         let named = |e: io::Error| match e.kind() {
-            ErrorKind::InvalidInput => Error::input(format!("{}: {e}", dir.display())),
-            _ => Error::output(format!("{}: {e}: choose another --status", dir.display())),
+            ErrorKind::InvalidInput => Error::input(e).at(dir),
+            _ => Error::output(format!("{e}: choose another --status")).at(dir),
         };
         agree(comm, begin.map_err(named))?;
     }

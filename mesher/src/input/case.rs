@@ -5,6 +5,7 @@ use crate::input::ingest::Source;
 use crate::input::lattice::{Bounds, Enclosed, ExtentBox, Keep, Root, Rules, Seed};
 use bricks::octant::ROOT_EDGE;
 use serde::Deserialize;
+use std::fmt::Display;
 
 /// A case as the user specifies it. Lengths are in the unit of the geometry.
 #[derive(Clone, Debug)]
@@ -93,7 +94,7 @@ impl Case {
 }
 
 /// Refuses the case, unless it is right.
-fn require(is_right: bool, why: impl Into<String>) -> Result<(), Error> {
+fn require(is_right: bool, why: impl Display) -> Result<(), Error> {
     if is_right { Ok(()) } else { Err(Error::input(why)) }
 }
 

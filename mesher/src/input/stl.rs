@@ -4,7 +4,6 @@
 
 use crate::error::Error;
 use geometries::Facet;
-use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
@@ -28,7 +27,7 @@ pub struct Stl {
 /// # Errors
 /// If the file cannot be read or is no STL file.
 pub fn open(path: &Path) -> Result<Stl, Error> {
-    let failed = |e: io::Error| fail(path, format_args!("{e}: give a readable STL file"));
+    let failed = |e: io::Error| Error::input(format!("{e}: give a readable STL file")).at(path);
     let file = files::open(path).map_err(failed)?;
     let length = file.metadata().map_err(failed)?.len();
     let mut head = vec![0; length.min(1024) as usize];
@@ -41,17 +40,14 @@ pub fn open(path: &Path) -> Result<Stl, Error> {
     if binary.is_some() || may_begin_with_solid(&head) && !head.contains(&0) {
         return Ok(stl);
     }
-    Err(fail(path, match count {
-        Some(count) => format!(
-            "the header promises {count} facets, which take {} bytes, but the file has {length}: it is truncated, longer or not an STL; export it again",
-            HEADER + RECORD * count
-        ),
-        None => "is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file".to_owned(),
-    }))
-}
-
-fn fail(path: &Path, what: impl Display) -> Error {
-    Error::input(format!("{}: {what}", path.display()))
+    let neither =
+        "is neither a binary STL nor a text STL, which begins with \"solid\": give an STL file";
+    let Some(count) = count else { return Err(Error::input(neither).at(path)) };
+    let promised = HEADER + RECORD * count;
+    Err(Error::input(format!(
+        "the header promises {count} facets, which take {promised} bytes, but the file has {length}: it is truncated, longer or not an STL; export it again"
+    ))
+    .at(path))
 }
 
 impl Stl {
@@ -66,9 +62,9 @@ impl Stl {
         for at in (first..end).step_by(CHUNK as usize) {
             let count = CHUNK.min(end - at);
             let bytes = &mut buffer[..(count * RECORD) as usize];
-            self.file
-                .read_exact_at(bytes, HEADER + RECORD * at)
-                .map_err(|e| fail(&self.path, format!("{e} at facet {at}: export it again")))?;
+            self.file.read_exact_at(bytes, HEADER + RECORD * at).map_err(|e| {
+                Error::input(format!("{e} at facet {at}: export it again")).at(&self.path)
+            })?;
             out.extend(bytes.as_chunks::<{ RECORD as usize }>().0.iter().map(record));
         }
         Ok(out)
@@ -80,8 +76,8 @@ impl Stl {
     /// If the file cannot be read, or is malformed or truncated.
     pub fn read_text(mut self) -> Result<Vec<Facet>, Error> {
         let mut bytes = Vec::new();
-        self.file.read_to_end(&mut bytes).map_err(|e| fail(&self.path, e))?;
-        parse(&bytes).map_err(|why| fail(&self.path, format!("{why}: export it again")))
+        self.file.read_to_end(&mut bytes).map_err(|e| Error::input(e).at(&self.path))?;
+        parse(&bytes).map_err(|why| Error::input(format!("{why}: export it again")).at(&self.path))
     }
 }
 

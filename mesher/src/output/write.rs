@@ -51,10 +51,8 @@ pub struct OutDir {
 }
 
 fn output(path: &Path, e: impl Display) -> Error {
-    Error::output(format!(
-        "{}: {e}: no mesh was written there; choose another --out or free disk space",
-        path.display()
-    ))
+    let advice = "no mesh was written there; choose another --out or free disk space";
+    Error::output(format!("{e}: {advice}")).at(path)
 }
 
 impl OutDir {
@@ -65,24 +63,26 @@ impl OutDir {
     pub fn claim(files: &Output, comm: &dyn Comm) -> Result<Self, Error> {
         let path = &files.directory;
         let all = || (0..comm.size()).flat_map(names).collect();
-        let failed = |e: io::Error| match e.kind() {
+        let rank = comm.rank();
+        let failed = |e: io::Error| {
+            match e.kind() {
             ErrorKind::DirectoryNotEmpty => {
-                Error::input(format!("{}: {e}: choose another --out", path.display()))
+                Error::input(format!("{e}: choose another --out")).at(path)
             }
             // The directory lies on a disk of rank 0's machine alone.
-            ErrorKind::NotFound if comm.rank() > 0 => Error::output(format!(
-                "{}: rank {} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share",
-                path.display(),
-                comm.rank()
-            )),
+            ErrorKind::NotFound if rank > 0 => Error::output(format!(
+                "rank {rank} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share"
+            ))
+            .at(path),
             _ => output(path, e),
+        }
         };
-        let created = (comm.rank() == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
+        let created = (rank == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
         let created = agree(comm, created.map_err(failed))?;
         let is_new = u64::from(created.as_ref().is_some_and(|claim| claim.is_new));
         let is_new = uncounted(comm, || comm.sum(is_new));
         // A rank that was killed could not remove its files. If it was the first, the others remove them.
-        let mine = [0, comm.rank()].into_iter().flat_map(names).collect();
+        let mine = [0, rank].into_iter().flat_map(names).collect();
         let join = || Claim::join(path, MANIFEST, mine, is_new == 1).map_err(failed);
         let claim = agree(comm, created.map_or_else(join, Ok))?;
         Ok(Self { output: files.clone(), claim })

@@ -1,8 +1,6 @@
 //! Measures the time of a message between two ranks: `mpirun -n 2 pingpong` prints message sizes with the median time of one way, as
 //! JSON of the schema `octree-pingpong/1`. `harness bench` projects run times with it.
 
-#![deny(missing_docs)]
-
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, Source};
 use serde_json::json;
