@@ -195,6 +195,6 @@ fn repartition_by_leaves(mesh: &mut Mesh, comm: &dyn Comm) {
     let gone = [sides.deleted(), &*crossing];
     let gone = &gone[..if rules.keep_crossing { 1 } else { 2 }];
     let new = repartition::after_gradation(split, gone, ownership, *level_base, comm);
-    repartition::migrate(split, crossing, &mut sides.stored, ownership, &new, comm);
+    repartition::migrate([split, crossing, &mut sides.stored], ownership, &new, comm);
     *ownership = new;
 }

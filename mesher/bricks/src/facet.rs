@@ -61,21 +61,14 @@ static COLUMNS: [[[u64; 256]; 2]; 3] = [columns(0), columns(1), columns(2)];
 const fn columns(a: usize) -> [[u64; 256]; 2] {
     let (u, w) = (SPANS[(a + 1) % 3], SPANS[(a + 2) % 3]);
     let mut table = [[0; 256]; 2];
-    let mut half = 0;
-    while half < 2 {
-        let mut m = 0;
-        while m < 256 {
-            let mut k = 0;
-            while k < 8 {
-                if m >> k & 1 == 1 {
-                    let (i, j) = (k & 3, 2 * half + (k >> 2));
-                    table[half][m] |= u[i][i] & w[j][j];
-                }
-                k += 1;
-            }
-            m += 1;
+    let mut at = 0;
+    while at < 2 * 256 * 8 {
+        let (half, mask, k) = (at >> 11, at >> 3 & 255, at & 7);
+        if mask >> k & 1 == 1 {
+            let (i, j) = (k & 3, 2 * half + (k >> 2));
+            table[half][mask] |= u[i][i] & w[j][j];
         }
-        half += 1;
+        at += 1;
     }
     table
 }

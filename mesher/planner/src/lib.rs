@@ -11,9 +11,6 @@
 //! - pilots become finer; if the last one is the run itself, the cells are its cells;
 //! - times are finite; the leaf words take about 8 bytes for each cell.
 
-#[cfg(test)]
-#[path = "../../tests/support/cases.rs"]
-mod cases;
 mod memory;
 mod pilot;
 #[cfg(test)]

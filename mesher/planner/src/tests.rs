@@ -1,5 +1,8 @@
+#[path = "../../tests/support/cases.rs"]
+mod cases;
+
 use super::*;
-use crate::cases::{case, options, rules as plain_rules};
+use cases::{case, options, rules as plain_rules};
 use mesher::input::lattice::{Keep, Root};
 use mesher::output::write::Output;
 use ranks::{Solo, sim};

@@ -41,16 +41,14 @@ pub fn unpack_bytes(words: &[u64]) -> (&[u8], &[u64]) {
 /// A key and a value.
 pub type Entry = [u64; 2];
 
+/// Reduces two values with the same key: associative and commutative.
+pub type Merge = fn(u64, u64) -> u64;
+
 /// Up to this number of ranks there are no reducers: the additional step would cost more than it saves.
 const SMALL: usize = 8;
 
-/// The entries of all ranks in the order of their keys, each key once, with values reduced by `merge`, which must be associative and
-/// commutative. Collective; the same on all ranks.
-pub fn all_gather_reduced(
-    mut mine: Vec<Entry>,
-    merge: impl Fn(u64, u64) -> u64 + Copy,
-    comm: &dyn Comm,
-) -> Vec<Entry> {
+/// The entries of all ranks in the order of their keys, each key once. Collective; the same on all ranks.
+pub fn all_gather_reduced(mut mine: Vec<Entry>, merge: Merge, comm: &dyn Comm) -> Vec<Entry> {
     if let Some(entries) = split_by_reducer(&mut mine, merge, comm) {
         mine = comm.sparse_all_to_all(MessageBuffer::of_entries(entries)).values().collect();
     }
@@ -61,7 +59,7 @@ pub fn all_gather_reduced(
 /// reducers, and the entries go straight to [`all_gather_from_reducers`].
 pub fn split_by_reducer(
     mine: &mut Vec<Entry>,
-    merge: impl Fn(u64, u64) -> u64,
+    merge: Merge,
     comm: &dyn Comm,
 ) -> Option<Vec<(usize, Entry)>> {
     combine(mine, merge);
@@ -80,11 +78,7 @@ pub fn split_by_reducer(
 }
 
 /// The second step: gathers the reduced entries of all ranks. Collective; the same on all ranks.
-pub fn all_gather_from_reducers(
-    mut mine: Vec<Entry>,
-    merge: impl Fn(u64, u64) -> u64 + Copy,
-    comm: &dyn Comm,
-) -> Vec<Entry> {
+pub fn all_gather_from_reducers(mut mine: Vec<Entry>, merge: Merge, comm: &dyn Comm) -> Vec<Entry> {
     combine(&mut mine, merge);
     let mut all = gather(comm, &mine);
     combine(&mut all, merge);
@@ -92,7 +86,7 @@ pub fn all_gather_from_reducers(
 }
 
 /// Sorts entries by key and reduces those with the same key.
-pub fn combine(entries: &mut Vec<Entry>, merge: impl Fn(u64, u64) -> u64) {
+pub fn combine(entries: &mut Vec<Entry>, merge: Merge) {
     // A stable sort takes advantage of the sorted runs that ranks send.
     entries.sort_by_key(|e| e[0]);
     entries.dedup_by(|e, before| {

@@ -15,7 +15,7 @@ mod mpi;
 pub mod sim;
 
 pub use collectives::{
-    Entry, all_gather_from_reducers, all_gather_reduced, combine, first_other, pack_bytes,
+    Entry, Merge, all_gather_from_reducers, all_gather_reduced, combine, first_other, pack_bytes,
     split_by_reducer, text_of_first, unpack_bytes,
 };
 pub use message_buffer::MessageBuffer;

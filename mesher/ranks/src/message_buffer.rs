@@ -9,14 +9,8 @@ use bytemuck::Pod;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MessageBuffer {
     words: Vec<u64>,
-    messages: Vec<Message>,
-}
-
-/// A message; it starts where the one before it ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Message {
-    rank: usize,
-    end: usize,
+    /// The rank and the end of each message, which starts where the one before it ends.
+    messages: Vec<(usize, usize)>,
 }
 
 impl MessageBuffer {
@@ -42,8 +36,8 @@ impl MessageBuffer {
         write(&mut self.words);
         let end = self.words.len();
         match self.messages.last_mut() {
-            Some(last) if last.rank == rank => last.end = end,
-            _ if end > start => self.messages.push(Message { rank, end }),
+            Some(last) if last.0 == rank => last.1 = end,
+            _ if end > start => self.messages.push((rank, end)),
             _ => {}
         }
     }
@@ -72,7 +66,7 @@ impl MessageBuffer {
 
     /// The messages, each with its rank, in the order in which they were written.
     pub fn messages(&self) -> impl Iterator<Item = (usize, &[u64])> {
-        let words = |start: &mut usize, &Message { rank, end }: &Message| {
+        let words = |start: &mut usize, &(rank, end): &(usize, usize)| {
             Some((rank, &self.words[std::mem::replace(start, end)..end]))
         };
         self.messages.iter().scan(0, words)

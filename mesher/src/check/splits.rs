@@ -28,15 +28,11 @@ pub fn routed(facets: &[Facet], all: &[Facet], ownership: &Ownership) {
         };
         octants.iter().any(meets) && touches(f, [0; 3], edge(0))
     };
-    let sorted = |facets: &mut dyn Iterator<Item = &Facet>| {
-        let mut facets: Vec<_> = facets.map(|f| f.v).collect();
-        facets.sort_unstable();
-        facets
-    };
-    assert!(
-        sorted(&mut facets.iter()) == sorted(&mut all.iter().filter(reaches)),
-        "a rank must have the facets that reach its octants, each once"
-    );
+    let mut found: Vec<_> = facets.iter().map(|f| f.v).collect();
+    let mut wanted: Vec<_> = all.iter().filter(reaches).map(|f| f.v).collect();
+    found.sort_unstable();
+    wanted.sort_unstable();
+    assert!(found == wanted, "a rank must have the facets that reach its octants, each once");
 }
 
 /// The tree is T0 wherever this rank owns a part of it.
@@ -125,10 +121,8 @@ pub fn gradation(mesh: &Mesh, base: &PerLevel, comm: &dyn Comm) {
         octants.without(&split[l as usize]).without(&sides.deleted()[l as usize])
     };
     let deepest = rules.level_deepest();
-    assert!(
-        split[deepest as usize..].iter().all(BrickSet::is_empty),
-        "no rule asks for level {deepest}"
-    );
+    let is_right = split[deepest as usize..].iter().all(BrickSet::is_empty);
+    assert!(is_right, "no rule asks for level {deepest}");
     let mut touched = BrickSet::EMPTY;
     for l in (1..=deepest).rev() {
         let above = &split[l as usize - 1];

@@ -29,16 +29,10 @@ pub fn leaves_in_boxes(l: Level, code: u64, rules: &Rules) -> u64 {
     rules.boxes.iter().map(leaves).max().unwrap_or(0)
 }
 
-/// Adds the leaves that the boxes ask for within an interval of the curve, in [`FRACTIONS`]: by octants of `level`, or larger ones
+/// The leaves that the boxes ask for within an interval of the curve, in [`FRACTIONS`]: by octants of `level`, or larger ones
 /// that hold no more than `light` leaves.
-pub fn add_boxes(
-    bins: &mut Vec<Bin>,
-    rules: &Rules,
-    level: Level,
-    light: u64,
-    within: &Range<u64>,
-) {
-    let mut open = vec![(0, 0)];
+pub fn of_boxes(rules: &Rules, level: Level, light: u64, within: &Range<u64>) -> Vec<Bin> {
+    let (mut bins, mut open) = (Vec::new(), vec![(0, 0)]);
     while let Some((l, code)) = open.pop() {
         let span = start57(l, code)..start57(l, code + 1);
         let leaves = leaves_in_boxes(l, code, rules);
@@ -52,6 +46,7 @@ pub fn add_boxes(
             open.extend((0..8).map(|child| (l + 1, code << 3 | child)));
         }
     }
+    bins
 }
 
 /// The sum of the areas of facets, in lattice units squared.
@@ -198,8 +193,7 @@ mod tests {
         let boxes = vec![ExtentBox { min, max, level: 6 }];
         let rules = Rules { level_surface: 6, boxes, ..plain_rules() };
         let weights = |level: Level, light: u64, within: &Range<u64>| {
-            let mut bins = Vec::new();
-            add_boxes(&mut bins, &rules, level, light, within);
+            let mut bins = of_boxes(&rules, level, light, within);
             combine(&mut bins, u64::wrapping_add);
             bins
         };

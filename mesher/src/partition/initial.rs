@@ -114,7 +114,7 @@ impl Estimate<'_> {
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
         let mut bins: Vec<Bin> = comm.sparse_all_to_all(messages).values().collect();
         for interval in rough.intervals() {
-            area::add_boxes(&mut bins, self.rules, fine, light, &interval);
+            bins.extend(area::of_boxes(self.rules, fine, light, &interval));
         }
         combine(&mut bins, u64::wrapping_add);
         Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
@@ -136,7 +136,7 @@ impl Estimate<'_> {
         let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
         let light = (leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank);
-        area::add_boxes(&mut bins, self.rules, level, light, &curve::ALL);
+        bins.extend(area::of_boxes(self.rules, level, light, &curve::ALL));
         combine(&mut bins, u64::wrapping_add);
         (leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK), bins)
     }
@@ -193,7 +193,7 @@ mod tests {
     /// Estimated leaves on each rank.
     fn weights(rules: &Rules, owners: &[usize]) -> Vec<u64> {
         let mut bins = area::of(&sheet(), rules, FINE);
-        area::add_boxes(&mut bins, rules, FINE, 0, &curve::ALL);
+        bins.extend(area::of_boxes(rules, FINE, 0, &curve::ALL));
         let mut sums = vec![0; RANKS];
         for [start, weight] in bins {
             sums[owners[(start / start57(FINE, 1)) as usize]] += weight;

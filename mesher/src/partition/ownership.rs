@@ -68,15 +68,11 @@ impl Ownership {
         ranks: usize,
         boundaries: impl IntoIterator<Item = Boundary>,
     ) -> Self {
-        let mut all: Vec<Boundary> = Vec::new();
-        for (start, owner) in boundaries {
-            assert!(owner < ranks, "an owner must be a rank");
-            assert!(all.last().is_none_or(|last| last.0 < start), "boundaries must ascend");
-            if all.last().is_none_or(|last| last.1 != owner) {
-                all.push((if all.is_empty() { 0 } else { start }, owner));
-            }
-        }
-        assert!(!all.is_empty(), "every octant must have an owner");
+        let mut all: Vec<Boundary> = boundaries.into_iter().collect();
+        assert!(all.iter().all(|b| b.1 < ranks), "an owner must be a rank");
+        assert!(all.is_sorted_by(|a, b| a.0 < b.0), "boundaries must ascend");
+        all.first_mut().expect("every octant must have an owner").0 = 0;
+        all.dedup_by_key(|b| b.1);
         let mut ownership = Self {
             rank: Some(rank),
             ranks,

@@ -64,16 +64,11 @@ pub fn after_gradation(
     leaves.repartition(TOLERANCE_LEAVES, comm)
 }
 
-/// Sends the bricks of three sets to the ranks that hold them in another partition. `split` may be condensed on some ranks and not on others.
+/// Sends the bricks of three sets to the ranks that hold them in another partition. The first, of split octants, may be condensed on some
+/// ranks and not on others.
 /// Collective.
-pub fn migrate(
-    split: &mut PerLevel,
-    crossing: &mut PerLevel,
-    stored: &mut PerLevel,
-    from: &Ownership,
-    to: &Ownership,
-    comm: &dyn Comm,
-) {
+pub fn migrate(sets: [&mut PerLevel; 3], from: &Ownership, to: &Ownership, comm: &dyn Comm) {
+    let [split, crossing, stored] = sets;
     // Bricks that are stored as the octants that they fill move so.
     let mut full = PerLevel::default();
     (2..LEVELS).for_each(|l| full[l - 2] = split[l].replace_full(BrickSet::EMPTY));
@@ -309,7 +304,7 @@ mod tests {
                 if condensed >> comm.rank() & 1 == 1 {
                     split[l as usize].condense();
                 }
-                migrate(&mut split, &mut other, &mut PerLevel::default(), &from, &to, comm);
+                migrate([&mut split, &mut other, &mut PerLevel::default()], &from, &to, comm);
                 split[l as usize].check_invariants();
                 split[l as usize].bricks().eq(held(&to).bricks())
             });
