@@ -58,54 +58,51 @@ use ranks::Comm;
 /// is worth. In debug builds few, so that in small cases some ranks do so and others do not.
 const BRICKS_MANY: usize = if cfg!(debug_assertions) { 8 } else { 1 << 16 };
 
-/// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
-/// at most one level. Turns the base tree's `split` sets into the graded tree's, and returns them;
-/// `crossing` are the base tree's crossing leaves, and `deleted` those of its leaves that the mesh does not keep. Adds its work to the counters; also returns the bytes of split octants at most. Collective.
-pub fn grade(
-    split: PerLevel,
-    crossing: &PerLevel,
-    deleted: &PerLevel,
-    rules: &Rules,
-    ownership: &Ownership,
-    counters: Counters,
-    comm: &dyn Comm,
-) -> (PerLevel, Counters, usize) {
-    let surface = rules.level_surface;
-    let mut g =
-        Gradation { split, crossing, deleted, surface, ownership, comm, counters, bytes: 0 };
-    if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
-        g.extra_layer();
-    }
-    // Grandparents reached for balance are redistributed together with the parents of the next level.
-    let mut touched = BrickSet::default();
-    for l in (1..=rules.level_deepest()).rev() {
-        g.close(l, touched);
-        if rules.layer_cells_min > 1 {
-            let reached = g.reach(l, rules.layer_cells_min - 1, l - 1);
-            g.split_where_kept(l - 1, reached);
-        }
-        // Splits of this level are complete.
-        if g.split[l as usize - 1].len() >= BRICKS_MANY {
-            g.split[l as usize - 1].condense();
-        }
-        touched = if l > 1 { g.reach(l, 1, l - 2) } else { BrickSet::default() };
-    }
-    (g.split, g.counters, g.bytes)
-}
-
-struct Gradation<'a> {
-    split: PerLevel,
-    crossing: &'a PerLevel,
-    deleted: &'a PerLevel,
-    surface: Level,
-    ownership: &'a Ownership,
-    comm: &'a dyn Comm,
-    counters: Counters,
+/// What gradation reads, and what it has made so far, on one rank.
+pub struct Gradation<'a> {
+    /// Split octants: of the base tree at first, of the graded tree in the end.
+    pub split: PerLevel,
+    /// Crossing leaves of the base tree.
+    pub crossing: &'a PerLevel,
+    /// Leaves of the base tree that the mesh does not keep.
+    pub deleted: &'a PerLevel,
+    /// The rules on the lattice.
+    pub rules: &'a Rules,
+    /// The ranks that own and hold bricks.
+    pub ownership: &'a Ownership,
+    /// All ranks.
+    pub comm: &'a dyn Comm,
+    /// Work done, that of other phases included.
+    pub counters: Counters,
     /// Bytes of split octants, and of those that are reached, at most.
-    bytes: usize,
+    pub bytes: usize,
 }
 
 impl Gradation<'_> {
+    /// Refines the kept part of the base tree until layers are thick enough and touching leaves differ by
+    /// at most one level. Collective.
+    pub fn graded(mut self) -> Self {
+        let (rules, surface) = (self.rules, self.rules.level_surface);
+        if surface > 0 && !rules.keep_crossing && rules.layer_cells_min < 3 {
+            self.extra_layer(surface);
+        }
+        // Grandparents reached for balance are redistributed together with the parents of the next level.
+        let mut touched = BrickSet::default();
+        for l in (1..=rules.level_deepest()).rev() {
+            self.close(l, touched);
+            if rules.layer_cells_min > 1 {
+                let reached = self.reach(l, rules.layer_cells_min - 1, l - 1);
+                self.split_where_kept(l - 1, reached);
+            }
+            // Splits of this level are complete.
+            if self.split[l as usize - 1].len() >= BRICKS_MANY {
+                self.split[l as usize - 1].condense();
+            }
+            touched = if l > 1 { self.reach(l, 1, l - 2) } else { BrickSet::default() };
+        }
+        self
+    }
+
     /// Splits the parents of the split octants of level `l`, and those of the octants `touched`, of
     /// level `l - 1`, that are kept. Collective: another rank may own the parent of an octant.
     fn close(&mut self, l: Level, touched: BrickSet) {
@@ -122,7 +119,7 @@ impl Gradation<'_> {
     /// The octants of level `to`, `l - 1` or `l - 2`, that the sources of level `l` in bricks that this rank owns reach within `radius` cells:
     /// kept leaves, or whole groups (see above). Groups without kept leaves are among these: to find them takes as long as to dilate them.
     fn reach(&mut self, l: Level, radius: u32, to: Level) -> BrickSet {
-        if l > self.surface {
+        if l > self.rules.level_surface {
             let mut split = self.split[l as usize].cursor();
             let mut deleted = self.deleted[l as usize].cursor();
             let leaves = Tree::exists(&self.split, l)
@@ -178,8 +175,7 @@ impl Gradation<'_> {
 
     /// The layer of finest cells that a mesh without crossing leaves starts from: kept octants of the
     /// surface level, which is not 0, that touch a crossing leaf. Collective.
-    fn extra_layer(&mut self) {
-        let surface = self.surface;
+    fn extra_layer(&mut self, surface: Level) {
         for m in (surface..self.crossing.len() as Level).rev() {
             let leaves = self.crossing[m as usize].bricks();
             let leaves = leaves.filter(|b| self.ownership.owns(m, b.key));

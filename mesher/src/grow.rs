@@ -2,7 +2,7 @@
 
 use crate::check;
 use crate::error::{Error, agree};
-use crate::grade;
+use crate::grade::Gradation;
 use crate::input::lattice::{Keep, Rules};
 use crate::input::quantise::{FacetCounts, Quantised};
 use crate::mesh::Mesh;
@@ -126,11 +126,12 @@ pub fn grow<F: Borrow<[Facet]>>(
 
     // 7. Gradation: layers and 2:1 balance, from the deepest level up.
     let base = is_whole.then(|| mesh.split.clone());
-    (mesh.split, job.counters, mesh.bytes_graded) = job.phase("grade", |comm| {
-        let split = std::mem::take(&mut mesh.split);
-        let Mesh { crossing, sides, rules, ownership, .. } = &mesh;
-        grade::grade(split, crossing, sides.deleted(), rules, ownership, work, comm)
-    });
+    let split = std::mem::take(&mut mesh.split);
+    let Mesh { crossing, sides, rules, ownership, .. } = &mesh;
+    let (deleted, counters) = (sides.deleted(), job.counters);
+    let start = Gradation { split, crossing, deleted, rules, ownership, comm, counters, bytes: 0 };
+    let graded = job.phase("grade", |_| start.graded());
+    (mesh.split, job.counters, mesh.bytes_graded) = (graded.split, graded.counters, graded.bytes);
     let mut fingerprint = 0;
     job.check(|comm| {
         check::graded(&mesh, comm);

@@ -8,6 +8,7 @@ use bricks::dilate::dilate_children;
 use bricks::facet::{Facet, crossed};
 use bricks::octant::ROOT_BITS;
 use bricks::tree::Tree;
+use mesher::grade::Gradation;
 use mesher::input::case::{Case, RootSpec};
 use mesher::input::ingest::{Slice, Source, read};
 use mesher::input::lattice::{Bounds, Enclosed, Keep, Rules};
@@ -21,7 +22,7 @@ use mesher::record::Counters;
 use mesher::refine::{BinnedFacets, refine};
 use mesher::sides::leaks::Leaks;
 use mesher::sides::{Base, Sides, decide};
-use mesher::{Mesh, Options, grade};
+use mesher::{Mesh, Options};
 use ranks::Solo;
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -84,15 +85,7 @@ impl Phases {
         let binned = BinnedFacets::new(&facets);
         let (tree, _) = refine(&binned, &rules, &[curve::ALL]);
         let sides = sides(&tree, &ownership, &facets, &rules);
-        let (graded, ..) = grade::grade(
-            tree.split.clone(),
-            &tree.crossing,
-            sides.deleted(),
-            &rules,
-            &ownership,
-            Counters::default(),
-            &Solo,
-        );
+        let graded = graded(&tree, &sides, &rules, &ownership).split;
         let mesh = Mesh {
             facets: FacetCounts { total: given.total, beyond_root: false, digest: 0 },
             rules: rules.clone(),
@@ -155,17 +148,8 @@ pub fn kernels() -> Vec<Kernel> {
             "grade",
             leaves,
             Box::new(|| {
-                grade::grade(
-                    p.tree.split.clone(),
-                    &p.tree.crossing,
-                    p.mesh.sides.deleted(),
-                    &p.rules,
-                    &p.ownership,
-                    Counters::default(),
-                    &Solo,
-                )
-                .1
-                .octants_split_graded
+                let graded = graded(&p.tree, &p.mesh.sides, &p.rules, &p.ownership);
+                graded.counters.octants_split_graded
             }),
         ),
         kernel(
@@ -220,6 +204,25 @@ fn floods(set: &BrickSet, l: u32) -> u64 {
 
 fn dilated(set: &BrickSet, l: u32, radius: u32) -> u64 {
     dilate_children(l - 1, set.bricks(), radius).octants.len() as u64
+}
+
+fn graded<'a>(
+    tree: &'a Tree,
+    sides: &'a Sides,
+    rules: &'a Rules,
+    ownership: &'a Ownership,
+) -> Gradation<'a> {
+    let start = Gradation {
+        split: tree.split.clone(),
+        crossing: &tree.crossing,
+        deleted: sides.deleted(),
+        rules,
+        ownership,
+        comm: &Solo,
+        counters: Counters::default(),
+        bytes: 0,
+    };
+    start.graded()
 }
 
 fn drop_counted<T>(made: T) -> u64 {
