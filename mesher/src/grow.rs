@@ -65,7 +65,7 @@ pub fn grow<F: Borrow<[Facet]>>(
         let name = if division.repartitions() { "rebalance" } else { "share top" };
         job.phase(name, |comm| {
             if division.repartitions() {
-                ownership = repartition::after_refinement(&tree, &ownership, level_base, comm);
+                ownership = repartition::by_work(&tree, &ownership, level_base, comm);
             }
             ownership.synchronise_replicas(&mut [&mut tree.split, &mut tree.crossing], comm);
         });
@@ -195,7 +195,7 @@ fn repartition_by_leaves(mesh: &mut Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, level_base, rules, .. } = mesh;
     let gone = [sides.deleted(), &*crossing];
     let gone = &gone[..if rules.keep_crossing { 1 } else { 2 }];
-    let new = repartition::after_gradation(split, gone, ownership, *level_base, comm);
+    let new = repartition::by_leaves(split, gone, ownership, *level_base, comm);
     repartition::migrate([split, crossing, &mut sides.stored], ownership, &new, comm);
     *ownership = new;
 }

@@ -284,7 +284,6 @@ pub fn ones(mut bits: u64) -> impl Iterator<Item = u32> {
 }
 
 /// The bricks of a set in order; also finds bricks by ascending keys, see [`BrickSet::cursor`].
-#[derive(Clone)]
 pub struct Cursor<'a> {
     /// Full bricks that are stored apart.
     full: Option<Box<Full<'a>>>,
@@ -320,7 +319,6 @@ impl Iterator for Cursor<'_> {
 }
 
 /// A reader of full bricks that are stored as the octants that they fill.
-#[derive(Clone)]
 struct Full<'a> {
     cursor: Cursor<'a>,
     /// The rest of the cursor's last brick.

@@ -161,9 +161,7 @@ impl<'a> Text<'a> {
     }
 
     fn skip_while(&mut self, skips: impl Fn(u8) -> bool) {
-        while self.bytes.get(self.at).is_some_and(|&byte| skips(byte)) {
-            self.at += 1;
-        }
+        self.at += self.bytes[self.at..].iter().take_while(|&&byte| skips(byte)).count();
     }
 
     fn is_at_end(&mut self) -> bool {

@@ -18,13 +18,11 @@ use std::collections::BTreeMap;
 use std::io;
 use std::iter::once;
 
-/// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Also returns the number of
-/// leaves in its heaviest base leaf. Collective.
-pub fn emit(
-    mesh: &Mesh,
-    out: Option<&OutDir>,
-    comm: &dyn Comm,
-) -> Result<(Counts, Digests, u64), Error> {
+/// The leaves that a rank has streamed: their number, their digests, and the number of leaves in its heaviest base leaf.
+pub type Emitted = (Counts, Digests, u64);
+
+/// Streams the leaves that this rank owns into the digest, and into its file if words are to be written. Collective.
+pub fn emit(mesh: &Mesh, out: Option<&OutDir>, comm: &dyn Comm) -> Result<Emitted, Error> {
     // Boundaries are chosen by bricks of split octants, which fill octants of this level.
     let level = mesh.level_base.min(mesh.rules.level_deepest().saturating_sub(3));
     let mut heaviest = Heaviest::new(level);

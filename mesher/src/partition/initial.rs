@@ -91,13 +91,11 @@ impl Estimate<'_> {
         if division.weights == Weights::Unit {
             leaves.iter_mut().for_each(|leaf| leaf[1] = 1);
         }
-        let by_metis = match division.partitioner {
-            Partitioner::Metis => metis::assign(&leaves, level, comm)?,
-            Partitioner::Morton | Partitioner::Paper => None,
-        };
-        let (boundaries, partitioner) = match by_metis {
-            Some(boundaries) => (boundaries, Partitioner::Metis),
-            None => (curve::partition(&leaves, comm.size(), &Solo), Partitioner::Morton),
+        let (boundaries, partitioner) = match division.partitioner {
+            Partitioner::Metis if metis::has_enough(&leaves, comm.size()) => {
+                (metis::assign(&leaves, level, comm)?, Partitioner::Metis)
+            }
+            _ => (curve::partition(&leaves, comm.size(), &Solo), Partitioner::Morton),
         };
         let ownership = Ownership::along(comm.rank(), comm.size(), boundaries);
         Ok(Partition { ownership, level_base: level, partitioner: Some(partitioner) })
@@ -113,9 +111,8 @@ impl Estimate<'_> {
         let entry = |bin: Bin| (rough.owner_at(bin[0]), bin);
         let messages = MessageBuffer::of_entries(local.into_iter().map(entry).collect());
         let mut bins: Vec<Bin> = comm.sparse_all_to_all(messages).values().collect();
-        for interval in rough.intervals() {
-            bins.extend(area::of_boxes(self.rules, fine, light, &interval));
-        }
+        let boxed = |interval| area::of_boxes(self.rules, fine, light, &interval);
+        bins.extend(rough.intervals().flat_map(boxed));
         combine(&mut bins, u64::wrapping_add);
         Ownership::along(comm.rank(), comm.size(), curve::partition(&bins, comm.size(), comm))
     }

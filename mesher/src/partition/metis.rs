@@ -12,21 +12,14 @@ const LEAVES_PER_RANK_MIN: usize = 8;
 /// A base leaf: the code of its minimum corner, and its level.
 pub type Leaf = (u64, Level);
 
-/// The boundaries between base leaves, octants of a level, by METIS on rank 0; none if it is not used. The leaves are the same on all
-/// ranks. Collective; the result is the same on all ranks.
-pub fn assign(
-    leaves: &[Bin],
-    level: Level,
-    comm: &dyn Comm,
-) -> Result<Option<Vec<Boundary>>, Error> {
-    if comm.size() == 1 || !has_enough(leaves, comm.size()) {
-        return Ok(None);
-    }
+/// The boundaries between base leaves, octants of a level, by METIS on rank 0. The leaves are the same on all ranks, and
+/// [enough](has_enough). Collective; the result is the same on all ranks.
+pub fn assign(leaves: &[Bin], level: Level, comm: &dyn Comm) -> Result<Vec<Boundary>, Error> {
     let octants: Vec<Leaf> = leaves.iter().map(|leaf| (leaf[0], level)).collect();
     let weights: Vec<u64> = leaves.iter().map(|leaf| leaf[1]).collect();
     let on_rank_0 = || parts(&octants, &weights, comm.size());
     let parts = agree(comm, if comm.rank() == 0 { on_rank_0() } else { Ok(Vec::new()) })?;
-    Ok(Some(boundaries(&octants, gather(comm, &parts))))
+    Ok(boundaries(&octants, gather(comm, &parts)))
 }
 
 /// The boundaries between base leaves of weight 1, which may be of several levels, in their order along the curve.
@@ -49,10 +42,10 @@ fn boundaries(leaves: &[Leaf], parts: Vec<u64>) -> Vec<Boundary> {
 
 /// Whether base leaves are enough for METIS, which bisects recursively, and prints complaints on standard
 /// output about empty parts. With few leaves per rank, or few that have nearly all the weight, intervals of the curve are as good.
-fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
+pub fn has_enough(leaves: &[Bin], ranks: usize) -> bool {
     let total: u128 = leaves.iter().map(|leaf| u128::from(leaf[1])).sum();
     let even: f64 = leaves.iter().map(|leaf| (leaf[1] as f64 / total as f64).powi(2)).sum();
-    total > 0 && ((LEAVES_PER_RANK_MIN * ranks) as f64) * even <= 1.0
+    ranks > 1 && total > 0 && ((LEAVES_PER_RANK_MIN * ranks) as f64) * even <= 1.0
 }
 
 /// The part of each base leaf.

@@ -32,12 +32,7 @@ const TOLERANCE_LEAVES: f64 = 0.05;
 
 /// The partition with nearly equal work on T0 for sides and gradation. Replicas in `tree` need not be equal. Boundaries lie
 /// between octants of `level`. Collective.
-pub fn after_refinement(
-    tree: &Tree,
-    ownership: &Ownership,
-    level: Level,
-    comm: &dyn Comm,
-) -> Ownership {
+pub fn by_work(tree: &Tree, ownership: &Ownership, level: Level, comm: &dyn Comm) -> Ownership {
     let mut work = Loads::new(ownership, level);
     let groups = tree.split.iter().map(BrickSet::len).max().unwrap_or(0);
     // Odd, as bricks come in groups of powers of two.
@@ -52,7 +47,7 @@ pub fn after_refinement(
 }
 
 /// The partition with nearly equal numbers of leaves of a tree, without those that are `gone`. Collective.
-pub fn after_gradation(
+pub fn by_leaves(
     split: &PerLevel,
     gone: &[&PerLevel],
     ownership: &Ownership,

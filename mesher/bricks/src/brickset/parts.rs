@@ -25,16 +25,17 @@ impl BrickSet {
         Brick { key, bits: self.bits[position] }
     }
 
-    /// Removes all bricks except those at a range of positions.
-    pub fn keep(&mut self, range: Range<usize>) {
+    /// The bricks at a range of positions; the others are removed in place.
+    pub fn keep(mut self, range: Range<usize>) -> Self {
         if range == (0..self.len()) {
-            return;
+            return self;
         }
         self.runs = self.runs_of(&range);
         self.low.truncate(range.end);
         self.bits.truncate(range.end);
         self.low.drain(..range.start);
         self.bits.drain(..range.start);
+        self
     }
 
     /// The runs of the bricks at a range of positions, with positions relative to the range.

@@ -96,8 +96,7 @@ proptest! {
         prop_assert_eq!(x.count(), a.values().map(|bits| u64::from(bits.count_ones())).sum::<u64>());
         let ranges = [0..i, i..j, j..x.len()];
         let intervals = ranges.clone().map(|range| {
-            let mut interval = x.clone();
-            interval.keep(range);
+            let interval = x.clone().keep(range);
             interval.check_invariants();
             interval
         });

@@ -56,11 +56,8 @@ impl Ownership {
         }
         let (messages, sent) = messages(out.queue, &sets);
         // The parts of each set on this rank: the retained one and those received.
-        let mut parts = Vec::with_capacity(sets.len());
-        for ((_, mut set), range) in sets.into_iter().zip(retained) {
-            set.keep(range);
-            parts.push(vec![set]);
-        }
+        let kept = sets.into_iter().zip(retained).map(|((_, set), range)| vec![set.keep(range)]);
+        let mut parts: Vec<Vec<BrickSet>> = kept.collect();
         let mut received: Vec<Entry> = Vec::new();
         for (_, mut words) in comm.sparse_all_to_all(messages).messages() {
             while let Some((&header, packed)) = words.split_first() {
