@@ -165,10 +165,9 @@ impl Gradation<'_> {
 
     /// Splits octants that are not split yet, in bricks that this rank holds.
     fn split_more(&mut self, l: Level, fresh: BrickSet) {
-        self.counters.octants_split_graded += (fresh.bricks())
-            .filter(|b| self.ownership.owns(l, b.key))
-            .map(|b| u64::from(b.bits.count_ones()))
-            .sum::<u64>();
+        let owned = fresh.bricks().filter(|b| self.ownership.owns(l, b.key));
+        let octants: u64 = owned.map(|b| u64::from(b.bits.count_ones())).sum();
+        self.counters.octants_split_graded += octants;
         let before = std::mem::take(&mut self.split[l as usize]);
         self.split[l as usize] = before.union(fresh);
     }

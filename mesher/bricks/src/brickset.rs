@@ -222,11 +222,10 @@ impl BrickSet {
     #[inline]
     pub fn child_bricks(&self) -> impl Iterator<Item = Brick> + '_ {
         self.bricks().flat_map(|b| {
-            let child = move |j: u32| {
-                let j = u64::from(j);
-                Brick { key: b.key << 3 | j, bits: brick::children(brick::byte(b.bits, j)) }
-            };
-            ones(u64::from(brick::parents(b.bits))).map(child)
+            ones(brick::parents(b.bits).into()).map(u64::from).map(move |j| Brick {
+                key: b.key << 3 | j,
+                bits: brick::children(brick::byte(b.bits, j)),
+            })
         })
     }
 

@@ -195,14 +195,14 @@ impl Claim {
     /// # Errors
     /// If another run has claimed it or it is not empty, of the kind `DirectoryNotEmpty`; or if it cannot be created or written to.
     pub fn create(path: &Path, last: &str, others: Vec<String>) -> io::Result<Self> {
-        let taken = |why: &str| Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, why));
-        match Self::begin(path, last, others, Self::make) {
+        let why = match Self::begin(path, last, others, Self::make) {
             Err(Errno::EXIST) => {
-                taken("another run is writing to this directory, or was killed while it did")
+                "another run is writing to this directory, or was killed while it did"
             }
-            Err(Errno::NOTEMPTY) => taken("the directory is not empty"),
-            claim => Ok(claim?),
-        }
+            Err(Errno::NOTEMPTY) => "the directory is not empty",
+            claim => return Ok(claim?),
+        };
+        Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, why))
     }
 
     /// The claim that another process of this run has created. `others` are names of files that this process removes if it gives up.

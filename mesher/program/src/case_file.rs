@@ -61,11 +61,8 @@ fn root(s: &str) -> Result<Root, String> {
 }
 
 fn extent_box(s: &str) -> Result<BoxSpec, String> {
-    numbers(s).map(|[x, y, z, u, v, w, spacing]| BoxSpec {
-        min: [x, y, z],
-        max: [u, v, w],
-        spacing,
-    })
+    let [x, y, z, u, v, w, spacing] = numbers(s)?;
+    Ok(BoxSpec { min: [x, y, z], max: [u, v, w], spacing })
 }
 
 /// Reads a case file. The path of the geometry is relative to the file's directory.

@@ -274,10 +274,8 @@ impl Watch {
 
     fn end(&self, answered: &BTreeSet<i32>) -> ! {
         tell_others(&self.side, END);
-        let silent: Vec<String> = (0..self.side.size())
-            .filter(|r| !answered.contains(r))
-            .map(|r| r.to_string())
-            .collect();
+        let silent = (0..self.side.size()).filter(|rank| !answered.contains(rank));
+        let silent: Vec<String> = silent.map(|rank| rank.to_string()).collect();
         let line = format!(
             "mesher: the other ranks have waited in phase {} for {} s, and rank {} does not answer: look at it with a debugger, or \
              give a greater --stall-limit\n",

@@ -18,13 +18,11 @@ const COMPONENTS_MAX: usize = 64;
 pub fn agree_over_faces(sides: &Sides, base: &Base) {
     let &Base { tree, ownership, comm, .. } = base;
     let stored = &sides.stored;
-    let mut others = PerLevel::default();
-    for l in 0..LEVELS as Level {
-        let mut on_side = stored[l as usize].cursor();
-        for b in open_bricks(tree, ownership, l) {
-            others[l as usize].push(b.key, b.open & !on_side.get(b.key));
-        }
-    }
+    let others: PerLevel = std::array::from_fn(|l| {
+        let mut on_side = stored[l].cursor();
+        let open = open_bricks(tree, ownership, l as Level);
+        open.map(|b| Brick { key: b.key, bits: b.open & !on_side.get(b.key) }).collect()
+    });
     for (here, there) in [(stored, &others), (&others, stored)] {
         for l in 0..LEVELS as Level {
             let owned = here[l as usize].bricks().filter(|b| ownership.owns(l, b.key));

@@ -109,10 +109,7 @@ fn spread(f: &Facet, extent: i64, add: &mut impl FnMut(u64, f64)) {
 
 /// Level-19 Morton code of the centre of a facet's extent; none if that is outside the root.
 fn centre(f: &Facet) -> Option<u64> {
-    let mid: [i64; 3] = std::array::from_fn(|a| {
-        let (lo, hi) = f.range(a);
-        (lo + hi) / 2
-    });
+    let mid = [0, 1, 2].map(|a| f.range(a)).map(|(lo, hi)| (lo + hi) / 2);
     let inside = mid.iter().all(|c| (0..ROOT_EDGE).contains(c));
     inside.then(|| morton(mid.map(|c| (c >> (ROOT_BITS - LEVEL_MAX)) as u32)))
 }
