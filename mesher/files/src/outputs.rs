@@ -81,9 +81,7 @@ impl Draft {
             Place::Through => {}
             Place::Claimed { dir, names } => locked(|| rename_to_new(&dir, &names))?,
             Place::Beside(unfinished) => {
-                unfinished.publish(|Output { dir, names: [from, to], .. }| {
-                    renameat(dir, from, dir, to)
-                })?;
+                unfinished.publish(|o| renameat(&o.dir, &o.names[0], &o.dir, &o.names[1]))?;
                 unfinished.keep();
             }
         }

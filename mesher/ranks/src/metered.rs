@@ -65,12 +65,10 @@ impl<C: Comm> Comm for Metered<C> {
     }
 
     fn all_gather(&self, mine: &[u64]) -> Gathered {
-        let (ranks, messages) = (self.size() as u64, 2 * self.doublings());
+        let ranks = self.size() as u64;
         let words = |all: &Gathered| all.words().len() as u64 + ranks;
-        self.metered(
-            |comm| comm.all_gather(mine),
-            |all| [messages, words(all) - words(all) / ranks],
-        )
+        let sent = |all: &Gathered| [2 * self.doublings(), words(all) - words(all) / ranks];
+        self.metered(|comm| comm.all_gather(mine), sent)
     }
 
     fn sums(&self, mine: &[u64]) -> Vec<u64> {

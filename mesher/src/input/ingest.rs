@@ -103,12 +103,11 @@ pub fn agree_on(source: &Source, comm: &dyn Comm) -> Result<(), Error> {
         // Copies on several machines differ in their times only.
         first_other(comm, &identity(path)).and_then(|_| first_other(comm, &content(path)))
     });
-    other.map_or(Ok(()), |rank| {
-        Err(Error::input(format!(
-            "rank {rank} has another file {} than rank 0: start all ranks with the same files",
-            path.display()
-        )))
-    })
+    let Some(rank) = other else { return Ok(()) };
+    let file = path.display();
+    Err(Error::input(format!(
+        "rank {rank} has another file {file} than rank 0: start all ranks with the same files"
+    )))
 }
 
 /// What the ranks of one machine, or of one network file system, have in common if they read the same file.

@@ -76,9 +76,8 @@ impl Report {
         words.extend(counters.values());
         words.extend(record.phases.iter().flat_map(|p| {
             let t = p.traffic;
-            let [wall, cpu, comm_wall, comm_cpu] =
-                [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s].map(f64::to_bits);
-            [wall, cpu, comm_wall, comm_cpu, t.messages, t.bytes]
+            let times = [p.time_wall_s, p.time_cpu_s, t.time_wall_s, t.time_cpu_s];
+            times.map(f64::to_bits).into_iter().chain([t.messages, t.bytes])
         }));
         let all = comm.all_gather(&words);
         // The columns of the table that has a row for each rank.
@@ -170,10 +169,8 @@ impl fmt::Display for Report {
         let Summary { outside, inside, enclosed, ambiguous, .. } = mesh.components;
         let [outside, inside, enclosed, ambiguous] =
             [outside, inside, enclosed.count, ambiguous.count].map(grouped);
-        writeln!(
-            f,
-            "components     outside {outside}, inside {inside}; deleted as enclosed {enclosed}, decided by majority {ambiguous}"
-        )?;
+        write!(f, "components     outside {outside}, inside {inside}; ")?;
+        writeln!(f, "deleted as enclosed {enclosed}, decided by majority {ambiguous}")?;
         writeln!(f, "digest         {}", mesh.digest)?;
         let leaves: Vec<f64> = self.counters["leaves"].iter().map(|n| *n as f64).collect();
         let lambda = imbalance(&leaves);
@@ -183,10 +180,8 @@ impl fmt::Display for Report {
             Some(Partitioner::Morton) => ", partitioned along the curve",
             Some(Partitioner::Paper) => ", partitioned as in the paper",
         };
-        writeln!(
-            f,
-            "ranks          {ranks}, cells max/mean {lambda:.3}, base level {level_base}{partitioned}"
-        )?;
+        write!(f, "ranks          {ranks}, cells max/mean {lambda:.3}, ")?;
+        writeln!(f, "base level {level_base}{partitioned}")?;
         writeln!(f, "phase              wall s     cpu s   cpu max/mean")?;
         for PhaseEntry { name, time_wall_s, time_cpu_s, .. } in &self.phases {
             let wall = time_wall_s.iter().copied().fold(0.0, f64::max);
