@@ -157,13 +157,6 @@ def across(k):
             yield k("across", w, usize(axis), up).x == union(w, lambda i: [j for j, beyond in [beside(i, axis, not up)] if beyond])
 
 
-@fact(BRICK, ("moved(w, 2, false)", "moved(w, 1, false)"), ("w | x | y | z", "x | y | z"))
-def spread_faces(k):
-    """`spread_faces` is the union of the octants and their face neighbours in the brick."""
-    w = k.bits("u64")
-    yield k("spread_faces", w).x == union(w, lambda i: [i] + [j for a in AXES for up in (False, True) for j, beyond in [beside(i, a, up)] if not beyond])
-
-
 @fact(BRICK, ("let index = (bit >> axis & 1) | (bit >> (axis + 3) & 1) << 1", "let index = (bit >> axis & 1) | (bit >> (axis + 2) & 1) << 1"))
 def spans(k):
     """`SPANS` of an axis, first and last is the mask of the octants between these positions."""

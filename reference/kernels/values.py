@@ -105,7 +105,6 @@ INPUTS = {
     (BRICK, "from_rows"): lambda r: [u64(r)],
     (BRICK, "moved"): lambda r: [u64(r), usize(r.randrange(3)), r.random() < 0.5],
     (BRICK, "across"): lambda r: [u64(r), usize(r.randrange(3)), r.random() < 0.5],
-    (BRICK, "spread_faces"): lambda r: [u64(r)],
     (BRICK, "flood"): lambda r: [Number("u64", 1 << r.randrange(64)), u64(r)],
     (TILE, "dilate_row"): lambda r: [row(r), usize(r.choice([0, 1, 15, 16, r.randrange(17)]))],
     (TILE, "pairs"): lambda r: [u64(r)],

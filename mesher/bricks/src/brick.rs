@@ -88,15 +88,6 @@ pub const fn byte(bits: u64, j: u64) -> u8 {
     (bits >> (8 * j)) as u8
 }
 
-/// The octants `w` and their face neighbours within the brick.
-#[inline]
-pub const fn spread_faces(w: u64) -> u64 {
-    let x = moved(w, 0, false) | moved(w, 0, true);
-    let y = moved(w, 1, false) | moved(w, 1, true);
-    let z = moved(w, 2, false) | moved(w, 2, true);
-    w | x | y | z
-}
-
 /// Flood fill: the octants of `within` that faces within `within` connect to those of `seed`.
 #[inline]
 pub const fn flood(seed: u64, within: u64) -> u64 {
@@ -113,17 +104,40 @@ pub const fn flood(seed: u64, within: u64) -> u64 {
     }
 }
 
-/// The local components of a brick: the subsets of `open` that are connected over faces inside the brick, by the lowest
-/// bit of each.
-#[inline]
-pub fn components(mut open: u64) -> impl Iterator<Item = u64> {
-    std::iter::from_fn(move || {
-        (open != 0).then(|| {
-            let component = flood(open & open.wrapping_neg(), open);
-            open &= !component;
-            component
-        })
-    })
+/// The eight bricks below one: word `j` is that below octant group `j`.
+pub type Block = [u64; 8];
+
+/// Reorders a block's bits: from bricks to layers along z, in each x fastest, then y; and back.
+#[inline(always)]
+pub fn layers(mut b: Block) -> Block {
+    // Swaps bits of the index, word first, from z2 y2 x2 z1 y1 x1 z0 y0 x0 to z2 z1 z0 y2 y1 y0 x2 x1 x0.
+    for (distance, word, mask) in [(32, 2, 0xffff_ffff), (4, 1, 0x0f0f_0f0f_0f0f_0f0f)] {
+        for j in (0..8).filter(|j| j & word == 0) {
+            let t = (b[j] >> distance ^ b[j | word]) & mask;
+            b[j] ^= t << distance;
+            b[j | word] ^= t;
+        }
+    }
+    b.map(swap::<3, 1>)
+}
+
+/// Flood fill of a block in layers, as [`flood`] of a brick.
+#[inline(always)]
+pub fn flood_layers(seed: Block, within: &Block) -> Block {
+    let mut w = seed;
+    loop {
+        const NOT_FIRST: u64 = 0xfefe_fefe_fefe_fefe;
+        let along_x = |v: u64| v << 1 & NOT_FIRST | (v & NOT_FIRST) >> 1;
+        let x: Block = std::array::from_fn(|z| w[z] | along_x(w[z]) & within[z]);
+        let y: Block = std::array::from_fn(|z| x[z] | (x[z] << 8 | x[z] >> 8) & within[z]);
+        let beside = |z: usize| if z < 8 { y[z] } else { 0 };
+        let next: Block =
+            std::array::from_fn(|z| y[z] | (beside(z + 1) | beside(z.wrapping_sub(1))) & within[z]);
+        if (0..8).fold(0, |all, z| all | w[z] ^ next[z]) == 0 {
+            return w;
+        }
+        w = next;
+    }
 }
 
 /// The face neighbours of the octants `w` within the brick along `axis`, in the positive direction if `up`.
@@ -185,6 +199,19 @@ mod tests {
     use super::*;
     use crate::octant::{morton, position};
 
+    fn draw() -> impl FnMut() -> u64 {
+        let mut random = 1u64;
+        move || {
+            random = random.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            random ^ random >> 29
+        }
+    }
+
+    /// The octants `w` and their face neighbours within the brick.
+    fn spread(w: u64) -> u64 {
+        (0..3).fold(w, |all, axis| all | moved(w, axis, false) | moved(w, axis, true))
+    }
+
     #[test]
     fn parents_and_children_agree_for_every_byte() {
         for b in 0..=255u8 {
@@ -224,26 +251,60 @@ mod tests {
                     want |= within;
                 }
             }
-            assert_eq!(spread_faces(1 << bit), want);
+            assert_eq!(spread(1 << bit), want);
         }
     }
 
     #[test]
     fn flood_fill_is_what_steps_over_all_faces_come_to() {
-        let mut random = 1u64;
-        let mut draw = || {
-            random = random.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-            random ^ random >> 29
-        };
+        let mut draw = draw();
         for _ in 0..10_000 {
             for within in [draw(), draw() | draw(), draw() & draw()] {
                 let seed = draw() & draw() & draw();
                 let mut filled = seed & within;
-                while filled != spread_faces(filled) & within {
-                    filled = spread_faces(filled) & within;
+                while filled != spread(filled) & within {
+                    filled = spread(filled) & within;
                 }
                 assert_eq!(flood(seed, within), filled, "{seed:#x} {within:#x}");
             }
+        }
+    }
+
+    #[test]
+    fn layers_have_every_octant_at_its_position_and_are_their_own_inverse() {
+        for code in 0..512u64 {
+            let [x, y, z] = position(code);
+            let mut block = [0; 8];
+            block[code as usize >> 6] = 1 << (code & 63);
+            let mut want = [0; 8];
+            want[z as usize] = 1 << (8 * y + x);
+            assert_eq!(layers(block), want);
+            assert_eq!(layers(want), block);
+        }
+    }
+
+    #[test]
+    fn flood_fill_of_a_block_is_what_steps_over_all_faces_come_to() {
+        let mut draw = draw();
+        for _ in 0..2_000 {
+            let (mut within, mut filled) = ([0; 8], [0; 8]);
+            within.fill_with(|| draw() | draw() & draw());
+            filled[draw() as usize & 7] = 1 << (draw() & 63);
+            let seed = filled;
+            loop {
+                let across =
+                    |j: usize, axis: usize| across(filled[j ^ 1 << axis], axis, j >> axis & 1 == 1);
+                let next = std::array::from_fn(|j| {
+                    let beside = across(j, 0) | across(j, 1) | across(j, 2);
+                    filled[j] | (spread(filled[j]) | beside) & within[j]
+                });
+                if next == filled {
+                    break;
+                }
+                filled = next;
+            }
+            let found = layers(flood_layers(layers(seed), &layers(within)));
+            assert_eq!(found, filled, "{seed:x?} {within:x?}");
         }
     }
 
@@ -267,7 +328,6 @@ mod tests {
                 ("from_rows", &|a| vec![from_rows(a[0] as u64).into()]),
                 ("moved", &|a| vec![moved(a[0] as u64, a[1] as usize, a[2] == 1).into()]),
                 ("across", &|a| vec![across(a[0] as u64, a[1] as usize, a[2] == 1).into()]),
-                ("spread_faces", &|a| vec![spread_faces(a[0] as u64).into()]),
                 ("flood", &|a| vec![flood(a[0] as u64, a[1] as u64).into()]),
             ],
         );

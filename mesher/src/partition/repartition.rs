@@ -190,8 +190,10 @@ const WEIGHT_OF_NEIGHBOUR: i64 = 230;
 /// The weight of a brick with the non-crossing leaves `open`.
 #[inline]
 fn weight_of_brick(open: u64) -> i64 {
-    let (mut components, mut single) = (0, 0);
-    for component in brick::components(open) {
+    let (mut components, mut single, mut rest) = (0, 0, open);
+    while rest != 0 {
+        let component = brick::flood(rest & rest.wrapping_neg(), rest);
+        rest &= !component;
         components += 1;
         single += i64::from(component.is_power_of_two());
     }

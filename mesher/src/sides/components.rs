@@ -1,15 +1,17 @@
-//! Merges the local components of bricks, within the bricks that this rank holds.
+//! Merges the components of blocks, within the bricks that this rank holds.
 //!
-//! A depth-first walk keeps, for each level, the brick on the path from the root and its six face
-//! neighbours, so that no neighbour needs a search. Two leaves of one level are merged from the upper
-//! side of their common face, as the walk has met the lower one recently. Two leaves of different levels are merged from the finer one: the walk
-//! ascends the path until it finds the leaf that covers the octant across the face.
+//! A depth-first walk keeps, for each level, the brick on the path from the root and its six face neighbours, so that no neighbour needs a
+//! search. The block below a brick is merged with what is across its sides: with leaves of its own level only on the lower sides, as the
+//! walk has met the block there, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover
+//! the octants across. Coarser leaves within the region of the block have been found with its components.
 
-use super::nodes::{Component, Family, Node, Nodes};
+use super::nodes::{Child, Component, Family, Node, Nodes, Part, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
-use bricks::brick;
+use bricks::brick::{self, Block};
 use bricks::brickset::ones;
 use bricks::octant::{Level, neighbour};
+use bricks::widest;
+use std::mem::take;
 
 /// Merged local components, and the faces whose other side only another rank sees.
 pub struct LocalMerge {
@@ -38,50 +40,18 @@ pub struct FacedOctants {
     pub bits: u64,
 }
 
-/// Sets of numbers from 0. The least number represents a set.
-pub struct UnionFind(Vec<u32>);
+/// An axis, and whether it is the upper side along it: 0 or 1.
+type Side = (usize, usize);
 
-impl UnionFind {
-    /// Numbers below `count`, each in a set of its own.
-    pub fn new(count: u32) -> Self {
-        Self((0..count).collect())
-    }
+/// All sides of a brick.
+const SIDES: [Side; 6] = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)];
 
-    /// The representative of a number.
-    #[inline]
-    pub fn find(&mut self, mut c: u32) -> u32 {
-        while self.0[c as usize] != c {
-            let up = self.0[self.0[c as usize] as usize];
-            self.0[c as usize] = up;
-            c = up;
-        }
-        c
-    }
+/// The octants of a brick without a face on its surface.
+const INNER: u64 = brick::SPANS[0][1][2] & brick::SPANS[1][1][2] & brick::SPANS[2][1][2];
 
-    /// The set of each number; the sets are numbered from 0.
-    pub fn numbered(self) -> Vec<u32> {
-        let mut merged = self.0;
-        let mut count = 0;
-        for c in 0..merged.len() {
-            // A parent in the union-find has a lower number than its child, so it is numbered already.
-            let up = merged[c] as usize;
-            merged[c] = if up == c { count } else { merged[up] };
-            count += u32::from(up == c);
-        }
-        merged
-    }
-
-    /// Unites the sets of two numbers.
-    #[inline]
-    pub fn unite(&mut self, a: u32, b: u32) {
-        // Most pairs have been united before and have the same parent.
-        if self.0[a as usize] == self.0[b as usize] {
-            return;
-        }
-        let (a, b) = (self.find(a), self.find(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-}
+/// The octant groups at each side of a brick, by axis, lower and upper.
+const GROUPS: [[[usize; 4]; 2]; 3] =
+    [[[0, 2, 4, 6], [1, 3, 5, 7]], [[0, 1, 4, 5], [2, 3, 6, 7]], [[0, 1, 2, 3], [4, 5, 6, 7]]];
 
 /// The other side of a brick's face.
 #[derive(Clone, Copy)]
@@ -92,32 +62,29 @@ enum Across {
     Coarser,
     /// A brick that this rank does not hold.
     Remote,
-    /// A brick of the same level: its node, and the mask of its octants that exist.
-    Here(Node, u64),
+    /// A brick of the same level.
+    Here(Child),
 }
 
-/// A brick on the path from the root.
+/// A brick with children, on the path from the root.
 #[derive(Clone, Copy)]
 struct Frame {
     level: Level,
     key: u64,
-    node: Node,
-    exists: u64,
+    brick: Child,
     /// By axis; lower side, upper side.
     across: [[Across; 2]; 3],
 }
 
-/// Merges all components that share part of a face, in the bricks that this rank holds.
-pub fn merge(nodes: &Nodes, ownership: &Ownership) -> LocalMerge {
-    let local = LocalMerge {
-        merged: UnionFind::new(nodes.component_count()),
-        faces: Vec::new(),
-        // Enough for most meshes, so that it does not grow in many steps.
-        at_boundary: Vec::with_capacity(1 << 12),
-    };
-    let mut w = Walk { nodes, ownership, local, path: Vec::new() };
-    let across = [[Across::Nothing; 2]; 3];
-    w.visit(&Frame { level: 0, key: 0, node: 0, exists: 1, across });
+/// Merges all components that share part of a face, in the bricks that this rank holds. `merged` are the sets that blocks connect.
+pub fn merge(nodes: &Nodes, merged: UnionFind, ownership: &Ownership) -> LocalMerge {
+    let brick = nodes.root();
+    // Every octant of levels 0 and 1 has a face on the root's boundary. Enough room for most meshes, so that it does not grow in many steps.
+    let mut at_boundary = Vec::with_capacity(1 << 12);
+    at_boundary.extend(nodes.components(brick.part).map(|c| c.0));
+    let local = LocalMerge { merged, faces: Vec::new(), at_boundary };
+    let mut w = Walk { nodes, ownership, local, path: vec![], mine: vec![], theirs: vec![] };
+    w.visit(&Frame { level: 0, key: 0, brick, across: [[Across::Nothing; 2]; 3] });
     w.local
 }
 
@@ -127,165 +94,186 @@ struct Walk<'a> {
     local: LocalMerge,
     /// The bricks on the path from the root, by level.
     path: Vec<Frame>,
+    /// The octants of the components of a block, and of one across a face.
+    mine: Vec<Block>,
+    theirs: Vec<Block>,
+}
+
+widest! {
+    /// Merges the components of the block below a brick with those across its faces.
+    fn merge_block(walk: &mut Walk, frame: &Frame, family: &Family) = Walk::merge_lanes;
 }
 
 impl Walk<'_> {
     fn visit(&mut self, frame: &Frame) {
-        self.merge_brick(frame);
-        let nodes = self.nodes;
-        let family = nodes.family(frame.level, frame.node);
-        if family.bricks == 0 {
-            return;
-        }
+        let (nodes, l) = (self.nodes, frame.level);
+        let family = nodes.family(l, frame.brick.node);
+        merge_block(self, frame, &family);
+        // Below a local brick all bricks are local.
+        let is_local = |n: Node| nodes.placement(l, n) == Placement::Local;
+        let is_inner = is_local(frame.brick.node)
+            && frame.across.iter().flatten().all(|across| match across {
+                Across::Nothing | Across::Coarser => true,
+                Across::Remote => false,
+                Across::Here(brick) => is_local(brick.node),
+            });
         self.path.push(*frame);
-        for j in ones(u64::from(family.bricks)) {
-            if let Some(child) = step_down(nodes, frame, &family, u64::from(j)) {
+        for j in ones(u64::from(family.bricks)).map(u64::from) {
+            if !is_inner {
+                self.record_faces(frame, &family, j);
+            }
+            if let Some(child) = self.step_down(frame, &family, j) {
                 self.visit(&child);
             }
         }
         self.path.pop();
     }
 
-    /// Merges the components of one brick with those across its faces.
-    fn merge_brick(&mut self, frame: &Frame) {
-        let (nodes, l) = (self.nodes, frame.level);
-        let is_replica = nodes.placement(l, frame.node) == Placement::PartiallyReplicated
-            && !self.ownership.owns(l, frame.key);
-        for (c, bits) in nodes.components(l, frame.node) {
-            if is_replica {
-                // The owner merges the brick with its neighbours, and this replica's components with its own.
-                self.record_face(l, frame.key, c, bits);
+    #[inline(always)]
+    fn merge_lanes(&mut self, frame: &Frame, family: &Family) {
+        let mut mine = take(&mut self.mine);
+        let first = self.nodes.block(family, &mut mine);
+        if frame.level < 2 {
+            let touches = |octants: &Block| frame.level == 0 || octants[0] & !INNER != 0;
+            let at = (first..).zip(&mine).filter(|(_, octants)| touches(octants));
+            self.local.at_boundary.extend(at.map(|(c, _)| c));
+        } else {
+            SIDES.iter().for_each(|side| self.merge_side(frame, first, &mine, *side));
+        }
+        self.mine = mine;
+    }
+
+    /// Merges the components of a block, from `first` on, with those across one side.
+    #[inline(always)]
+    fn merge_side(&mut self, frame: &Frame, first: Component, mine: &[Block], side: Side) {
+        let (nodes, l, (axis, up)) = (self.nodes, frame.level, side);
+        let groups = GROUPS[axis][1 - up];
+        let mut leaves = groups.iter().fold(0, |all, j| all | 0xff << (8 * j));
+        let mut other = Family::default();
+        match frame.across[axis][up] {
+            // The other rank merges what is there.
+            Across::Remote => return,
+            Across::Nothing => leaves = 0,
+            Across::Coarser => {}
+            Across::Here(brick) if up == 1 => leaves &= !nodes.split(l, brick.node),
+            // The block across has been met.
+            Across::Here(brick) => {
+                other = nodes.family(l, brick.node);
+                leaves &= !other.split;
             }
-            if l < 2 {
-                // Every octant of these levels has a face on the root's boundary.
+        }
+        let other = nodes.block(&other, &mut self.theirs);
+        for (c, octants) in (first..).zip(mine) {
+            let across = |k: usize| brick::across(octants[groups[k] ^ 1 << axis], axis, up == 1);
+            let faced = [across(0), across(1), across(2), across(3)];
+            if faced[0] | faced[1] | faced[2] | faced[3] == 0 {
+                continue;
+            }
+            for (d, theirs) in (other..).zip(&self.theirs) {
+                if (0..4).fold(0, |all, k| all | faced[k] & theirs[groups[k]]) != 0 {
+                    self.local.merged.unite(c, d);
+                }
+            }
+            if let Across::Nothing = frame.across[axis][up] {
                 self.local.at_boundary.push(c);
             }
-            let inner = brick::spread_faces(bits) & !frame.exists & brick::valid(l);
-            self.merge_coarser(frame, c, inner, None);
-            for axis in 0..3 {
-                for up in 0..2 {
-                    let faced = brick::across(bits, axis, up == 1) & brick::valid(l);
-                    if faced != 0 {
-                        self.merge_across(frame, c, faced, (axis, up));
+            if leaves != 0 {
+                let parents = |k: usize| u64::from(brick::parents(faced[k])) << (8 * groups[k]);
+                let coarse = parents(0) | parents(1) | parents(2) | parents(3);
+                self.merge_leaves(frame, c, coarse & leaves, side);
+            }
+        }
+    }
+
+    /// Merges a component with the leaves that cover the octants `faced` of the brick across one side of a brick, none of them split.
+    fn merge_leaves(&mut self, frame: &Frame, c: Component, mut faced: u64, side: Side) {
+        let (mut frame, (axis, up), mut is_across) = (frame, side, true);
+        while faced != 0 {
+            let brick = match frame.across[axis][up] {
+                _ if !is_across => Some(frame.brick),
+                Across::Here(brick) => Some(brick),
+                _ => None,
+            };
+            if let Some(Child { part, exists, .. }) = brick {
+                let touched = self.nodes.components(part).filter(|d| d.1 & faced != 0);
+                touched.for_each(|(d, _)| self.local.merged.unite(c, d));
+                faced &= !exists;
+            }
+            if frame.level == 0 {
+                return;
+            }
+            // The octants lie in the group next to the brick's own, or in its own; in the same parent brick if that group is on the inner side.
+            let mut group = frame.key & 7;
+            if is_across {
+                is_across = group >> axis & 1 == up as u64;
+                group ^= 1 << axis;
+            }
+            faced = u64::from(brick::parents(faced)) << (8 * group);
+            frame = &self.path[frame.level as usize - 1];
+        }
+    }
+
+    /// Records, for the ranks that own them, the octants that components of child brick `j` have or face in other ranks' bricks.
+    fn record_faces(&mut self, frame: &Frame, family: &Family, j: u64) {
+        let (l, key) = (frame.level + 1, frame.key << 3 | j);
+        let Some(Child { node, part, .. }) = family.child(j) else { return };
+        match self.nodes.placement(l, node) {
+            // The other ranks hold a fully replicated brick as well.
+            Placement::FullyReplicated | Placement::Remote(_) => {}
+            Placement::PartiallyReplicated if !self.ownership.owns(l, key) => {
+                // The owner merges the brick with its neighbours, and this replica's components with its own.
+                self.record_face((l, key), part, |bits| bits);
+            }
+            _ => {
+                for (axis, up) in SIDES {
+                    if let Across::Remote = self.across(frame, family, j, (axis, up)) {
+                        let beside = neighbour(l - 2, key, axis, up == 1);
+                        let beside = beside.expect("the neighbour lies in the root");
+                        self.record_face((l, beside), part, |bits| {
+                            brick::across(bits, axis, up == 1)
+                        });
                     }
                 }
             }
         }
     }
 
-    #[inline]
-    fn merge_across(&mut self, frame: &Frame, c: Component, faced: u64, side: (usize, usize)) {
-        let (nodes, l, (axis, up)) = (self.nodes, frame.level, side);
-        match frame.across[axis][up] {
-            Across::Nothing => self.local.at_boundary.push(c),
-            Across::Coarser => self.merge_coarser(frame, c, faced, Some(side)),
-            Across::Remote => {
-                // The other rank holds a fully replicated brick as well.
-                let is_everywhere = nodes.placement(l, frame.node) == Placement::FullyReplicated;
-                if !is_everywhere && self.ownership.owns(l, frame.key) {
-                    let across = neighbour(l - 2, frame.key, axis, up == 1);
-                    self.record_face(l, across.expect("the neighbour lies in the root"), c, faced);
-                }
-            }
-            Across::Here(n, exists) => {
-                if up == 0 {
-                    self.unite(c, l, n, faced);
-                }
-                if faced & !exists != 0 {
-                    self.merge_coarser(frame, c, faced & !exists, Some(side));
-                }
-            }
-        }
-    }
-
-    /// Merges a component with those of a node of level `l` that have some of the octants `faced`.
-    #[inline]
-    fn unite(&mut self, c: Component, l: Level, node: Node, faced: u64) {
-        for (d, bits) in self.nodes.components(l, node) {
-            if bits & faced != 0 {
-                self.local.merged.unite(c, d);
-            }
-        }
-    }
-
-    /// Records, for the owner of a brick, the octants of the brick that a component has or faces.
-    fn record_face(&mut self, level: Level, key: u64, component: Component, bits: u64) {
+    /// Records, for the owner of a brick, those of its octants that are `faced` by components.
+    fn record_face(&mut self, (level, key): (Level, u64), part: Part, faced: impl Fn(u64) -> u64) {
         let rank = self.ownership.owner(level, key);
-        self.local.faces.push(FacedOctants { rank, level, key, component, bits });
+        let all = self.nodes.components(part).map(|(c, bits)| (c, faced(bits)));
+        let face = |(component, bits)| FacedOctants { rank, level, key, component, bits };
+        self.local.faces.extend(all.filter(|face| face.1 != 0).map(face));
     }
 
-    /// Merges a component of a brick with the coarser leaves that cover the octants `faced`: octants of the brick
-    /// itself if `side` is none, of its neighbour on this side otherwise.
-    #[inline]
-    fn merge_coarser(
-        &mut self,
-        frame: &Frame,
-        c: Component,
-        mut faced: u64,
-        mut side: Option<(usize, usize)>,
-    ) {
-        let (mut m, mut key) = (frame.level, frame.key);
-        while faced != 0 && m > 0 {
-            let mut group = key & 7;
-            if let Some((axis, up)) = side {
-                // The octants lie in the group next to the brick's own, in the same parent brick if that group is on
-                // the inner side.
-                if group >> axis & 1 != up as u64 {
-                    side = None;
-                }
-                group ^= 1 << axis;
-            }
-            faced = u64::from(brick::parents(faced)) << (8 * group);
-            key >>= 3;
-            m -= 1;
-            let frame = &self.path[m as usize];
-            let (node, exists) = match side {
-                None => (frame.node, frame.exists),
-                Some((axis, up)) => match frame.across[axis][up] {
-                    Across::Here(n, exists) => (n, exists),
-                    _ => continue,
-                },
-            };
-            if faced & exists != 0 {
-                self.unite(c, m, node, faced);
-                faced &= !exists;
+    /// The frame of child brick `j`; none if it has no children or this rank does not hold it.
+    fn step_down(&self, frame: &Frame, family: &Family, j: u64) -> Option<Frame> {
+        let (level, key) = (frame.level + 1, frame.key << 3 | j);
+        let brick = family.child(j).filter(|child| self.nodes.split(level, child.node) != 0)?;
+        let mut across = [[Across::Nothing; 2]; 3];
+        if level > 2 {
+            for (axis, up) in SIDES {
+                across[axis][up] = self.across(frame, family, j, (axis, up));
             }
         }
+        Some(Frame { level, key, brick, across })
     }
-}
 
-/// The frame of child brick `j`; none if this rank does not hold it.
-#[inline]
-fn step_down(nodes: &Nodes, frame: &Frame, family: &Family, j: u64) -> Option<Frame> {
-    let l = frame.level;
-    let (node, exists) = family.child(j)?;
-    if let Placement::Remote(_) = nodes.placement(l + 1, node) {
-        return None;
-    }
-    let mut across = [[Across::Nothing; 2]; 3];
-    if l >= 2 {
-        for axis in 0..3 {
-            for up in 0..2 {
-                let beside = j ^ 1 << axis;
-                across[axis][up] = match frame.across[axis][up] {
-                    _ if j >> axis & 1 != up as u64 => step_across(nodes, l, family, beside),
-                    Across::Here(n, _) => step_across(nodes, l, &nodes.family(l, n), beside),
-                    other => other,
-                };
-            }
+    /// The other side of a face of child brick `j`.
+    #[inline(always)]
+    fn across(&self, frame: &Frame, family: &Family, j: u64, (axis, up): Side) -> Across {
+        let (nodes, l, beside) = (self.nodes, frame.level, j ^ 1 << axis);
+        let child = match frame.across[axis][up] {
+            _ if j >> axis & 1 != up as u64 => family.child(beside),
+            Across::Here(brick) => nodes.family(l, brick.node).child(beside),
+            other => return other,
+        };
+        match child {
+            None => Across::Coarser,
+            Some(brick) => match nodes.placement(l + 1, brick.node) {
+                Placement::Remote(_) => Across::Remote,
+                _ => Across::Here(brick),
+            },
         }
-    }
-    Some(Frame { level: l + 1, key: frame.key << 3 | j, node, exists, across })
-}
-
-/// The other side of a face of a child brick: octant group `j` of the brick across, whose children are `family`.
-#[inline]
-fn step_across(nodes: &Nodes, l: Level, family: &Family, j: u64) -> Across {
-    match family.child(j) {
-        None => Across::Coarser,
-        Some((n, exists)) => match nodes.placement(l + 1, n) {
-            Placement::Remote(_) => Across::Remote,
-            _ => Across::Here(n, exists),
-        },
     }
 }

@@ -6,8 +6,8 @@
 //! a spanning forest of each group of ranks' edges goes to all ranks.
 
 use super::Base;
-use super::components::{self, FacedOctants, UnionFind};
-use super::nodes::{Component, Nodes};
+use super::components::{self, FacedOctants};
+use super::nodes::{Component, Nodes, UnionFind};
 use bricks::octant::Level;
 use ranks::{Comm, MessageBuffer, gather};
 use rustc_hash::FxHashMap;
@@ -53,23 +53,25 @@ fn label_replicated(
     merged: &[u32],
 ) -> Vec<[Label; 2]> {
     let non_owning_view = base.ownership.non_owning_view();
-    let replicated = Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
-    let of_replicated = components::merge(&replicated, &non_owning_view).merged.numbered();
-    let of_nodes = nodes.replicated_components();
-    assert_eq!(
-        of_nodes.len(),
-        of_replicated.len(),
-        "all ranks hold the same fully replicated bricks"
-    );
-    let mut pairs = Vec::new();
-    let mut labelled = vec![false; labels.len()];
-    for (c, replicated) in of_nodes.into_iter().zip(of_replicated) {
-        let component = merged[c as usize] as usize;
-        let (label, replicated) = (&mut labels[component], Label::from(replicated));
-        if !std::mem::replace(&mut labelled[component], true) {
-            *label = replicated;
-        } else if *label != replicated {
-            pairs.push([*label, replicated]);
+    let (replicated, sets) =
+        Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
+    let of_replicated = components::merge(&replicated, sets, &non_owning_view).merged.numbered();
+    let [mine, all] = [nodes, &replicated].map(|nodes| nodes.replicated().collect::<Vec<_>>());
+    assert_eq!(mine.len(), all.len(), "all ranks hold the same fully replicated bricks");
+    let (mut pairs, mut labelled) = (Vec::new(), vec![false; labels.len()]);
+    for (mine, all) in mine.into_iter().zip(all) {
+        for (replicated, part) in replicated.components(all) {
+            // It is part of one component, as this rank holds more bricks.
+            let whole = nodes.components(mine).find(|whole| whole.1 & part != 0);
+            let (c, _) = whole.expect("both have the leaves of the brick");
+            let component = merged[c as usize] as usize;
+            let label = &mut labels[component];
+            let replicated = Label::from(of_replicated[replicated as usize]);
+            if !std::mem::replace(&mut labelled[component], true) {
+                *label = replicated;
+            } else if *label != replicated {
+                pairs.push([*label, replicated]);
+            }
         }
     }
     pairs

@@ -184,11 +184,12 @@ impl Components {
     fn volumes(&self, base: &Base) -> Vec<[u64; 2]> {
         let mut mine = vec![0; self.labels.len()];
         for l in 0..=LEVEL_MAX {
-            for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
+            let bricks = Tree::exists(&base.tree.split, l);
+            for (Brick { key, .. }, part) in bricks.zip(self.nodes.parts(l)) {
                 if !base.ownership.owns(l, key) {
                     continue;
                 }
-                for (c, bits) in self.nodes.components(l, n) {
+                for (c, bits) in self.nodes.components(part) {
                     mine[self.merged[c as usize] as usize] +=
                         u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));
                 }

@@ -2,7 +2,7 @@
 //! and rays), and which of them are kept.
 //!
 //! Non-crossing leaves that share part of a face belong to one component, and a component has one side.
-//! Within a brick, local components are flood fills by shifts. Across bricks a union-find merges them
+//! Within a block of eight bricks, local components are flood fills by shifts ([`nodes`]). Across blocks a union-find merges them
 //! in a walk of the tree ([`components`]). Across ranks they receive common labels, by messages about
 //! the faces between ranks ([`global`]). Each component is then put to a vote of rays ([`rays`])
 //! or, if the case has seeds, decided by them ([`verdict`], which also finds the outside components that the far field
@@ -30,9 +30,8 @@ use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree};
-use components::LocalMerge;
 use global::Label;
-use nodes::{Component, Node, Nodes};
+use nodes::{Component, Nodes};
 use ranks::Comm;
 use serde::Serialize;
 use std::collections::HashSet;
@@ -139,10 +138,10 @@ struct Components {
 impl Components {
     /// Finds the components of a tree's leaves that do not cross. Collective.
     fn new(base: &Base) -> Self {
-        let nodes = Nodes::new(base.tree, base.ownership);
-        let LocalMerge { merged, faces, at_boundary } = components::merge(&nodes, base.ownership);
-        let merged = merged.numbered();
-        let labels = global::labels(base, &nodes, faces, &merged);
+        let (nodes, sets) = Nodes::new(base.tree, base.ownership);
+        let local = components::merge(&nodes, sets, base.ownership);
+        let (merged, at_boundary) = (local.merged.numbered(), local.at_boundary);
+        let labels = global::labels(base, &nodes, local.faces, &merged);
         let candidates = verdict::candidates(base, &nodes, &merged, &labels);
         let all = verdict::all_components(&candidates, base.comm);
         Self { nodes, merged, labels, candidates, all, at_boundary }
@@ -235,9 +234,10 @@ impl Sides {
         let mut leaves_enclosed = 0;
         for l in 0..LEVELS as Level {
             let mut crossing = base.tree.crossing[l as usize].cursor();
-            Tree::exists(&base.tree.split, l).enumerate().for_each(|(n, Brick { key, .. })| {
+            let parts = nodes.parts(l).zip(Tree::exists(&base.tree.split, l));
+            parts.for_each(|(part, Brick { key, .. })| {
                 let (mut open, mut within, mut enclosed) = (0, 0, 0);
-                for (c, part) in nodes.components(l, n as Node) {
+                for (c, part) in nodes.components(part) {
                     open |= part;
                     match of_local[c as usize] {
                         Class::Outside => {}

@@ -1,23 +1,28 @@
-//! The base tree's bricks as a linked tree, with the local components of each brick.
+//! The base tree's bricks as a linked tree, with the components of their leaves.
+//!
+//! The child bricks of a brick are a *block* of 8 x 8 x 8 octants. A flood fill finds what is connected in a block, through leaves of
+//! the two levels above, too. So only faces between blocks need a search, and few components remain to be united.
 //!
 //! Invariants:
 //! - the nodes of a level are in Morton order;
 //! - the children of a node are contiguous in the next level, one for each non-zero byte of `split`;
-//! - components are numbered through all levels in order, and each is a non-empty set of octants that
-//!   are connected over faces within the brick.
+//! - components are numbered through all levels in order; each is a set of leaves of one block, and no leaf is in two.
 
 use crate::partition::ownership::{Ownership, Placement};
-use bricks::brick::{self, Brick};
+use bricks::brick::{self, Block, Brick};
+use bricks::brickset::ones;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
+use bricks::widest;
 
-/// Number of a local component: leaves of one brick that are connected over faces.
+/// Number of a local component: leaves of one block that are connected.
 pub type Component = u32;
 
 /// Number of a node within its level.
 pub type Node = u32;
 
 /// All bricks that this rank holds, and placeholders for those children of its bricks that it does not hold.
+#[derive(Default)]
 pub struct Nodes {
     levels: Vec<LevelNodes>,
     masks: Vec<u64>,
@@ -27,11 +32,80 @@ pub struct Nodes {
 struct LevelNodes {
     /// Split octants of each node; empty if no octant of the level is split.
     split: Vec<u64>,
-    first_child: Vec<Node>,
-    /// First component of each node, and the end: one entry more than nodes.
-    components: Vec<Component>,
+    /// Where the block below each node of the level above begins, and the end. A block of its own has the brick of level 0.
+    blocks: Vec<BlockStart>,
     /// Placements of the first nodes; the others are local.
     placements: Vec<Placement>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct BlockStart {
+    node: Node,
+    component: Component,
+    /// Each brick has a mask for each component of its block, and some have no octants.
+    mask: u32,
+}
+
+/// The components of a brick: those of its block.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    first: Component,
+    count: u32,
+    mask: u32,
+}
+
+impl Part {
+    /// That of brick `n` of a block with this start and end.
+    #[inline(always)]
+    fn of([start, end]: [BlockStart; 2], n: u32) -> Self {
+        let count = end.component - start.component;
+        Self { first: start.component, count, mask: start.mask + n * count }
+    }
+}
+
+/// Sets of numbers from 0. The least number represents a set.
+pub struct UnionFind(Vec<u32>);
+
+impl UnionFind {
+    /// Numbers below `count`, each in a set of its own.
+    pub fn new(count: u32) -> Self {
+        Self((0..count).collect())
+    }
+
+    /// The representative of a number.
+    #[inline]
+    pub fn find(&mut self, mut c: u32) -> u32 {
+        while self.0[c as usize] != c {
+            let up = self.0[self.0[c as usize] as usize];
+            self.0[c as usize] = up;
+            c = up;
+        }
+        c
+    }
+
+    /// The set of each number; the sets are numbered from 0.
+    pub fn numbered(self) -> Vec<u32> {
+        let mut merged = self.0;
+        let mut count = 0;
+        for c in 0..merged.len() {
+            // A parent in the union-find has a lower number than its child, so it is numbered already.
+            let up = merged[c] as usize;
+            merged[c] = if up == c { count } else { merged[up] };
+            count += u32::from(up == c);
+        }
+        merged
+    }
+
+    /// Unites the sets of two numbers.
+    #[inline]
+    pub fn unite(&mut self, a: u32, b: u32) {
+        // Most pairs have been united before and have the same parent.
+        if self.0[a as usize] == self.0[b as usize] {
+            return;
+        }
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
 }
 
 /// A brick and its non-crossing leaves. Of a brick that this rank does not hold, no octants are known.
@@ -66,108 +140,239 @@ pub fn open_bricks<'a>(
 }
 
 /// A node's children.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Family {
     /// The node's split octants.
     pub split: u64,
     /// Mask of the octant groups that have a child brick.
     pub bricks: u8,
-    first: Node,
+    block: [BlockStart; 2],
+}
+
+/// A child brick.
+#[derive(Clone, Copy, Debug)]
+pub struct Child {
+    /// Its node.
+    pub node: Node,
+    /// Its octants that exist.
+    pub exists: u64,
+    /// Its components.
+    pub part: Part,
 }
 
 impl Family {
-    /// The child brick below octant group `j` and the mask of its octants that exist; none if no octant of
-    /// the group is split.
-    #[inline]
-    pub fn child(&self, j: u64) -> Option<(Node, u64)> {
-        let before = self.bricks & ((1u16 << j) - 1) as u8;
-        let child = self.first + before.count_ones();
-        (self.bricks >> j & 1 == 1).then(|| (child, brick::children(brick::byte(self.split, j))))
+    /// The child brick below octant group `j`; none if no octant of the group is split.
+    #[inline(always)]
+    pub fn child(&self, j: u64) -> Option<Child> {
+        let before = u32::from(self.bricks & ((1u16 << j) - 1) as u8).count_ones();
+        (self.bricks >> j & 1 == 1).then(|| Child {
+            node: self.block[0].node + before,
+            exists: brick::children(brick::byte(self.split, j)),
+            part: Part::of(self.block, before),
+        })
     }
 }
 
-impl Nodes {
-    /// Links the bricks of a base tree and finds their local components.
-    pub fn new(tree: &Tree, ownership: &Ownership) -> Self {
-        let (mut levels, mut masks) = (Vec::with_capacity(LEVELS), Vec::new());
-        for l in 0..LEVELS as Level {
-            let mut out = LevelNodes::default();
-            let splits = !tree.split[l as usize].is_empty();
-            let mut children = 0;
-            open_bricks(tree, ownership, l).for_each(|b| {
-                if splits {
-                    out.split.push(b.split);
-                    out.first_child.push(children);
-                    children += brick::parents(b.split).count_ones();
-                }
-                if b.placement != Placement::Local {
-                    out.placements.resize(out.components.len(), Placement::Local);
-                    out.placements.push(b.placement);
-                }
-                out.components.push(masks.len() as Component);
-                masks.extend(brick::components(b.open));
-            });
-            let end = Component::try_from(masks.len()).expect("fewer than 2^32 components");
-            out.components.push(end);
-            levels.push(out);
+/// A block whose components are looked for.
+#[derive(Default)]
+struct NewBlock {
+    /// Its non-crossing leaves.
+    open: Block,
+    /// Components of the two levels above, with the octants of the block that they fill.
+    above: Vec<(Component, Block)>,
+    /// The components, each with one of the levels above that it is connected to, if there is one.
+    found: Vec<(Option<Component>, Block)>,
+}
+
+widest! {
+    /// Finds what is connected in a block, and unites those of the levels above that it connects.
+    fn fill(block: &mut NewBlock, sets: &mut UnionFind) = NewBlock::fill_lanes;
+}
+
+impl NewBlock {
+    #[inline(always)]
+    fn fill_lanes(&mut self, sets: &mut UnionFind) {
+        let Self { open, above, found } = self;
+        let and = |a, b| a & b;
+        // What is in no component yet.
+        let mut free = above.iter().fold(*open, |all, (_, w)| both(&all, w, |a, b| a | b));
+        let within = brick::layers(free);
+        found.clear();
+        let grow = |seed| brick::layers(brick::flood_layers(brick::layers(seed), &within));
+        for &(c, seed) in above.iter() {
+            for (other, _) in found.iter().filter(|(_, w)| !is_empty(&both(w, &seed, and))) {
+                sets.unite(other.expect("found above"), c);
+            }
+            let seed = both(&seed, &free, and);
+            if !is_empty(&seed) {
+                found.push((Some(c), grow(seed)));
+                free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
+            }
         }
-        Self { levels, masks }
+        while let Some(j) = (0..8).find(|&j| open[j] & free[j] != 0) {
+            let (mut seed, bits) = ([0; 8], open[j] & free[j]);
+            seed[j] = bits & bits.wrapping_neg();
+            found.push((None, grow(seed)));
+            free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
+        }
+        found.retain(|(_, w)| !is_empty(&both(w, open, and)));
+    }
+}
+
+#[inline(always)]
+fn both(a: &Block, b: &Block, f: impl Fn(u64, u64) -> u64) -> Block {
+    std::array::from_fn(|j| f(a[j], b[j]))
+}
+
+#[inline(always)]
+fn is_empty(block: &Block) -> bool {
+    block.iter().fold(0, |all, w| all | w) == 0
+}
+
+impl Nodes {
+    /// Links the bricks of a base tree and finds the components of its blocks; those that a block connects are united.
+    pub fn new(tree: &Tree, ownership: &Ownership) -> (Self, UnionFind) {
+        let (mut nodes, mut sets) = (Self::default(), UnionFind::new(0));
+        let mut block = NewBlock::default();
+        for l in 0..LEVELS as Level {
+            let mut level = LevelNodes::default();
+            let has_split = !tree.split[l as usize].is_empty();
+            let mut bricks = open_bricks(tree, ownership, l);
+            // The bricks above a block, one and two levels.
+            let (mut node, mut parents) = (0, [0; 2]);
+            for above in 0..l.checked_sub(1).map_or(1, |l| nodes.levels[l as usize].split.len()) {
+                let split = if l == 0 { 1 } else { nodes.split(l - 1, above as Node) };
+                level.blocks.push(nodes.block_start(node, &sets));
+                if split == 0 {
+                    continue;
+                }
+                let (groups, mut key) = (brick::parents(split).into(), 0);
+                block.open = [0; 8];
+                for j in ones(groups) {
+                    let b = bricks.next().expect("split octants have a brick below");
+                    (key, block.open[j as usize]) = (b.key >> 3, b.open);
+                    if b.placement != Placement::Local {
+                        level.placements.resize(node as usize, Placement::Local);
+                        level.placements.push(b.placement);
+                    }
+                    if has_split {
+                        level.split.push(b.split);
+                    }
+                    node += 1;
+                }
+                block.above.clear();
+                let mut child = above;
+                for (up, parent) in (1..=l).zip(&mut parents) {
+                    for (c, bits) in nodes.components(nodes.part(l - up, child as Node, parent)) {
+                        let fill = |j| match up {
+                            1 => brick::children(brick::byte(bits, j as u64)),
+                            _ => u64::from(brick::byte(bits, key & 7) >> j & 1).wrapping_neg(),
+                        };
+                        block.above.push((c, std::array::from_fn(fill)));
+                    }
+                    child = *parent;
+                }
+                fill(&mut block, &mut sets);
+                for (c, (above, _)) in (sets.0.len() as Component..).zip(&block.found) {
+                    let set = above.map_or(c, |above| sets.find(above));
+                    sets.0.push(set);
+                }
+                for j in ones(groups).map(|j| j as usize) {
+                    nodes.masks.extend(block.found.iter().map(|(_, w)| w[j] & block.open[j]));
+                }
+            }
+            level.blocks.push(nodes.block_start(node, &sets));
+            nodes.levels.push(level);
+        }
+        (nodes, sets)
+    }
+
+    fn block_start(&self, node: Node, sets: &UnionFind) -> BlockStart {
+        let mask = u32::try_from(self.masks.len()).expect("fewer than 2^32 masks");
+        BlockStart { node, component: sets.0.len() as Component, mask }
+    }
+
+    /// The components of a node of level `l`, whose parent is not before `parent`, which becomes the parent.
+    fn part(&self, l: Level, node: Node, parent: &mut usize) -> Part {
+        let blocks = &self.levels[l as usize].blocks;
+        while blocks[*parent + 1].node <= node {
+            *parent += 1;
+        }
+        let block = [blocks[*parent], blocks[*parent + 1]];
+        Part::of(block, node - block[0].node)
+    }
+
+    /// The components of each node of a level.
+    pub fn parts(&self, l: Level) -> impl Iterator<Item = Part> + '_ {
+        self.levels[l as usize].blocks.windows(2).flat_map(|block| {
+            let block = [block[0], block[1]];
+            (0..block[1].node - block[0].node).map(move |n| Part::of(block, n))
+        })
     }
 
     /// Frees the links between bricks, which take much of the memory; the components remain.
     pub fn drop_links(&mut self) {
-        for level in &mut self.levels {
-            let components = std::mem::take(&mut level.components);
-            *level = LevelNodes { components, ..LevelNodes::default() };
-        }
+        self.levels.iter_mut().for_each(|level| level.split = Vec::new());
     }
 
     /// Bytes that the nodes and their components take.
     pub fn bytes(&self) -> usize {
-        let of_level = |level: &LevelNodes| {
-            let numbers = level.first_child.len() + level.components.len();
-            size_of_val(&level.split[..]) + numbers * size_of::<u32>()
-        };
+        let of_level =
+            |level: &LevelNodes| size_of_val(&level.split[..]) + size_of_val(&level.blocks[..]);
         self.levels.iter().map(of_level).sum::<usize>() + size_of_val(&self.masks[..])
     }
 
-    /// Number of local components.
-    pub fn component_count(&self) -> Component {
-        self.masks.len() as Component
+    /// The brick of level 0.
+    pub fn root(&self) -> Child {
+        Child { node: 0, exists: 1, part: self.part(0, 0, &mut 0) }
+    }
+
+    /// The split octants of a node.
+    pub fn split(&self, l: Level, n: Node) -> u64 {
+        self.levels[l as usize].split.get(n as usize).copied().unwrap_or(0)
     }
 
     /// The children of a node.
-    #[inline]
+    #[inline(always)]
     pub fn family(&self, l: Level, n: Node) -> Family {
-        let level = &self.levels[l as usize];
-        level.split.get(n as usize).map_or(Family::default(), |&split| {
-            let (bricks, first) = (brick::parents(split), level.first_child[n as usize]);
-            Family { split, bricks, first }
-        })
+        let split = self.split(l, n);
+        if split == 0 {
+            return Family::default();
+        }
+        let blocks = &self.levels[l as usize + 1].blocks[n as usize..];
+        Family { split, bricks: brick::parents(split), block: [blocks[0], blocks[1]] }
     }
 
     /// The placement of the node's brick.
-    #[inline]
     pub fn placement(&self, l: Level, n: Node) -> Placement {
         self.levels[l as usize].placements.get(n as usize).copied().unwrap_or(Placement::Local)
     }
 
-    /// The components of a node, with their octants.
-    #[inline]
-    pub fn components(&self, l: Level, n: Node) -> impl Iterator<Item = (Component, u64)> + '_ {
-        let starts = &self.levels[l as usize].components;
-        let range = starts[n as usize]..starts[n as usize + 1];
-        range.clone().zip(self.masks[range.start as usize..range.end as usize].iter().copied())
+    /// The components with leaves in a brick, and their octants.
+    pub fn components(&self, part: Part) -> impl Iterator<Item = (Component, u64)> + '_ {
+        let masks = &self.masks[part.mask as usize..][..part.count as usize];
+        (part.first..).zip(masks.iter().copied()).filter(|c| c.1 != 0)
     }
 
-    /// The components of fully replicated bricks, in an order that is the same on all ranks.
-    pub fn replicated_components(&self) -> Vec<Component> {
-        let of_level = |(l, level): (Level, &LevelNodes)| {
-            let nodes = (0..).zip(level.placements.clone());
-            let replicated = nodes.filter(|node| node.1 == Placement::FullyReplicated);
-            replicated.flat_map(move |(n, _)| self.components(l, n).map(|c| c.0))
-        };
-        (0..).zip(&self.levels).flat_map(of_level).collect()
+    /// The components of a block: the number of the first, and their octants.
+    pub fn block(&self, family: &Family, out: &mut Vec<Block>) -> Component {
+        let [start, end] = family.block;
+        let count = (end.component - start.component) as usize;
+        out.clear();
+        out.resize(count, [0; 8]);
+        let masks = self.masks[start.mask as usize..end.mask as usize].chunks(count.max(1));
+        for (j, masks) in ones(u64::from(family.bricks)).zip(masks) {
+            out.iter_mut().zip(masks).for_each(|(octants, mask)| octants[j as usize] = *mask);
+        }
+        start.component
+    }
+
+    /// The components of fully replicated bricks, brick by brick in an order that is the same on all ranks.
+    pub fn replicated(&self) -> impl Iterator<Item = Part> + '_ {
+        (0..).zip(&self.levels).flat_map(|(l, level)| {
+            let nodes = self.parts(l).zip(&level.placements);
+            nodes.filter(|node| *node.1 == Placement::FullyReplicated).map(|node| node.0)
+        })
     }
 
     /// Checks the invariants, with the links.
@@ -175,25 +380,23 @@ impl Nodes {
     /// # Panics
     /// If one is violated; the message names it, the level and a node.
     pub fn check_invariants(&self) {
-        let mut component = 0;
-        for (l, level) in self.levels.iter().enumerate() {
-            let mut child = 0;
-            for (n, (&first, &split)) in level.first_child.iter().zip(&level.split).enumerate() {
-                assert_eq!(first, child, "children of node {n} of level {l} must be contiguous");
-                child += brick::parents(split).count_ones();
+        for (l, level) in (0..).zip(&self.levels) {
+            for (n, &split) in (0..).zip(&level.split) {
+                let [start, end] = [0, 1].map(|k| self.levels[l as usize + 1].blocks[n + k].node);
+                let children = brick::parents(split).count_ones();
+                assert_eq!(start + children, end, "children of node {n} of level {l} must follow");
             }
-            let next = self.levels.get(l + 1).map_or(0, |next| next.components.len() as Node - 1);
-            assert_eq!(child, next, "each node of level {} must be a child", l + 1);
-            for (n, range) in level.components.windows(2).enumerate() {
-                assert_eq!(range[0], component, "components of node {n} of level {l} must follow");
-                for &mask in &self.masks[range[0] as usize..range[1] as usize] {
-                    let connected = brick::flood(mask & mask.wrapping_neg(), mask);
-                    assert!(mask != 0 && connected == mask, "node {n} of level {l}: {mask:#x}");
-                }
-                component = range[1];
+            for (n, part) in self.parts(l).enumerate() {
+                let masks = self.components(part).map(|c| c.1);
+                let (all, sum) =
+                    masks.fold((0, 0), |(all, sum), m| (all | m, sum + m.count_ones()));
+                assert_eq!(
+                    all.count_ones(),
+                    sum,
+                    "node {n} of level {l}: a leaf has two components"
+                );
             }
         }
-        assert_eq!(component, self.component_count(), "each component must belong to a node");
     }
 
     /// Calls `found` with the components of the octants `bits` of brick `key` of level `l`: of the leaves of that
@@ -201,7 +404,7 @@ impl Nodes {
     /// another brick, by level, empty at first; afterwards those on the way to this one.
     pub fn find(
         &self,
-        path: &mut Vec<(u64, Node)>,
+        path: &mut Vec<(u64, Child)>,
         l: Level,
         key: u64,
         bits: u64,
@@ -211,11 +414,11 @@ impl Nodes {
             (0..=l).zip(&*path).take_while(|&(m, at)| at.0 == key >> (3 * (l - m))).count();
         path.truncate(common);
         if common == 0 {
-            path.push((0, 0));
+            path.push((0, self.root()));
         }
         // Where two bricks of the path follow on one, its octant that contains `bits` is split.
         for m in common.saturating_sub(2) as Level..=l {
-            let node = path[m as usize].1;
+            let brick = path[m as usize].1;
             // At two levels above `l` and higher, one octant contains all of `bits`; at one level above, those of
             // one sibling group do.
             let octants = match l - m {
@@ -223,17 +426,18 @@ impl Nodes {
                 1 => u64::from(brick::parents(bits)) << (8 * (key & 7)),
                 up => 1 << (key >> (3 * (up - 2)) & 63),
             };
-            let family = self.family(m, node);
+            let family = self.family(m, brick.node);
             let leaves = octants & !family.split;
             if leaves != 0 {
-                self.components(m, node).filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
+                let components = self.components(brick.part);
+                components.filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
             }
             if leaves == octants || m == l {
                 return;
             }
             if path.len() == m as usize + 1 {
                 let below = key >> (3 * (l - m - 1));
-                let Some((child, _)) = family.child(below & 7) else { return };
+                let Some(child) = family.child(below & 7) else { return };
                 path.push((below, child));
             }
         }
@@ -276,7 +480,7 @@ mod tests {
         let m = (0..=l).rev().find(|&m| exists(m))?;
         let at = code >> (3 * (l - m));
         let node = Tree::exists(&tree.split, m).position(|b| b.key == at >> 6)?;
-        let mut components = nodes.components(m, node as Node);
+        let mut components = nodes.components(nodes.parts(m).nth(node)?);
         components.find(|c| c.1 >> (at & 63) & 1 == 1).map(|c| c.0)
     }
 
@@ -288,7 +492,7 @@ mod tests {
         ) {
             let tree = tree(&deepest);
             tree.check_structure();
-            let nodes = Nodes::new(&tree, &Ownership::solo());
+            let (nodes, _) = Nodes::new(&tree, &Ownership::solo());
             nodes.check_invariants();
             let mut path = Vec::new();
             for (l, near, offset, bits) in queries {
@@ -306,19 +510,21 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "children of node 1 of level 4 must be contiguous")]
+    #[should_panic(expected = "children of node 1 of level 4 must follow")]
     fn a_wrong_link_is_found() {
-        let mut nodes = Nodes::new(&tree(&[0, 1 << 12]), &Ownership::solo());
-        nodes.levels[4].first_child[1] += 1;
+        let (mut nodes, _) = Nodes::new(&tree(&[0, 1 << 12]), &Ownership::solo());
+        nodes.levels[5].blocks[2].node += 1;
         nodes.check_invariants();
     }
 
     #[test]
-    #[should_panic(expected = "node 0 of level 1: 0x81")]
-    fn a_component_of_two_parts_is_found() {
-        let mut nodes = Nodes::new(&tree(&[0]), &Ownership::solo());
-        let first = nodes.levels[1].components[0];
-        nodes.masks[first as usize] = 0x81;
+    #[should_panic(expected = "node 0 of level 1: a leaf has two components")]
+    fn a_leaf_of_two_components_is_found() {
+        let (mut nodes, _) = Nodes::new(&tree(&[0]), &Ownership::solo());
+        let first = nodes.levels[1].blocks[0].mask as usize;
+        let leaves = nodes.masks[first];
+        nodes.masks.insert(first, leaves);
+        nodes.levels[1].blocks[1].component += 1;
         nodes.check_invariants();
     }
 }

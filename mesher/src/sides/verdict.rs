@@ -56,11 +56,11 @@ impl Candidate {
 pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) -> FirstLeaves {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
     for l in 0..LEVELS as Level {
-        for (n, Brick { key, .. }) in (0..).zip(Tree::exists(&base.tree.split, l)) {
+        for (part, Brick { key, .. }) in nodes.parts(l).zip(Tree::exists(&base.tree.split, l)) {
             if !base.ownership.owns(l, key) {
                 continue;
             }
-            for (c, bits) in nodes.components(l, n) {
+            for (c, bits) in nodes.components(part) {
                 let list = &mut first[merged[c as usize] as usize];
                 // Local components of one brick may be parts of one component: then their leaves are interleaved in Morton order.
                 let is_of_brick = |last: &Candidate| *last >= Candidate::new(l, key << 6);

@@ -241,8 +241,8 @@ fn by_mesher(case: &Small) -> Firsts {
     let ownership = Ownership::solo();
     let base =
         Base { tree: &tree, ownership: &ownership, facets: &facets, rules: &rules, comm: &Solo };
-    let nodes = Nodes::new(&tree, &ownership);
-    let mut local = components::merge(&nodes, &ownership);
+    let (nodes, sets) = Nodes::new(&tree, &ownership);
+    let mut local = components::merge(&nodes, sets, &ownership);
     let faces = std::mem::take(&mut local.faces);
     let merged = local.merged.numbered();
     let labels = global::labels(&base, &nodes, faces, &merged);
