@@ -2,7 +2,7 @@
 //! y >= 0; the other half is its mirror image.
 
 use super::implicit::Body;
-use super::solids::{Panel, RoundCone, Section, Vec3, blend, carve, rounded_box};
+use super::solids::{Panel, Points, RoundCone, Section, Vec3, blend, carve, join, rounded_box};
 
 fn section(leading: f64, trailing: f64, thickness_half: f64) -> Section {
     Section { leading, trailing, thickness_half }
@@ -69,17 +69,18 @@ impl Body for Uav {
         }
     }
 
-    fn distance(&self, [x, y, z]: Vec3) -> f64 {
-        let p = [x, y.abs(), z];
-        let nearest =
-            |cones: &[RoundCone]| cones.iter().map(|c| c.distance(p)).fold(f64::INFINITY, f64::min);
+    fn distance<const N: usize>(&self, [x, y, z]: &Points<N>) -> [f64; N] {
+        let p = &[*x, y.map(f64::abs), *z];
+        let nearest = |cones: &[RoundCone]| {
+            cones.iter().map(|c| c.distance(p)).fold([f64::INFINITY; N], join)
+        };
         let hull = blend(nearest(&self.hull), self.ball.distance(p), 0.006);
         let wing = self
             .pylons
             .iter()
             .fold(self.wing.distance(p), |sum, pylon| blend(sum, pylon.distance(p), 0.003));
         let wing = blend(wing, nearest(&self.stores), 0.002);
-        let tail = self.tail.distance(p).min(self.fin.distance(p));
+        let tail = join(self.tail.distance(p), self.fin.distance(p));
         blend(blend(hull, wing, 0.010), tail, 0.006)
     }
 }
@@ -159,10 +160,11 @@ impl Body for Fighter {
         }
     }
 
-    fn distance(&self, [x, y, z]: Vec3) -> f64 {
-        let p = [x, y.abs(), z];
-        let nearest =
-            |cones: &[RoundCone]| cones.iter().map(|c| c.distance(p)).fold(f64::INFINITY, f64::min);
+    fn distance<const N: usize>(&self, [x, y, z]: &Points<N>) -> [f64; N] {
+        let p = &[*x, y.map(f64::abs), *z];
+        let nearest = |cones: &[RoundCone]| {
+            cones.iter().map(|c| c.distance(p)).fold([f64::INFINITY; N], join)
+        };
         let nose = blend(nearest(&self.nose), nearest(&self.canopy), 0.012);
         let nose = blend(nose, self.chine.distance(p), 0.03);
         let duct = rounded_box(p, [0.470, 0.076, -0.004], [0.200, 0.034, 0.037], 0.010);
@@ -175,6 +177,6 @@ impl Body for Fighter {
         let solid = blend(solid, self.fin.distance(p), 0.010);
         let half = [0.110, 0.026, 0.029].map(|size: f64| (size - self.radius_least).max(0.004));
         let intake = rounded_box(p, [0.250, 0.078, -0.004], half, 0.003);
-        carve(solid, intake.min(self.nozzle.distance(p)))
+        carve(solid, join(intake, self.nozzle.distance(p)))
     }
 }

@@ -7,7 +7,7 @@
 //! Tetrahedra have no ambiguous cases, so the result is a closed manifold for every function: each
 //! edge of a triangle lies in a face shared by two tetrahedra.
 
-use super::solids::Vec3;
+use super::solids::{Points, Vec3};
 use crate::mesh::EdgeHasher;
 use crate::{Generator, GeneratorError, Mesh};
 use std::collections::HashMap;
@@ -23,8 +23,8 @@ pub(super) trait Body {
     /// are thinner than its cells, so thin parts are thickened on a coarse grid.
     fn new(radius_least: f64) -> Self;
 
-    /// A function that is negative inside and has a Lipschitz constant of at most 1.
-    fn distance(&self, p: Vec3) -> f64;
+    /// A function that is negative inside and has a Lipschitz constant of at most 1, at several points.
+    fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N];
 }
 
 /// The part of the requested facets that the grid should produce, and its minimum. Splitting edges
@@ -88,6 +88,17 @@ const MARGIN: f64 = 0.05;
 /// Cells along the edge of a block, the unit of sampling.
 const BLOCK: usize = 4;
 
+/// Number of vertices that are placed at once.
+const LANES: usize = 8;
+
+/// An edge of the grid that crosses the surface: its vertex, which is not placed yet, its ends and the distances there.
+#[derive(Clone, Copy)]
+struct Crossing {
+    vertex: u32,
+    ends: [Vec3; 2],
+    values: [f64; 2],
+}
+
 /// A surface under construction.
 struct Drawing<B> {
     body: B,
@@ -97,6 +108,8 @@ struct Drawing<B> {
     /// Vertex indices by grid edge: its lower end, 20 bits per coordinate, and its direction, 3
     /// bits.
     indices: HashMap<u64, u32, EdgeHasher>,
+    /// Vertices to be placed, fewer than `LANES`.
+    crossings: Vec<Crossing>,
 }
 
 /// The integer coordinates of a grid point.
@@ -121,8 +134,10 @@ impl<B: Body> Drawing<B> {
             spacing,
             mesh: Mesh::default(),
             indices: HashMap::default(),
+            crossings: Vec::with_capacity(LANES),
         };
         drawing.visit([0; 3], cells);
+        drawing.place();
         drawing.mesh
     }
 
@@ -134,9 +149,9 @@ impl<B: Body> Drawing<B> {
     /// if the distance at its centre exceeds half its diagonal.
     fn visit(&mut self, origin: GridPoint, cells: usize) {
         let half = cells as f64 * 0.5 * self.spacing;
-        let centre = self.position(origin).map(|x| x + half);
+        let centre = self.position(origin).map(|x| [x + half]);
         let reach = half * 1.7321;
-        if self.body.distance(centre).abs() > reach {
+        if self.body.distance(&centre)[0].abs() > reach {
             return;
         }
         if cells == BLOCK {
@@ -152,13 +167,11 @@ impl<B: Body> Drawing<B> {
         const POINTS: usize = BLOCK + 1;
         let mut values = [0.0; POINTS * POINTS * POINTS];
         let index = |[x, y, z]: GridPoint| (z * POINTS + y) * POINTS + x;
-        for z in 0..POINTS {
-            for y in 0..POINTS {
-                for x in 0..POINTS {
-                    let sample = [origin[0] + x, origin[1] + y, origin[2] + z];
-                    values[index([x, y, z])] = self.body.distance(self.position(sample));
-                }
-            }
+        for (z, values) in values.chunks_mut(POINTS * POINTS).enumerate() {
+            let sample =
+                |i| self.position([origin[0] + i % POINTS, origin[1] + i / POINTS, origin[2] + z]);
+            let points = [0, 1, 2].map(|a| std::array::from_fn(|i| sample(i)[a]));
+            values.copy_from_slice(&self.body.distance::<{ POINTS * POINTS }>(&points));
         }
         for z in 0..BLOCK {
             for y in 0..BLOCK {
@@ -228,30 +241,48 @@ impl<B: Body> Drawing<B> {
             return index;
         }
         let end = std::array::from_fn(|a| start[a] + (direction >> a & 1));
-        let (p, q) = (self.position(start), self.position(end));
-        let t = self.zero(p, q, values[low], values[high]).clamp(MARGIN, 1.0 - MARGIN);
-        let index = self.mesh.add_vertex(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
-        self.indices.insert(key, index);
-        index
+        let vertex = self.mesh.add_vertex([0.0; 3]);
+        self.indices.insert(key, vertex);
+        let ends = [start, end].map(|point| self.position(point));
+        self.crossings.push(Crossing { vertex, ends, values: [values[low], values[high]] });
+        if self.crossings.len() == LANES {
+            self.place();
+        }
+        vertex
     }
 
-    /// The parameter in [0, 1] at which the distance is zero between two points on different sides,
-    /// by the Illinois variant of the false position method.
-    fn zero(&self, p: Vec3, q: Vec3, value_p: f64, value_q: f64) -> f64 {
-        let (mut low, mut high) = ((0.0, value_p), (1.0, value_q));
-        let mut t = 0.5;
+    /// Places vertices where the distance is zero along their edges, by the Illinois variant of the false position method.
+    fn place(&mut self) {
+        let Some(last) = self.crossings.last() else { return };
+        let edges: [Crossing; LANES] =
+            std::array::from_fn(|i| *self.crossings.get(i).unwrap_or(last));
+        let along = |i: usize, t: f64| {
+            let [p, q] = edges[i].ends;
+            [0, 1, 2].map(|a| p[a] + (q[a] - p[a]) * t)
+        };
+        let (mut low, mut high) =
+            (edges.map(|e| (0.0, e.values[0])), edges.map(|e| (1.0, e.values[1])));
+        let mut t = [0.5; LANES];
         for _ in 0..3 {
-            t = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let value = self.body.distance(std::array::from_fn(|a| p[a] + (q[a] - p[a]) * t));
-            if (value < 0.0) == (low.1 < 0.0) {
-                low = (t, value);
-                high.1 *= 0.5;
-            } else {
-                high = (t, value);
-                low.1 *= 0.5;
+            for i in 0..LANES {
+                let (low, high) = (low[i], high[i]);
+                t[i] = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
+            }
+            let points = [0, 1, 2].map(|a| std::array::from_fn(|i| along(i, t[i])[a]));
+            let values = self.body.distance::<LANES>(&points);
+            for i in 0..LANES {
+                if (values[i] < 0.0) == (low[i].1 < 0.0) {
+                    low[i] = (t[i], values[i]);
+                    high[i].1 *= 0.5;
+                } else {
+                    high[i] = (t[i], values[i]);
+                    low[i].1 *= 0.5;
+                }
             }
         }
-        t
+        for (i, edge) in self.crossings.drain(..).enumerate() {
+            self.mesh.vertices[edge.vertex as usize] = along(i, t[i].clamp(MARGIN, 1.0 - MARGIN));
+        }
     }
 }
 
@@ -293,8 +324,8 @@ mod tests {
             Self
         }
 
-        fn distance(&self, p: Vec3) -> f64 {
-            (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt() - 1.0
+        fn distance<const N: usize>(&self, [x, y, z]: &Points<N>) -> [f64; N] {
+            std::array::from_fn(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt() - 1.0)
         }
     }
 

@@ -6,6 +6,28 @@
 /// A point or direction.
 pub(super) type Vec3 = [f64; 3];
 
+/// Several points, by axis. Functions of all of them are loops without branches, which the compiler turns into vector instructions.
+pub(super) type Points<const N: usize> = [[f64; N]; 3];
+
+/// The values of a function at several points.
+#[inline(always)]
+fn at_each<const N: usize>(p: &Points<N>, f: impl Fn(Vec3) -> f64) -> [f64; N] {
+    let mut values = [0.0; N];
+    for i in 0..N {
+        values[i] = f([p[0][i], p[1][i], p[2][i]]);
+    }
+    values
+}
+
+/// A function of two values, for several of them.
+#[inline(always)]
+fn of_both<const N: usize>(mut a: [f64; N], b: [f64; N], f: impl Fn(f64, f64) -> f64) -> [f64; N] {
+    for i in 0..N {
+        a[i] = f(a[i], b[i]);
+    }
+    a
+}
+
 fn sub(p: Vec3, q: Vec3) -> Vec3 {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
@@ -40,29 +62,40 @@ impl RoundCone {
     }
 
     /// The exact distance, by Inigo Quilez's formula for a round cone.
-    pub(super) fn distance(&self, p: Vec3) -> f64 {
+    pub(super) fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N] {
         let [from, to] = self.radius;
         let (square, shrink) = (self.square, from - to);
-        let q = sub(p, self.from);
-        let y = dot(q, self.along);
-        let z = y - square;
-        let x2 = (dot(q, q) * square - y * y).max(0.0) * square;
-        let k = shrink * shrink.abs() * x2;
-        if z * z.abs() * square * self.square_side > k {
-            return (x2 + z * z * square).sqrt() / square - to;
-        }
-        if y * y.abs() * square * self.square_side < k {
-            return (x2 + y * y * square).sqrt() / square - from;
-        }
-        ((x2 * self.square_side / square).sqrt() + y * shrink) / square - from
+        at_each(p, |p| {
+            let q = sub(p, self.from);
+            let y = dot(q, self.along);
+            let z = y - square;
+            let x2 = (dot(q, q) * square - y * y).max(0.0) * square;
+            let k = shrink * shrink.abs() * x2;
+            // Beyond either end, or beside the cone.
+            let (squared, more, radius) = if z * z.abs() * square * self.square_side > k {
+                (x2 + z * z * square, 0.0, to)
+            } else if y * y.abs() * square * self.square_side < k {
+                (x2 + y * y * square, 0.0, from)
+            } else {
+                (x2 * self.square_side / square, y * shrink, from)
+            };
+            (squared.sqrt() + more) / square - radius
+        })
     }
 }
 
 /// A box with rounded edges; `half` includes the rounding.
-pub(super) fn rounded_box(p: Vec3, centre: Vec3, half: Vec3, rounding: f64) -> f64 {
-    let q: Vec3 = std::array::from_fn(|a| (p[a] - centre[a]).abs() - half[a] + rounding);
-    let out = q.map(|x| x.max(0.0));
-    dot(out, out).sqrt() + q[0].max(q[1]).max(q[2]).min(0.0) - rounding
+pub(super) fn rounded_box<const N: usize>(
+    p: &Points<N>,
+    centre: Vec3,
+    half: Vec3,
+    rounding: f64,
+) -> [f64; N] {
+    at_each(p, |p| {
+        let q: Vec3 = std::array::from_fn(|a| (p[a] - centre[a]).abs() - half[a] + rounding);
+        let out = q.map(|x| x.max(0.0));
+        dot(out, out).sqrt() + q[0].max(q[1]).max(q[2]).min(0.0) - rounding
+    })
 }
 
 /// The cross section of a wing at one end: the x coordinates of its leading and trailing edge, and
@@ -104,7 +137,16 @@ impl Panel {
         Self { root, along, span, sections, radius_least, shrink }
     }
 
-    pub(super) fn distance(&self, p: Vec3) -> f64 {
+    pub(super) fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N] {
+        let mut values = [0.0; N];
+        for i in 0..N {
+            values[i] = self.distance_at([p[0][i], p[1][i], p[2][i]]);
+        }
+        values
+    }
+
+    #[inline(always)]
+    fn distance_at(&self, p: Vec3) -> f64 {
         let (y, z) = (p[1] - self.root[0], p[2] - self.root[1]);
         let reach = y * self.along[0] + z * self.along[1];
         let off = (z * self.along[0] - y * self.along[1]).abs();
@@ -115,17 +157,14 @@ impl Panel {
         let trailing = interpolate(t, from.trailing, to.trailing);
         let thick = interpolate(t, from.thickness_half, to.thickness_half).max(self.radius_least);
         let section = self.section(p[0], off, leading, trailing, thick);
-        let rounded = if beyond > 0.0 {
-            let side = (section + thick).max(0.0);
-            (side * side + beyond * beyond).sqrt() - thick
-        } else {
-            section
-        };
-        rounded * self.shrink
+        let side = (section + thick).max(0.0);
+        let rounded = (side * side + beyond * beyond).sqrt() - thick;
+        (if beyond > 0.0 { rounded } else { section }) * self.shrink
     }
 
     /// An aerofoil: the hulls of a circle at the nose and a thick circle at 35 % of the chord, and
     /// of the latter and a thin circle at the trailing edge.
+    #[inline(always)]
     fn section(&self, x: f64, off: f64, leading: f64, trailing: f64, thick: f64) -> f64 {
         let [nose, tail] = [0.45, 0.12].map(|part| (thick * part).max(self.radius_least));
         let middle = interpolate(0.35, leading, trailing);
@@ -137,37 +176,38 @@ impl Panel {
 
 /// The distance to the hull of two circles whose centres lie on the axis `off = 0`; `off` is at
 /// least 0.
+#[inline(always)]
 fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) -> f64 {
     let length = centres[1] - centres[0];
-    let circle = |i: usize, radius: f64| {
-        let q = x - centres[i];
-        (q * q + off * off).sqrt() - radius
-    };
-    if length <= (from - to).abs() {
-        return if from > to { circle(0, from) } else { circle(1, to) };
-    }
     let sin = (from - to) / length;
     let cos = (1.0 - sin * sin).sqrt();
     let q = x - centres[0];
     let reach = q * cos - off * sin;
-    if reach < 0.0 {
-        circle(0, from)
-    } else if reach > cos * length {
-        circle(1, to)
-    } else {
-        off * cos + q * sin - from
-    }
+    // One circle may contain the other.
+    let is_one = length <= (from - to).abs();
+    let is_first = if is_one { from > to } else { reach < 0.0 };
+    let is_circle = is_one || is_first || reach > cos * length;
+    let (centre, radius) = if is_first { (centres[0], from) } else { (centres[1], to) };
+    let circle = ((x - centre) * (x - centre) + off * off).sqrt() - radius;
+    if is_circle { circle } else { off * cos + q * sin - from }
 }
 
 /// The union of two solids with a fillet of about the size `fillet` at their intersection.
-pub(super) fn blend(a: f64, b: f64, fillet: f64) -> f64 {
-    let h = (fillet - (a - b).abs()).max(0.0);
-    a.min(b) - h * h / (4.0 * fillet)
+pub(super) fn blend<const N: usize>(a: [f64; N], b: [f64; N], fillet: f64) -> [f64; N] {
+    of_both(a, b, |a, b| {
+        let h = (fillet - (a - b).abs()).max(0.0);
+        a.min(b) - h * h / (4.0 * fillet)
+    })
+}
+
+/// The union of two solids.
+pub(super) fn join<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    of_both(a, b, f64::min)
 }
 
 /// The first solid without the second.
-pub(super) fn carve(a: f64, b: f64) -> f64 {
-    a.max(-b)
+pub(super) fn carve<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    of_both(a, b, |a, b| a.max(-b))
 }
 
 #[cfg(test)]
@@ -176,7 +216,8 @@ mod tests {
 
     /// The greatest difference quotient over random pairs of nearby points around a solid of unit
     /// size.
-    fn steepest(distance: impl Fn(Vec3) -> f64) -> f64 {
+    fn steepest(distance: impl Fn(&Points<1>) -> [f64; 1]) -> f64 {
+        let distance = |p: Vec3| distance(&p.map(|x| [x]))[0];
         let mut steepest = 0.0_f64;
         for i in 0..20_000_u64 {
             let noise = |salt: u64| {
@@ -198,11 +239,11 @@ mod tests {
         let root = Section { leading: -0.6, trailing: 0.6, thickness_half: 0.1 };
         let tip = Section { leading: 0.4, trailing: 0.7, thickness_half: 0.02 };
         let panel = Panel::new([0.0, 0.1], [0.6, 0.8], 1.0, [root, tip], 0.01);
-        let chunk = |p| rounded_box(p, [0.1; 3], [0.5, 0.3, 0.2], 0.1);
+        let chunk = |p: &Points<1>| rounded_box(p, [0.1; 3], [0.5, 0.3, 0.2], 0.1);
         assert!(steepest(|p| cone.distance(p)) < 1.0 + 1e-9);
         assert!(steepest(|p| panel.distance(p)) < 1.0 + 1e-9);
         assert!(steepest(chunk) < 1.0 + 1e-9);
-        let all = |p| carve(blend(cone.distance(p), panel.distance(p), 0.2), chunk(p));
+        let all = |p: &Points<1>| carve(blend(cone.distance(p), panel.distance(p), 0.2), chunk(p));
         let steep = steepest(all);
         assert!(steep > 0.9 && steep < 1.0 + 1e-9, "{steep}");
     }
@@ -210,23 +251,25 @@ mod tests {
     #[test]
     fn the_distance_to_a_round_cone_is_exact() {
         let cone = RoundCone::new([0.0; 3], 0.5, [2.0, 0.0, 0.0], 0.25);
-        assert_eq!(cone.distance([-1.5, 0.0, 0.0]), 1.0);
-        assert_eq!(cone.distance([3.25, 0.0, 0.0]), 1.0);
-        assert!(cone.distance([1.0, 0.3, 0.0]) < 0.0);
+        let distance = |p: Vec3| cone.distance(&p.map(|x| [x]))[0];
+        assert_eq!(distance([-1.5, 0.0, 0.0]), 1.0);
+        assert_eq!(distance([3.25, 0.0, 0.0]), 1.0);
+        assert!(distance([1.0, 0.3, 0.0]) < 0.0);
         // The side is tangent to the first ball at this point.
         let sin = 0.125;
         let p = [0.5 * sin, 0.5 * (1.0_f64 - sin * sin).sqrt(), 0.0];
-        assert!(cone.distance(p).abs() < 1e-12);
+        assert!(distance(p).abs() < 1e-12);
     }
 
     #[test]
     fn the_surface_of_a_panel_passes_through_its_edges_and_its_thickest_point() {
         let section = Section { leading: 0.0, trailing: 1.0, thickness_half: 0.05 };
         let panel = Panel::new([0.0; 2], [1.0, 0.0], 2.0, [section; 2], 0.001);
-        assert!(panel.distance([0.0, 1.0, 0.0]).abs() < 1e-12);
-        assert!(panel.distance([1.0, 1.0, 0.0]).abs() < 1e-12);
-        assert!(panel.distance([0.35, 1.0, 0.05]).abs() < 1e-12);
-        assert!(panel.distance([0.5, 2.5, 0.0]) > 0.4);
-        assert!(panel.distance([0.5, 1.0, 0.0]) < 0.0);
+        let distance = |p: Vec3| panel.distance(&p.map(|x| [x]))[0];
+        assert!(distance([0.0, 1.0, 0.0]).abs() < 1e-12);
+        assert!(distance([1.0, 1.0, 0.0]).abs() < 1e-12);
+        assert!(distance([0.35, 1.0, 0.05]).abs() < 1e-12);
+        assert!(distance([0.5, 2.5, 0.0]) > 0.4);
+        assert!(distance([0.5, 1.0, 0.0]) < 0.0);
     }
 }
