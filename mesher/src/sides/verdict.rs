@@ -173,7 +173,7 @@ pub(super) fn find_seeds(base: &Base, components: &Components) -> HashMap<u64, L
     gather(base.comm, &mine).into_iter().map(|[number, label]| (number, label)).collect()
 }
 
-/// The components that have a seed, of seeds that were [found](find_seeds). Collective; the same on all ranks.
+/// The components that have a seed, of seeds that `find_seeds` found. Collective; the same on all ranks.
 ///
 /// # Errors
 /// If a seed is outside the root or in a crossing leaf.
