@@ -138,6 +138,7 @@ impl Panel {
     }
 
     pub(super) fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N] {
+        // Not `at_each`: in a closure of this size the compiler does not use vectors.
         let mut values = [0.0; N];
         for i in 0..N {
             values[i] = self.distance_at([p[0][i], p[1][i], p[2][i]]);

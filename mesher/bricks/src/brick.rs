@@ -121,7 +121,7 @@ pub fn layers(mut b: Block) -> Block {
     b.map(swap::<3, 1>)
 }
 
-/// Flood fill of a block in layers, as [`flood`] of a brick.
+/// Flood fill of a block in layers, as [`flood`] of a brick, from a seed that lies in `within`.
 #[inline(always)]
 pub fn flood_layers(seed: Block, within: &Block) -> Block {
     let mut w = seed;

@@ -1,9 +1,9 @@
 //! Merges the components of blocks, within the bricks that this rank holds.
 //!
 //! A depth-first walk keeps, for each level, the brick on the path from the root and its six face neighbours, so that no neighbour needs a
-//! search. The block below a brick is merged with what is across its sides: with leaves of its own level only on the lower sides, as the
-//! walk has met the block there, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover
-//! the octants across. Coarser leaves within the region of the block have been found with its components.
+//! search. The block below a brick is merged with what is across its sides: with leaves of its own level on the lower sides only, so that
+//! each pair is merged once, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover the
+//! octants across. Coarser leaves above the block have been found with its components.
 
 use super::nodes::{Child, Component, Family, Node, Nodes, Part, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
@@ -79,7 +79,7 @@ struct Frame {
 /// Merges all components that share part of a face, in the bricks that this rank holds. `merged` are the sets that blocks connect.
 pub fn merge(nodes: &Nodes, merged: UnionFind, ownership: &Ownership) -> LocalMerge {
     let brick = nodes.root();
-    // Every octant of levels 0 and 1 has a face on the root's boundary. Enough room for most meshes, so that it does not grow in many steps.
+    // Enough room for most meshes, so that it does not grow in many steps.
     let mut at_boundary = Vec::with_capacity(1 << 12);
     at_boundary.extend(nodes.components(brick.part).map(|c| c.0));
     let local = LocalMerge { merged, faces: Vec::new(), at_boundary };
@@ -134,6 +134,7 @@ impl Walk<'_> {
         let mut mine = take(&mut self.mine);
         let first = self.nodes.block(family, &mut mine);
         if frame.level < 2 {
+            // Every octant of levels 0 and 1 has a face on the root's boundary.
             let touches = |octants: &Block| frame.level == 0 || octants[0] & !INNER != 0;
             let at = (first..).zip(&mine).filter(|(_, octants)| touches(octants));
             self.local.at_boundary.extend(at.map(|(c, _)| c));
@@ -156,20 +157,20 @@ impl Walk<'_> {
             Across::Nothing => leaves = 0,
             Across::Coarser => {}
             Across::Here(brick) if up == 1 => leaves &= !nodes.split(l, brick.node),
-            // The block across has been met.
+            // On the lower side, pairs of leaves of one level are merged.
             Across::Here(brick) => {
                 other = nodes.family(l, brick.node);
                 leaves &= !other.split;
             }
         }
-        let other = nodes.block(&other, &mut self.theirs);
+        let first_across = nodes.block(&other, &mut self.theirs);
         for (c, octants) in (first..).zip(mine) {
             let across = |k: usize| brick::across(octants[groups[k] ^ 1 << axis], axis, up == 1);
             let faced = [across(0), across(1), across(2), across(3)];
             if faced[0] | faced[1] | faced[2] | faced[3] == 0 {
                 continue;
             }
-            for (d, theirs) in (other..).zip(&self.theirs) {
+            for (d, theirs) in (first_across..).zip(&self.theirs) {
                 if (0..4).fold(0, |all, k| all | faced[k] & theirs[groups[k]]) != 0 {
                     self.local.merged.unite(c, d);
                 }

@@ -1,7 +1,7 @@
 //! The base tree's bricks as a linked tree, with the components of their leaves.
 //!
 //! The child bricks of a brick are a *block* of 8 x 8 x 8 octants. A flood fill finds what is connected in a block, through leaves of
-//! the two levels above, too. So only faces between blocks need a search, and few components remain to be united.
+//! the two levels above, too. So only faces between blocks remain to be looked at, and few components to be united.
 //!
 //! Invariants:
 //! - the nodes of a level are in Morton order;
@@ -180,7 +180,8 @@ struct NewBlock {
     open: Block,
     /// Components of the two levels above, with the octants of the block that they fill.
     above: Vec<(Component, Block)>,
-    /// The components, each with one of the levels above that it is connected to, if there is one.
+    /// The components, each with one of the levels above that it is connected to, if there is one. Leaves of these levels may be all that
+    /// connects its leaves.
     found: Vec<(Option<Component>, Block)>,
 }
 
@@ -447,8 +448,10 @@ impl Nodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sides::components;
     use crate::tests::set;
     use bricks::brickset::ones;
+    use bricks::wide::widths;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
@@ -507,6 +510,17 @@ mod tests {
                 prop_assert_eq!(found, want, "level {} key {}", l, key);
             }
         }
+    }
+
+    #[test]
+    fn all_widths_find_the_same_components() {
+        let tree = tree(&[0, 0o777777, 0o123456, 0o123457, 0o070707, 0o654321, 0o111222, 0o333444]);
+        let found = widths(|| {
+            let (nodes, sets) = Nodes::new(&tree, &Ownership::solo());
+            let merged = components::merge(&nodes, sets, &Ownership::solo()).merged.numbered();
+            (nodes.masks, merged)
+        });
+        assert!(found.iter().all(|(_, of)| *of == found[0].1 && of.1.len() > 10));
     }
 
     #[test]
