@@ -169,7 +169,7 @@ struct Voxeliser<'a> {
     tree: Tree,
     /// Straddling facets of the bricks on the path from the root, concatenated.
     lists: Vec<u32>,
-    /// FacetTest facets of the bricks on the path from the root, with the octants that they cross.
+    /// Tested facets of the bricks on the path from the root, with the octants that they cross.
     pairs: Vec<(u32, u64)>,
     /// Tests of the last facets, each at the facet's index modulo the length.
     tests: Vec<FacetTest>,

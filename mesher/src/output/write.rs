@@ -64,18 +64,17 @@ impl OutDir {
         let path = &files.directory;
         let all = || (0..comm.size()).flat_map(names).collect();
         let rank = comm.rank();
-        let failed = |e: io::Error| {
-            match e.kind() {
+        let failed = |e: io::Error| match e.kind() {
             ErrorKind::DirectoryNotEmpty => {
                 Error::input(format!("{e}: choose another --out")).at(path)
             }
             // The directory lies on a disk of rank 0's machine alone.
-            ErrorKind::NotFound if rank > 0 => Error::output(format!(
-                "rank {rank} does not find the directory that rank 0 has made: choose an --out on a disk that all ranks share"
-            ))
-            .at(path),
+            ErrorKind::NotFound if rank > 0 => {
+                let advice = "choose an --out on a disk that all ranks share";
+                let why = "does not find the directory that rank 0 has made";
+                Error::output(format!("rank {rank} {why}: {advice}")).at(path)
+            }
             _ => output(path, e),
-        }
         };
         let created = (rank == 0).then(|| Claim::create(path, MANIFEST, all())).transpose();
         let created = agree(comm, created.map_err(failed))?;

@@ -56,15 +56,16 @@ impl Estimate<'_> {
     }
 
     /// The coarse and the fine level, each the coarsest of which an octant at a surface or in a box has at most a rank's share of the leaves
-    /// divided by [`COARSE_PER_RANK`] or [`FINE_PER_RANK`]. Collective.
-    fn levels(&self) -> [Level; 2] {
+    /// divided by [`COARSE_PER_RANK`] or [`FINE_PER_RANK`]; and the level of which octants at a surface are fine enough, without boxes.
+    /// Collective.
+    fn levels(&self) -> [Level; 3] {
         let &Self { facets, rules, comm } = self;
         let each = area::leaves_per_surface_cell(rules) as f64;
         // Whole faces of finest cells: a sum of integers does not depend on its order.
         let face = (edge(rules.level_surface) as f64).powi(2);
         let faces = comm.sum((area::total(facets) / face) as u64) as f64;
         let leaves = each * faces + area::leaves_in_boxes(0, 0, rules) as f64;
-        [COARSE_PER_RANK, FINE_PER_RANK as f64].map(|per_rank| {
+        let level = |per_rank: f64, boxes: &[ExtentBox]| {
             // Four sheets of facets in one octant are not unusual: wings, fins.
             let most = leaves / (comm.size() as f64 * per_rank * 4.0);
             let small = |l: &Level| {
@@ -75,10 +76,13 @@ impl Estimate<'_> {
                     (0..3).map(side).product::<f64>()
                 };
                 let at_surface = each * (h as f64).powi(2) / face;
-                at_surface <= most && rules.boxes.iter().all(|b| in_box(b) <= most)
+                at_surface <= most && boxes.iter().all(|b| in_box(b) <= most)
             };
             (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
-        })
+        };
+        let fine = FINE_PER_RANK as f64;
+        let of_facets = level(fine, &[]).min(rules.level_surface);
+        [level(COARSE_PER_RANK, &rules.boxes), level(fine, &rules.boxes), of_facets]
     }
 
     /// The partition by base leaves. METIS is not used where there are too few of them for it. Collective.
@@ -101,9 +105,10 @@ impl Estimate<'_> {
         Ok(Partition { ownership, level_base: level, partitioner: Some(partitioner) })
     }
 
-    /// Intervals of the curve with equal estimated numbers of leaves, given a coarse and a fine level. Collective.
-    fn by_area(&self, [coarse, fine]: [Level; 2]) -> Ownership {
-        let (comm, local) = (self.comm, area::of(self.facets, self.rules, fine));
+    /// Intervals of the curve with equal estimated numbers of leaves, given the [levels](Self::levels). Facets are not resolved to the level of
+    /// boxes that are finer than the surface. Collective.
+    fn by_area(&self, [coarse, fine, of_facets]: [Level; 3]) -> Ownership {
+        let (comm, local) = (self.comm, area::of(self.facets, self.rules, of_facets));
         let in_boxes = area::leaves_in_boxes(0, 0, self.rules);
         let (light, bins) = self.all_bins(&local, coarse, in_boxes, 1);
         let boundaries = curve::partition(&bins, comm.size(), &Solo);
@@ -119,7 +124,7 @@ impl Estimate<'_> {
 
     /// The bins of all ranks, the same on all ranks, by octants of a level; in boxes by larger ones as far as these have no more leaves than a
     /// `per_rank`-th of a rank's share. In that, leaves in boxes count as `in_boxes`: as none for base leaves, which METIS takes for octants of
-    /// one level. Before the bins the number of leaves that need not be resolved further after that. Collective.
+    /// one level. Before the bins the number of leaves that need not be resolved further after that, at least 1. Collective.
     fn all_bins(
         &self,
         local: &[Bin],
@@ -135,7 +140,7 @@ impl Estimate<'_> {
         let light = (leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank);
         bins.extend(area::of_boxes(self.rules, level, light, &curve::ALL));
         combine(&mut bins, u64::wrapping_add);
-        (leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK), bins)
+        ((leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK)).max(1), bins)
     }
 }
 
@@ -178,7 +183,7 @@ mod tests {
             let on_this = |(i, f): (usize, &Facet)| (rank_of(i) == comm.rank()).then_some(*f);
             let mine: Vec<Facet> = all.iter().enumerate().filter_map(on_this).collect();
             let estimate = Estimate { facets: &mine, rules, comm };
-            let ownership = estimate.by_area([4, FINE]);
+            let ownership = estimate.by_area([4, FINE, FINE]);
             (0..1 << (3 * FINE))
                 .map(|code| ownership.owner_at(start57(FINE, code)))
                 .collect::<Vec<_>>()
@@ -259,7 +264,10 @@ mod tests {
         let bins = sim::run(RANKS, 5, |comm| {
             let local = area::of(facets, &rules, FINE);
             let in_boxes = area::leaves_in_boxes(0, 0, &rules);
-            Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, in_boxes, 1).1.len()
+            let (light, bins) =
+                Estimate { facets, rules: &rules, comm }.all_bins(&local, FINE, in_boxes, 1);
+            assert!(light >= 1, "a leaf need not be resolved");
+            bins.len()
         });
         assert!(bins.iter().all(|n| (RANKS..=8 * RANKS + 8).contains(n)), "{bins:?}");
     }
@@ -278,15 +286,21 @@ mod tests {
         let box_of = |edge: i64| ExtentBox { min: [0; 3], max: [edge; 3], level: 9 };
         assert_eq!(levels(&all, vec![box_of(h >> 6)]), levels(&all, vec![]), "a small box");
         // An eighth of the root for nine ranks, with a quarter and with sixteen parts each, in octants a quarter as large.
-        for [coarse, fine] in levels(&all[..1], vec![box_of(h)]) {
+        for [coarse, fine, _] in levels(&all[..1], vec![box_of(h)]) {
             assert!(coarse <= 3 && (4..=5).contains(&fine), "few facets: {coarse} {fine}");
+        }
+        // The box has most leaves, and octants of a few of them are far finer than the surface.
+        let deep = ExtentBox { min: [0; 3], max: [16 * edge(18); 3], level: 18 };
+        for [_, fine, of_facets] in levels(&all[..1], vec![deep]) {
+            assert!(fine >= 15 && of_facets <= rules(vec![]).level_surface, "{fine} {of_facets}");
         }
     }
 
     #[test]
     fn without_any_facet_one_rank_owns_everything() {
         let owners = sim::run(3, 1, |comm| {
-            let ownership = Estimate { facets: &[], rules: &rules(vec![]), comm }.by_area([2, 3]);
+            let ownership =
+                Estimate { facets: &[], rules: &rules(vec![]), comm }.by_area([2, 3, 3]);
             ownership.octants().len()
         });
         assert_eq!(owners, [1, 0, 0]);

@@ -3,7 +3,7 @@
 //! A depth-first walk keeps, for each level, the brick on the path from the root and its six face neighbours, so that no neighbour needs a
 //! search. The block below a brick is merged with what is across its sides: with leaves of its own level on the lower sides only, so that
 //! each pair is merged once, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover the
-//! octants across. Coarser leaves above the block have been found with its components.
+//! octants across. The flood fill of the block has found the coarser leaves of its own region.
 
 use super::nodes::{Child, Component, Family, Node, Nodes, Part, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
