@@ -283,8 +283,7 @@ impl Sides {
 mod tests {
     use super::*;
     use crate::check;
-    use crate::tests::set;
-    use crate::tests::{rules, small};
+    use crate::tests::{rules, set, small};
     use ranks::Solo;
 
     /// Sides of a tree without facets: all leaves that do not cross are outside.

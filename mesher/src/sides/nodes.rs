@@ -187,37 +187,35 @@ struct NewBlock {
 
 widest! {
     /// Finds what is connected in a block, and unites those of the levels above that it connects.
-    fn fill(block: &mut NewBlock, sets: &mut UnionFind) = NewBlock::fill_lanes;
+    fn fill(block: &mut NewBlock, sets: &mut UnionFind) = fill_lanes;
 }
 
-impl NewBlock {
-    #[inline(always)]
-    fn fill_lanes(&mut self, sets: &mut UnionFind) {
-        let Self { open, above, found } = self;
-        let and = |a, b| a & b;
-        // What is in no component yet.
-        let mut free = above.iter().fold(*open, |all, (_, w)| both(&all, w, |a, b| a | b));
-        let within = brick::layers(free);
-        found.clear();
-        let grow = |seed| brick::layers(brick::flood_layers(brick::layers(seed), &within));
-        for &(c, seed) in above.iter() {
-            for (other, _) in found.iter().filter(|(_, w)| !is_empty(&both(w, &seed, and))) {
-                sets.unite(other.expect("found above"), c);
-            }
-            let seed = both(&seed, &free, and);
-            if !is_empty(&seed) {
-                found.push((Some(c), grow(seed)));
-                free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
-            }
+#[inline(always)]
+fn fill_lanes(block: &mut NewBlock, sets: &mut UnionFind) {
+    let NewBlock { open, above, found } = block;
+    let and = |a, b| a & b;
+    // What is in no component yet.
+    let mut free = above.iter().fold(*open, |all, (_, w)| both(&all, w, |a, b| a | b));
+    let within = brick::layers(free);
+    found.clear();
+    let grow = |seed| brick::layers(brick::flood_layers(brick::layers(seed), &within));
+    for &(c, seed) in above.iter() {
+        for (other, _) in found.iter().filter(|(_, w)| !is_empty(&both(w, &seed, and))) {
+            sets.unite(other.expect("found above"), c);
         }
-        while let Some(j) = (0..8).find(|&j| open[j] & free[j] != 0) {
-            let (mut seed, bits) = ([0; 8], open[j] & free[j]);
-            seed[j] = bits & bits.wrapping_neg();
-            found.push((None, grow(seed)));
+        let seed = both(&seed, &free, and);
+        if !is_empty(&seed) {
+            found.push((Some(c), grow(seed)));
             free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
         }
-        found.retain(|(_, w)| !is_empty(&both(w, open, and)));
     }
+    while let Some(j) = (0..8).find(|&j| open[j] & free[j] != 0) {
+        let (mut seed, bits) = ([0; 8], open[j] & free[j]);
+        seed[j] = bits & bits.wrapping_neg();
+        found.push((None, grow(seed)));
+        free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
+    }
+    found.retain(|(_, w)| !is_empty(&both(w, open, and)));
 }
 
 #[inline(always)]
@@ -391,9 +389,8 @@ impl Nodes {
                 let masks = self.components(part).map(|c| c.1);
                 let (all, sum) =
                     masks.fold((0, 0), |(all, sum), m| (all | m, sum + m.count_ones()));
-                assert_eq!(
-                    all.count_ones(),
-                    sum,
+                assert!(
+                    all.count_ones() == sum,
                     "node {n} of level {l}: a leaf has two components"
                 );
             }

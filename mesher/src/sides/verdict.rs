@@ -55,18 +55,22 @@ impl Candidate {
 /// their labels.
 pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) -> FirstLeaves {
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
+    let mut unfinished = labels.len();
     for l in 0..LEVELS as Level {
-        for (part, Brick { key, .. }) in nodes.parts(l).zip(Tree::exists(&base.tree.split, l)) {
-            if !base.ownership.owns(l, key) {
-                continue;
+        let bricks = nodes.parts(l).zip(Tree::exists(&base.tree.split, l));
+        for (part, Brick { key, .. }) in bricks.filter(|b| base.ownership.owns(l, b.1.key)) {
+            if unfinished == 0 {
+                break;
             }
             for (c, bits) in nodes.components(part) {
                 let list = &mut first[merged[c as usize] as usize];
                 // Local components of one brick may be parts of one component: then their leaves are interleaved in Morton order.
                 let is_of_brick = |last: &Candidate| *last >= Candidate::new(l, key << 6);
-                if list.len() < CANDIDATES || list.last().is_some_and(is_of_brick) {
+                let before = list.len();
+                if before < CANDIDATES || list.last().is_some_and(is_of_brick) {
                     let leaf = |bit| Candidate::new(l, key << 6 | u64::from(bit));
                     list.extend(ones(bits).map(leaf));
+                    unfinished -= usize::from(before < CANDIDATES && list.len() >= CANDIDATES);
                 }
             }
         }
