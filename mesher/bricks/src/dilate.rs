@@ -47,19 +47,19 @@ pub fn dilate(l: Level, sources: impl Iterator<Item = Brick>, radius: u32) -> Re
 /// The octants of level `l` that are parents of those within `radius` of a source, with sources and radius one level deeper. Sources
 /// come in Morton order.
 pub fn dilate_children(l: Level, sources: impl Iterator<Item = Brick>, radius: u32) -> Reached {
-    further(l, pass(l, sources, radius & 1, true), radius / 2)
+    further(l, pass(l, sources, radius & 1, true), (radius / 2).min(1 << l))
 }
 
 /// All octants within `radius` of those that a pass has reached by dilating some words.
-fn further(l: Level, (near, words): (Gathered, u64), radius: u32) -> Reached {
-    let bytes = near.bytes();
-    let mut octants = near.into_set();
-    if radius == 0 {
-        return Reached { octants, words, bytes };
+fn further(l: Level, (mut near, mut words): (Gathered, u64), mut rest: u32) -> Reached {
+    while rest > 0 {
+        let mut sources = near.into_set();
+        sources.condense();
+        let (reached, more) = pass(l, sources.bricks(), rest.min(MARGIN as u32), false);
+        // What is gathered becomes a set when its sources are gone: that of the last pass is large.
+        (near, words, rest) = (reached, words + more, rest.saturating_sub(MARGIN as u32));
     }
-    octants.condense();
-    let reached = dilate(l, octants.bricks(), radius);
-    Reached { words: words + reached.words, ..reached }
+    Reached { words, bytes: near.bytes(), octants: near.into_set() }
 }
 
 /// log2 of the bricks in a block, in which results are gathered: 2 x 2 x 2, most of which a layer fills.
