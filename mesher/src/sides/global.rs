@@ -15,6 +15,9 @@ use rustc_hash::FxHashMap;
 /// Label of a component of the tree, the same on all ranks.
 pub type Label = u64;
 
+/// Pairs of labels of one component.
+type Pairs = Vec<[Label; 2]>;
+
 /// Labels of this rank's merged components: equal labels mean one component of the whole tree. Collective.
 pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u32]) -> Vec<Label> {
     let comm = base.comm;
@@ -33,7 +36,7 @@ pub fn labels(base: &Base, nodes: &Nodes, faces: Vec<FacedOctants>, merged: &[u3
 /// A spanning forest of the pairs of all ranks in a group, on the group's first rank, and none on the others.
 /// Both sides of a face yield the same pair, and consecutive ranks are often neighbours; so a group's
 /// forest is much smaller than all its pairs. Collective.
-fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
+fn group_forest(pairs: Pairs, comm: &dyn Comm) -> Pairs {
     let group = comm.size().isqrt();
     let first = comm.rank() / group * group;
     let mut messages = MessageBuffer::default();
@@ -46,12 +49,7 @@ fn group_forest(pairs: Vec<[Label; 2]>, comm: &dyn Comm) -> Vec<[Label; 2]> {
 /// merged component within the fully replicated bricks alone. All ranks hold these bricks and merge them
 /// alike, so the labels need no message. Returns the pairs of such labels that belong to one merged
 /// component of this rank.
-fn label_replicated(
-    labels: &mut [Label],
-    base: &Base,
-    nodes: &Nodes,
-    merged: &[u32],
-) -> Vec<[Label; 2]> {
+fn label_replicated(labels: &mut [Label], base: &Base, nodes: &Nodes, merged: &[u32]) -> Pairs {
     let non_owning_view = base.ownership.non_owning_view();
     let (replicated, sets) =
         Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
@@ -84,7 +82,7 @@ fn across_ranks(
     merged: &[u32],
     labels: &[Label],
     comm: &dyn Comm,
-) -> Vec<[Label; 2]> {
+) -> Pairs {
     let label = |c: Component| labels[merged[c as usize] as usize];
     let labelled = |f: FacedOctants| ((f.rank, f.level, f.key, label(f.component)), f.bits);
     let mut faces: Vec<_> = faces.into_iter().map(labelled).collect();
@@ -110,7 +108,7 @@ fn across_ranks(
 }
 
 /// Pairs that unite the same labels as `pairs`: one for each label but the least of its set, with that one. Ascending.
-fn forest(pairs: &[[Label; 2]]) -> Vec<[Label; 2]> {
+fn forest(pairs: &[[Label; 2]]) -> Pairs {
     let all = least(pairs).into_iter().filter(|(label, least)| label != least);
     let mut all: Vec<_> = all.map(|(label, least)| [label, least]).collect();
     all.sort_unstable();

@@ -29,13 +29,17 @@ struct Grid {
     side_log2: u32,
     /// The points, each after its square, sorted.
     members: Vec<(usize, u32)>,
+    /// Least and greatest coordinates of the points along both sides.
+    reach: [(i64, i64); 2],
 }
 
 impl Grid {
     fn new(points: &[[i64; 3]], axis: usize) -> Self {
         let side_log2 = (points.len().max(1).ilog2() / 2).min(10);
-        let grid = Self { axis, side_log2, members: Vec::new() };
         let [u, w] = [1, 2].map(|next| (axis + next) % 3);
+        let widen = |(low, high): (i64, i64), c: i64| (low.min(c), high.max(c));
+        let reach = [u, w].map(|a| points.iter().map(|p| p[a]).fold((i64::MAX, i64::MIN), widen));
+        let grid = Self { axis, side_log2, members: Vec::new(), reach };
         let square = |p: &[i64; 3]| grid.index(p[w]) << side_log2 | grid.index(p[u]);
         let mut members: Vec<_> = points.iter().map(square).zip(0..).collect();
         members.sort_unstable();
@@ -52,7 +56,8 @@ impl Grid {
     fn count(&self, f: &Facet, extent: &[(i64, i64); 3], points: &[[i64; 3]], odd: &mut [u8]) {
         let (u, w) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         let ((u0, u1), (w0, w1)) = (extent[u], extent[w]);
-        if u1 < 0 || w1 < 0 || u0 > ROOT_EDGE || w0 > ROOT_EDGE {
+        let [of_u, of_w] = self.reach;
+        if u1 < of_u.0 || w1 < of_w.0 || u0 > of_u.1 || w0 > of_w.1 {
             return;
         }
         for row in self.index(w0)..=self.index(w1) {
@@ -163,9 +168,12 @@ mod tests {
             let v = |u, w| at(axis, 1 << 21, u, w).map(|c| c as i32);
             let corners = [v(0, 0), v(1 << 22, 0), v(0, 1 << 22)];
             for v in [corners, [corners[0], corners[2], corners[1]]] {
-                let points = [1 << 20, 1 << 22].map(|along| at(axis, along, 1 << 20, 1 << 20));
-                let below_and_above = parities(&[Facet { v }], &points);
-                assert_eq!(below_and_above, [2 << (2 * axis), 1 << (2 * axis)], "axis {axis}");
+                // Within the facet's projection, and on its lower sides.
+                for (u, w) in [(1 << 20, 1 << 20), (0, 1 << 20), (1 << 20, 0)] {
+                    let points = [1 << 20, 1 << 22].map(|along| at(axis, along, u, w));
+                    let below_and_above = parities(&[Facet { v }], &points);
+                    assert_eq!(below_and_above, [2 << (2 * axis), 1 << (2 * axis)], "axis {axis}");
+                }
             }
         }
     }
