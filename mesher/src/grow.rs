@@ -155,8 +155,8 @@ pub fn grow<F: Borrow<[Facet]>>(
     Ok(mesh)
 }
 
-/// The paper's partition (section III). Every rank makes the same base mesh, T0 down to a fixed depth, deletes the leaves that the mesh
-/// does not keep, and calls METIS for the others. The facets, which the paper's ranks read, are gathered. Collective.
+/// The paper's partition (section III). Every rank makes the same base mesh, T0 down to a fixed depth, deletes the leaves on the
+/// side that is not kept, and calls METIS for the others. The facets, which the paper's ranks read, are gathered. Collective.
 fn of_base_mesh(
     (facets, counts): (&[Facet], FacetCounts),
     rules: &Rules,

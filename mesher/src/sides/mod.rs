@@ -283,8 +283,15 @@ impl Sides {
 mod tests {
     use super::*;
     use crate::check;
+    use crate::partition::ownership::Placement;
     use crate::tests::{rules, set, small};
-    use ranks::Solo;
+    use bricks::brickset::ones;
+    use bricks::digest::mix;
+    use bricks::octant::neighbour;
+    use proptest::prelude::*;
+    use ranks::{Solo, sim};
+    use std::collections::{BTreeMap, BTreeSet};
+    use verdict::{CANDIDATES, Candidate};
 
     /// Sides of a tree without facets: all leaves that do not cross are outside.
     fn decided(keep: Keep) -> (Tree, Sides) {
@@ -314,5 +321,126 @@ mod tests {
         let (ownership, rules) = (&Ownership::solo(), &rules());
         let base = Base { tree: &tree, ownership, facets: &[], rules, comm: &Solo };
         check::sides::agree_over_faces(&sides, &base);
+    }
+
+    /// Deepest level of drawn trees.
+    const DEEPEST: Level = 5;
+
+    /// A tree with the given octants and their siblings at its deepest level; a share of its leaves, in percent, crosses.
+    fn drawn(octants: &BTreeSet<u64>, crossing: u64) -> Tree {
+        let mut tree = Tree::default();
+        for l in 0..=DEEPEST {
+            let up = octants.iter().map(|code| code >> (3 * (DEEPEST - l)));
+            let split = if l < DEEPEST { up.collect() } else { BTreeSet::new() };
+            let exists = Tree::exists(&tree.split, l);
+            let codes =
+                exists.flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)));
+            let crosses = |code: &u64| mix(code << 5 | u64::from(l)) as u64 % 100 < crossing;
+            let leaves = codes.filter(|code| !split.contains(code) && crosses(code));
+            tree.crossing[l as usize] = set(&leaves.collect::<BTreeSet<_>>());
+            tree.split[l as usize] = set(&split);
+        }
+        tree.check_structure();
+        tree
+    }
+
+    /// The first leaves of each component, and whether one of its leaves has a face on the root's boundary.
+    type Firsts = BTreeSet<(Vec<Candidate>, bool)>;
+
+    /// Those that all ranks together find, which own the curve from each of these places on.
+    fn on_ranks(tree: &Tree, ranks: usize, owners: &BTreeMap<u64, usize>) -> Firsts {
+        let results = sim::run(ranks, 1, |comm| {
+            let owners = owners.iter().map(|(&start, &owner)| (start, owner % ranks));
+            let ownership = &Ownership::along(comm.rank(), ranks, owners);
+            let mut tree = tree.clone();
+            for sets in [&mut tree.split, &mut tree.crossing] {
+                for (l, set) in (0..).zip(sets) {
+                    let is_held =
+                        |key| !matches!(ownership.placement(l, key), Placement::Remote(_));
+                    set.retain(|b| if is_held(b.key) { b.bits } else { 0 });
+                }
+            }
+            let (rules, tree) = (&rules(), &tree);
+            let components = Components::new(&Base { tree, ownership, facets: &[], rules, comm });
+            components.nodes.check_invariants();
+            let label = |&c: &Component| components.label(c);
+            let at_boundary: Vec<Label> = components.at_boundary.iter().map(label).collect();
+            (components.candidates, at_boundary)
+        });
+        let at_boundary: BTreeSet<Label> = results.iter().flat_map(|r| r.1.clone()).collect();
+        let mut firsts: BTreeMap<Label, Vec<Candidate>> = BTreeMap::new();
+        for (label, list) in results.into_iter().flat_map(|r| r.0) {
+            firsts.entry(label).or_default().extend(list);
+        }
+        firsts
+            .into_iter()
+            .map(|(label, list)| (first(list), at_boundary.contains(&label)))
+            .collect()
+    }
+
+    fn first(mut list: Vec<Candidate>) -> Vec<Candidate> {
+        list.sort_unstable();
+        list.truncate(CANDIDATES);
+        list
+    }
+
+    /// Those that are found from leaf to leaf.
+    fn leaf_by_leaf(tree: &Tree) -> Firsts {
+        let mut open = BTreeSet::new();
+        for l in 0..=DEEPEST {
+            for Brick { key, bits } in Tree::exists(&tree.split, l) {
+                let [split, crossing] =
+                    [&tree.split, &tree.crossing].map(|s| s[l as usize].get(key));
+                open.extend(
+                    ones(bits & !split & !crossing).map(|bit| (l, key << 6 | u64::from(bit))),
+                );
+            }
+        }
+        // A leaf's neighbour of its own size, or the coarser leaf there. A finer one finds this leaf.
+        let beside = |(l, code): (Level, u64), side: usize| {
+            let next = neighbour(l, code, side / 2, side % 2 == 1)?;
+            (0..=l).map(|up| (l - up, next >> (3 * up))).find(|leaf| open.contains(leaf))
+        };
+        let mut neighbours: BTreeMap<(Level, u64), Vec<(Level, u64)>> = BTreeMap::new();
+        for (&leaf, side) in open.iter().flat_map(|leaf| (0..6).map(move |side| (leaf, side))) {
+            if let Some(other) = beside(leaf, side) {
+                neighbours.entry(leaf).or_default().push(other);
+                neighbours.entry(other).or_default().push(leaf);
+            }
+        }
+        let mut rest = open.clone();
+        let mut firsts = Firsts::new();
+        while let Some(seed) = rest.pop_first() {
+            let (mut component, mut queue) = (Vec::new(), vec![seed]);
+            while let Some(leaf) = queue.pop() {
+                component.push(leaf);
+                let others = neighbours.get(&leaf).into_iter().flatten();
+                queue.extend(others.filter(|other| rest.remove(*other)));
+            }
+            let is_outer = |&(l, code): &(Level, u64)| {
+                (0..6).any(|side| neighbour(l, code, side / 2, side % 2 == 1).is_none())
+            };
+            let is_at_boundary = component.iter().any(is_outer);
+            let leaves = component.into_iter().map(|(l, code)| Candidate::new(l, code));
+            firsts.insert((first(leaves.collect()), is_at_boundary));
+        }
+        firsts
+    }
+
+    proptest! {
+        /// Of any tree, with ranks that own any parts of it, even of leaves.
+        #[test]
+        fn components_are_those_found_from_leaf_to_leaf(
+            runs in prop::collection::vec((0u64..1 << (3 * DEEPEST), 1u64..300), 1..12),
+            crossing in prop::sample::select(vec![0u64, 20, 50, 65, 75, 90]),
+            ranks in prop::sample::select(vec![1usize, 2, 3, 5, 9]),
+            owners in prop::collection::btree_map((any::<u64>(), prop::sample::select(vec![0u32, 30, 42, 45, 48])), any::<usize>(), 1..30),
+        ) {
+            let octants = runs.iter().flat_map(|&(start, count)| start..(start + count).min(1 << (3 * DEEPEST)));
+            let tree = drawn(&octants.collect(), crossing);
+            let aligned = |((start, bits), owner): ((u64, u32), usize)| ((start >> 7) >> bits << bits, owner);
+            let owners = owners.into_iter().map(aligned).collect();
+            prop_assert_eq!(on_ranks(&tree, ranks, &owners), leaf_by_leaf(&tree));
+        }
     }
 }

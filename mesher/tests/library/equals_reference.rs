@@ -53,6 +53,17 @@ fn assert_reference(case: &Small, run: &Run) -> Result<(), TestCaseError> {
     Ok(())
 }
 
+/// The geometry surrounds the root: the outside is in two bodies that the far field does not reach.
+#[test]
+fn nothing_is_enclosed_if_the_far_field_reaches_no_outside_component() {
+    let bodies = [([-8.0; 3], [72.0; 3]), ([9.0; 3], [23.0; 3]), ([41.0; 3], [55.0; 3])];
+    let facets = bodies.into_iter().flat_map(|(lo, hi)| cuboid(lo, hi)).collect();
+    let case = Small { facets, ..slit(1.0, 10.0, Keep::Outside, vec![]) };
+    let summary = case.outcome(&Run::SOLO, false).summary;
+    assert_eq!((summary.outside, summary.inside, summary.enclosed.count), (2, 1, 0));
+    assert_reference(&case, &Run::SOLO).expect("the same mesh");
+}
+
 /// The facet misses an edge of the root by a lattice unit, although its extent meets the root.
 #[test]
 fn a_facet_outside_the_root_crosses_nothing() {
