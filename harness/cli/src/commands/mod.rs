@@ -65,7 +65,7 @@ pub enum Command {
     Leak(Box<leak::Arguments>),
     /// Write a mesh, or part of it, for ParaView and other programs
     Export(export::Arguments),
-    /// Draw a slice of a mesh, or a view in three dimensions
+    /// Draw a slice of a mesh
     Picture(Box<picture::Arguments>),
     /// Make a leaf-set directory from a mesh in another program's format
     Import(import::Arguments),
