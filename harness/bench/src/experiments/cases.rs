@@ -9,6 +9,7 @@
 //! has at least half of the requested cells; an overshooting mesh would cost more than the requested one. A large mesh is then
 //! extrapolated. Small ones grow unevenly, as levels begin, so that one is searched between its neighbours.
 
+use crate::read_toml;
 use contract::case::Case;
 use contract::failure::Failure;
 use contract::lattice::Root;
@@ -23,6 +24,8 @@ use toml::{Table, Value};
 pub struct Base {
     /// The case's name.
     pub name: String,
+    /// That of its files, of which there is one set for each number of facets.
+    pub stem: String,
     /// Edge length of the finest cell at the surface in the unchanged case.
     pub spacing_min: f64,
     /// n of the unchanged case.
@@ -33,20 +36,35 @@ pub struct Base {
 }
 
 impl Base {
-    /// Reads a case file; writes its geometry into `directory`.
+    /// Reads a case file; writes its geometry into `directory`, generated with another number of facets if one is given.
     ///
     /// # Errors
-    /// If the case is invalid or the directory cannot be written.
-    pub fn read(path: &Path, directory: &Path) -> Result<Self, Failure> {
-        let case = Case::read(path)?;
+    /// If the case is invalid, it has no generator for a number of facets, or the directory cannot be written.
+    pub fn read(path: &Path, facets: Option<usize>, directory: &Path) -> Result<Self, Failure> {
+        let mut case = Case::read(path)?;
         let mut table = PlainCase::read(path)?.table;
-        let stl = directory.join(format!("{}.stl", case.name));
+        let (name, mut stem) = (case.name.clone(), case.name.clone());
+        if let Some(facets) = facets {
+            stem = format!("{name}-{facets}");
+            let mut grown: Table = read_toml(path)?;
+            let generator = grown.get_mut("generator").and_then(Value::as_table_mut);
+            let generator = generator.ok_or_else(|| {
+                let file = path.display();
+                Failure::input(format!("{file}: facets cannot grow without a [generator]"))
+            })?;
+            generator.insert("facets".into(), (facets as i64).into());
+            let path = directory.join(format!("{stem}.toml"));
+            fs::write(&path, grown.to_string()).map_err(|error| Failure::at(&path, error))?;
+            (case, table) = (Case::read(&path)?, PlainCase::read(&path)?.table);
+        }
+        let stl = directory.join(format!("{stem}.stl"));
         File::create(&stl)
             .and_then(|file| geometries::write_stl_binary(&case.facets, BufWriter::new(file)))
             .map_err(|error| Failure::at(&stl, error))?;
         table.insert("geometry".into(), stl.to_string_lossy().into_owned().into());
         Ok(Self {
-            name: case.name.clone(),
+            name,
+            stem,
             spacing_min: case.root.edge / f64::from(1u32 << case.level_surface),
             layer_cells_min: case.layer_cells_min,
             table,
@@ -72,7 +90,7 @@ impl Base {
         table.insert("layer_cells_min".into(), i64::from(n).into());
         let of_root = Value::try_from(root).expect("a root is representable in TOML");
         table.insert("root".into(), of_root);
-        let name = format!("{}-{spacing_min:e}-{n}-{:e}.toml", self.name, root.edge);
+        let name = format!("{}-{spacing_min:e}-{n}-{:e}.toml", self.stem, root.edge);
         let path = self.directory.join(name);
         fs::write(&path, table.to_string()).map_err(|error| Failure::at(&path, error))?;
         Ok(path)
@@ -183,7 +201,7 @@ mod tests {
         let text = "spacing_min = 0.1\nroot_scale = 3.0\nkeep = \"all\"\n[generator]\nshape = \"sphere\"\nfacets = 80\n\
                     [[box]]\nmin = [0.0, 0.0, 0.0]\nmax = [1.0, 1.0, 1.0]\nspacing = 0.2\n";
         fs::write(&path, text).unwrap();
-        let base = Base::read(&path, place.path()).unwrap();
+        let base = Base::read(&path, None, place.path()).unwrap();
         let original = Case::read(&path).unwrap();
         let made = Case::read(&base.write(0.07, 3, false).unwrap()).unwrap();
         assert_eq!((made.layer_cells_min, made.boxes.len(), made.keep), (3, 1, original.keep));
@@ -194,6 +212,32 @@ mod tests {
         assert_eq!((same.root, same.level_surface), (original.root, original.level_surface));
         let kept = Case::read(&base.write(0.07, 3, true).unwrap()).unwrap();
         assert_eq!((kept.root, kept.layer_cells_min), (original.root, 3));
+    }
+
+    #[test]
+    fn facets_grow_if_a_generator_makes_them() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("ball.toml");
+        let text =
+            "spacing_min = 0.1\nroot_scale = 3.0\n[generator]\nshape = \"sphere\"\nfacets = 80\n";
+        fs::write(&path, text).unwrap();
+        let [small, large] =
+            [80, 320].map(|facets| Base::read(&path, Some(facets), place.path()).unwrap());
+        assert_eq!((&small.name, &small.root), (&large.name, &large.root));
+        let made =
+            [&small, &large].map(|base| Case::read(&base.write(0.1, 4, false).unwrap()).unwrap());
+        assert_eq!(made.map(|case| case.facets.len()), [80, 320]);
+        let given = place.path().join("given.toml");
+        fs::write(
+            &given,
+            text.replace(
+                "[generator]\nshape = \"sphere\"\nfacets = 80\n",
+                "geometry = \"ball-80.stl\"\n",
+            ),
+        )
+        .unwrap();
+        let refused = Base::read(&given, Some(80), place.path()).unwrap_err();
+        assert!(refused.why.ends_with("facets cannot grow without a [generator]"), "{refused:?}");
     }
 
     #[test]

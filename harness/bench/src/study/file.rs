@@ -168,6 +168,9 @@ pub struct Series {
     /// If empty, the case's own spacing.
     #[serde(default)]
     pub cells: Vec<f64>,
+    /// Facets per rank (weak), which the case's generator makes; if missing, the facets of the case.
+    #[serde(default)]
+    pub facets: Option<usize>,
     /// The programs, which mesh the same cases in turn: names in harness/engines, or engine files, whose paths in the file are relative to
     /// it.
     #[serde(default = "mesher")]
@@ -361,6 +364,7 @@ impl Series {
             (self.engines.is_empty(), "it has no engines"),
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
             (what == Weak && self.cells.is_empty(), "give the cells of a rank"),
+            (what != Weak && self.facets.is_some(), "facets per rank are for weak"),
             (is_about_ranks && ranks.is_empty(), "give ranks"),
             (what == Layers && self.layers.is_empty(), "give layers"),
         ];

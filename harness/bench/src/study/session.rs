@@ -137,7 +137,7 @@ struct Session<'a> {
     record: &'a Path,
     lines: Vec<Line>,
     /// Geometries read so far, by case.
-    bases: BTreeMap<String, Base>,
+    bases: BTreeMap<(String, Option<usize>), Base>,
     /// The known sizes of meshes, by case and n.
     sizes: BTreeMap<(String, u32), Sizes>,
     /// What is known of the meshes.
@@ -206,7 +206,7 @@ impl Session<'_> {
     fn of_series(&mut self, series: &Series, cells: Option<f64>) -> Result<Vec<Planned>, Failure> {
         use Experiment::{Spacing, Strong, Weak, Weights};
         let (experiment, named) = (series.experiment, name_of(&series.experiment));
-        let base = self.base(&series.case)?;
+        let mut base = self.base(&series.case, None)?;
         let of_case = [base.layer_cells_min];
         let layers = if series.layers.is_empty() { &of_case[..] } else { &series.layers };
         let mut points = Vec::new();
@@ -218,6 +218,9 @@ impl Session<'_> {
             }
             let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
             for (n, (comm, ranks)) in all {
+                if let Some(facets) = series.facets {
+                    base = self.base(&series.case, Some(facets * ranks))?;
+                }
                 let target = cells.map(|n| if experiment == Weak { n * ranks as f64 } else { n });
                 let finest = match target {
                     None => base.spacing_min,
@@ -250,7 +253,7 @@ impl Session<'_> {
 
     /// Returns the spacing that gives about this number of cells; meshes on one rank are counted for it.
     fn spacing(&mut self, base: &Base, n: u32, cells: f64) -> Result<f64, Failure> {
-        let sizes = self.sizes.entry((base.name.clone(), n)).or_default();
+        let sizes = self.sizes.entry((base.stem.clone(), n)).or_default();
         sizes.spacing(cells, base.coarse(), |spacing| {
             let case = base.write(spacing, n, false)?;
             let setup = Setup::serial(&base.name, spacing, n);
@@ -262,7 +265,7 @@ impl Session<'_> {
     fn of_run(&mut self, name: &str) -> Result<Planned, Failure> {
         let spec = &self.study.run[name];
         let mesh = &self.study.mesh[&spec.mesh];
-        let base = self.base(&mesh.case)?;
+        let base = self.base(&mesh.case, None)?;
         let n = mesh.layer_cells_min.unwrap_or(base.layer_cells_min);
         let spacing = match mesh.cells {
             None => mesh.spacing_min.unwrap_or(base.spacing_min),
@@ -277,16 +280,17 @@ impl Session<'_> {
         Ok(Planned { setup, case, repeats, warm_up: repeats > 1, failed: false })
     }
 
-    /// Returns a case, whose geometry is written as a binary STL file, once.
-    fn base(&mut self, case: &str) -> Result<Base, Failure> {
-        if let Some(known) = self.bases.get(case) {
+    /// Returns a case, with this number of facets if one is given, whose geometry is written as a binary STL file, once.
+    fn base(&mut self, case: &str, facets: Option<usize>) -> Result<Base, Failure> {
+        let key = (case.to_owned(), facets);
+        if let Some(known) = self.bases.get(&key) {
             return Ok(known.clone());
         }
         (self.progress)(&format!("{case}: reading the geometry"));
         let catalogue = &self.runner.programs.paths.catalogue;
         let path = catalogue.case_file(case, &self.study.directory)?;
-        let base = Base::read(&path, self.runner.place)?;
-        self.bases.insert(case.to_owned(), base.clone());
+        let base = Base::read(&path, facets, self.runner.place)?;
+        self.bases.insert(key, base.clone());
         Ok(base)
     }
 

@@ -117,6 +117,7 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
         ("[1, 2]", "[0]", "ranks are from 1"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
         ("cells = [1e4]", "", "give the cells of a rank"),
+        ("sim", "facets = 80\nsim", "facets per rank are for weak"),
         ("mpi = [1]", "", "give ranks"),
         ("'strong'", "'layers'", "give layers"),
         ("'strong'", "'luck'", "unknown variant"),
