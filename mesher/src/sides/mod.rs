@@ -326,8 +326,9 @@ mod tests {
     /// Deepest level of drawn trees.
     const DEEPEST: Level = 5;
 
-    /// A tree with the given octants and their siblings at its deepest level; a share of its leaves, in percent, crosses.
-    fn drawn(octants: &BTreeSet<u64>, crossing: u64) -> Tree {
+    /// A tree with the given octants and their siblings at its deepest level; a share of its leaves, in percent, crosses, according to the bits
+    /// `of` of their codes.
+    fn drawn(octants: &BTreeSet<u64>, crossing: u64, of: u64) -> Tree {
         let mut tree = Tree::default();
         for l in 0..=DEEPEST {
             let up = octants.iter().map(|code| code >> (3 * (DEEPEST - l)));
@@ -335,7 +336,7 @@ mod tests {
             let exists = Tree::exists(&tree.split, l);
             let codes =
                 exists.flat_map(|b| ones(b.bits).map(move |bit| b.key << 6 | u64::from(bit)));
-            let crosses = |code: &u64| mix(code << 5 | u64::from(l)) as u64 % 100 < crossing;
+            let crosses = |code: &u64| mix((code & of) << 5 | u64::from(l)) as u64 % 100 < crossing;
             let leaves = codes.filter(|code| !split.contains(code) && crosses(code));
             tree.crossing[l as usize] = set(&leaves.collect::<BTreeSet<_>>());
             tree.split[l as usize] = set(&split);
@@ -433,11 +434,13 @@ mod tests {
         fn components_are_those_found_from_leaf_to_leaf(
             runs in prop::collection::vec((0u64..1 << (3 * DEEPEST), 1u64..300), 1..12),
             crossing in prop::sample::select(vec![0u64, 20, 50, 65, 75, 90]),
+            // All, or those within a brick or a group of siblings: then neighbours are alike.
+            of in prop::sample::select(vec![u64::MAX, 0o77, 0o7]),
             ranks in prop::sample::select(vec![1usize, 2, 3, 5, 9]),
             owners in prop::collection::btree_map((any::<u64>(), prop::sample::select(vec![0u32, 30, 42, 45, 48])), any::<usize>(), 1..30),
         ) {
             let octants = runs.iter().flat_map(|&(start, count)| start..(start + count).min(1 << (3 * DEEPEST)));
-            let tree = drawn(&octants.collect(), crossing);
+            let tree = drawn(&octants.collect(), crossing, of);
             let aligned = |((start, bits), owner): ((u64, u32), usize)| ((start >> 7) >> bits << bits, owner);
             let owners = owners.into_iter().map(aligned).collect();
             prop_assert_eq!(on_ranks(&tree, ranks, &owners), leaf_by_leaf(&tree));
