@@ -56,7 +56,7 @@ fn further(l: Level, (mut near, mut words): (Gathered, u64), mut rest: u32) -> R
         let mut sources = near.into_set();
         sources.condense();
         let (reached, more) = pass(l, sources.bricks(), rest.min(MARGIN as u32), false);
-        // What is gathered becomes a set when its sources are gone: that of the last pass is large.
+        // The sources are freed before what they reach becomes a set, which takes the most memory.
         (near, words, rest) = (reached, words + more, rest.saturating_sub(MARGIN as u32));
     }
     Reached { words, bytes: near.bytes(), octants: near.into_set() }

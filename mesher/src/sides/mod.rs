@@ -326,8 +326,8 @@ mod tests {
     /// Deepest level of drawn trees.
     const DEEPEST: Level = 5;
 
-    /// A tree with the given octants and their siblings at its deepest level; a share of its leaves, in percent, crosses, according to the bits
-    /// `of` of their codes.
+    /// A tree with the given octants and their siblings at its deepest level. `crossing` percent of its leaves cross; which ones depends on those
+    /// bits of their codes that are in `of`.
     fn drawn(octants: &BTreeSet<u64>, crossing: u64, of: u64) -> Tree {
         let mut tree = Tree::default();
         for l in 0..=DEEPEST {
@@ -348,7 +348,7 @@ mod tests {
     /// The first leaves of each component, and whether one of its leaves has a face on the root's boundary.
     type Firsts = BTreeSet<(Vec<Candidate>, bool)>;
 
-    /// Those that all ranks together find, which own the curve from each of these places on.
+    /// As the ranks find them together. `owners` gives who owns the curve from each of these places on.
     fn on_ranks(tree: &Tree, ranks: usize, owners: &BTreeMap<u64, usize>) -> Firsts {
         let results = sim::run(ranks, 1, |comm| {
             let owners = owners.iter().map(|(&start, &owner)| (start, owner % ranks));
@@ -385,7 +385,7 @@ mod tests {
         list
     }
 
-    /// Those that are found from leaf to leaf.
+    /// As a search from leaf to leaf finds them.
     fn leaf_by_leaf(tree: &Tree) -> Firsts {
         let mut open = BTreeSet::new();
         for l in 0..=DEEPEST {
@@ -429,12 +429,12 @@ mod tests {
     }
 
     proptest! {
-        /// Of any tree, with ranks that own any parts of it, even of leaves.
+        /// On any tree and for any ownership: boundaries between ranks may cut through leaves.
         #[test]
         fn components_are_those_found_from_leaf_to_leaf(
             runs in prop::collection::vec((0u64..1 << (3 * DEEPEST), 1u64..300), 1..12),
             crossing in prop::sample::select(vec![0u64, 20, 50, 65, 75, 90]),
-            // All, or those within a brick or a group of siblings: then neighbours are alike.
+            // All bits, or those of the octant within its brick or its group of siblings: these make neighbours alike.
             of in prop::sample::select(vec![u64::MAX, 0o77, 0o7]),
             ranks in prop::sample::select(vec![1usize, 2, 3, 5, 9]),
             owners in prop::collection::btree_map((any::<u64>(), prop::sample::select(vec![0u32, 30, 42, 45, 48])), any::<usize>(), 1..30),

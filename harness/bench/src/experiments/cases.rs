@@ -22,9 +22,9 @@ use toml::{Table, Value};
 /// A case to vary; its geometry is written once.
 #[derive(Clone, Debug)]
 pub struct Base {
-    /// The case's name.
+    /// The name in results: that of the case, or of all variants of it with as many facets per rank.
     pub name: String,
-    /// That of its files, of which there is one set for each number of facets.
+    /// How the names of its files begin.
     pub stem: String,
     /// Edge length of the finest cell at the surface in the unchanged case.
     pub spacing_min: f64,
@@ -36,25 +36,31 @@ pub struct Base {
 }
 
 impl Base {
-    /// Reads a case file; writes its geometry into `directory`, generated with another number of facets if one is given.
+    /// Reads a case file; writes its geometry into `directory`. If they are given, its generator makes a number of facets for each of so many
+    /// ranks.
     ///
     /// # Errors
-    /// If the case is invalid, it has no generator for a number of facets, or the directory cannot be written.
-    pub fn read(path: &Path, facets: Option<usize>, directory: &Path) -> Result<Self, Failure> {
+    /// If the case is invalid, it has no generator for other facets, or the directory cannot be written.
+    pub fn read(
+        path: &Path,
+        per_rank: Option<[usize; 2]>,
+        directory: &Path,
+    ) -> Result<Self, Failure> {
         let mut case = Case::read(path)?;
         let mut table = PlainCase::read(path)?.table;
-        let (name, mut stem) = (case.name.clone(), case.name.clone());
-        if let Some(facets) = facets {
-            stem = format!("{name}-{facets}");
-            let mut grown: Table = read_toml(path)?;
-            let generator = grown.get_mut("generator").and_then(Value::as_table_mut);
+        let (mut name, mut stem) = (case.name.clone(), case.name.clone());
+        if let Some([facets, ranks]) = per_rank {
+            let all = facets * ranks;
+            (name, stem) = (grown(&name, facets), format!("{name}-{all}"));
+            let mut of_file: Table = read_toml(path)?;
+            let generator = of_file.get_mut("generator").and_then(Value::as_table_mut);
             let generator = generator.ok_or_else(|| {
                 let file = path.display();
                 Failure::input(format!("{file}: facets cannot grow without a [generator]"))
             })?;
-            generator.insert("facets".into(), (facets as i64).into());
+            generator.insert("facets".into(), (all as i64).into());
             let path = directory.join(format!("{stem}.toml"));
-            fs::write(&path, grown.to_string()).map_err(|error| Failure::at(&path, error))?;
+            fs::write(&path, of_file.to_string()).map_err(|error| Failure::at(&path, error))?;
             (case, table) = (Case::read(&path)?, PlainCase::read(&path)?.table);
         }
         let stl = directory.join(format!("{stem}.stl"));
@@ -95,6 +101,11 @@ impl Base {
         fs::write(&path, table.to_string()).map_err(|error| Failure::at(&path, error))?;
         Ok(path)
     }
+}
+
+/// The name in results of a case with so many facets per rank.
+pub(crate) fn grown(case: &str, facets: usize) -> String {
+    format!("{case}-{facets}-facets-per-rank")
 }
 
 /// Returns the smallest concentric root that is not smaller and has `spacing` as the edge of a level.
@@ -222,21 +233,15 @@ mod tests {
             "spacing_min = 0.1\nroot_scale = 3.0\n[generator]\nshape = \"sphere\"\nfacets = 80\n";
         fs::write(&path, text).unwrap();
         let [small, large] =
-            [80, 320].map(|facets| Base::read(&path, Some(facets), place.path()).unwrap());
-        assert_eq!((&small.name, &small.root), (&large.name, &large.root));
+            [1, 4].map(|ranks| Base::read(&path, Some([80, ranks]), place.path()).unwrap());
+        assert_eq!((&small.name[..], &small.root), ("ball-80-facets-per-rank", &large.root));
+        assert_eq!((&small.name, small.stem == large.stem), (&large.name, false));
         let made =
             [&small, &large].map(|base| Case::read(&base.write(0.1, 4, false).unwrap()).unwrap());
         assert_eq!(made.map(|case| case.facets.len()), [80, 320]);
         let given = place.path().join("given.toml");
-        fs::write(
-            &given,
-            text.replace(
-                "[generator]\nshape = \"sphere\"\nfacets = 80\n",
-                "geometry = \"ball-80.stl\"\n",
-            ),
-        )
-        .unwrap();
-        let refused = Base::read(&given, Some(80), place.path()).unwrap_err();
+        fs::write(&given, "spacing_min = 0.1\ngeometry = \"ball-80.stl\"\n").unwrap();
+        let refused = Base::read(&given, Some([80, 1]), place.path()).unwrap_err();
         assert!(refused.why.ends_with("facets cannot grow without a [generator]"), "{refused:?}");
     }
 

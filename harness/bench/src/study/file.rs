@@ -4,13 +4,13 @@
 //! has exactly the runs, the other run and the phase that its measure requires.
 
 use super::measure::{self, Input, Measure};
+use crate::experiments::cases::grown;
 use crate::experiments::entry::{Comm, Setup};
 use crate::order::distinct;
 use crate::{name_of, read_toml, refuse};
 use run::engine::description::{Description, is_own};
 use run::engine::report::one_or_many;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ use std::path::{Path, PathBuf};
 /// Valid numbers of cells.
 const CELLS: RangeInclusive<f64> = 1e3..=1e12;
 const WRONG_CELLS: &str = "cells is from 1e3 to 1e12";
+/// Valid numbers of facets per rank.
+const FACETS: RangeInclusive<usize> = 1..=100_000_000;
 /// Valid numbers of ranks.
 const RANKS: RangeInclusive<usize> = 1..=65_536;
 
@@ -245,7 +247,7 @@ impl Study {
     /// Whether runs on a case of this name are of the study.
     pub fn has_case(&self, name: &str) -> bool {
         let mut series = self.series.iter();
-        self.mesh.contains_key(name) || series.any(|series| stem(&series.case) == name)
+        self.mesh.contains_key(name) || series.any(|series| series.name() == name)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -253,8 +255,9 @@ impl Study {
         refuse(&[(is_empty, "it has no [[series]] and no [[row]]")])?;
         self.series.iter().try_for_each(Series::check)?;
         let mut cases = BTreeMap::new();
-        for Series { case, .. } in &self.series {
-            let other = *cases.entry(stem(case)).or_insert(case);
+        for series in &self.series {
+            let case = &series.case;
+            let other = *cases.entry(series.name()).or_insert(case);
             let why =
                 format!("the cases {other} and {case} have the same name in results: rename one");
             refuse(&[(other != case, &why)])?;
@@ -310,11 +313,6 @@ impl Study {
     }
 }
 
-/// Returns the name of a case in results.
-fn stem(case: &str) -> Cow<'_, str> {
-    Path::new(case).file_stem().unwrap_or_default().to_string_lossy()
-}
-
 /// Weights and partitioner of a run, empty to leave the choice to the program.
 pub(super) type Choice = (&'static str, &'static str);
 
@@ -329,6 +327,12 @@ const CHOICES: [Choice; 6] = [
 ];
 
 impl Series {
+    /// The name of its case in results.
+    fn name(&self) -> String {
+        let case = Path::new(&self.case).file_stem().unwrap_or_default().to_string_lossy();
+        self.facets.map_or(case.clone().into(), |facets| grown(&case, facets))
+    }
+
     /// Returns the partitions that are compared.
     pub(super) fn choices(&self) -> &'static [Choice] {
         match self.experiment {
@@ -365,6 +369,7 @@ impl Series {
             (!self.cells.iter().all(|cells| CELLS.contains(cells)), WRONG_CELLS),
             (what == Weak && self.cells.is_empty(), "give the cells of a rank"),
             (what != Weak && self.facets.is_some(), "facets per rank are for weak"),
+            (self.facets.is_some_and(|n| !FACETS.contains(&n)), "facets is from 1 to 1e8"),
             (is_about_ranks && ranks.is_empty(), "give ranks"),
             (what == Layers && self.layers.is_empty(), "give layers"),
         ];

@@ -136,9 +136,9 @@ struct Session<'a> {
     name: String,
     record: &'a Path,
     lines: Vec<Line>,
-    /// Geometries read so far, by case.
-    bases: BTreeMap<(String, Option<usize>), Base>,
-    /// The known sizes of meshes, by case and n.
+    /// Geometries read so far, by case, facets per rank and ranks.
+    bases: BTreeMap<(String, Option<[usize; 2]>), Base>,
+    /// The known sizes of meshes, by geometry and n.
     sizes: BTreeMap<(String, u32), Sizes>,
     /// What is known of the meshes.
     meshes: Meshes,
@@ -219,7 +219,7 @@ impl Session<'_> {
             let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
             for (n, (comm, ranks)) in all {
                 if let Some(facets) = series.facets {
-                    base = self.base(&series.case, Some(facets * ranks))?;
+                    base = self.base(&series.case, Some([facets, ranks]))?;
                 }
                 let target = cells.map(|n| if experiment == Weak { n * ranks as f64 } else { n });
                 let finest = match target {
@@ -280,16 +280,16 @@ impl Session<'_> {
         Ok(Planned { setup, case, repeats, warm_up: repeats > 1, failed: false })
     }
 
-    /// Returns a case, with this number of facets if one is given, whose geometry is written as a binary STL file, once.
-    fn base(&mut self, case: &str, facets: Option<usize>) -> Result<Base, Failure> {
-        let key = (case.to_owned(), facets);
+    /// Returns a case, with facets for each of some ranks if they are given; writes its geometry as a binary STL file, once.
+    fn base(&mut self, case: &str, per_rank: Option<[usize; 2]>) -> Result<Base, Failure> {
+        let key = (case.to_owned(), per_rank);
         if let Some(known) = self.bases.get(&key) {
             return Ok(known.clone());
         }
         (self.progress)(&format!("{case}: reading the geometry"));
         let catalogue = &self.runner.programs.paths.catalogue;
         let path = catalogue.case_file(case, &self.study.directory)?;
-        let base = Base::read(&path, facets, self.runner.place)?;
+        let base = Base::read(&path, per_rank, self.runner.place)?;
         self.bases.insert(key, base.clone());
         Ok(base)
     }

@@ -113,11 +113,15 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     let mut study = read(text).unwrap();
     study.only(&["weak".to_owned()]).unwrap();
     assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
+    let growing = read(&text.replace("mpi", "facets = 80\nmpi")).unwrap();
+    let known = |name| growing.has_case(name);
+    assert_eq!(["cube", "cube-80-facets-per-rank", "ball"].map(known), [true, true, false]);
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
         ("cells = [1e4]", "", "give the cells of a rank"),
         ("sim", "facets = 80\nsim", "facets per rank are for weak"),
+        ("mpi", "facets = 100000001\nmpi", "facets is from 1 to 1e8"),
         ("mpi = [1]", "", "give ranks"),
         ("'strong'", "'layers'", "give layers"),
         ("'strong'", "'luck'", "unknown variant"),
