@@ -18,7 +18,7 @@ mod tests;
 
 pub use memory::{Tightest, address_space_left};
 
-use bricks::octant::{Level, edge};
+use bricks::octant::Level;
 use memory::Ranks;
 use mesher::error::Error;
 use mesher::input::case::Case;
@@ -152,9 +152,7 @@ fn pilot(quantised: &Quantised, shift: Level, job: &Job) -> Result<Amounts, Erro
 impl<'a> Problem<'a> {
     fn new(quantised: &'a Quantised, job: &Job<'a>) -> Self {
         let rules = &quantised.rules;
-        let face = (edge(rules.level_surface) as f64).powi(2);
-        let faces = job.comm.sum((area::total(&quantised.facets) / face) as u64) as f64;
-        let around_facets = faces * area::leaves_per_surface_cell(rules) as f64;
+        let around_facets = area::leaves_at_surface(&quantised.facets, rules, job.comm);
         let before: f64 = job.record.phases.iter().map(|p| p.time_cpu_s).sum();
         let written = job.options.out.as_ref().map_or([false; 2], |o| [o.words, o.tree]);
         let times = written.iter().zip(TIMES_WRITTEN_S).filter(|(is, _)| **is);

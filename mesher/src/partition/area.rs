@@ -8,7 +8,7 @@ use crate::input::lattice::{ExtentBox, Rules};
 use crate::partition::curve::Bin;
 use bricks::facet::Facet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton, start57};
-use ranks::combine;
+use ranks::{Comm, combine};
 use std::ops::Range;
 
 /// Fractions of a leaf that leaves are counted in: sums of integers do not depend on their order.
@@ -49,11 +49,15 @@ pub fn of_boxes(rules: &Rules, level: Level, light: u64, within: &Range<u64>) ->
     bins
 }
 
-/// The sum of the areas of facets, in lattice units squared.
-pub fn total(facets: &[Facet]) -> f64 {
-    facets.iter().map(norm).sum()
+/// The number of leaves near the facets of all ranks. Collective.
+pub fn leaves_at_surface(facets: &[Facet], rules: &Rules, comm: &dyn Comm) -> f64 {
+    let area: f64 = facets.iter().map(norm).sum();
+    // Whole faces of finest cells: a sum of integers does not depend on its order.
+    let faces = comm.sum((area / (edge(rules.level_surface) as f64).powi(2)) as u64);
+    leaves_per_surface_cell(rules) as f64 * faces as f64
 }
 
+/// The area of a facet, in lattice units squared.
 fn norm(f: &Facet) -> f64 {
     f.normal().iter().map(|c| (*c as f64).abs()).sum::<f64>() * 0.5
 }
@@ -179,7 +183,7 @@ mod tests {
         let h = (ROOT_EDGE / 2) as i32;
         let oblique = Facet { v: [[h, 0, 0], [0, h, 0], [0, 0, h]] };
         // The sum of its projections onto the three coordinate planes.
-        assert_eq!(total(&[oblique]), 1.5 * f64::from(h) * f64::from(h));
+        assert_eq!(norm(&oblique), 1.5 * f64::from(h) * f64::from(h));
     }
 
     #[test]

@@ -60,10 +60,9 @@ impl Estimate<'_> {
     fn levels(&self) -> [Level; 3] {
         let &Self { facets, rules, comm } = self;
         let each = area::leaves_per_surface_cell(rules) as f64;
-        // Whole faces of finest cells: a sum of integers does not depend on its order.
         let face = (edge(rules.level_surface) as f64).powi(2);
-        let faces = comm.sum((area::total(facets) / face) as u64) as f64;
-        let leaves = each * faces + area::leaves_in_boxes(0, 0, rules) as f64;
+        let at_surface = area::leaves_at_surface(facets, rules, comm);
+        let leaves = at_surface + area::leaves_in_boxes(0, 0, rules) as f64;
         let level = |per_rank: f64, boxes: &[ExtentBox]| {
             // Four sheets of facets in one octant are not unusual: wings, fins.
             let most = leaves / (comm.size() as f64 * per_rank * 4.0);
