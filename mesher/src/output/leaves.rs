@@ -57,7 +57,7 @@ pub fn finish(
     let entry = MeshEntry::new(mesh, by_level.as_chunks().0, &digests);
     let published = out.filter(|_| comm.rank() == 0).map_or(Ok(()), |out| {
         stop_at(format_args!("manifest:0"));
-        out.manifest(&manifest(&out.output, &entry, &digests, &parts))
+        out.manifest(&entry.manifest(&out.output, &digests, &parts))
     });
     agree(comm, published)?;
     Ok(entry)
@@ -146,6 +146,20 @@ impl MeshEntry {
             digest: hex(digests.whole()),
         }
     }
+
+    /// Contents of `mesh.json`: this mesh with these digests and parts; parts and tree are named as far as `output` has them.
+    fn manifest(&self, output: &Output, digests: &Digests, parts: &[PartEntry]) -> Value {
+        let part = |(rank, &(leaves, digest)): (usize, &PartEntry)| json!({ "file": part_name(rank), "leaves": leaves, "digest": hex(digest) });
+        let parts = parts.iter().enumerate().filter(|_| output.words).map(part);
+        let mut manifest = json!(self);
+        manifest["schema"] = "octree-leaf-set/1".into();
+        manifest["octant_digests"] = digests.octants.iter().map(|&d| hex(d)).collect();
+        manifest["parts"] = parts.collect();
+        if output.tree {
+            manifest["hyper_tree_grid"] = TREE.into();
+        }
+        manifest
+    }
 }
 
 /// A part: its number of leaves and its digest.
@@ -165,25 +179,6 @@ pub fn gather(leaves: u64, mine: &Digests, comm: &dyn Comm) -> (Digests, Vec<Par
         digests.merge(theirs.map(|(octant, digest)| (octant as usize, digest)));
     }
     (digests, parts)
-}
-
-/// Contents of `mesh.json`: a mesh with these digests and parts; parts and tree are named as far as `output` has them.
-pub fn manifest(
-    output: &Output,
-    mesh: &MeshEntry,
-    digests: &Digests,
-    parts: &[PartEntry],
-) -> Value {
-    let part = |(rank, &(leaves, digest)): (usize, &PartEntry)| json!({ "file": part_name(rank), "leaves": leaves, "digest": hex(digest) });
-    let parts = parts.iter().enumerate().filter(|_| output.words).map(part);
-    let mut manifest = json!(mesh);
-    manifest["schema"] = "octree-leaf-set/1".into();
-    manifest["octant_digests"] = digests.octants.iter().map(|&d| hex(d)).collect();
-    manifest["parts"] = parts.collect();
-    if output.tree {
-        manifest["hyper_tree_grid"] = TREE.into();
-    }
-    manifest
 }
 
 #[cfg(test)]
@@ -206,7 +201,7 @@ mod tests {
             let entry = finish(&mesh, &counts, &digests, None, comm).expect("nothing is written");
             let output = Output { directory: "mesh".into(), words: true, tree: true };
             let parts = [(total(&counts), 1)];
-            (entry.leaves, manifest(&output, &entry, &digests, &parts))
+            (entry.leaves, entry.manifest(&output, &digests, &parts))
         });
         let [outside, inside, crossing] = [3_u64 << 37, 9 << 32, 5 + 6 + 7];
         for (rank, (leaves, manifest)) in (0..).zip(entries) {
