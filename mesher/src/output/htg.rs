@@ -161,10 +161,7 @@ fn place(ownership: &Ownership, l: Level, key: u64) -> usize {
 }
 
 /// The siblings in the bricks that this rank owns, with their numbers, in ascending order.
-fn own_siblings<'a>(
-    mesh: &'a Mesh,
-    numbering: &'a Numbering,
-) -> impl Iterator<Item = Numbered> + 'a {
+fn own_siblings(mesh: &Mesh, numbering: &Numbering) -> impl Iterator<Item = Numbered> {
     let of_level = move |l: Level| {
         let mut path = Path::new(mesh, l);
         // The place of the last brick, and the number of the next siblings.
