@@ -24,10 +24,8 @@ use std::convert::Infallible;
 ///
 /// # Errors
 /// The same on all ranks.
-pub fn grow<F: Borrow<[Facet]>>(
-    Quantised { rules, facets, counts }: Quantised<F>,
-    job: &mut Job,
-) -> Result<Mesh, Error> {
+pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Result<Mesh, Error> {
+    let Quantised { rules, facets, counts } = quantised;
     let (options, comm) = (job.options, job.comm);
     let division = &options.division;
     let all = || uncounted(comm, || gather(comm, facets.borrow()));
