@@ -24,7 +24,7 @@ use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour, path};
 use bricks::tree::{PerLevel, check_existing, check_split};
 use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash};
 use std::iter::once;
 
 /// Splits from which on debug builds leave out the checks that take more memory than the mesh. `--check` always runs them.
@@ -139,12 +139,11 @@ pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
 /// A number that any change of the mesh changes, whatever the partition. Collective.
 pub fn fingerprint(mesh: &Mesh, comm: &dyn Comm) -> u64 {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
+    let hasher = BuildHasherDefault::<DefaultHasher>::new();
     let mut sum = 0u64;
     for (number, sets) in [split, crossing, &sides.stored].into_iter().enumerate() {
         for (l, b) in bricks_of(sets).filter(|(l, b)| ownership.owns(*l, b.key)) {
-            let mut hasher = DefaultHasher::new();
-            (number, l, b.key, b.bits).hash(&mut hasher);
-            sum = sum.wrapping_add(hasher.finish());
+            sum = sum.wrapping_add(hasher.hash_one((number, l, b.key, b.bits)));
         }
     }
     comm.sum(sum)

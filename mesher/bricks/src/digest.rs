@@ -9,8 +9,6 @@ use crate::widest;
 
 /// Level of the octants whose digests are in the manifest.
 pub const OCTANT_LEVEL: Level = 3;
-/// Number of such octants.
-pub const OCTANTS: usize = 512;
 
 /// The increment of splitmix64.
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -102,7 +100,7 @@ pub struct Digests {
 
 impl Default for Digests {
     fn default() -> Self {
-        Self { octants: vec![0; OCTANTS] }
+        Self { octants: vec![0; 1 << (3 * OCTANT_LEVEL)] }
     }
 }
 
