@@ -33,7 +33,6 @@ pub struct Partition {
 }
 
 /// The estimate of the leaves.
-#[derive(Clone, Copy)]
 pub struct Estimate<'a> {
     /// This rank's slice of the geometry.
     pub facets: &'a [Facet],
