@@ -113,7 +113,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 fn may_begin_with_solid(head: &[u8]) -> bool {
     let mut text = Text::new(head);
     let word = text.word().to_ascii_lowercase();
-    word == b"solid" || text.at == text.bytes.len() && b"solid".starts_with(&word)
+    word == b"solid" || text.0.is_empty() && b"solid".starts_with(&word)
 }
 
 /// The facets of all solids.
@@ -137,11 +137,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<Facet>, String> {
     Ok(facets)
 }
 
-/// A position in the text.
-struct Text<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
+/// The rest of a text.
+struct Text<'a>(&'a [u8]);
 
 fn is_white(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t'..=b'\r')
@@ -149,24 +146,24 @@ fn is_white(byte: u8) -> bool {
 
 impl<'a> Text<'a> {
     fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes: bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes), at: 0 }
+        Self(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes))
     }
 
     /// The next word, which is empty at the end of the text.
     fn word(&mut self) -> &'a [u8] {
-        self.skip_while(is_white);
-        let start = self.at;
-        self.skip_while(|byte| !is_white(byte));
-        &self.bytes[start..self.at]
+        self.next_while(is_white);
+        self.next_while(|byte| !is_white(byte))
     }
 
-    fn skip_while(&mut self, skips: impl Fn(u8) -> bool) {
-        self.at += self.bytes[self.at..].iter().take_while(|&&byte| skips(byte)).count();
+    /// The next bytes, as many as satisfy a condition.
+    fn next_while(&mut self, is_one: impl Fn(u8) -> bool) -> &'a [u8] {
+        let length = self.0.iter().take_while(|&&byte| is_one(byte)).count();
+        self.0.split_off(..length).expect("no more than the rest")
     }
 
     fn is_at_end(&mut self) -> bool {
-        self.skip_while(is_white);
-        self.at == self.bytes.len()
+        self.next_while(is_white);
+        self.0.is_empty()
     }
 
     fn expect(&mut self, wanted: &str) -> Result<(), String> {
@@ -221,18 +218,17 @@ impl<'a> Text<'a> {
 
     /// Skips the rest of the line up to words of which the first ones satisfy `ends`. Returns whether there are such words.
     fn skip_name(&mut self, ends: impl Fn(&[&[u8]; NAME_AHEAD]) -> bool) -> bool {
-        let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|byte| b"\n\r".contains(byte)).unwrap_or(rest.len());
-        let mut line = Text { bytes: &self.bytes[..self.at + length], at: self.at };
+        let mut line = Text(Text(self.0).next_while(|byte| !b"\n\r".contains(&byte)));
+        let after = &self.0[line.0.len()..];
         while !line.is_at_end() {
-            let mut ahead = Text { ..line };
+            let mut ahead = Text(line.0);
             if ends(&std::array::from_fn(|_| ahead.word())) {
-                self.at = line.at;
+                self.0 = &self.0[self.0.len() - after.len() - line.0.len()..];
                 return true;
             }
             line.word();
         }
-        self.at = line.at;
+        self.0 = after;
         false
     }
 }
