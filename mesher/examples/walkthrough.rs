@@ -41,8 +41,7 @@ struct CutLeaf {
 
 /// The case of the walk-through.
 fn case() -> Case {
-    program::case_file::read(&directory().join("case.toml"))
-        .expect("the walk-through's case is valid")
+    case_file::read(&directory().join("case.toml")).expect("the walk-through's case is valid")
 }
 
 /// Where the case is, and the drawings.

@@ -1,6 +1,7 @@
 //! The command line, and the case that it describes.
 
 use bricks::octant::{LEVEL_MAX, Level};
+use case_file::Keys;
 use clap::Parser;
 use mesher::Options;
 use mesher::error::{Error, agree};
@@ -8,7 +9,6 @@ use mesher::input::case::Case;
 use mesher::input::ingest::Source;
 use mesher::output::write::Output;
 use mesher::partition::{Division, Partitioner, Weights};
-use program::case_file::{self, Keys};
 use ranks::{Comm, launch, text_of_first, uncounted};
 use std::ffi::OsString;
 use std::io::{self, Write};

@@ -168,7 +168,7 @@ proptest! {
             keep_crossing = true\n[root]\norigin = [-4.0, -4.0, -4.0]\nedge = 8.0\n[[box]]\nmin = [0.0, -1.0, -1.0]\n
             max = [4.0, 1.0, 1.0]\nspacing = 0.05\n";
         let file = file(&damaged(GOOD.into(), &by));
-        match program::case_file::read(file.path()) {
+        match case_file::read(file.path()) {
             Err(error) => is_input_error(&error)?,
             Ok(case) => {
                 let unit = Bounds { lo: [0.0; 3], hi: [1.0; 3] };

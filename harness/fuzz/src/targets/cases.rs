@@ -74,7 +74,7 @@ pub(super) fn case(scratch: &mut Scratch, bytes: &[u8]) -> bool {
     scratch.file("body.stl", BODY);
     let path = scratch.file("case.toml", bytes).to_owned();
     // The path of another file, which might be a large one.
-    if let Ok(case) = program::case_file::read(&path)
+    if let Ok(case) = case_file::read(&path)
         && let Source::Stl(body) = case.source
         && body != path.with_file_name("body.stl")
     {
@@ -99,7 +99,7 @@ fn root_bits([x, y, z]: [f64; 3], edge: f64) -> [u64; 4] {
 
 fn by_mesher(path: &std::path::Path) -> Result<Meaning, String> {
     let meaning = || {
-        let case = program::case_file::read(path)?;
+        let case = case_file::read(path)?;
         let slice = ingest::read(&case.source, &Solo)?;
         let bounds = Bounds::of(&slice.facets);
         let rules = case.rules(&bounds)?;

@@ -37,7 +37,7 @@ fn read_part(path: &Path) -> Vec<u64> {
 
 /// The mesh's words by the library, which the property tests compare with the reference.
 fn meshed(workspace: &Workspace, ungraded: bool) -> Vec<u64> {
-    let case = program::case_file::read(&workspace.path().join("case.toml")).expect("a good case");
+    let case = case_file::read(&workspace.path().join("case.toml")).expect("a good case");
     let options = crate::support::options(crate::support::Run::SOLO.division, ungraded);
     crate::support::words(&case, &options, &Solo).expect("a good case").0
 }
