@@ -316,7 +316,7 @@ mod tests {
             let v = v.map(|p| p.map(|c| (c / 2) * (1 << 25) + c % 2));
             let (f, leaves) = (Facet { v }, two_levels(split));
             let starts = leaves.iter().map(|&(level, code)| start57(level, code));
-            let ownership = Ownership::along(0, leaves.len(), starts.zip(0..));
+            let ownership = Ownership::along(0, leaves.len(), starts.zip(0..).collect());
             let reached = |(level, code): (Level, u64)| (0..3).all(|a| {
                 let at = corner(level, code)[a];
                 f.range(a).0 <= at + edge(level) && f.range(a).1 >= at

@@ -55,7 +55,7 @@ pub struct Ownership {
 impl Ownership {
     /// The ownership of a single rank.
     pub fn solo() -> Self {
-        Self::along(0, 1, [(0, 0)])
+        Self::along(0, 1, vec![(0, 0)])
     }
 
     /// The ownership given by boundaries: level-19 codes in ascending order, each with the owner from there on. The first owner owns the
@@ -63,12 +63,7 @@ impl Ownership {
     ///
     /// # Panics
     /// If the codes do not ascend, or an owner is not a rank.
-    pub fn along(
-        rank: usize,
-        ranks: usize,
-        boundaries: impl IntoIterator<Item = Boundary>,
-    ) -> Self {
-        let mut all: Vec<Boundary> = boundaries.into_iter().collect();
+    pub fn along(rank: usize, ranks: usize, mut all: Vec<Boundary>) -> Self {
         assert!(all.iter().all(|b| b.1 < ranks), "an owner must be a rank");
         assert!(all.is_sorted_by(|a, b| a.0 < b.0), "boundaries must ascend");
         all.first_mut().expect("every octant must have an owner").0 = 0;

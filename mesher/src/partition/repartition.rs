@@ -283,8 +283,9 @@ mod tests {
     fn bricks_move_whether_ranks_have_condensed_them_or_not() {
         let l = 6;
         // A boundary in a brick, which both ranks hold.
-        let along =
-            |rank, key: u64| Ownership::along(rank, 2, [(0, 0), (start57(l, key * 64 + 24), 1)]);
+        let along = |rank, key: u64| {
+            Ownership::along(rank, 2, vec![(0, 0), (start57(l, key * 64 + 24), 1)])
+        };
         for (condensed, [begin, end]) in (0..4)
             .flat_map(|condensed| [[1000, 777], [777, 1000], [5, 5]].map(|at| (condensed, at)))
         {

@@ -5,7 +5,8 @@
 //! each pair is merged once, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover the
 //! octants across. The flood fill of the block has found the coarser leaves of its own region.
 
-use super::nodes::{Child, Component, Family, Node, Nodes, Part, UnionFind};
+use super::masks::Part;
+use super::nodes::{Child, Component, Family, Node, Nodes, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::brick::{self, Block};
 use bricks::brickset::ones;
@@ -81,7 +82,7 @@ pub fn merge(nodes: &Nodes, merged: UnionFind, ownership: &Ownership) -> LocalMe
     let brick = nodes.root();
     // Enough room for most meshes, so that it does not grow in many steps.
     let mut at_boundary = Vec::with_capacity(1 << 12);
-    at_boundary.extend(nodes.components(brick.part).map(|c| c.0));
+    nodes.masks.brick(brick.part, |c, _| at_boundary.push(c));
     let local = LocalMerge { merged, faces: Vec::new(), at_boundary };
     let mut w = Walk { nodes, ownership, local, path: vec![], mine: vec![], theirs: vec![] };
     w.visit(&Frame { level: 0, key: 0, brick, across: [[Across::Nothing; 2]; 3] });
@@ -95,8 +96,8 @@ struct Walk<'a> {
     /// The bricks on the path from the root, by level.
     path: Vec<Frame>,
     /// The octants of the components of a block, and of one across a face.
-    mine: Vec<Block>,
-    theirs: Vec<Block>,
+    mine: Vec<(Component, Block)>,
+    theirs: Vec<(Component, Block)>,
 }
 
 widest! {
@@ -132,21 +133,24 @@ impl Walk<'_> {
     #[inline(always)]
     fn merge_lanes(&mut self, frame: &Frame, family: &Family) {
         let mut mine = take(&mut self.mine);
-        let first = self.nodes.block(family, &mut mine);
+        mine.clear();
+        self.nodes.masks.block(family.block(), |c, octants| mine.push((c, octants)));
         if frame.level < 2 {
             // Every octant of levels 0 and 1 has a face on the root's boundary.
             let touches = |octants: &Block| frame.level == 0 || octants[0] & !INNER != 0;
-            let at = (first..).zip(&mine).filter(|(_, octants)| touches(octants));
+            let at = mine.iter().filter(|(_, octants)| touches(octants));
             self.local.at_boundary.extend(at.map(|(c, _)| c));
         } else {
-            SIDES.iter().for_each(|side| self.merge_side(frame, first, &mine, *side));
+            for side in SIDES {
+                self.merge_side(frame, &mine, side);
+            }
         }
         self.mine = mine;
     }
 
-    /// Merges the components of a block, from `first` on, with those across one side.
+    /// Merges the components of a block with those across one side.
     #[inline(always)]
-    fn merge_side(&mut self, frame: &Frame, first: Component, mine: &[Block], side: Side) {
+    fn merge_side(&mut self, frame: &Frame, mine: &[(Component, Block)], side: Side) {
         let (nodes, l, (axis, up)) = (self.nodes, frame.level, side);
         let groups = GROUPS[axis][1 - up];
         let mut leaves = groups.iter().fold(0, |all, j| all | 0xff << (8 * j));
@@ -163,25 +167,26 @@ impl Walk<'_> {
                 leaves &= !other.split;
             }
         }
-        let first_across = nodes.block(&other, &mut self.theirs);
-        for (c, octants) in (first..).zip(mine) {
+        self.theirs.clear();
+        nodes.masks.block(other.block(), |c, octants| self.theirs.push((c, octants)));
+        for (c, octants) in mine {
             let across = |k: usize| brick::across(octants[groups[k] ^ 1 << axis], axis, up == 1);
             let faced = [across(0), across(1), across(2), across(3)];
             if faced[0] | faced[1] | faced[2] | faced[3] == 0 {
                 continue;
             }
-            for (d, theirs) in (first_across..).zip(&self.theirs) {
+            for (d, theirs) in &self.theirs {
                 if (0..4).fold(0, |all, k| all | faced[k] & theirs[groups[k]]) != 0 {
-                    self.local.merged.unite(c, d);
+                    self.local.merged.unite(*c, *d);
                 }
             }
             if let Across::Nothing = frame.across[axis][up] {
-                self.local.at_boundary.push(c);
+                self.local.at_boundary.push(*c);
             }
             if leaves != 0 {
                 let parents = |k: usize| u64::from(brick::parents(faced[k])) << (8 * groups[k]);
                 let coarse = parents(0) | parents(1) | parents(2) | parents(3);
-                self.merge_leaves(frame, c, coarse & leaves, side);
+                self.merge_leaves(frame, *c, coarse & leaves, side);
             }
         }
     }
@@ -196,8 +201,11 @@ impl Walk<'_> {
                 _ => None,
             };
             if let Some(Child { part, exists, .. }) = brick {
-                let touched = self.nodes.components(part).filter(|d| d.1 & faced != 0);
-                touched.for_each(|(d, _)| self.local.merged.unite(c, d));
+                self.nodes.masks.brick(part, |d, bits| {
+                    if bits & faced != 0 {
+                        self.local.merged.unite(c, d);
+                    }
+                });
                 faced &= !exists;
             }
             if frame.level == 0 {
@@ -242,9 +250,12 @@ impl Walk<'_> {
     /// Records, for the owner of a brick, those of its octants that are `faced` by components.
     fn record_face(&mut self, (level, key): (Level, u64), part: Part, faced: impl Fn(u64) -> u64) {
         let rank = self.ownership.owner(level, key);
-        let all = self.nodes.components(part).map(|(c, bits)| (c, faced(bits)));
-        let face = |(component, bits)| FacedOctants { rank, level, key, component, bits };
-        self.local.faces.extend(all.filter(|face| face.1 != 0).map(face));
+        self.nodes.masks.brick(part, |component, bits| {
+            let bits = faced(bits);
+            if bits != 0 {
+                self.local.faces.push(FacedOctants { rank, level, key, component, bits });
+            }
+        });
     }
 
     /// The frame of child brick `j`; none if it has no children or this rank does not hold it.

@@ -51,18 +51,24 @@ fn group_forest(pairs: Pairs, comm: &dyn Comm) -> Pairs {
 /// component of this rank.
 fn label_replicated(labels: &mut [Label], base: &Base, nodes: &Nodes, merged: &[u32]) -> Pairs {
     let non_owning_view = base.ownership.non_owning_view();
-    let (replicated, sets) =
-        Nodes::new(&base.ownership.fully_replicated(base.tree), &non_owning_view);
+    let tree = base.ownership.fully_replicated(base.tree);
+    let (replicated, sets) = Nodes::new(&tree, &non_owning_view);
     let of_replicated = components::merge(&replicated, sets, &non_owning_view).merged.numbered();
-    let [mine, all] = [nodes, &replicated].map(|nodes| nodes.replicated().collect::<Vec<_>>());
+    let mine: Vec<_> = nodes.replicated(base.tree).collect();
+    let all: Vec<_> = replicated.replicated(&tree).collect();
     assert_eq!(mine.len(), all.len(), "all ranks hold the same fully replicated bricks");
     let (mut pairs, mut labelled) = (Vec::new(), vec![false; labels.len()]);
     for (mine, all) in mine.into_iter().zip(all) {
-        for (replicated, part) in replicated.components(all) {
+        replicated.masks.brick(all, |replicated, part| {
             // It is part of one component, as this rank holds more bricks.
-            let whole = nodes.components(mine).find(|whole| whole.1 & part != 0);
-            let (c, _) = whole.expect("both have the leaves of the brick");
-            let component = merged[c as usize] as usize;
+            let mut whole = None;
+            nodes.masks.brick(mine, |c, bits| {
+                if bits & part != 0 {
+                    whole = Some(c)
+                }
+            });
+            let component =
+                merged[whole.expect("both have the leaves of the brick") as usize] as usize;
             let label = &mut labels[component];
             let replicated = Label::from(of_replicated[replicated as usize]);
             if !std::mem::replace(&mut labelled[component], true) {
@@ -70,7 +76,7 @@ fn label_replicated(labels: &mut [Label], base: &Base, nodes: &Nodes, merged: &[
             } else if *label != replicated {
                 pairs.push([*label, replicated]);
             }
-        }
+        });
     }
     pairs
 }

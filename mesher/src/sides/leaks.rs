@@ -184,15 +184,14 @@ impl Components {
     fn volumes(&self, base: &Base) -> Vec<[u64; 2]> {
         let mut mine = vec![0; self.labels.len()];
         for l in 0..=LEVEL_MAX {
-            let bricks = Tree::exists(&base.tree.split, l);
-            for (Brick { key, .. }, part) in bricks.zip(self.nodes.parts(l)) {
+            for (Brick { key, .. }, part) in self.nodes.bricks(base.tree, l) {
                 if !base.ownership.owns(l, key) {
                     continue;
                 }
-                for (c, bits) in self.nodes.components(part) {
+                self.nodes.masks.brick(part, |c, bits| {
                     mine[self.merged[c as usize] as usize] +=
                         u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));
-                }
+                });
             }
         }
         let mine = self.labels.iter().zip(mine).map(|(&label, volume)| [label, volume]).collect();

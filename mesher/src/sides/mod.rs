@@ -16,6 +16,7 @@
 pub mod components;
 pub mod global;
 pub mod leaks;
+pub mod masks;
 pub mod nodes;
 pub mod openness;
 pub mod rays;
@@ -31,10 +32,12 @@ use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree};
 use global::Label;
+use masks::Part;
 use nodes::{Component, Nodes};
 use ranks::Comm;
 use serde::Serialize;
 use std::collections::HashSet;
+use std::mem::take;
 use verdict::{FirstLeaf, FirstLeaves};
 
 /// The base tree as one rank holds it, and what its sides depend on.
@@ -214,7 +217,7 @@ pub fn decide(base: &Base, options: &Options, is_closed: bool) -> Result<Decided
     let (stored, summary, rays) = (PerLevel::default(), verdict.summary, verdict.rays);
     let mut sides = Sides { keep, stored, summary, rays, bytes };
     let mut regions = if is_closed { Vec::new() } else { leaks::Region::of(rules) };
-    let leaves_enclosed = sides.store(base, &nodes, &of_local, &mut regions);
+    let leaves_enclosed = sides.store(base, nodes, &of_local, &mut regions);
     let inside = verdict.inside.len() as u64;
     (sides.summary.inside, sides.summary.outside) = (inside, all.len() as u64 - inside);
     sides.summary.enclosed = verdict.enclosed_components(&all, leaves_enclosed, base);
@@ -227,24 +230,27 @@ impl Sides {
     fn store(
         &mut self,
         base: &Base,
-        nodes: &Nodes,
+        mut nodes: Nodes,
         of_local: &[Class],
         regions: &mut [leaks::Region],
     ) -> u64 {
-        let mut leaves_enclosed = 0;
+        let (mut leaves_enclosed, mut masks) = (0, take(&mut nodes.masks));
+        let (mut block, mut of_block) = (Part::default(), [[0; 8]; 3]);
         for l in 0..LEVELS as Level {
             let mut crossing = base.tree.crossing[l as usize].cursor();
-            let parts = nodes.parts(l).zip(Tree::exists(&base.tree.split, l));
-            parts.for_each(|(part, Brick { key, .. })| {
-                let (mut open, mut within, mut enclosed) = (0, 0, 0);
-                for (c, part) in nodes.components(part) {
-                    open |= part;
-                    match of_local[c as usize] {
-                        Class::Outside => {}
-                        Class::Inside => within |= part,
-                        Class::Enclosed => enclosed |= part,
-                    }
+            nodes.bricks(base.tree, l).for_each(|(Brick { key, .. }, part)| {
+                if block != (Part { brick: 0, ..part }) {
+                    block = Part { brick: 0, ..part };
+                    of_block = [[0; 8]; 3];
+                    masks.block(block, |c, octants| {
+                        let all = &mut of_block[of_local[c as usize] as usize];
+                        (0..8).for_each(|j| all[j] |= octants[j]);
+                    });
+                    masks.free_before(block);
                 }
+                let [outside, within, enclosed] =
+                    of_block.each_ref().map(|of| of[key as usize & 7]);
+                let open = outside | within | enclosed;
                 let stored = match self.keep {
                     Keep::All => within,
                     Keep::Outside => within | enclosed,
@@ -352,7 +358,7 @@ mod tests {
     fn on_ranks(tree: &Tree, ranks: usize, owners: &BTreeMap<u64, usize>) -> Firsts {
         let results = sim::run(ranks, 1, |comm| {
             let owners = owners.iter().map(|(&start, &owner)| (start, owner % ranks));
-            let ownership = &Ownership::along(comm.rank(), ranks, owners);
+            let ownership = &Ownership::along(comm.rank(), ranks, owners.collect());
             let mut tree = tree.clone();
             for sets in [&mut tree.split, &mut tree.crossing] {
                 for (l, set) in (0..).zip(sets) {

@@ -8,6 +8,7 @@
 //! - the children of a node are contiguous in the next level, one for each non-zero byte of `split`;
 //! - components are numbered through all levels in order; each is a set of leaves of one block, and no leaf is in two.
 
+use super::masks::{Masks, Part};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::brick::{self, Block, Brick};
 use bricks::brickset::ones;
@@ -25,7 +26,8 @@ pub type Node = u32;
 #[derive(Default)]
 pub struct Nodes {
     levels: Vec<LevelNodes>,
-    masks: Vec<u64>,
+    /// The octants of the components.
+    pub masks: Masks,
 }
 
 #[derive(Default)]
@@ -42,24 +44,15 @@ struct LevelNodes {
 struct BlockStart {
     node: Node,
     component: Component,
-    /// Each brick has a mask for each component of its block, and some have no octants.
-    mask: u32,
+    /// Where the octants of its components begin.
+    word: u32,
 }
 
-/// The components of a brick: those of its block.
-#[derive(Clone, Copy, Debug)]
-pub struct Part {
-    first: Component,
-    count: u32,
-    mask: u32,
-}
-
-impl Part {
-    /// That of brick `n` of a block with this start and end.
+impl BlockStart {
+    /// The components of brick `brick` of the block, before the start of the next.
     #[inline(always)]
-    fn of([start, end]: [BlockStart; 2], n: u32) -> Self {
-        let count = end.component - start.component;
-        Self { first: start.component, count, mask: start.mask + n * count }
+    fn part(self, next: Self, brick: u8) -> Part {
+        Part { components: [self.component, next.component], word: self.word, brick }
     }
 }
 
@@ -121,11 +114,11 @@ pub struct OpenBrick {
 }
 
 /// The bricks of a level in Morton order: one for each node.
-pub fn open_bricks<'a>(
-    tree: &'a Tree,
-    ownership: &'a Ownership,
+pub fn open_bricks(
+    tree: &Tree,
+    ownership: &Ownership,
     l: Level,
-) -> impl Iterator<Item = OpenBrick> + 'a {
+) -> impl Iterator<Item = OpenBrick> {
     let mut split = tree.split[l as usize].cursor();
     let mut crossing = tree.crossing[l as usize].cursor();
     Tree::exists(&tree.split, l).map(move |Brick { key, bits }| {
@@ -161,6 +154,12 @@ pub struct Child {
 }
 
 impl Family {
+    /// The components of the children.
+    #[inline(always)]
+    pub fn block(&self) -> Part {
+        self.block[0].part(self.block[1], 0)
+    }
+
     /// The child brick below octant group `j`; none if no octant of the group is split.
     #[inline(always)]
     pub fn child(&self, j: u64) -> Option<Child> {
@@ -168,7 +167,7 @@ impl Family {
         (self.bricks >> j & 1 == 1).then(|| Child {
             node: self.block[0].node + before,
             exists: brick::children(brick::byte(self.split, j)),
-            part: Part::of(self.block, before),
+            part: self.block[0].part(self.block[1], j as u8),
         })
     }
 }
@@ -178,7 +177,11 @@ impl Family {
 struct NewBlock {
     /// Its non-crossing leaves.
     open: Block,
-    /// Components of the two levels above, with the octants of the block that they fill.
+    /// The key of the brick above it.
+    key: u64,
+    /// The components of this brick, and of the brick above that, as far as there are such bricks.
+    parents: Vec<Part>,
+    /// Components of these, with the octants of the block that they fill.
     above: Vec<(Component, Block)>,
     /// The components, each with one of the levels above that it is connected to, if there is one. Leaves of these levels may be all that
     /// connects its leaves.
@@ -187,13 +190,23 @@ struct NewBlock {
 
 widest! {
     /// Finds what is connected in a block, and unites those of the levels above that it connects.
-    fn fill(block: &mut NewBlock, sets: &mut UnionFind) = fill_lanes;
+    fn fill(block: &mut NewBlock, masks: &mut Masks, sets: &mut UnionFind) = fill_lanes;
 }
 
 #[inline(always)]
-fn fill_lanes(block: &mut NewBlock, sets: &mut UnionFind) {
-    let NewBlock { open, above, found } = block;
+fn fill_lanes(block: &mut NewBlock, masks: &mut Masks, sets: &mut UnionFind) {
+    let NewBlock { open, key, parents, above, found } = block;
     let and = |a, b| a & b;
+    above.clear();
+    for (up, part) in parents.iter().enumerate() {
+        masks.brick(*part, |c, bits| {
+            let fill = |j| match up {
+                0 => brick::children(brick::byte(bits, j as u64)),
+                _ => u64::from(brick::byte(bits, *key & 7) >> j & 1).wrapping_neg(),
+            };
+            above.push((c, std::array::from_fn(fill)));
+        });
+    }
     // What is in no component yet.
     let mut free = above.iter().fold(*open, |all, (_, w)| both(&all, w, |a, b| a | b));
     let within = brick::layers(free);
@@ -215,7 +228,14 @@ fn fill_lanes(block: &mut NewBlock, sets: &mut UnionFind) {
         found.push((None, grow(seed)));
         free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
     }
-    found.retain(|(_, w)| !is_empty(&both(w, open, and)));
+    for (above, w) in found {
+        let octants = both(w, open, and);
+        if !is_empty(&octants) {
+            let set = above.map_or(sets.0.len() as Component, |above| sets.find(above));
+            sets.0.push(set);
+            masks.push(&octants);
+        }
+    }
 }
 
 #[inline(always)]
@@ -241,15 +261,14 @@ impl Nodes {
             let (mut node, mut parents) = (0, [0; 2]);
             for above in 0..l.checked_sub(1).map_or(1, |l| nodes.levels[l as usize].split.len()) {
                 let split = if l == 0 { 1 } else { nodes.split(l - 1, above as Node) };
-                level.blocks.push(nodes.block_start(node, &sets));
+                level.blocks.push(nodes.block_start(node));
                 if split == 0 {
                     continue;
                 }
-                let (groups, mut key) = (brick::parents(split).into(), 0);
                 block.open = [0; 8];
-                for j in ones(groups) {
+                for j in ones(brick::parents(split).into()) {
                     let b = bricks.next().expect("split octants have a brick below");
-                    (key, block.open[j as usize]) = (b.key >> 3, b.open);
+                    (block.key, block.open[j as usize]) = (b.key >> 3, b.open);
                     if b.placement != Placement::Local {
                         level.placements.resize(node as usize, Placement::Local);
                         level.placements.push(b.placement);
@@ -259,53 +278,42 @@ impl Nodes {
                     }
                     node += 1;
                 }
-                block.above.clear();
+                block.parents.clear();
                 let mut child = above;
                 for (up, parent) in (1..=l).zip(&mut parents) {
-                    for (c, bits) in nodes.components(nodes.part(l - up, child as Node, parent)) {
-                        let fill = |j| match up {
-                            1 => brick::children(brick::byte(bits, j as u64)),
-                            _ => u64::from(brick::byte(bits, key & 7) >> j & 1).wrapping_neg(),
-                        };
-                        block.above.push((c, std::array::from_fn(fill)));
-                    }
+                    let place = (block.key >> (3 * (up - 1)) & 7) as u8;
+                    block.parents.push(nodes.part(l - up, child as Node, place, parent));
                     child = *parent;
                 }
-                fill(&mut block, &mut sets);
-                for (c, (above, _)) in (sets.0.len() as Component..).zip(&block.found) {
-                    let set = above.map_or(c, |above| sets.find(above));
-                    sets.0.push(set);
-                }
-                for j in ones(groups).map(|j| j as usize) {
-                    nodes.masks.extend(block.found.iter().map(|(_, w)| w[j] & block.open[j]));
-                }
+                fill(&mut block, &mut nodes.masks, &mut sets);
             }
-            level.blocks.push(nodes.block_start(node, &sets));
+            level.blocks.push(nodes.block_start(node));
             nodes.levels.push(level);
         }
         (nodes, sets)
     }
 
-    fn block_start(&self, node: Node, sets: &UnionFind) -> BlockStart {
-        let mask = u32::try_from(self.masks.len()).expect("fewer than 2^32 masks");
-        BlockStart { node, component: sets.0.len() as Component, mask }
+    fn block_start(&mut self, node: Node) -> BlockStart {
+        let (component, word) = self.masks.begin();
+        BlockStart { node, component, word }
     }
 
-    /// The components of a node of level `l`, whose parent is not before `parent`, which becomes the parent.
-    fn part(&self, l: Level, node: Node, parent: &mut usize) -> Part {
+    /// The components of a node of level `l` at place `brick` of its block, whose parent is not before `parent`, which becomes the parent.
+    fn part(&self, l: Level, node: Node, brick: u8, parent: &mut usize) -> Part {
         let blocks = &self.levels[l as usize].blocks;
         while blocks[*parent + 1].node <= node {
             *parent += 1;
         }
-        let block = [blocks[*parent], blocks[*parent + 1]];
-        Part::of(block, node - block[0].node)
+        blocks[*parent].part(blocks[*parent + 1], brick)
     }
 
-    /// The components of each node of a level.
-    pub fn parts(&self, l: Level) -> impl Iterator<Item = Part> + '_ {
-        self.levels[l as usize].blocks.windows(2).flat_map(|block| {
-            let block = [block[0], block[1]];
-            (0..block[1].node - block[0].node).map(move |n| Part::of(block, n))
+    /// The bricks of a level of the tree, with their components.
+    pub fn bricks(&self, tree: &Tree, l: Level) -> impl Iterator<Item = (Brick, Part)> {
+        let (mut node, mut parent) = (0, 0);
+        Tree::exists(&tree.split, l).map(move |b| {
+            let part = self.part(l, node, (b.key & 7) as u8, &mut parent);
+            node += 1;
+            (b, part)
         })
     }
 
@@ -318,12 +326,12 @@ impl Nodes {
     pub fn bytes(&self) -> usize {
         let of_level =
             |level: &LevelNodes| size_of_val(&level.split[..]) + size_of_val(&level.blocks[..]);
-        self.levels.iter().map(of_level).sum::<usize>() + size_of_val(&self.masks[..])
+        self.levels.iter().map(of_level).sum::<usize>() + self.masks.bytes()
     }
 
     /// The brick of level 0.
     pub fn root(&self) -> Child {
-        Child { node: 0, exists: 1, part: self.part(0, 0, &mut 0) }
+        Child { node: 0, exists: 1, part: self.part(0, 0, 0, &mut 0) }
     }
 
     /// The split octants of a node.
@@ -347,30 +355,11 @@ impl Nodes {
         self.levels[l as usize].placements.get(n as usize).copied().unwrap_or(Placement::Local)
     }
 
-    /// The components with leaves in a brick, and their octants.
-    pub fn components(&self, part: Part) -> impl Iterator<Item = (Component, u64)> + '_ {
-        let masks = &self.masks[part.mask as usize..][..part.count as usize];
-        (part.first..).zip(masks.iter().copied()).filter(|c| c.1 != 0)
-    }
-
-    /// The components of a block: the number of the first, and their octants.
-    pub fn block(&self, family: &Family, out: &mut Vec<Block>) -> Component {
-        let [start, end] = family.block;
-        let count = (end.component - start.component) as usize;
-        out.clear();
-        out.resize(count, [0; 8]);
-        let masks = self.masks[start.mask as usize..end.mask as usize].chunks(count.max(1));
-        for (j, masks) in ones(u64::from(family.bricks)).zip(masks) {
-            out.iter_mut().zip(masks).for_each(|(octants, mask)| octants[j as usize] = *mask);
-        }
-        start.component
-    }
-
     /// The components of fully replicated bricks, brick by brick in an order that is the same on all ranks.
-    pub fn replicated(&self) -> impl Iterator<Item = Part> + '_ {
+    pub fn replicated(&self, tree: &Tree) -> impl Iterator<Item = Part> {
         (0..).zip(&self.levels).flat_map(|(l, level)| {
-            let nodes = self.parts(l).zip(&level.placements);
-            nodes.filter(|node| *node.1 == Placement::FullyReplicated).map(|node| node.0)
+            let nodes = self.bricks(tree, l).zip(&level.placements);
+            nodes.filter(|node| *node.1 == Placement::FullyReplicated).map(|node| node.0.1)
         })
     }
 
@@ -385,14 +374,13 @@ impl Nodes {
                 let children = brick::parents(split).count_ones();
                 assert_eq!(start + children, end, "children of node {n} of level {l} must follow");
             }
-            for (n, part) in self.parts(l).enumerate() {
-                let masks = self.components(part).map(|c| c.1);
-                let (all, sum) =
-                    masks.fold((0, 0), |(all, sum), m| (all | m, sum + m.count_ones()));
-                assert!(
-                    all.count_ones() == sum,
-                    "node {n} of level {l}: a leaf has two components"
-                );
+            for (n, block) in level.blocks.windows(2).enumerate() {
+                let mut all = [0; 8];
+                self.masks.block(block[0].part(block[1], 0), |_, octants| {
+                    let common = both(&all, &octants, |a, b| a & b);
+                    assert!(is_empty(&common), "block {n} of level {l}: a leaf has two components");
+                    all = both(&all, &octants, |a, b| a | b);
+                });
             }
         }
     }
@@ -427,8 +415,11 @@ impl Nodes {
             let family = self.family(m, brick.node);
             let leaves = octants & !family.split;
             if leaves != 0 {
-                let components = self.components(brick.part);
-                components.filter(|c| c.1 & leaves != 0).for_each(|c| found(c.0));
+                self.masks.brick(brick.part, |c, bits| {
+                    if bits & leaves != 0 {
+                        found(c);
+                    }
+                });
             }
             if leaves == octants || m == l {
                 return;
@@ -480,8 +471,13 @@ mod tests {
         let m = (0..=l).rev().find(|&m| exists(m))?;
         let at = code >> (3 * (l - m));
         let node = Tree::exists(&tree.split, m).position(|b| b.key == at >> 6)?;
-        let mut components = nodes.components(nodes.parts(m).nth(node)?);
-        components.find(|c| c.1 >> (at & 63) & 1 == 1).map(|c| c.0)
+        let mut found = None;
+        nodes.masks.brick(nodes.bricks(tree, m).nth(node)?.1, |c, bits| {
+            if bits >> (at & 63) & 1 == 1 {
+                found = Some(c);
+            }
+        });
+        found
     }
 
     proptest! {
@@ -529,12 +525,10 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "node 0 of level 1: a leaf has two components")]
+    #[should_panic(expected = "block 0 of level 1: a leaf has two components")]
     fn a_leaf_of_two_components_is_found() {
         let (mut nodes, _) = Nodes::new(&tree(&[0]), &Ownership::solo());
-        let first = nodes.levels[1].blocks[0].mask as usize;
-        let leaves = nodes.masks[first];
-        nodes.masks.insert(first, leaves);
+        // The first component of the next block becomes one of this block, too.
         nodes.levels[1].blocks[1].component += 1;
         nodes.check_invariants();
     }

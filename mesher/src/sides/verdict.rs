@@ -19,7 +19,7 @@ use crate::input::lattice::{Enclosed, Keep};
 use bricks::brick::Brick;
 use bricks::brickset::ones;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_BITS, ROOT_EDGE, corner, edge, morton};
-use bricks::tree::{LEVELS, Tree};
+use bricks::tree::LEVELS;
 use bytemuck::allocation::pod_collect_to_vec;
 use ranks::{Comm, all_gather_reduced, gather};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -57,12 +57,12 @@ pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) 
     let mut first: Vec<Vec<Candidate>> = vec![Vec::new(); labels.len()];
     let mut unfinished = labels.len();
     for l in 0..LEVELS as Level {
-        let bricks = nodes.parts(l).zip(Tree::exists(&base.tree.split, l));
-        for (part, Brick { key, .. }) in bricks.filter(|b| base.ownership.owns(l, b.1.key)) {
+        let bricks = nodes.bricks(base.tree, l);
+        for (Brick { key, .. }, part) in bricks.filter(|b| base.ownership.owns(l, b.0.key)) {
             if unfinished == 0 {
                 break;
             }
-            for (c, bits) in nodes.components(part) {
+            nodes.masks.brick(part, |c, bits| {
                 let list = &mut first[merged[c as usize] as usize];
                 // Local components of one brick may be parts of one component: then their leaves are interleaved in Morton order.
                 let is_of_brick = |last: &Candidate| *last >= Candidate::new(l, key << 6);
@@ -72,7 +72,7 @@ pub fn candidates(base: &Base, nodes: &Nodes, merged: &[u32], labels: &[Label]) 
                     list.extend(ones(bits).map(leaf));
                     unfinished -= usize::from(before < CANDIDATES && list.len() >= CANDIDATES);
                 }
-            }
+            });
         }
     }
     first_of_all(labels.iter().copied().zip(first).filter(|(_, list)| !list.is_empty()))

@@ -24,7 +24,7 @@ pub fn owners() -> impl Strategy<Value = Vec<usize>> {
 
 pub fn ownership(rank: usize, owners: &[usize]) -> Ownership {
     let starts = (0..).map(|code| start57(FINE, code));
-    Ownership::along(rank, RANKS, starts.zip(owners.iter().copied()))
+    Ownership::along(rank, RANKS, starts.zip(owners.iter().copied()).collect())
 }
 
 /// All bricks down to one level below the finest that could be replicated, and the owners of the intervals in each.
