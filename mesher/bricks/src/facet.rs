@@ -27,6 +27,7 @@
 
 use crate::brick::SPANS;
 use crate::octant::{Level, ROOT_BITS};
+use crate::widest;
 use bytemuck::{Pod, Zeroable};
 
 /// A facet on the lattice.
@@ -133,7 +134,7 @@ impl FacetTest {
             wide += usize::from(first < last);
         }
         // A connected set within one row of octants meets each octant that its extent meets.
-        if wide < 2 { mask } else { mask & kernel::separated(self.prepared(f), corner, shift) }
+        if wide < 2 { mask } else { mask & separated(self.prepared(f), corner, shift) }
     }
 }
 
@@ -155,159 +156,85 @@ fn sides(v: &[[i32; 3]; 3], normal: i64, a: usize) -> [Side; 3] {
     [side(longest, 1), side(longest, -1), side(longest, -1)]
 }
 
-/// The ten tests by plane and edges, in the widest vectors that the processor supports.
-mod kernel {
-    use super::{COLUMNS, FacetTest, Side};
-
-    /// Octants that neither the normal nor a cross product separates from the facet. To be intersected with the
+widest! {
+    /// The ten tests by plane and edges: octants that neither the normal nor a cross product separates from the facet. To be intersected with the
     /// mask of the coordinate axes.
-    #[inline]
-    pub fn separated(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512dq") {
-            // SAFETY: the features that the function is compiled for have just been detected; these imply AVX-512 F.
-            return unsafe { avx512::separated(f, corner, shift) };
-        }
-        generic(f, corner, shift, plane_lanes, edge_lanes)
-    }
-
-    /// The tests, with the evaluation of lanes as parameters: all vector widths share the rest.
-    #[inline(always)]
-    pub fn generic(
-        f: &FacetTest,
-        corner: [i64; 3],
-        shift: u32,
-        plane: impl Fn([i64; 3], i64, i64) -> u64,
-        edge: impl Fn(i32, i32, i32) -> u16,
-    ) -> u64 {
-        let from = [0, 1, 2].map(|a| i64::from(f.facet.v[0][a]) - corner[a]);
-        let mut mask = plane_mask(from, f.normal, shift, plane);
-        for a in 0..3 {
-            let at = [corner[(a + 1) % 3], corner[(a + 2) % 3]];
-            let [s, t, r] = f.sides[a].map(|side| half_plane(side, at, shift, &edge));
-            let squares = usize::from(s & t & r);
-            mask &= COLUMNS[a][0][squares & 0xff] | COLUMNS[a][1][squares >> 8];
-        }
-        mask
-    }
-
-    /// Mask of the squares, i fastest, that meet a half-plane. Square (0, 0) is at `corner`.
-    #[inline(always)]
-    fn half_plane(
-        side: Side,
-        corner: [i64; 2],
-        shift: u32,
-        edge: &impl Fn(i32, i32, i32) -> u16,
-    ) -> u16 {
-        let (ci, cj) = (i64::from(side.ci), i64::from(side.cj));
-        // The edge function at its greatest over square (1, 1), in units of h.
-        let most =
-            ((side.at_origin + ci * corner[0] + cj * corner[1]) >> shift) + i64::from(side.growth);
-        edge(side.ci, side.cj, (-most).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32)
-    }
-
-    /// Octants that the plane through `from` with normal `n` meets.
-    #[inline(always)]
-    fn plane_mask(
-        from: [i64; 3],
-        n: [i64; 3],
-        shift: u32,
-        plane: impl Fn([i64; 3], i64, i64) -> u64,
-    ) -> u64 {
-        let offset: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(from[a])).sum();
-        let up: i64 = n.iter().map(|v| v.max(&0)).sum();
-        let down: i64 = n.iter().map(|v| v.min(&0)).sum();
-        // In units of h, the scalar product with n ranges over octant (i, j, k) from n.(i, j, k) + down to
-        // n.(i, j, k) + up, and is offset / h on the plane. Beyond 4 * (up - down) < 2^62, no octant of the
-        // brick meets the plane. The lanes stay below 3 * 2^60 + 2^60 + 2^62 = 2^63 in magnitude.
-        let floor = offset >> shift;
-        if floor.abs() > 4 * i128::from(up - down) {
-            return 0;
-        }
-        let ceil = (offset + ((1 << shift) - 1)) >> shift;
-        plane(n, up - ceil as i64, down - floor as i64)
-    }
-
-    /// Mask of the octants (i, j, k) where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
-    #[inline(always)]
-    pub fn plane_lanes(n: [i64; 3], most: i64, least: i64) -> u64 {
-        // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
-        let mut low = [0i64; 8];
-        for i in 0..8usize {
-            for a in 0..3 {
-                low[i] += n[a] * (i >> a & 1) as i64;
-            }
-        }
-        let mut outside = 0;
-        for byte in 0..8usize {
-            let base = 2 * low[byte];
-            for i in 0..8usize {
-                let v = low[i] + base;
-                let misses = (v + most < 0) | (v + least > 0);
-                outside |= u64::from(misses) << (8 * byte + i);
-            }
-        }
-        !outside
-    }
-
-    /// Mask of the squares (i, j), i fastest, where `ci * (i - 1) + cj * (j - 1) >= least`.
-    #[inline(always)]
-    pub fn edge_lanes(ci: i32, cj: i32, least: i32) -> u16 {
-        let mut mask = 0;
-        for k in 0..16 {
-            let v = ci * ((k & 3) - 1) + cj * ((k >> 2) - 1);
-            mask |= u16::from(v >= least) << k;
-        }
-        mask
-    }
-
-    /// 512 bits at a time.
-    #[cfg(target_arch = "x86_64")]
-    mod avx512 {
-        use super::FacetTest;
-        use std::arch::x86_64::*;
-
-        #[target_feature(enable = "avx512bw,avx512dq")]
-        pub fn separated(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
-            let plane = |n, most, least| plane(n, most, least);
-            super::generic(f, corner, shift, plane, |ci, cj, least| edge(ci, cj, least))
-        }
-
-        #[inline]
-        #[target_feature(enable = "avx512bw,avx512dq")]
-        fn plane(n: [i64; 3], most: i64, least: i64) -> u64 {
-            let lane = |m: u8, v: i64| _mm512_maskz_set1_epi64(m, v);
-            // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
-            let add = |a: __m512i, b: __m512i| _mm512_add_epi64(a, b);
-            let low = add(add(lane(0xaa, n[0]), lane(0xcc, n[1])), lane(0xf0, n[2]));
-            let low_most = add(low, _mm512_set1_epi64(most));
-            let width = _mm512_set1_epi64(most - least);
-            // `v + most >= 0` and `v + least <= 0` in one comparison: without signs, negative numbers are beyond `most - least >= 0`.
-            let byte = |byte: i64| {
-                let base = 2 * (n[0] * (byte & 1) + n[1] * (byte >> 1 & 1) + n[2] * (byte >> 2));
-                _mm512_cmple_epu64_mask(add(low_most, _mm512_set1_epi64(base)), width)
-            };
-            let pair = |i: i64| _mm512_kunpackb(u16::from(byte(i + 1)), u16::from(byte(i)));
-            let four = |i: i64| _mm512_kunpackw(u32::from(pair(i + 2)), u32::from(pair(i)));
-            _mm512_kunpackd(u64::from(four(4)), u64::from(four(0)))
-        }
-
-        #[inline]
-        #[target_feature(enable = "avx512bw,avx512dq")]
-        fn edge(ci: i32, cj: i32, least: i32) -> u16 {
-            let i = _mm512_setr_epi32(-1, 0, 1, 2, -1, 0, 1, 2, -1, 0, 1, 2, -1, 0, 1, 2);
-            let j = _mm512_setr_epi32(-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2);
-            let along = |c: i32, lanes: __m512i| _mm512_mullo_epi32(_mm512_set1_epi32(c), lanes);
-            let v = _mm512_add_epi32(along(ci, i), along(cj, j));
-            _mm512_cmpge_epi32_mask(v, _mm512_set1_epi32(least))
-        }
-    }
+    fn separated(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 = lanes;
 }
 
+#[inline(always)]
+fn lanes(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
+    let from = [0, 1, 2].map(|a| i64::from(f.facet.v[0][a]) - corner[a]);
+    let mut mask = plane_mask(from, f.normal, shift);
+    for a in 0..3 {
+        let at = [corner[(a + 1) % 3], corner[(a + 2) % 3]];
+        let squares = usize::from(squares(f.sides[a].map(|side| half_plane(side, at, shift))));
+        mask &= COLUMNS[a][0][squares & 0xff] | COLUMNS[a][1][squares >> 8];
+    }
+    mask
+}
+
+/// A half-plane in units of h: where `ci * (i - 1) + cj * (j - 1) >= least`, the square (i, j) meets it. Square (0, 0) is at `corner`.
+#[inline(always)]
+fn half_plane(side: Side, corner: [i64; 2], shift: u32) -> [i32; 3] {
+    let (ci, cj) = (i64::from(side.ci), i64::from(side.cj));
+    // The edge function at its greatest over square (1, 1), in units of h.
+    let most =
+        ((side.at_origin + ci * corner[0] + cj * corner[1]) >> shift) + i64::from(side.growth);
+    let least = (-most).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+    [side.ci, side.cj, least]
+}
+
+/// Mask of the squares, i fastest, that meet three half-planes.
+#[inline(always)]
+fn squares(sides: [[i32; 3]; 3]) -> u16 {
+    let mut mask = 0;
+    for k in 0..16 {
+        let meets = |[ci, cj, least]: [i32; 3]| ci * ((k & 3) - 1) + cj * ((k >> 2) - 1) >= least;
+        mask |= u32::from(meets(sides[0]) & meets(sides[1]) & meets(sides[2])) << k;
+    }
+    mask as u16
+}
+
+/// Octants that the plane through `from` with normal `n` meets.
+#[inline(always)]
+fn plane_mask(from: [i64; 3], n: [i64; 3], shift: u32) -> u64 {
+    let offset: i128 = (0..3).map(|a| i128::from(n[a]) * i128::from(from[a])).sum();
+    let up: i64 = n.iter().map(|v| v.max(&0)).sum();
+    let down: i64 = n.iter().map(|v| v.min(&0)).sum();
+    // In units of h, the scalar product with n ranges over octant (i, j, k) from n.(i, j, k) + down to
+    // n.(i, j, k) + up, and is offset / h on the plane. Beyond 4 * (up - down) < 2^62, no octant of the
+    // brick meets the plane. The lanes stay below 3 * 2^60 + 2^60 + 2^62 = 2^63 in magnitude.
+    let floor = offset >> shift;
+    if floor.abs() > 4 * i128::from(up - down) {
+        return 0;
+    }
+    let ceil = (offset + ((1 << shift) - 1)) >> shift;
+    // Octants (i, j, k) are met where `n.(i, j, k) + most >= 0` and `n.(i, j, k) + least <= 0`.
+    let (most, least) = (up - ceil as i64, down - floor as i64);
+    // Lanes enumerate the low bits x0, y0, z0 of the octant's index, bytes the high bits x1, y1, z1.
+    let mut low = [0i64; 8];
+    for i in 0..8usize {
+        for a in 0..3 {
+            low[i] += n[a] * (i >> a & 1) as i64;
+        }
+    }
+    let mut met = [0u64; 8];
+    for byte in 0..8usize {
+        let base = 2 * low[byte] + most;
+        for i in 0..8usize {
+            // Without signs, negative numbers are beyond `most - least >= 0`.
+            let meets = (low[i] + base) as u64 <= (most - least) as u64;
+            met[i] |= u64::from(meets) << (8 * byte + i);
+        }
+    }
+    met.into_iter().fold(0, |all, of| all | of)
+}
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::octant::{edge, position};
+    use crate::wide::widths;
     use proptest::prelude::*;
 
     fn vertex(reach: std::ops::Range<i32>) -> impl Strategy<Value = [i32; 3]> {
@@ -351,8 +278,8 @@ mod tests {
             let f = Facet { v };
             let corner = position(at).map(|p| i64::from(p) << 25);
             let shift = ROOT_BITS - l;
-            let portable = kernel::generic(&FacetTest::new(&f), corner, shift, kernel::plane_lanes, kernel::edge_lanes);
-            prop_assert_eq!(kernel::separated(&FacetTest::new(&f), corner, shift), portable);
+            let masks = widths(|| separated(&FacetTest::new(&f), corner, shift));
+            prop_assert!(masks.iter().all(|mask| mask.1 == masks[0].1), "{:?}", masks);
         }
     }
 
@@ -380,10 +307,7 @@ mod tests {
                 ("normal", &|a| facet(a).normal().map(i128::from).to_vec()),
                 ("crossed", &|a| vec![crossed(&facet(a), corner(a), a[12] as Level).into()]),
                 ("separated", &|a| {
-                    vec![
-                        kernel::separated(&FacetTest::new(&facet(a)), corner(a), a[12] as u32)
-                            .into(),
-                    ]
+                    vec![separated(&FacetTest::new(&facet(a)), corner(a), a[12] as u32).into()]
                 }),
             ],
         );

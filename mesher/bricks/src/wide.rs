@@ -4,6 +4,7 @@
 //! thus compute the same by construction; tests still run each of them.
 
 use std::cell::Cell;
+use std::sync::LazyLock;
 
 /// Instruction sets that the compiler may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -24,8 +25,9 @@ thread_local! {
 /// The widest that this processor supports.
 #[inline]
 pub fn width() -> Width {
+    static DETECTED: LazyLock<Width> = LazyLock::new(detected);
     let forced = if cfg!(debug_assertions) { FORCED.get() } else { None };
-    forced.unwrap_or_else(detected)
+    forced.unwrap_or_else(|| *DETECTED)
 }
 
 /// The results of `work` at every width that this processor supports, for tests. Release builds use the widest all the time.
@@ -40,23 +42,19 @@ pub fn widths<T>(mut work: impl FnMut() -> T) -> Vec<(Width, T)> {
     results.collect()
 }
 
-#[cfg(target_arch = "x86_64")]
-#[inline]
 fn detected() -> Width {
-    macro_rules! has {
-        ($($feature:tt)*) => { $(is_x86_feature_detected!($feature) &&)* true };
+    #[cfg(target_arch = "x86_64")]
+    {
+        macro_rules! has {
+            ($($feature:tt)*) => { $(is_x86_feature_detected!($feature) &&)* true };
+        }
+        let avx2 = has!("avx2" "bmi1" "bmi2" "lzcnt" "popcnt");
+        if avx2 && has!("avx512f" "avx512bw" "avx512dq" "avx512vl") {
+            return Width::Avx512;
+        } else if avx2 {
+            return Width::Avx2;
+        }
     }
-    let avx2 = has!("avx2" "bmi1" "bmi2" "lzcnt" "popcnt");
-    match avx2 && has!("avx512f" "avx512bw" "avx512dq" "avx512vl") {
-        true => Width::Avx512,
-        false if avx2 => Width::Avx2,
-        false => Width::Portable,
-    }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-#[inline]
-fn detected() -> Width {
     Width::Portable
 }
 
