@@ -3,7 +3,7 @@ import z3
 from kernels import (
     AXES, CHECK_SPLITS, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANTS, RAYS, ROOT, VERTEX, VERDICT, REFINE, bit, fact, has, i64, maximum,
     minimum, no, octant, u32, usize, word)
-from rust import coerced, Number, plain, Struct, term
+from rust import Number, plain, Struct, term
 
 
 # Facets
@@ -17,7 +17,6 @@ def normals(k):
     yield 3 * (18 << 54) < 1 << 60
 
 
-def function(name, file=FACET): return lambda run: lambda *args: run.call(name, args, file)
 def abs_at_most(n, bound): return z3.And(-bound <= n.x, n.x <= bound)
 
 
@@ -60,57 +59,27 @@ def columns(k):
 def square(i, a): return OCTANTS[i][(a + 1) % 3] + 4 * OCTANTS[i][(a + 2) % 3]
 
 
-# The instructions of AVX-512 that the lanes use, by their manual.
-def lanes_where(run, op, a, b):
-    lanes = [run.compared(op, x, y) for x, y in zip(a, b)]
-    return Number(f"u{len(lanes)}", sum(lane << i for i, lane in enumerate(lanes)) if all(isinstance(lane, bool) for lane in lanes) else word(lanes))
-
-
-def without_sign(n):
-    return Number("i64", n.x % (1 << 64) if n.is_known else z3.If(n.x < 0, n.x + (1 << 64), n.x))
-
-
-AVX512 = {
-    "_mm512_set1_epi64": lambda run, v: [v] * 8,
-    "_mm512_set1_epi32": lambda run, v: [v] * 16,
-    "_mm512_setr_epi32": lambda run, *v: [coerced(x, "i32") for x in v],
-    "_mm512_add_epi32": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
-    "_mm512_mullo_epi32": lambda run, a, b: [run.binary("*", x, y) for x, y in zip(a, b)],
-    "_mm512_cmpge_epi32_mask": lambda run, a, b: lanes_where(run, ">=", a, b),
-    "_mm512_maskz_set1_epi64": lambda run, m, v: [v if plain(m) >> i & 1 else i64(0) for i in range(8)],
-    "_mm512_add_epi64": lambda run, a, b: [run.binary("+", x, y) for x, y in zip(a, b)],
-    "_mm512_cmple_epu64_mask": lambda run, a, b: lanes_where(run, "<=", map(without_sign, a), map(without_sign, b)),
-    **{f"_mm512_kunpack{size}": lambda run, high, low, width=width: run.binary("|", run.binary("<<", high, width), low) for size, width in (("b", 8), ("w", 16), ("d", 32))},
-}
 SHIFTS = range(7, 28)  # of octants of levels 20 to 0
 
 
-def half_plane(k, lanes):
+@fact(FACET, ("+ i64::from(side.growth);", "+ i64::from(side.growth) - 1;"), ("ci * ((k & 3) - 1) + cj * ((k >> 2) - 1)", "cj * ((k & 3) - 1) + ci * ((k >> 2) - 1)"),
+      ("ci * ((k & 3) - 1) + cj * ((k >> 2) - 1)", "ci * ((k & 3) - 2) + cj * ((k >> 2) - 2)"), ("u32::from(s & t & r)", "u32::from(s & t | r)"))
+def half_planes(k):
+    """`squares` of what `half_plane` returns, whichever of the three sides it is: a square meets the closed half-plane if and only if some corner
+    of it does, and all terms fit their types, for all edges, starts, corners of bricks, and levels up to 20."""
     for shift in SHIFTS:
         h = 1 << shift
         ci, cj = (k.integer("i32", -(3 << 27), 3 << 27) for _ in range(2))
         start, corner = [k.integer("i64", *VERTEX) for _ in range(2)], [k.integer("i64", 0, ROOT) for _ in range(2)]
         growth = ci.x + cj.x + maximum([ci.x, z3.IntVal(0)]) + maximum([cj.x, z3.IntVal(0)])
         side = Struct(ci=ci, cj=cj, at_origin=Number("i64", -(ci.x * start[0].x) - cj.x * start[1].x), growth=Number("i32", growth))
-        mask = k("half_plane", side, corner, u32(shift), function(lanes), file=FACET, replaced=AVX512)
+        half, whole = k("half_plane", side, corner, u32(shift), file=FACET), [Number("i32", 0)] * 3
         def edge(i, j): return ci.x * (h * i + corner[0].x - start[0].x) + cj.x * (h * j + corner[1].x - start[1].x)
-        for i in range(4):
-            for j in range(4):
-                yield has(mask, i + 4 * j) == (maximum([edge(i + di, j + dj) for di in range(2) for dj in range(2)]) >= 0)
-
-
-@fact(FACET, ("+ i64::from(side.growth);", "+ i64::from(side.growth) - 1;"), ("let v = ci * ((k & 3) - 1) + cj * ((k >> 2) - 1);", "let v = cj * ((k & 3) - 1) + ci * ((k >> 2) - 1);"),
-      ("let v = ci * ((k & 3) - 1) + cj * ((k >> 2) - 1);", "let v = ci * ((k & 3) - 2) + cj * ((k >> 2) - 2);"))
-def half_planes(k):
-    """`half_plane` with `edge_lanes`: a square meets the closed half-plane if and only if some corner of it does, and all terms fit their
-    types, for all edges, starts, corners of bricks, and levels up to 20."""
-    yield from half_plane(k, "edge_lanes")
-
-
-@fact(FACET, ("along(ci, i), along(cj, j)", "along(cj, i), along(ci, j)"), ("-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2)", "-1, -1, -1, -1, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 1)"))
-def half_planes_avx512(k):
-    """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
-    yield from half_plane(k, "edge")
+        for at in range(3):
+            mask = k("squares", [half if s == at else whole for s in range(3)], file=FACET)
+            for i in range(4):
+                for j in range(4):
+                    yield has(mask, i + 4 * j) == (maximum([edge(i + di, j + dj) for di in range(2) for dj in range(2)]) >= 0)
 
 
 def projected(k): return [[k.integer("i32", *VERTEX) for _ in AXES] for _ in range(3)]
@@ -147,32 +116,22 @@ def degenerate(k):
                 *[back[of].x == -side[of].x for of in ("ci", "cj", "at_origin") for back in (other, last)]))
 
 
-def plane(k, lanes):
+@fact(FACET, ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 3 * i128::from(up - down) {"), ("let ceil = (offset + ((1 << shift) - 1)) >> shift;", "let ceil = offset >> shift;"),
+      ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 16 * i128::from(up - down) {"), ("<= (most - least) as u64", "<= most as u64"))
+def planes(k):
+    """`plane_mask`: an octant meets the facet's plane if and only if its corners are not all on one side, for all normals, vertices and levels up
+    to 20. What is decided without lanes is decided so, and all lanes fit i64."""
     for shift in SHIFTS:
         h = 1 << shift
         n = [k.integer("i64", -18 << 54, 18 << 54) for _ in AXES]
         vertex = [k.integer("i64", -(1 << 28), 1 << 28) for _ in AXES]
-        mask = k("plane_mask", vertex, n, u32(shift), function(lanes), file=FACET, replaced=AVX512)
+        mask = k("plane_mask", vertex, n, u32(shift), file=FACET)
         offset = sum(n[a].x * vertex[a].x for a in AXES)
         most, least = [sum(h * each([n[a].x, z3.IntVal(0)]) for a in AXES) for each in (maximum, minimum)]
         def meets(p): at = sum(h * p[a] * n[a].x for a in AXES) - offset; return z3.And(at + most >= 0, at + least <= 0)
         # Always so, which is lost where products become unknowns.
         is_plane = z3.Or([offset == 0] + [c.x != 0 for c in n])
         yield z3.Implies(is_plane, z3.And([has(mask, i) == meets(p) for i, p in enumerate(OCTANTS)]))
-
-
-@fact(FACET, ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 3 * i128::from(up - down) {"), ("let ceil = (offset + ((1 << shift) - 1)) >> shift;", "let ceil = offset >> shift;"),
-      ("if floor.abs() > 4 * i128::from(up - down) {", "if floor.abs() > 16 * i128::from(up - down) {"))
-def planes(k):
-    """`plane_mask` with `plane_lanes`: an octant meets the facet's plane if and only if its corners are not all on one side, for all normals,
-    vertices and levels up to 20. What is decided without lanes is decided so, and all lanes fit i64."""
-    yield from plane(k, "plane_lanes")
-
-
-@fact(FACET, ("let base = 2 * (n[0] * (byte & 1)", "let base = 2 * (n[0] * (byte & 3)"), ("lane(0xf0, n[2])", "lane(0xf8, n[2])"), ("_mm512_set1_epi64(most - least)", "_mm512_set1_epi64(most)"))
-def planes_avx512(k):
-    """The same with the instructions of AVX-512, whose lanes wrap silently: none does."""
-    yield from plane(k, "plane")
 
 
 # Rays

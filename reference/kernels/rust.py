@@ -385,6 +385,8 @@ class Run:
             return Number(type, float(plain(v)))
         if known(v):
             return Number(type, wrapped(type, plain(v)))
+        if v.is_unbounded and v.type[0] == "i" and type == f"u{WIDTHS[v.type]}":
+            return Number(type, z3.If(v.x < 0, v.x + (1 << WIDTHS[type]), v.x))
         if v.is_unbounded:
             self.check_range(v.x, type)
             return Number(type, v.x)

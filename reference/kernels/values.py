@@ -5,7 +5,6 @@ is `None`.
 """
 import random
 
-from facts_geometry import AVX512
 from kernels import (BRICK, CHECK_SPLITS, CHECK_SIDES, DIGEST, FACET, LATTICE, OCTANT, RAYS, ROOT, TILE, VERTEX, VERDICT, REFINE, i64, u32,
                      usize)
 from rust import Number, Run, Struct
@@ -79,15 +78,12 @@ def ray(r):
     return [f, p, usize(axis)]
 
 
-def separated(plane, edge):
-    """The tests by lanes, without asking which the processor has."""
-    def generic(run, f, corner, shift):
-        f = f if "facet" in f else run.call("new", [f], FACET)
-        return run.call("generic", [f, corner, shift, lambda *a: run.call(plane, a, FACET), lambda *a: run.call(edge, a, FACET)], FACET)
-    return {"separated": generic, "default": lambda run: Struct(), "prepared": lambda run, _, f: run.call("new", [f], FACET), **AVX512}
+def separated(run, f, corner, shift):
+    """The tests by lanes, at the width that every processor has."""
+    return run.call("lanes", [f if "facet" in f else run.call("new", [f], FACET), corner, shift], FACET)
 
 
-PORTABLE, WIDE = separated("plane_lanes", "edge_lanes"), separated("plane", "edge")
+REPLACED = {"separated": separated, "default": lambda run: Struct(), "prepared": lambda run, _, f: run.call("new", [f], FACET)}
 
 INPUTS = {
     (OCTANT, "spread"): lambda r: [u64(r)],
@@ -146,7 +142,7 @@ def lines(sources, only=None):
         for _ in range(DRAWS):
             inputs = draw(r)
             given = flat(list(inputs))
-            replaced = WIDE if name == "separated" else PORTABLE
-            outputs = replaced["separated"](Run(sources, replaced), *inputs) if name == "separated" else Run(sources, replaced).call(name, inputs, file)
+            run = Run(sources, REPLACED)
+            outputs = separated(run, *inputs) if name == "separated" else run.call(name, inputs, file)
             outputs = inputs[0] if name == "transpose" else outputs
             yield " ".join(map(str, [file, name, *given, "=", *(["None"] if outputs is None else flat(outputs))]))

@@ -190,8 +190,9 @@ fn half_plane(side: Side, corner: [i64; 2], shift: u32) -> [i32; 3] {
 fn squares(sides: [[i32; 3]; 3]) -> u16 {
     let mut mask = 0;
     for k in 0..16 {
-        let meets = |[ci, cj, least]: [i32; 3]| ci * ((k & 3) - 1) + cj * ((k >> 2) - 1) >= least;
-        mask |= u32::from(meets(sides[0]) & meets(sides[1]) & meets(sides[2])) << k;
+        let [s, t, r] =
+            sides.map(|[ci, cj, least]| ci * ((k & 3) - 1) + cj * ((k >> 2) - 1) >= least);
+        mask |= u32::from(s & t & r) << k;
     }
     mask as u16
 }
@@ -223,13 +224,14 @@ fn plane_mask(from: [i64; 3], n: [i64; 3], shift: u32) -> u64 {
     for byte in 0..8usize {
         let base = 2 * low[byte] + most;
         for i in 0..8usize {
-            // Without signs, negative numbers are beyond `most - least >= 0`.
+            // Without signs, negative numbers are beyond `most - least >= 0`: one comparison for both.
             let meets = (low[i] + base) as u64 <= (most - least) as u64;
             met[i] |= u64::from(meets) << (8 * byte + i);
         }
     }
-    met.into_iter().fold(0, |all, of| all | of)
+    met.iter().fold(0, |all, of| all | of)
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;
