@@ -63,10 +63,13 @@ SHIFTS = range(7, 28)  # of octants of levels 20 to 0
 
 
 @fact(FACET, ("+ i64::from(side.growth);", "+ i64::from(side.growth) - 1;"), ("ci * ((k & 3) - 1) + cj * ((k >> 2) - 1)", "cj * ((k & 3) - 1) + ci * ((k >> 2) - 1)"),
-      ("ci * ((k & 3) - 1) + cj * ((k >> 2) - 1)", "ci * ((k & 3) - 2) + cj * ((k >> 2) - 2)"), ("u32::from(s & t & r)", "u32::from(s & t | r)"))
+      ("ci * ((k & 3) - 1) + cj * ((k >> 2) - 1)", "ci * ((k & 3) - 2) + cj * ((k >> 2) - 2)"), ("u32::from(s & t & r)", "u32::from(s & t | r)"), ("u32::from(s & t & r)", "u32::from(s ^ t ^ r)"))
 def half_planes(k):
     """`squares` of what `half_plane` returns, whichever of the three sides it is: a square meets the closed half-plane if and only if some corner
-    of it does, and all terms fit their types, for all edges, starts, corners of bricks, and levels up to 20."""
+    of it does, and all terms fit their types, for all edges, starts, corners of bricks, and levels up to 20; and all three count."""
+    for bits in range(8):
+        sides = [[Number("i32", 0), Number("i32", 0), Number("i32", bits >> s & 1)] for s in range(3)]
+        yield plain(k("squares", sides, file=FACET)) == (0 if bits else 0xffff)
     for shift in SHIFTS:
         h = 1 << shift
         ci, cj = (k.integer("i32", -(3 << 27), 3 << 27) for _ in range(2))

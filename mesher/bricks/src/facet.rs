@@ -168,8 +168,8 @@ fn lanes(f: &FacetTest, corner: [i64; 3], shift: u32) -> u64 {
     let mut mask = plane_mask(from, f.normal, shift);
     for a in 0..3 {
         let at = [corner[(a + 1) % 3], corner[(a + 2) % 3]];
-        let squares = usize::from(squares(f.sides[a].map(|side| half_plane(side, at, shift))));
-        mask &= COLUMNS[a][0][squares & 0xff] | COLUMNS[a][1][squares >> 8];
+        let met = usize::from(squares(f.sides[a].map(|side| half_plane(side, at, shift))));
+        mask &= COLUMNS[a][0][met & 0xff] | COLUMNS[a][1][met >> 8];
     }
     mask
 }
@@ -185,7 +185,7 @@ fn half_plane(side: Side, corner: [i64; 2], shift: u32) -> [i32; 3] {
     [side.ci, side.cj, least]
 }
 
-/// Mask of the squares, i fastest, that meet three half-planes.
+/// Mask of the squares, i fastest, that meet three half-planes. In words as wide as what is compared, which makes it lanes.
 #[inline(always)]
 fn squares(sides: [[i32; 3]; 3]) -> u16 {
     let mut mask = 0;
@@ -220,6 +220,7 @@ fn plane_mask(from: [i64; 3], n: [i64; 3], shift: u32) -> u64 {
             low[i] += n[a] * (i >> a & 1) as i64;
         }
     }
+    // A word per lane, which are united in the end.
     let mut met = [0u64; 8];
     for byte in 0..8usize {
         let base = 2 * low[byte] + most;

@@ -1,7 +1,7 @@
 //! One source for several vector widths; the widest that the processor supports is chosen at run time.
 //!
 //! [`widest`](crate::widest) compiles an `#[inline(always)]` function once for each width and calls the right one. All widths
-//! thus compute the same by construction; tests still run each of them.
+//! thus compute the same by construction, but for what is called by the name of an instruction; tests in debug builds run each of them.
 
 use std::cell::Cell;
 use std::sync::LazyLock;

@@ -67,8 +67,8 @@ fn label_replicated(labels: &mut [Label], base: &Base, nodes: &Nodes, merged: &[
                     whole = Some(c)
                 }
             });
-            let component =
-                merged[whole.expect("both have the leaves of the brick") as usize] as usize;
+            let whole: Component = whole.expect("both have the leaves of the brick");
+            let component = merged[whole as usize] as usize;
             let label = &mut labels[component];
             let replicated = Label::from(of_replicated[replicated as usize]);
             if !std::mem::replace(&mut labelled[component], true) {

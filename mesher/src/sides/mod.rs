@@ -32,7 +32,6 @@ use bricks::facet::Facet;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, PerLevel, Tree};
 use global::Label;
-use masks::Part;
 use nodes::{Component, Nodes};
 use ranks::Comm;
 use serde::Serialize;
@@ -163,7 +162,7 @@ impl Components {
     }
 }
 
-/// The result of the phase for a component.
+/// The result of the phase for a component, in the order in which octants are stored by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Class {
     Outside,
@@ -235,18 +234,18 @@ impl Sides {
         regions: &mut [leaks::Region],
     ) -> u64 {
         let (mut leaves_enclosed, mut masks) = (0, take(&mut nodes.masks));
-        let (mut block, mut of_block) = (Part::default(), [[0; 8]; 3]);
+        let (mut of_block, mut components) = ([[0; 8]; 3], [0; 2]);
         for l in 0..LEVELS as Level {
             let mut crossing = base.tree.crossing[l as usize].cursor();
             nodes.bricks(base.tree, l).for_each(|(Brick { key, .. }, part)| {
-                if block != (Part { brick: 0, ..part }) {
-                    block = Part { brick: 0, ..part };
+                if components != part.components {
+                    components = part.components;
                     of_block = [[0; 8]; 3];
-                    masks.block(block, |c, octants| {
+                    masks.block(part, |c, octants| {
                         let all = &mut of_block[of_local[c as usize] as usize];
                         (0..8).for_each(|j| all[j] |= octants[j]);
                     });
-                    masks.free_before(block);
+                    masks.free_before(part);
                 }
                 let [outside, within, enclosed] =
                     of_block.each_ref().map(|of| of[key as usize & 7]);

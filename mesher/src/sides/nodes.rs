@@ -366,7 +366,7 @@ impl Nodes {
     /// Checks the invariants, with the links.
     ///
     /// # Panics
-    /// If one is violated; the message names it, the level and a node.
+    /// If one is violated; the message names it, the level, and a node or a block.
     pub fn check_invariants(&self) {
         for (l, level) in (0..).zip(&self.levels) {
             for (n, &split) in (0..).zip(&level.split) {
