@@ -149,7 +149,7 @@ fn axis_options(name: &str, axis: &Axis, scale: &Scale) -> String {
     )
 }
 
-/// The figures with captions and labels, for `\input` in a document.
+/// The figures with captions and labels, for `\input` in a document. LaTeX holds only 52 of them back unless it is asked for more.
 pub fn fragment(figures: &[Figure]) -> String {
     let included = |Figure { id, caption, .. }: &Figure| {
         format!(
@@ -160,7 +160,8 @@ pub fn fragment(figures: &[Figure]) -> String {
     format!(
         "% Made by `harness report`. Requires {PREAMBLE}.\n\
          % \\figures is the directory of the .tex files and of the .csv files that they read.\n\
-         \\providecommand{{\\figures}}{{figures}}\n{}",
+         \\providecommand{{\\figures}}{{figures}}\n\\extrafloats{{{}}}\n{}",
+        figures.len(),
         figures.iter().map(included).collect::<String>()
     )
 }
@@ -170,7 +171,9 @@ pub fn fragment(figures: &[Figure]) -> String {
 pub fn table(table: &Table) -> String {
     let row = |fields: Vec<String>| fields.join(" & ") + " \\\\\n";
     let head = row(table.columns.iter().map(|title| escape(&title.replace('\n', " "))).collect());
-    let rows = table.rows.iter().map(|fields| row(fields.iter().map(|f| escape(f)).collect()));
+    // Long names of counters have no other place to break.
+    let field = |f: &String| escape(f).replace("\\_", "\\_\\allowbreak{}");
+    let rows = table.rows.iter().map(|fields| row(fields.iter().map(field).collect()));
     let length = |i: usize| (longest(table.rows.iter().map(|row| &row[i])) as f64).sqrt();
     let lengths: Vec<f64> = (0..table.columns.len()).map(length).collect();
     let share = |length: &f64| 0.94 * length / lengths.iter().sum::<f64>();
@@ -205,6 +208,8 @@ fn escape(text: &str) -> String {
         '₂' => "$_2$".to_owned(),
         '⌈' => "$\\lceil$".to_owned(),
         '⌉' => "$\\rceil$".to_owned(),
+        '⌊' => "$\\lfloor$".to_owned(),
+        '⌋' => "$\\rfloor$".to_owned(),
         _ => match SUPERSCRIPTS.iter().position(|s| *s == c) {
             Some(digit) => format!("$^{digit}$"),
             None => c.to_string(),
@@ -217,6 +222,13 @@ fn escape(text: &str) -> String {
 mod tests {
     use super::super::samples::{bars, figure, series};
     use super::*;
+
+    #[test]
+    fn all_signs_of_formulas_are_known_to_latex() {
+        let formulas = include_str!("../../../bench/src/experiments/model.rs");
+        let signs: String = formulas.chars().filter(|c| !c.is_ascii()).collect();
+        assert!(signs.contains('√') && escape(&signs).is_ascii(), "{}", escape(&signs));
+    }
 
     #[test]
     fn every_point_is_a_line_and_text_is_plain() {
