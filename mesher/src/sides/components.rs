@@ -5,8 +5,8 @@
 //! each pair is merged once, and with coarser leaves on all sides, for which the walk ascends the path until it finds those that cover the
 //! octants across. The flood fill of the block has found the coarser leaves of its own region.
 
-use super::masks::Part;
-use super::nodes::{Child, Component, Family, Node, Nodes, UnionFind};
+use super::masks::{Component, Part};
+use super::nodes::{Child, Family, Node, Nodes, UnionFind};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::brick::{self, Block};
 use bricks::brickset::ones;

@@ -7,7 +7,8 @@
 
 use super::Base;
 use super::components::{self, FacedOctants};
-use super::nodes::{Component, Nodes, UnionFind};
+use super::masks::Component;
+use super::nodes::{Nodes, UnionFind};
 use bricks::octant::Level;
 use ranks::{Comm, MessageBuffer, gather};
 use rustc_hash::FxHashMap;

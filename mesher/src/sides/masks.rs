@@ -3,10 +3,12 @@
 //! About half of the halves are empty. When sides are stored, blocks are read a last time, in order, and the chunks before them are freed:
 //! what is stored takes about as much memory.
 
-use super::nodes::Component;
 use bricks::brick::Block;
 #[cfg(target_arch = "x86_64")]
 use bricks::wide;
+
+/// Number of a local component: leaves of one block that are connected.
+pub type Component = u32;
 
 /// Number of words of a chunk: as many bytes as the heap of the program maps apart, so that the system gets them back when they are freed.
 const CHUNK: usize = 1 << 20;

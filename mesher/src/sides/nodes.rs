@@ -8,16 +8,13 @@
 //! - the children of a node are contiguous in the next level, one for each non-zero byte of `split`;
 //! - components are numbered through all levels in order; each is a set of leaves of one block, and no leaf is in two.
 
-use super::masks::{Masks, Part};
+use super::masks::{Component, Masks, Part};
 use crate::partition::ownership::{Ownership, Placement};
 use bricks::brick::{self, Block, Brick};
 use bricks::brickset::ones;
 use bricks::octant::Level;
 use bricks::tree::{LEVELS, Tree};
 use bricks::widest;
-
-/// Number of a local component: leaves of one block that are connected.
-pub type Component = u32;
 
 /// Number of a node within its level.
 pub type Node = u32;
