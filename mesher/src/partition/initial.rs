@@ -85,7 +85,10 @@ impl Estimate<'_> {
     /// The partition by base leaves. METIS is not used where there are too few of them for it. Collective.
     fn by_base_leaves(&self, division: &Division) -> Result<Partition, Error> {
         let comm = self.comm;
-        let level = division.level_base.unwrap_or_else(|| self.levels()[1]);
+        // In octants as small as boxes may need, facets would be in millions of them.
+        let [_, fine, of_facets] = self.levels();
+        let level =
+            division.level_base.unwrap_or(fine.min(of_facets + 2).min(self.rules.level_surface));
         let level = level.min(level_last(self.rules));
         let (_, mut leaves) =
             self.all_bins(&area::of(self.facets, self.rules, level), level, 0, FINE_PER_RANK);
