@@ -201,11 +201,7 @@ impl Walk<'_> {
                 _ => None,
             };
             if let Some(Child { part, exists, .. }) = brick {
-                self.nodes.masks.brick(part, |d, bits| {
-                    if bits & faced != 0 {
-                        self.local.merged.unite(c, d);
-                    }
-                });
+                self.nodes.masks.among(part, faced, |d| self.local.merged.unite(c, d));
                 faced &= !exists;
             }
             if frame.level == 0 {

@@ -412,11 +412,7 @@ impl Nodes {
             let family = self.family(m, brick.node);
             let leaves = octants & !family.split;
             if leaves != 0 {
-                self.masks.brick(brick.part, |c, bits| {
-                    if bits & leaves != 0 {
-                        found(c);
-                    }
-                });
+                self.masks.among(brick.part, leaves, &mut found);
             }
             if leaves == octants || m == l {
                 return;
