@@ -27,7 +27,6 @@ pub struct LocalMerge {
 
 /// Octants of a brick that belong to a component or share a face with it. They are leaves, or lie in
 /// coarser leaves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FacedOctants {
     /// The rank that owns the brick.
     pub rank: usize,

@@ -41,7 +41,6 @@ use std::mem::take;
 use verdict::{FirstLeaf, FirstLeaves};
 
 /// The base tree as one rank holds it, and what its sides depend on.
-#[derive(Clone, Copy)]
 pub struct Base<'a> {
     /// The bricks that the rank holds.
     pub tree: &'a Tree,
@@ -56,7 +55,6 @@ pub struct Base<'a> {
 }
 
 /// Sides of the base tree's leaves.
-#[derive(Clone, Debug)]
 pub struct Sides {
     /// The side that is kept. Everything is kept if the mesh is the base tree.
     pub keep: Keep,
