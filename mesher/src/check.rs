@@ -21,7 +21,7 @@ use crate::sides::{Base, Sides};
 use bricks::brick::{self, Brick};
 use bricks::brickset::BrickSet;
 use bricks::octant::{LEVEL_MAX, Level, ROOT_EDGE, neighbour, path};
-use bricks::tree::{PerLevel, check_existing, check_split};
+use bricks::tree::{PerLevel, check_octants, check_split};
 use ranks::{Comm, MessageBuffer, first_other, gather, uncounted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, Hash};
@@ -124,15 +124,8 @@ pub fn sides(sides: &Sides, base: &Base) {
 pub fn graded(mesh: &Mesh, comm: &dyn Comm) {
     let Mesh { split, crossing, sides, ownership, .. } = mesh;
     check_split(split);
-    for sets in [crossing, sides.deleted()] {
-        check_existing(split, sets, "has no split parent");
-    }
-    for (l, set) in split.iter().enumerate() {
-        let mut cursor = set.cursor();
-        for b in sides.deleted()[l].bricks() {
-            assert_eq!(b.bits & cursor.get(b.key), 0, "level {l}: deleted leaves must not split");
-        }
-    }
+    check_octants(split, crossing, &[], "is crossing, but has no split parent");
+    check_octants(split, sides.deleted(), &[split], "is deleted, but no leaf");
     replicas(&[split, crossing, &sides.stored], ownership, comm);
 }
 

@@ -179,10 +179,7 @@ impl Gradation<'_> {
             let leaves = self.crossing[m as usize].bricks();
             let leaves = leaves.filter(|b| self.ownership.owns(m, b.key));
             let reached = dilate_children(m - 1, leaves, 1);
-            let mut touched = self.counted(reached);
-            for _ in surface..m {
-                touched = touched.coarsen();
-            }
+            let touched = (surface..m).fold(self.counted(reached), |set, _| set.coarsen());
             self.split_where_kept(surface - 1, touched);
         }
     }

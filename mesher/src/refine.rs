@@ -105,7 +105,6 @@ impl ContainingOctant {
 }
 
 /// Facets sorted by containing octant.
-#[derive(Debug, Default)]
 pub struct BinnedFacets {
     containing: Vec<ContainingOctant>,
     facets: Vec<Facet>,

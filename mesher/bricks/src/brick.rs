@@ -104,6 +104,12 @@ pub const fn flood(seed: u64, within: u64) -> u64 {
     }
 }
 
+/// Whether any bit is set. A comparison with an array of zeros would compile to a call.
+#[inline(always)]
+pub fn any(words: &[u64]) -> bool {
+    words.iter().fold(0, |all, w| all | w) != 0
+}
+
 /// The eight bricks below one: word `j` is that below octant group `j`.
 pub type Block = [u64; 8];
 

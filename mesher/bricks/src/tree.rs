@@ -15,7 +15,7 @@
 //! tree, and its sides, which store the deleted leaves, that of the region.
 
 use crate::brick::{self, Brick};
-use crate::brickset::{BrickSet, ones};
+use crate::brickset::{BrickSet, Cursor, ones};
 use crate::octant::{LEVEL_MAX, Level, path};
 
 /// Number of levels that sets are stored for: voxelisation looks one level below the deepest leaf.
@@ -49,23 +49,7 @@ impl Tree {
     /// If one is violated; the message names it, the level and an octant.
     pub fn check_structure(&self) {
         check_split(&self.split);
-        self.check_apart(&self.crossing, &[&self.split], "is crossing, but no leaf");
-    }
-
-    /// Checks that some sets hold octants of this tree that are in none of `others`.
-    ///
-    /// # Panics
-    /// If they do not; `violation` completes the sentence that names an octant.
-    pub fn check_apart(&self, sets: &PerLevel, others: &[&PerLevel], violation: &str) {
-        check_existing(&self.split, sets, violation);
-        for other in others {
-            for (l, (set, other)) in (0..).zip(sets.iter().zip(*other)) {
-                let mut other = other.cursor();
-                for b in set.bricks() {
-                    assert_none(l, b.key, b.bits & other.get(b.key), violation);
-                }
-            }
-        }
+        check_octants(&self.split, &self.crossing, &[&self.split], "is crossing, but no leaf");
     }
 }
 
@@ -74,32 +58,29 @@ impl Tree {
 /// # Panics
 /// If one is not.
 pub fn check_split(split: &PerLevel) {
-    check_existing(split, split, "is split, but its parent is not");
+    check_octants(split, split, &[], "is split, but its parent is not");
 }
 
-/// Checks the sets themselves, and that all their octants have split parents.
+/// Checks the sets themselves, and that all their octants have split parents and are in none of `others`.
 ///
 /// # Panics
-/// If one has not; `violation` completes the sentence that names it.
-pub fn check_existing(split: &PerLevel, sets: &PerLevel, violation: &str) {
-    for (l, set) in (0..).zip(sets) {
+/// If one is wrong; `violation` completes the sentence that names it by its level and path.
+pub fn check_octants(split: &PerLevel, sets: &PerLevel, others: &[&PerLevel], violation: &str) {
+    for (l, set) in sets.iter().enumerate() {
         set.check_invariants();
-        let mut above = split[(l as usize).saturating_sub(1)].cursor();
+        let mut above = split[l.saturating_sub(1)].cursor();
+        let mut others: Vec<Cursor> = others.iter().map(|other| other[l].cursor()).collect();
         for b in set.bricks() {
             let exists = match l {
                 0 => u64::from(b.key == 0),
                 _ => brick::children(brick::byte(above.get(b.key >> 3), b.key & 7)),
             };
-            assert_none(l, b.key, b.bits & !exists, violation);
+            let taken = others.iter_mut().fold(0, |all, other| all | other.get(b.key));
+            if let Some(bit) = ones(b.bits & (!exists | taken)).next() {
+                let path = path(l as Level, b.key << 6 | u64::from(bit));
+                panic!("octant {path} of level {l} {violation}");
+            }
         }
-    }
-}
-
-/// Panics if a brick has an octant that violates an invariant, with the octant's level and path.
-#[track_caller]
-pub fn assert_none(l: Level, key: u64, wrong: u64, violation: &str) {
-    if let Some(bit) = ones(wrong).next() {
-        panic!("octant {} of level {l} {violation}", path(l, key << 6 | u64::from(bit)));
     }
 }
 
@@ -167,7 +148,7 @@ mod tests {
         let mut deleted = PerLevel::default();
         deleted[3] = set(&[1, 2]);
         let tree = small();
-        tree.check_apart(&deleted, &[&tree.split, &tree.crossing], "is deleted");
+        check_octants(&tree.split, &deleted, &[&tree.split, &tree.crossing], "is deleted");
     }
 
     #[test]

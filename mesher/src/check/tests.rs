@@ -313,7 +313,7 @@ fn different_numbers_of_components_are_found() {
 }
 
 #[test]
-#[should_panic(expected = "deleted leaves must not split")]
+#[should_panic(expected = "is deleted, but no leaf")]
 fn a_deleted_leaf_that_is_split_is_found() {
     let corrupt = |m: &mut Mesh| {
         let l = deepest(&m.sides.stored);

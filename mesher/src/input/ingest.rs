@@ -26,7 +26,6 @@ pub enum Source {
 }
 
 /// A rank's slice of the facets.
-#[derive(Clone, Debug)]
 pub struct Slice {
     /// The facets, all finite.
     pub facets: Vec<Facet>,

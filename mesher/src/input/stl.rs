@@ -13,7 +13,6 @@ const HEADER: u64 = 84;
 const RECORD: u64 = 50;
 
 /// An open STL file of known format.
-#[derive(Debug)]
 pub struct Stl {
     path: PathBuf,
     file: File,

@@ -43,7 +43,6 @@ fn names(rank: usize) -> impl Iterator<Item = String> {
 
 /// The directory that a mesh is written to. Its files are removed, unless its claim is kept: on all ranks, after the
 /// [manifest](Self::manifest).
-#[derive(Debug)]
 pub struct OutDir {
     /// The files that it gets.
     pub output: Output,

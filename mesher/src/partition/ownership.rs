@@ -68,7 +68,7 @@ impl Ownership {
         assert!(all.is_sorted_by(|a, b| a.0 < b.0), "boundaries must ascend");
         all.first_mut().expect("every octant must have an owner").0 = 0;
         all.dedup_by_key(|b| b.1);
-        let mut ownership = Self {
+        let ownership = Self {
             rank: Some(rank),
             ranks,
             level_replicated: deepest_brick_of(2, &all),
@@ -77,8 +77,7 @@ impl Ownership {
             own: 0..0,
         };
         let longest = ownership.intervals().max_by_key(|own| own.end - own.start);
-        ownership.own = longest.unwrap_or(0..0);
-        ownership
+        Self { own: longest.unwrap_or(0..0), ..ownership }
     }
 
     /// The same partition seen from outside all ranks: every brick is fully replicated or remote.

@@ -27,7 +27,6 @@ pub struct LocalMerge {
 
 /// Octants of a brick that belong to a component or share a face with it. They are leaves, or lie in
 /// coarser leaves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FacedOctants {
     /// The rank that owns the brick.
     pub rank: usize,
@@ -201,11 +200,7 @@ impl Walk<'_> {
                 _ => None,
             };
             if let Some(Child { part, exists, .. }) = brick {
-                self.nodes.masks.brick(part, |d, bits| {
-                    if bits & faced != 0 {
-                        self.local.merged.unite(c, d);
-                    }
-                });
+                self.nodes.masks.among(part, faced, |d| self.local.merged.unite(c, d));
                 faced &= !exists;
             }
             if frame.level == 0 {

@@ -63,11 +63,7 @@ fn label_replicated(labels: &mut [Label], base: &Base, nodes: &Nodes, merged: &[
         replicated.masks.brick(all, |replicated, part| {
             // It is part of one component, as this rank holds more bricks.
             let mut whole = None;
-            nodes.masks.brick(mine, |c, bits| {
-                if bits & part != 0 {
-                    whole = Some(c)
-                }
-            });
+            nodes.masks.among(mine, part, |c| whole = Some(c));
             let whole: Component = whole.expect("both have the leaves of the brick");
             let component = merged[whole as usize] as usize;
             let label = &mut labels[component];

@@ -88,11 +88,8 @@ impl Region {
     /// Adds the leaves of a brick of level `l`: those that cross, those that do not, and which of these are inside.
     #[inline]
     pub fn push(&mut self, l: Level, key: u64, crossing: u64, open: u64, inside: u64) {
-        let mut walls =
-            Brick { key, bits: crossing | if self.is_inside { open & !inside } else { inside } };
-        for _ in self.cut..l {
-            walls = walls.parents();
-        }
+        let bits = crossing | if self.is_inside { open & !inside } else { inside };
+        let walls = (self.cut..l).fold(Brick { key, bits }, |walls, _| walls.parents());
         self.walls[l as usize].push(walls.key, walls.bits);
     }
 
@@ -184,10 +181,8 @@ impl Components {
     fn volumes(&self, base: &Base) -> Vec<[u64; 2]> {
         let mut mine = vec![0; self.labels.len()];
         for l in 0..=LEVEL_MAX {
-            for (Brick { key, .. }, part) in self.nodes.bricks(base.tree, l) {
-                if !base.ownership.owns(l, key) {
-                    continue;
-                }
+            let bricks = self.nodes.bricks(base.tree, l);
+            for (_, part) in bricks.filter(|b| base.ownership.owns(l, b.0.key)) {
                 self.nodes.masks.brick(part, |c, bits| {
                     mine[self.merged[c as usize] as usize] +=
                         u64::from(bits.count_ones()) << (3 * (LEVEL_MAX - l));

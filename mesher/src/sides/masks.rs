@@ -99,6 +99,16 @@ impl Masks {
         }
     }
 
+    /// Calls `each` with the components that have octants among those of a brick.
+    #[inline(always)]
+    pub fn among(&self, part: Part, octants: u64, mut each: impl FnMut(Component)) {
+        self.brick(part, |c, bits| {
+            if bits & octants != 0 {
+                each(c);
+            }
+        });
+    }
+
     /// The halves in which component `c` has octants, and words that begin with these, at `at`, where those of the next component will begin.
     #[inline(always)]
     fn component(&self, c: Component, at: &mut usize) -> (u16, &[u32; HALVES]) {

@@ -30,7 +30,7 @@ use bricks::brick::Brick;
 use bricks::brickset::BrickSet;
 use bricks::facet::Facet;
 use bricks::octant::Level;
-use bricks::tree::{LEVELS, PerLevel, Tree};
+use bricks::tree::{LEVELS, PerLevel, Tree, check_octants};
 use global::Label;
 use masks::Component;
 use nodes::Nodes;
@@ -41,7 +41,6 @@ use std::mem::take;
 use verdict::{FirstLeaf, FirstLeaves};
 
 /// The base tree as one rank holds it, and what its sides depend on.
-#[derive(Clone, Copy)]
 pub struct Base<'a> {
     /// The bricks that the rank holds.
     pub tree: &'a Tree,
@@ -56,7 +55,6 @@ pub struct Base<'a> {
 }
 
 /// Sides of the base tree's leaves.
-#[derive(Clone, Debug)]
 pub struct Sides {
     /// The side that is kept. Everything is kept if the mesh is the base tree.
     pub keep: Keep,
@@ -280,8 +278,9 @@ impl Sides {
     /// # Panics
     /// If an invariant is violated; the message names it, the level and an octant.
     pub fn check_invariants(&self, tree: &Tree) {
-        let others = [&tree.split, &tree.crossing];
-        tree.check_apart(&self.stored, &others, "has a side, but is no leaf off the surface");
+        let Tree { split, crossing } = tree;
+        let violation = "has a side, but is no leaf off the surface";
+        check_octants(split, &self.stored, &[split, crossing], violation);
     }
 }
 

@@ -210,11 +210,11 @@ fn fill_lanes(block: &mut NewBlock, masks: &mut Masks, sets: &mut UnionFind) {
     found.clear();
     let grow = |seed| brick::layers(brick::flood_layers(brick::layers(seed), &within));
     for &(c, seed) in above.iter() {
-        for (other, _) in found.iter().filter(|(_, w)| !is_empty(&both(w, &seed, and))) {
+        for (other, _) in found.iter().filter(|(_, w)| brick::any(&both(w, &seed, and))) {
             sets.unite(other.expect("found above"), c);
         }
         let seed = both(&seed, &free, and);
-        if !is_empty(&seed) {
+        if brick::any(&seed) {
             found.push((Some(c), grow(seed)));
             free = both(&free, &found[found.len() - 1].1, |a, b| a & !b);
         }
@@ -227,7 +227,7 @@ fn fill_lanes(block: &mut NewBlock, masks: &mut Masks, sets: &mut UnionFind) {
     }
     for (above, w) in found {
         let octants = both(w, open, and);
-        if !is_empty(&octants) {
+        if brick::any(&octants) {
             let set = above.map_or(sets.0.len() as Component, |above| sets.find(above));
             sets.0.push(set);
             masks.push(&octants);
@@ -238,11 +238,6 @@ fn fill_lanes(block: &mut NewBlock, masks: &mut Masks, sets: &mut UnionFind) {
 #[inline(always)]
 fn both(a: &Block, b: &Block, f: impl Fn(u64, u64) -> u64) -> Block {
     std::array::from_fn(|j| f(a[j], b[j]))
-}
-
-#[inline(always)]
-fn is_empty(block: &Block) -> bool {
-    block.iter().fold(0, |all, w| all | w) == 0
 }
 
 impl Nodes {
@@ -374,8 +369,8 @@ impl Nodes {
             for (n, block) in level.blocks.windows(2).enumerate() {
                 let mut all = [0; 8];
                 self.masks.block(block[0].part(block[1], 0), |_, octants| {
-                    let common = both(&all, &octants, |a, b| a & b);
-                    assert!(is_empty(&common), "block {n} of level {l}: a leaf has two components");
+                    let has_common = brick::any(&both(&all, &octants, |a, b| a & b));
+                    assert!(!has_common, "block {n} of level {l}: a leaf has two components");
                     all = both(&all, &octants, |a, b| a | b);
                 });
             }
@@ -412,11 +407,7 @@ impl Nodes {
             let family = self.family(m, brick.node);
             let leaves = octants & !family.split;
             if leaves != 0 {
-                self.masks.brick(brick.part, |c, bits| {
-                    if bits & leaves != 0 {
-                        found(c);
-                    }
-                });
+                self.masks.among(brick.part, leaves, &mut found);
             }
             if leaves == octants || m == l {
                 return;

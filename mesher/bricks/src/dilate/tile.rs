@@ -175,7 +175,7 @@ impl Tile {
                 let x = first[0].div_euclid(2);
                 for (i, x) in (x..x + 8).enumerate() {
                     let block: [u64; 8] = std::array::from_fn(|o| bricks[o >> 1][2 * i + (o & 1)]);
-                    if any(&block) {
+                    if brick::any(&block) {
                         out.add([x, y, z], &block.map(brick::from_rows));
                     }
                 }
@@ -190,12 +190,6 @@ impl Tile {
     }
 }
 
-/// Whether any bit is set. A comparison with an array of zeros would compile to a call.
-#[inline(always)]
-fn any(words: &[u64]) -> bool {
-    words.iter().fold(0, |all, w| all | w) != 0
-}
-
 /// The 16 bricks along x, with bits in row order, at a position along y and z in bricks; empty outside the tile.
 #[inline(always)]
 fn bricks_along(rows: &[u64], side: usize, y: i64, z: i64) -> [u64; 16] {
@@ -205,7 +199,7 @@ fn bricks_along(rows: &[u64], side: usize, y: i64, z: i64) -> [u64; 16] {
     }
     let base = 4 * (z as usize * side + y as usize);
     let mut bricks = std::array::from_fn(|i| rows[base + (i >> 2) * side + (i & 3)]);
-    if any(&bricks) {
+    if brick::any(&bricks) {
         transpose(&mut bricks);
     }
     bricks
