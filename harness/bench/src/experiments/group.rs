@@ -18,7 +18,7 @@ use super::pop::{self, Efficiency};
 use crate::order::{Origins, by_key, distinct};
 use run::engine::description::{EQUAL_RANKS, EQUAL_RUNS};
 use statistics::{Median, median, median_of};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The repetitions of one run.
 pub struct Group {
@@ -154,8 +154,8 @@ pub struct Groups {
     pub left_out: Vec<NoResult>,
     /// By program: what it does not do or promise.
     pub lacks: Lacks,
-    /// A sentence for every program and case of which there are several series, for nodes whose runs are pooled, and for every run with
-    /// another mesh.
+    /// A sentence for every program and case of which there are several series, for nodes whose runs are pooled, for every run with
+    /// another mesh, and for every program without any run on a case.
     pub notes: Vec<String>,
 }
 
@@ -198,7 +198,14 @@ impl Groups {
             }
         }
         let by_setup = by_key(&runs, |(run, _)| run.setup.clone()).into_iter();
-        let all = by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
+        let all: Vec<Group> =
+            by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
+        let of_all = |s: &Setup| (s.engine.clone(), s.case.clone());
+        let has_runs: HashSet<_> = all.iter().map(|group| of_all(&group.setup)).collect();
+        let without = left_out.iter().filter(|left| !has_runs.contains(&of_all(&left.setup)));
+        notes.extend(without.map(|NoResult { setup, why }| {
+            format!("{} has no run on {}: {why}", setup.engine, setup.case)
+        }));
         let origins = origins.each_ref().map(Origins::described).concat();
         let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(distinct(notes)).collect();
         let groups = Self { all, left_out, lacks, notes };

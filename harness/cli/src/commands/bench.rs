@@ -1,7 +1,7 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
 use crate::output::{put, unwritten};
-use bench::experiments::entry::{Entry, Line};
+use bench::experiments::entry::{Entry, Line, Run};
 use bench::experiments::group::Groups;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
@@ -194,18 +194,23 @@ fn markdown(table: &Table, machine: &str) -> String {
     format!("# Targets\n\n{machine}\n\n{counts}\n\n{}", table.markdown())
 }
 
-/// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured.
+/// Returns the exit code: 1 if a run of a series or a row failed or a row was missed, 3 if nothing was measured, or nothing of a program.
 fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
-    let measured = |line: &Line| line.run().is_some_and(|run| !run.warm_up);
+    let runs: Vec<&Run> = lines.iter().filter_map(Line::run).filter(|run| !run.warm_up).collect();
+    let has_none = |name: &&String| runs.iter().all(|run| run.setup.engine != **name);
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let why = match study.series.is_empty() {
-        true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured",
-        false if !lines.iter().any(measured) => "nothing was measured: request fewer cells",
-        _ => return EXIT_HOLDS,
+    let without = study.series.iter().flat_map(|series| &series.engines).find(has_none);
+    let why = match without {
+        _ if study.series.is_empty() && rows.iter().all(|row| row.measured.is_none()) => {
+            "no row was measured".to_owned()
+        }
+        Some(_) if runs.is_empty() => "nothing was measured: request fewer cells".to_owned(),
+        Some(name) => format!("nothing was measured of {name}: the report says why"),
+        None => return EXIT_HOLDS,
     };
     eprintln!("harness: {why}");
     EXIT_MISSING
@@ -214,8 +219,25 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::experiments::entry::Comm;
     use bench::study::judge::unjudged;
-    use bench::testing::study as read;
+    use bench::testing::{line, run, study as read};
+
+    #[test]
+    fn a_study_is_complete_if_every_program_has_a_run() {
+        let series =
+            "[[series]]\nexperiment = 'strong'\ncase = 'cube'\nengines = ['mesher', 'x']\n";
+        let study = read(series).unwrap();
+        let run_of = |engine: &str, warm_up| {
+            let mut run = Run { warm_up, ..run(Comm::Solo, 1, &[("a", &[1.0])]) };
+            run.setup.engine = engine.into();
+            line(Entry::Run(Box::new(run)))
+        };
+        let [mesher, warm_up, other] =
+            [("mesher", false), ("x", true), ("x", false)].map(|(name, warm)| run_of(name, warm));
+        assert_eq!(code(&study, &[], &[mesher.clone(), warm_up.clone()]), EXIT_MISSING);
+        assert_eq!(code(&study, &[], &[mesher, warm_up, other]), EXIT_HOLDS);
+    }
 
     #[test]
     fn every_verdict_is_shown_with_its_reason() {

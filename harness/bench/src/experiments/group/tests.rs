@@ -99,6 +99,16 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
 
 /// A later session without runs, or with another network, changes nothing of an earlier one.
 #[test]
+fn a_program_without_any_run_on_a_case_is_named() {
+    let (why, of) = ("keep = outside".to_owned(), run(Comm::Mpi, 1, &[("a", &[1.0])]));
+    let setup = Setup { engine: "other".into(), ..of.setup.clone() };
+    let left = |setup: &Setup| NoResult { setup: setup.clone(), why: why.clone() };
+    let lines = [&setup, &setup, &of.setup].map(|s| line(Entry::LeftOut(left(s))));
+    let groups = Groups::of(&[&lines[..], &[line_of(of)]].concat());
+    assert_eq!(groups.notes, ["other has no run on cube: keep = outside"]);
+}
+
+#[test]
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
     let network = |latency_s: f64, measured: bool| {
