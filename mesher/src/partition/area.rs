@@ -51,10 +51,20 @@ pub fn of_boxes(rules: &Rules, level: Level, light: u64, within: &Range<u64>) ->
 
 /// The number of leaves near the facets of all ranks. Collective.
 pub fn leaves_at_surface(facets: &[Facet], rules: &Rules, comm: &dyn Comm) -> f64 {
-    let area: f64 = facets.iter().map(norm).sum();
+    let area: f64 = facets.iter().map(area_in_root).sum();
     // Whole faces of finest cells: a sum of integers does not depend on its order.
     let faces = comm.sum((area / (edge(rules.level_surface) as f64).powi(2)) as u64);
     leaves_per_surface_cell(rules) as f64 * faces as f64
+}
+
+/// The area of a facet within the root, about.
+fn area_in_root(f: &Facet) -> f64 {
+    if (0..3).map(|a| f.range(a)).all(|(lo, hi)| 0 <= lo && hi <= ROOT_EDGE) {
+        return norm(f);
+    }
+    let mut area = 0.0;
+    spread(f, edge(5), &mut |_, part| area += part);
+    area
 }
 
 /// The area of a facet, in lattice units squared.
@@ -94,14 +104,20 @@ fn width(f: &Facet) -> i64 {
     (0..3).map(|a| f.range(a)).fold(0, |all, (lo, hi)| all.max(hi - lo))
 }
 
-/// Calls `add` with the positions of points of a facet and the area that each stands for: its centroid alone if it is no wider than octants of
-/// the given size, and otherwise about four for the area of such an octant's face and two for its edge; of thin facets fewer, each for a
-/// sixteenth of that area. A needle across the root, halved until its parts are small, would have billions.
+/// Most points of a facet: the parts of ten thousand ranks may lie on it.
+const POINTS_MAX: f64 = (1 << 20) as f64;
+
+/// Calls `add` with the positions of points of a facet, as far as they are in the root, and the area that each stands for: its centroid alone
+/// if it is no wider than octants of the given size, and otherwise about four for the area of such an octant's face and two for its edge; of
+/// thin facets fewer, each for a twentieth of that area. A needle across the root, halved until its parts are small, would have billions.
 fn spread(f: &Facet, size: i64, add: &mut impl FnMut(u64, f64)) {
+    if (0..3).map(|a| f.range(a)).any(|(lo, hi)| hi < 0 || ROOT_EDGE < lo) {
+        return;
+    }
     let ([a, b, c], area) = (f.v.map(|v| v.map(f64::from)), norm(f));
     let (faces, edges) = (area / (size as f64).powi(2), width(f) as f64 / size as f64);
     let many = (4.0 * faces + (2.0 * edges).min(16.0 * faces)).ceil();
-    let count = if edges > 1.0 { many } else { 1.0 };
+    let count = if edges > 1.0 { many.min(POINTS_MAX) } else { 1.0 };
     for i in 0..count as u64 {
         // A sequence of low discrepancy in the unit square (Roberts, 2018), of which the half beyond the diagonal is turned over.
         let [u, v] = [0.7548776662466927, 0.5698402909980532]
@@ -121,6 +137,7 @@ mod tests {
     use crate::partition::curve;
     use crate::tests::rules as plain_rules;
     use bricks::octant::position;
+    use ranks::Solo;
 
     fn rules(level_surface: Level) -> Rules {
         Rules { level_surface, layer_cells_min: 4, keep: Keep::Outside, ..plain_rules() }
@@ -160,6 +177,34 @@ mod tests {
         let near = all.iter().filter(|b| position(b[0])[0] < 1 << 17);
         let [near, whole] = [near.map(|b| b[1]).sum(), all.iter().map(|b| b[1]).sum::<u64>()];
         assert!((16 * near).abs_diff(7 * whole) < whole / 10, "{near} of {whole}");
+    }
+
+    #[test]
+    fn what_is_outside_the_root_does_not_count() {
+        // A square in the plane z = 1, a quarter of it in the root.
+        let (h, rules) = ((ROOT_EDGE / 2) as i32, rules(6));
+        let [a, b, c, d] = [[-h, -h, 1], [h, -h, 1], [-h, h, 1], [h, h, 1]];
+        let square = [Facet { v: [a, b, c] }, Facet { v: [b, d, c] }];
+        let bins = of(&square, &rules, 4);
+        assert!(bins.iter().all(|b| b[0] < start57(1, 4)), "{bins:?}");
+        let leaves = bins.iter().map(|b| b[1]).sum::<u64>() / FRACTIONS;
+        let want = 32 * 32 * leaves_per_surface_cell(&rules);
+        assert!(leaves.abs_diff(want) < want / 20, "{leaves} for {want}");
+        let all = leaves_at_surface(&square, &rules, &Solo);
+        assert!((all as u64).abs_diff(want) < want / 20, "{all} for {want}");
+        let beyond = Facet { v: [[-9, 1, 1], [-9, h, 1], [-9, 1, h]] };
+        assert_eq!(leaves_at_surface(&[beyond], &rules, &Solo), 0.0);
+    }
+
+    #[test]
+    fn a_small_facet_counts_at_its_centroid() {
+        // Its extent has its middle in another octant.
+        let (l, h) = (4, edge(4) as i32);
+        let f = Facet { v: [[h + 1, 1, 1], [h + 1, 1, h], [2, h, 1]] };
+        let bins = of(&[f], &rules(9), l);
+        assert_eq!(bins.iter().map(|b| b[0]).collect::<Vec<_>>(), [0]);
+        let g = Facet { v: [[h + 1, 1, 1], [h + 1, 1, h], [h / 2 + 2, h, 1]] };
+        assert!(of(&[g], &rules(9), l).iter().all(|b| b[0] == 0));
     }
 
     #[test]

@@ -54,15 +54,13 @@ impl Estimate<'_> {
     }
 
     /// The coarse and the fine level, each the coarsest of which an octant at a surface or in a box has at most a rank's share of the leaves
-    /// divided by [`COARSE_PER_RANK`] or [`FINE_PER_RANK`]; and the level of which octants at a surface are fine enough, without boxes.
-    /// Collective.
+    /// divided by [`COARSE_PER_RANK`] or [`FINE_PER_RANK`]; and the fine one of the facets alone, as if there were no boxes. Collective.
     fn levels(&self) -> [Level; 3] {
         let &Self { facets, rules, comm } = self;
         let each = area::leaves_per_surface_cell(rules) as f64;
         let face = (edge(rules.level_surface) as f64).powi(2);
         let at_surface = area::leaves_at_surface(facets, rules, comm);
-        let leaves = at_surface + area::leaves_in_boxes(0, 0, rules) as f64;
-        let level = |per_rank: f64, boxes: &[ExtentBox]| {
+        let level = |per_rank: f64, leaves: f64, boxes: &[ExtentBox]| {
             // Four sheets of facets in one octant are not unusual: wings, fins.
             let most = leaves / (comm.size() as f64 * per_rank * 4.0);
             let small = |l: &Level| {
@@ -77,9 +75,10 @@ impl Estimate<'_> {
             };
             (0..LEVEL_MAX).find(small).unwrap_or(LEVEL_MAX).min(level_last(rules))
         };
+        let all = at_surface + area::leaves_in_boxes(0, 0, rules) as f64;
         let fine = FINE_PER_RANK as f64;
-        let of_facets = level(fine, &[]).min(rules.level_surface);
-        [level(COARSE_PER_RANK, &rules.boxes), level(fine, &rules.boxes), of_facets]
+        let of_all = |per_rank| level(per_rank, all, &rules.boxes);
+        [of_all(COARSE_PER_RANK), of_all(fine), level(fine, at_surface, &[])]
     }
 
     /// The partition by base leaves. METIS is not used where there are too few of them for it. Collective.
@@ -87,8 +86,7 @@ impl Estimate<'_> {
         let comm = self.comm;
         // In octants as small as boxes may need, facets would be in millions of them.
         let [_, fine, of_facets] = self.levels();
-        let level =
-            division.level_base.unwrap_or(fine.min(of_facets + 2).min(self.rules.level_surface));
+        let level = division.level_base.unwrap_or(fine.min(of_facets + 2));
         let level = level.min(level_last(self.rules));
         let (_, mut leaves) =
             self.all_bins(&area::of(self.facets, self.rules, level), level, 0, FINE_PER_RANK);
@@ -108,6 +106,7 @@ impl Estimate<'_> {
     /// Intervals of the curve with equal estimated numbers of leaves, given the [levels](Self::levels). Facets are not resolved to the level of
     /// boxes that are finer than the surface. Collective.
     fn by_area(&self, [coarse, fine, of_facets]: [Level; 3]) -> Ownership {
+        let of_facets = of_facets.min(self.rules.level_surface);
         let (comm, local) = (self.comm, area::of(self.facets, self.rules, of_facets));
         let in_boxes = area::leaves_in_boxes(0, 0, self.rules);
         let (light, bins) = self.all_bins(&local, coarse, in_boxes, 1);
@@ -137,7 +136,7 @@ impl Estimate<'_> {
         let coarse = local.iter().map(|b| [b[0] >> shift << shift, b[1]]).collect();
         let mut bins = all_gather_reduced(coarse, |a, b| a + b, comm);
         let leaves = |bins: &[Bin]| bins.iter().map(|b| b[1] / FRACTIONS).sum::<u64>();
-        let light = (leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank);
+        let light = ((leaves(&bins) + in_boxes) / (comm.size() as u64 * per_rank)).max(1);
         bins.extend(area::of_boxes(self.rules, level, light, &curve::ALL));
         combine(&mut bins, u64::wrapping_add);
         ((leaves(&bins) / (comm.size() as u64 * FINE_PER_RANK)).max(1), bins)
@@ -290,10 +289,31 @@ mod tests {
             assert!(coarse <= 3 && (4..=5).contains(&fine), "few facets: {coarse} {fine}");
         }
         // The box has most leaves, and octants of a few of them are far finer than the surface.
-        let deep = ExtentBox { min: [0; 3], max: [16 * edge(18); 3], level: 18 };
-        for [_, fine, of_facets] in levels(&all[..1], vec![deep]) {
-            assert!(fine >= 15 && of_facets <= rules(vec![]).level_surface, "{fine} {of_facets}");
+        let deep = ExtentBox { min: [0; 3], max: [256 * edge(18); 3], level: 18 };
+        let alone = levels(&all, vec![])[0];
+        for [_, fine, of_facets] in levels(&all, vec![deep]) {
+            assert!(fine >= 13 && of_facets == alone[2], "{fine} {of_facets}");
         }
+        let rules = rules(vec![deep]);
+        let unit = Division { weights: Weights::Unit, ..Division::default() };
+        let of_unit = sim::run(RANKS, 5, |comm| {
+            let mine = if comm.rank() == 0 { &all[..] } else { &[] };
+            let estimate = Estimate { facets: mine, rules: &rules, comm };
+            estimate.partition(&unit).expect("no METIS").level_base
+        });
+        assert_eq!(of_unit, [alone[2] + 2; RANKS], "facets would be in many octants");
+    }
+
+    #[test]
+    fn a_cell_of_a_box_is_not_divided() {
+        let h = ROOT_EDGE / 4;
+        let cell = ExtentBox { min: [h; 3], max: [2 * h; 3], level: 2 };
+        let rules = rules(vec![cell]);
+        let bins = sim::run(RANKS, 5, |comm| {
+            let estimate = Estimate { facets: &[], rules: &rules, comm };
+            [0, 1].map(|in_boxes| estimate.all_bins(&[], FINE, in_boxes, 1).1.len())
+        });
+        assert_eq!(bins, [[1; 2]; RANKS]);
     }
 
     #[test]
