@@ -125,18 +125,20 @@ impl<'a> Loads<'a> {
         }
     }
 
-    /// Adds `each` for every octant of a set in bricks that this rank owns.
+    /// Adds `each` for every octant of a set that this rank owns.
     fn add_octants(&mut self, l: Level, set: &BrickSet, each: i64) {
         let ownership = self.ownership;
-        for b in set.bricks().filter(|b| ownership.owns(l, b.key)) {
+        let is_shared = ownership.is_replicated(l);
+        for b in set.bricks().filter(|b| is_shared || ownership.owns(l, b.key)) {
             if l >= self.level + 2 {
                 self.add(brick_start(l, b.key), each * i64::from(b.bits.count_ones()));
                 continue;
             }
-            // A brick spans several bins.
-            for j in ones(u64::from(brick::parents(b.bits))).map(u64::from) {
-                let octants = brick::byte(b.bits, j).count_ones();
-                self.add(brick_start(l + 1, b.key << 3 | j), each * i64::from(octants));
+            // A brick spans several bins, and several ranks may own parts of it.
+            let groups = ones(brick::parents(b.bits).into()).map(|j| b.key << 3 | u64::from(j));
+            for group in groups.filter(|group| ownership.owns(l + 1, *group)) {
+                let octants = brick::byte(b.bits, group & 7).count_ones();
+                self.add(brick_start(l + 1, group), each * i64::from(octants));
             }
         }
     }
@@ -238,6 +240,21 @@ mod tests {
         let sum = |bins: &[Bin]| bins.iter().map(|b| b[1]).sum::<u64>();
         let coarse = coarse.into_bins();
         assert_eq!((coarse.len(), sum(&coarse)), (1 << (3 * (LEVEL - 2)), sum(&want)));
+    }
+
+    #[test]
+    fn each_rank_counts_its_octants_of_a_brick_that_two_hold() {
+        let (l, key) = (LEVEL, 5);
+        let mut split = PerLevel::default();
+        split[l as usize].push(key, u64::MAX);
+        let loads = [0, 1].map(|rank| {
+            let boundary = (start57(l, key << 6 | 24), 1);
+            let ownership = Ownership::along(rank, 2, vec![(0, 0), boundary]);
+            let mut counts = Loads::new(&ownership, l);
+            counts.add_leaves(&split, &[]);
+            counts.into_bins().iter().map(|bin| bin[1]).sum::<u64>()
+        });
+        assert_eq!(loads, [24 * 7, 40 * 7]);
     }
 
     #[test]
