@@ -214,7 +214,12 @@ impl Session<'_> {
             let description = &self.runner.programs.named(engine).description;
             let layouts = series.layouts(description, self.mpi_left_out().is_some());
             if layouts.is_empty() {
-                (self.progress)(&format!("{engine} cannot run the series {named}"));
+                let why = format!("{engine} cannot run the series {named}");
+                (self.progress)(&why);
+                let (experiment, engine) = (named.clone(), engine.clone());
+                let serial = Setup::serial(&base.name, base.spacing_min, base.layer_cells_min);
+                let setup = Setup { experiment, engine, ..serial };
+                self.append(Entry::LeftOut(NoResult { setup, why }))?;
             }
             let all = layers.iter().flat_map(|n| layouts.iter().map(move |layout| (*n, *layout)));
             for (n, (comm, ranks)) in all {

@@ -199,18 +199,22 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
     let bad = |row: &Judged| matches!(row.verdict(), Verdict::Missed | Verdict::Failed);
     let failed = |line: &Line| matches!(line.entry, Entry::Failure(_));
     let runs: Vec<&Run> = lines.iter().filter_map(Line::run).filter(|run| !run.warm_up).collect();
+    let mut left_out = lines.iter().filter_map(|line| match &line.entry {
+        Entry::LeftOut(left) => Some(&left.setup.engine),
+        _ => None,
+    });
     let has_none = |name: &&String| runs.iter().all(|run| run.setup.engine != **name);
     if rows.iter().any(bad) || !study.series.is_empty() && lines.iter().any(failed) {
         return EXIT_FAILED;
     }
-    let without = study.series.iter().flat_map(|series| &series.engines).find(has_none);
-    let why = match without {
-        _ if study.series.is_empty() && rows.iter().all(|row| row.measured.is_none()) => {
-            "no row was measured".to_owned()
-        }
-        Some(_) if runs.is_empty() => "nothing was measured: request fewer cells".to_owned(),
-        Some(name) => format!("nothing was measured of {name}: the report says why"),
-        None => return EXIT_HOLDS,
+    let without = left_out.find(has_none).filter(|_| !study.series.is_empty());
+    let why = match study.series.is_empty() {
+        true if rows.iter().all(|row| row.measured.is_none()) => "no row was measured".to_owned(),
+        false if runs.is_empty() => "nothing was measured: request fewer cells".to_owned(),
+        _ => match without {
+            Some(name) => format!("nothing was measured of {name}: the report says why"),
+            None => return EXIT_HOLDS,
+        },
     };
     eprintln!("harness: {why}");
     EXIT_MISSING
@@ -219,7 +223,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::Comm;
+    use bench::experiments::entry::{Comm, NoResult};
     use bench::study::judge::unjudged;
     use bench::testing::{line, run, study as read};
 
@@ -235,8 +239,11 @@ mod tests {
         };
         let [mesher, warm_up, other] =
             [("mesher", false), ("x", true), ("x", false)].map(|(name, warm)| run_of(name, warm));
-        assert_eq!(code(&study, &[], &[mesher.clone(), warm_up.clone()]), EXIT_MISSING);
-        assert_eq!(code(&study, &[], &[mesher, warm_up, other]), EXIT_HOLDS);
+        let (setup, why) = (warm_up.run().expect("a run").setup.clone(), "declined".to_owned());
+        let left = line(Entry::LeftOut(NoResult { setup, why }));
+        let all = [mesher, warm_up, left, other];
+        assert_eq!(code(&study, &[], &all[..3]), EXIT_MISSING);
+        assert_eq!(code(&study, &[], &all), EXIT_HOLDS);
     }
 
     #[test]

@@ -97,7 +97,6 @@ fn a_run_of_other_facets_or_cells_is_left_out_even_without_digests() {
     assert_eq!(with(|run| run.facets = 13, &[EQUAL_RUNS]), left_out);
 }
 
-/// A later session without runs, or with another network, changes nothing of an earlier one.
 #[test]
 fn a_program_without_any_run_on_a_case_is_named() {
     let (why, of) = ("keep = outside".to_owned(), run(Comm::Mpi, 1, &[("a", &[1.0])]));
@@ -108,6 +107,7 @@ fn a_program_without_any_run_on_a_case_is_named() {
     assert_eq!(groups.notes, ["other has no run on cube: keep = outside"]);
 }
 
+/// A later session without runs, or with another network, changes nothing of an earlier one.
 #[test]
 fn a_session_has_its_own_network() {
     let of = |session: &str, entry: Entry| Line { session: session.into(), ..line(entry) };
