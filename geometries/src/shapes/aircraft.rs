@@ -2,7 +2,9 @@
 //! y >= 0; the other half is its mirror image.
 
 use super::implicit::Body;
-use super::solids::{Panel, Points, RoundCone, Section, Vec3, blend, carve, join, rounded_box};
+use super::solids::{
+    Panel, Points, RoundCone, Section, Vec3, blend, carve, join, nearest, rounded_box,
+};
 
 fn section(leading: f64, trailing: f64, thickness_half: f64) -> Section {
     Section { leading, trailing, thickness_half }
@@ -69,17 +71,15 @@ impl Body for Uav {
         }
     }
 
+    #[inline(always)]
     fn distance<const N: usize>(&self, [x, y, z]: &Points<N>) -> [f64; N] {
         let p = &[*x, y.map(f64::abs), *z];
-        let nearest = |cones: &[RoundCone]| {
-            cones.iter().map(|c| c.distance(p)).fold([f64::INFINITY; N], join)
-        };
-        let hull = blend(nearest(&self.hull), self.ball.distance(p), 0.006);
-        let wing = self
-            .pylons
-            .iter()
-            .fold(self.wing.distance(p), |sum, pylon| blend(sum, pylon.distance(p), 0.003));
-        let wing = blend(wing, nearest(&self.stores), 0.002);
+        let hull = blend(nearest(&self.hull, p), self.ball.distance(p), 0.006);
+        let mut wing = self.wing.distance(p);
+        for pylon in &self.pylons {
+            wing = blend(wing, pylon.distance(p), 0.003);
+        }
+        let wing = blend(wing, nearest(&self.stores, p), 0.002);
         let tail = join(self.tail.distance(p), self.fin.distance(p));
         blend(blend(hull, wing, 0.010), tail, 0.006)
     }
@@ -160,12 +160,10 @@ impl Body for Fighter {
         }
     }
 
+    #[inline(always)]
     fn distance<const N: usize>(&self, [x, y, z]: &Points<N>) -> [f64; N] {
         let p = &[*x, y.map(f64::abs), *z];
-        let nearest = |cones: &[RoundCone]| {
-            cones.iter().map(|c| c.distance(p)).fold([f64::INFINITY; N], join)
-        };
-        let nose = blend(nearest(&self.nose), nearest(&self.canopy), 0.012);
+        let nose = blend(nearest(&self.nose, p), nearest(&self.canopy, p), 0.012);
         let nose = blend(nose, self.chine.distance(p), 0.03);
         let duct = rounded_box(p, [0.470, 0.076, -0.004], [0.200, 0.034, 0.037], 0.010);
         let aft = rounded_box(p, [0.690, 0.045, 0.002], [0.170, 0.070, 0.034], 0.014);

@@ -10,6 +10,7 @@
 use super::solids::{Points, Vec3};
 use crate::mesh::EdgeHasher;
 use crate::{Generator, GeneratorError, Mesh};
+use multiversion::multiversion;
 use std::collections::HashMap;
 
 /// A solid that can be drawn at any grid spacing.
@@ -25,6 +26,12 @@ pub(super) trait Body {
 
     /// A function that is negative inside and has a Lipschitz constant of at most 1, at several points.
     fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N];
+}
+
+/// The distances at several points, by the widest vectors of the processor. They are the same for all widths: no operation is fused with another.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn distances<B: Body, const N: usize>(body: &B, p: &Points<N>) -> [f64; N] {
+    body.distance(p)
 }
 
 /// The part of the requested facets that the grid should produce, and its minimum. Splitting edges
@@ -151,7 +158,7 @@ impl<B: Body> Drawing<B> {
         let half = cells as f64 * 0.5 * self.spacing;
         let centre = self.position(origin).map(|x| [x + half]);
         let reach = half * 1.7321;
-        if self.body.distance(&centre)[0].abs() > reach {
+        if distances(&self.body, &centre)[0].abs() > reach {
             return;
         }
         if cells == BLOCK {
@@ -171,7 +178,7 @@ impl<B: Body> Drawing<B> {
             let sample =
                 |i| self.position([origin[0] + i % POINTS, origin[1] + i / POINTS, origin[2] + z]);
             let points = [0, 1, 2].map(|a| std::array::from_fn(|i| sample(i)[a]));
-            values.copy_from_slice(&self.body.distance::<{ POINTS * POINTS }>(&points));
+            values.copy_from_slice(&distances::<B, { POINTS * POINTS }>(&self.body, &points));
         }
         for z in 0..BLOCK {
             for y in 0..BLOCK {
@@ -269,7 +276,7 @@ impl<B: Body> Drawing<B> {
                 t[i] = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
             }
             let points = [0, 1, 2].map(|a| std::array::from_fn(|i| along(i, t[i])[a]));
-            let values = self.body.distance::<LANES>(&points);
+            let values = distances::<B, LANES>(&self.body, &points);
             for i in 0..LANES {
                 if (values[i] < 0.0) == (low[i].1 < 0.0) {
                     low[i] = (t[i], values[i]);
@@ -337,6 +344,25 @@ mod tests {
         assert!((mesh.volume() - 4.18879).abs() < 0.01);
         let euler = mesh.vertices.len() as i64 - mesh.triangles.len() as i64 / 2;
         assert_eq!(euler, 2);
+    }
+
+    #[test]
+    fn distances_do_not_depend_on_the_width_of_vectors() {
+        fn compare<B: Body>() {
+            let body = B::new(0.001);
+            for i in 0..4000 {
+                // A lattice of rank 1 in the bounds.
+                let at = |a: usize, lane: usize| {
+                    let t = (f64::from(i * 8) + lane as f64) * [0.754_877, 0.569_840, 0.430_160][a];
+                    B::BOUNDS[0][a] + (B::BOUNDS[1][a] - B::BOUNDS[0][a]) * t.fract()
+                };
+                let p = [0, 1, 2].map(|a| std::array::from_fn(|lane| at(a, lane)));
+                let [wide, narrow]: [[f64; 8]; 2] = [distances(&body, &p), body.distance(&p)];
+                assert_eq!(wide.map(f64::to_bits), narrow.map(f64::to_bits), "{p:?}");
+            }
+        }
+        compare::<super::super::aircraft::Uav>();
+        compare::<super::super::aircraft::Fighter>();
     }
 
     #[test]

@@ -28,14 +28,17 @@ fn of_both<const N: usize>(mut a: [f64; N], b: [f64; N], f: impl Fn(f64, f64) ->
     a
 }
 
+#[inline(always)]
 fn sub(p: Vec3, q: Vec3) -> Vec3 {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
+#[inline(always)]
 fn dot(p: Vec3, q: Vec3) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
+#[inline(always)]
 fn interpolate(t: f64, from: f64, to: f64) -> f64 {
     from + (to - from) * t
 }
@@ -62,6 +65,7 @@ impl RoundCone {
     }
 
     /// The exact distance, by Inigo Quilez's formula for a round cone.
+    #[inline(always)]
     pub(super) fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N] {
         let [from, to] = self.radius;
         let (square, shrink) = (self.square, from - to);
@@ -85,6 +89,7 @@ impl RoundCone {
 }
 
 /// A box with rounded edges; `half` includes the rounding.
+#[inline(always)]
 pub(super) fn rounded_box<const N: usize>(
     p: &Points<N>,
     centre: Vec3,
@@ -137,6 +142,7 @@ impl Panel {
         Self { root, along, span, sections, radius_least, shrink }
     }
 
+    #[inline(always)]
     pub(super) fn distance<const N: usize>(&self, p: &Points<N>) -> [f64; N] {
         // Not `at_each`: in a closure of this size the compiler does not use vectors.
         let mut values = [0.0; N];
@@ -194,6 +200,7 @@ fn hull_of_circles([x, off]: [f64; 2], centres: [f64; 2], [from, to]: [f64; 2]) 
 }
 
 /// The union of two solids with a fillet of about the size `fillet` at their intersection.
+#[inline(always)]
 pub(super) fn blend<const N: usize>(a: [f64; N], b: [f64; N], fillet: f64) -> [f64; N] {
     of_both(a, b, |a, b| {
         let h = (fillet - (a - b).abs()).max(0.0);
@@ -202,11 +209,23 @@ pub(super) fn blend<const N: usize>(a: [f64; N], b: [f64; N], fillet: f64) -> [f
 }
 
 /// The union of two solids.
+#[inline(always)]
 pub(super) fn join<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
     of_both(a, b, f64::min)
 }
 
+/// The union of some round cones. A loop, as `fold` would be compiled for the narrowest vectors.
+#[inline(always)]
+pub(super) fn nearest<const N: usize>(cones: &[RoundCone], p: &Points<N>) -> [f64; N] {
+    let mut nearest = [f64::INFINITY; N];
+    for cone in cones {
+        nearest = join(nearest, cone.distance(p));
+    }
+    nearest
+}
+
 /// The first solid without the second.
+#[inline(always)]
 pub(super) fn carve<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
     of_both(a, b, |a, b| a.max(-b))
 }
