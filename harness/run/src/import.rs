@@ -166,6 +166,8 @@ fn cells(bytes: &[u8], stated: Stated) -> Result<Cells, Failure> {
     let (numbers, _) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     let columns = 4 + usize::from(has_levels) + usize::from(has_sides);
+    let is_whole = bytes.len().is_multiple_of(8 * columns);
+    Failure::unless(is_whole, "was read, but the script's table ends within a row")?;
     let mut cells = Cells { root, digest, ..Cells::default() };
     numbers.chunks_exact(columns).for_each(|row| cells.push([row[0], row[1], row[2]], row[3]));
     let rows = || numbers.chunks_exact(columns).enumerate();

@@ -58,10 +58,13 @@ impl Runner<'_> {
         let _ = fs::remove_dir_all(&mesh);
         let Completed { report, finished, command } = completed?;
         kept?;
+        // Those of rank 0 alone, or without CPU times, say nothing of the ranks.
+        let is_of_all = |phase: &PhaseReport| phase.time_cpu_s.len() >= setup.ranks;
+        let phases = if report.phases.iter().all(is_of_all) { &report.phases[..] } else { &[] };
         let not_metis = report.partitioner.as_deref().is_some_and(|used| used != METIS);
         refuse(&[
             (
-                setup.comm == Comm::Sim && report.phases.is_empty(),
+                setup.comm == Comm::Sim && phases.is_empty(),
                 "its run report has no phases, without which simulated ranks cannot be projected",
             ),
             (
@@ -85,8 +88,8 @@ impl Runner<'_> {
             time_launch_s: finished.time_wall_s,
             time_cpu_s: finished.time_cpu_s,
             peak_rss_bytes: spread(&report.peak_rss_bytes),
-            useful_s: Spread::of(&useful_s(setup.ranks, &report.phases, time_wall_s)),
-            phases: report.phases.iter().map(phase).collect(),
+            useful_s: Spread::of(&useful_s(setup.ranks, phases, time_wall_s)),
+            phases: phases.iter().map(phase).collect(),
             counters: counters.collect(),
             digest: report.digest.unwrap_or_default(),
             setup: setup.clone(),
@@ -145,10 +148,9 @@ fn layout(setup: &Setup) -> Layout {
     Layout { partitioner, weights, level_base, ..Layout::on(ranks) }
 }
 
-/// CPU time outside calls to other ranks, per rank; the wall time if there are no phases, or those of rank 0 alone.
+/// CPU time outside calls to other ranks, per rank; the wall time if there are no phases.
 fn useful_s(ranks: usize, phases: &[PhaseReport], time_wall_s: f64) -> Vec<f64> {
-    let known = phases.iter().map(|phase| phase.time_cpu_s.len()).max();
-    if known.is_none_or(|known| known < ranks) {
+    if phases.is_empty() {
         return vec![time_wall_s; ranks];
     }
     let mut total = vec![0.0; ranks];
@@ -317,11 +319,17 @@ mod tests {
     }
 
     #[test]
-    fn a_report_of_rank_0_alone_is_none_of_the_efficiency_and_needs_no_digest() {
-        let report =
-            r#"{"cells": 8, "time_wall_s": 7.5, "phases": [{"name": "all", "time_cpu_s": [2.0]}]}"#;
-        let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
-        assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![7.5, 7.5], ""));
+    fn phases_of_fewer_ranks_or_without_cpu_times_are_not_used_and_no_digest_is_needed() {
+        let report = |key: &str| {
+            let phases = format!(r#"[{{"name": "all", "{key}": [2.0]}}]"#);
+            let json = format!(r#"{{"cells": 8, "time_wall_s": 7.5, "phases": {phases}}}"#);
+            format!("echo '{json}' > $2")
+        };
+        let run = scripted(&report("time_wall_s"), REPORTS, Comm::Solo).unwrap();
+        assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![7.5], ""));
+        assert!(run.phases.is_empty());
+        let of_rank_0 = scripted(&report("time_cpu_s"), REPORTS, Comm::Sim);
+        assert!(of_rank_0.unwrap_err().contains("no phases"));
     }
 
     #[test]

@@ -63,9 +63,9 @@ impl Group {
         self.runs[0].cells
     }
 
-    /// Returns cells per second and rank.
-    pub fn rate(&self) -> f64 {
-        self.cells() as f64 / self.time_s.value / self.setup.ranks as f64
+    /// Returns million cells per second and rank.
+    pub fn rates(&self) -> Median {
+        self.time_s.falling(|s| self.cells() as f64 / s / self.setup.ranks as f64 / 1e6)
     }
 
     /// Returns the median over the repetitions of a quantity that every run has; `None` if one does not have it.
@@ -202,10 +202,13 @@ impl Groups {
             by_setup.filter_map(|(setup, runs)| Group::of(setup, &runs)).collect();
         let of_all = |s: &Setup| (s.engine.clone(), s.case.clone());
         let has_runs: HashSet<_> = all.iter().map(|group| of_all(&group.setup)).collect();
-        let without = left_out.iter().filter(|left| !has_runs.contains(&of_all(&left.setup)));
-        notes.extend(without.map(|NoResult { setup, why }| {
-            format!("{} has no run on {}: {why}", setup.engine, setup.case)
-        }));
+        let without = left_out.iter().filter(|left| all.iter().all(|g| g.setup != left.setup));
+        notes.extend(without.map(
+            |NoResult { setup, why }| match has_runs.contains(&of_all(setup)) {
+                true => format!("no run of {setup}: {why}"),
+                false => format!("{} has no run on {}: {why}", setup.engine, setup.case),
+            },
+        ));
         let origins = origins.each_ref().map(Origins::described).concat();
         let notes = origins.into_iter().chain(pooled_nodes(lines)).chain(distinct(notes)).collect();
         let groups = Self { all, left_out, lacks, notes };

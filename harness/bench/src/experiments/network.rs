@@ -74,7 +74,8 @@ fn parse(text: &str) -> Result<Network, String> {
 /// # Errors
 /// The expected format.
 pub fn given(text: &str) -> Result<Network, String> {
-    let values: Vec<f64> = text.split(',').filter_map(|w| w.trim().parse().ok()).collect();
+    let numbers = text.split(',').filter_map(|w| w.trim().parse::<f64>().ok());
+    let values: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
     match values[..] {
         [latency_s, bandwidth_bytes_per_s] if latency_s >= 0.0 && bandwidth_bytes_per_s > 0.0 => {
             Ok(Network { latency_s, bandwidth_bytes_per_s, measured: false })

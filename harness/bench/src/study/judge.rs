@@ -5,7 +5,7 @@
 
 use super::file::{Row, Study};
 use super::measure::Sample;
-use crate::experiments::entry::{Entry, Line, Network};
+use crate::experiments::entry::{Entry, Line, Network, NoResult, Run};
 use crate::experiments::group::{Group, Groups};
 use crate::experiments::pop::{ABOVE_ONE, Efficiency, above_one};
 use std::collections::HashMap;
@@ -50,8 +50,6 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
     let origin =
         |line: &Line| line.session().map(|s| (s.machine.label(), s.machine.commit.clone()));
     let Some(last) = lines.iter().rev().find_map(origin) else { return lines.to_vec() };
-    let built: HashMap<&String, &String> =
-        lines.iter().filter_map(Line::run).map(|run| (&run.setup.engine, &run.program)).collect();
     let of_last = lines.iter().filter(|line| origin(line).as_ref() == Some(&last));
     let mut sessions: Vec<&str> = of_last.map(|line| line.session.as_str()).collect();
     let given = |(session, network)| (session, Some(network).filter(|of: &Network| !of.measured));
@@ -60,23 +58,28 @@ pub(crate) fn of_last_origin(lines: &[Line]) -> Vec<Line> {
         sessions
             .retain(|session| networks.iter().all(|(of, given)| of != session || given == last));
     }
-    let is_of = |line: &&Line| {
-        sessions.contains(&line.session.as_str())
-            && line.run().is_none_or(|run| *built[&run.setup.engine] == run.program)
-    };
-    lines.iter().filter(is_of).cloned().collect()
+    let of_sessions = || lines.iter().filter(|line| sessions.contains(&line.session.as_str()));
+    let built: HashMap<&String, &String> =
+        of_sessions().filter_map(Line::run).map(|run| (&run.setup.engine, &run.program)).collect();
+    let is_last = |run: &Run| *built[&run.setup.engine] == run.program;
+    of_sessions().filter(|line| line.run().is_none_or(is_last)).cloned().collect()
 }
 
 /// Judges one row. If a run that it needs failed or is missing, the result contains the reason.
 pub(super) fn judge(study: &Study, row: &Row, lines: &[Line]) -> Judged {
-    let judged = measured(study, row, lines).unwrap_or_else(|why| {
-        let failure = |name: &String, line: &Line| {
-            let Entry::Failure(failed) = &line.entry else { return None };
-            study.is_run(name, &failed.setup).then(|| format!("run {name} failed: {}", failed.why))
+    // A run that failed is not repeated: it failed if its last line says so, whatever other repetitions took.
+    let failure = |name: &String| {
+        let is_of = |line: &&Line| match &line.entry {
+            Entry::Failure(NoResult { setup, .. }) => study.is_run(name, setup),
+            entry => matches!(entry, Entry::Run(run) if study.is_run(name, &run.setup)),
         };
-        let failed = row.runs().find_map(|name| lines.iter().find_map(|line| failure(name, line)));
-        unjudged(row, failed.is_some(), failed.unwrap_or(why))
-    });
+        let Entry::Failure(failed) = &lines.iter().rfind(is_of)?.entry else { return None };
+        Some(format!("run {name} failed: {}", failed.why))
+    };
+    let judged = match row.runs().find_map(failure) {
+        Some(why) => unjudged(row, true, why),
+        None => measured(study, row, lines).unwrap_or_else(|why| unjudged(row, false, why)),
+    };
     check_invariants(&judged);
     judged
 }
@@ -99,7 +102,8 @@ pub fn unjudged(row: &Row, failed: bool, why: String) -> Judged {
 fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> {
     let groups = Groups::of(lines);
     let find = |name: &String| {
-        let found = groups.all.iter().find(|g| study.is_run(name, &g.setup));
+        // Of several spacings for one number of cells the last one.
+        let found = groups.all.iter().rfind(|g| study.is_run(name, &g.setup));
         found.ok_or_else(|| format!("run {name} is not in the record"))
     };
     let runs = row.run.iter().map(find).collect::<Result<Vec<&Group>, String>>()?;
@@ -111,7 +115,7 @@ fn measured(study: &Study, row: &Row, lines: &[Line]) -> Result<Judged, String> 
     // The least trustworthy run counts.
     let ranking = ["serial", "measured", "oversubscribed", "projected"];
     let rank = |how: &&str| ranking.iter().position(|h| h == how);
-    let how = runs.iter().map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
+    let how = runs.iter().chain([&against]).map(|g| g.how()).max_by_key(rank).unwrap_or("measured");
     let value = (row.measure.of)(&Sample { runs: &runs, against, phases: &row.phase })?;
     Ok(Judged { measured: Some((value, how)), ..unjudged(row, false, why) })
 }
@@ -160,7 +164,7 @@ mod tests {
     use super::super::file::EXPERIMENT;
     use super::super::measure::Measure;
     use super::*;
-    use crate::experiments::entry::{Comm, Machine, NoResult, Session, Setup};
+    use crate::experiments::entry::{Comm, Machine, Session, Setup};
     use crate::testing::line;
     use crate::testing::run;
     use crate::testing::study as read;
@@ -218,6 +222,9 @@ mod tests {
         assert_eq!(verdicts(&[ran(1, 9.0), ran(2, 4.0)]), [Met, Missed, ForComparison]);
         assert_eq!(verdicts(&[ran(1, 9.0), failed(2)]), [Met, Failed, Failed]);
         assert_eq!(verdicts(&[ran(1, 9.0)]), [Met, LeftOut, LeftOut]);
+        // A repetition that fails; in a later session it does not.
+        assert_eq!(verdicts(&[ran(1, 9.0), failed(1)])[0], Failed);
+        assert_eq!(verdicts(&[ran(1, 9.0), failed(1), ran(1, 9.0)])[0], Met);
     }
 
     #[test]

@@ -65,7 +65,7 @@ const fn measure(
 
 /// All measures.
 pub static MEASURES: [Measure; 15] = [
-    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run().rate())),
+    measure("cells_per_second_per_core", Alone, RATE, |s| Ok(s.run().rates().value * 1e6)),
     measure("facets_per_second_per_core", Alone, (1e-6, 2, " M facets/s"), |s| {
         let run = s.run();
         Ok(run.runs[0].facets as f64 / run.time_s.value / run.setup.ranks as f64)
@@ -79,7 +79,7 @@ pub static MEASURES: [Measure; 15] = [
         )),
         _ => Ok(s.against.time_s.value / s.run().time_s.value),
     }),
-    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rate() / s.against.rate())),
+    measure("rate_ratio", Against, PLAIN, |s| Ok(s.run().rates().value / s.against.rates().value)),
     measure("peak_bytes", Alone, (1.0 / (1u64 << 30) as f64, 2, " GiB"), |s| Ok(peak(s.run()))),
     measure("bytes_per_cell", Alone, PER_CELL, |s| Ok(s.run().bytes_per_cell().value)),
     measure("bytes_per_cell_beyond", Against, PER_CELL, |s| beyond(s.run(), s.against)),

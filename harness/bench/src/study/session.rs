@@ -121,8 +121,11 @@ pub fn measure(
     let rest = study.row[rows.len()..].iter();
     rows.extend(rest.map(|row| unjudged(row, false, "interrupted".to_owned())));
     let program = launcher.program();
-    let missing = (rows.iter().any(|row| row.why == NO_LAUNCHER))
-        .then(|| format!("{} is missing: runs on MPI were left out", program.display()));
+    let has_mpi = study.series.iter().any(|series| !series.mpi.is_empty());
+    let is_missing = rows.iter().any(|row| row.why == NO_LAUNCHER)
+        || has_mpi && session.mpi_left_out() == Some(NO_LAUNCHER);
+    let missing =
+        is_missing.then(|| format!("{} is missing: runs on MPI were left out", program.display()));
     Ok(Outcome { rows, lines: session.lines, interrupted, missing })
 }
 
@@ -339,14 +342,25 @@ impl Session<'_> {
             }
             let engine = &self.runner.programs.named(&setup.engine).description;
             let declined = engine.declines(&Case::read(&mesh.1)?);
+            let (is_declined, layout) = (declined.is_some(), (setup.ranks, setup.comm));
             let too_much = || excess(&self.lines, &setup, self.runner.limit);
             match declined.or_else(too_much) {
                 Some(why) => {
-                    points.iter_mut().filter(|p| p.mesh() == mesh).for_each(|p| p.failed = true);
+                    // What takes too long on one rank may not on two.
+                    let is_left = |p: &&mut Planned| {
+                        p.mesh() == mesh && (is_declined || (p.setup.ranks, p.setup.comm) == layout)
+                    };
+                    points.iter_mut().filter(is_left).for_each(|p| p.failed = true);
                     (self.progress)(&format!("left out, spacing {:.3e}: {why}", setup.spacing_min));
                     self.append(Entry::LeftOut(NoResult { setup, why }))?;
                 }
-                None if self.warm.insert(mesh) => self.run(&mut points[index], None)?,
+                None if self.warm.insert(mesh.clone()) => {
+                    self.run(&mut points[index], None)?;
+                    // The mesh of the next run is checked, too.
+                    if points[index].failed {
+                        self.warm.remove(&mesh);
+                    }
+                }
                 None => {}
             }
         }

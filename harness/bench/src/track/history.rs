@@ -13,7 +13,7 @@
 //! "metrics": {"CASE/METRIC": number}, "accepted": true (absent
 //! if false)}`.
 
-use super::{plain, unit};
+use super::{is_gain, plain, unit};
 use crate::gate::measures::{CaseMeasures, LayerName, Measures};
 use crate::gate::numbers::MEMORY;
 use crate::gate::report::{GateFinding, GateReport};
@@ -162,7 +162,8 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         let named = |(mut name, value): (String, f64)| {
             // The others depend on the program and the case alone.
             let of_machine = [MEMORY, "instructions", "allocations"];
-            if unit(&name) == "s" || of_machine.contains(&plain(&name)) {
+            let is_rate = is_gain(&name) == Some(true);
+            if is_rate || unit(&name) == "s" || of_machine.contains(&plain(&name)) {
                 name += &suffix;
             }
             let is_of = |case: &str| name.strip_prefix(case).is_some_and(|of| of.starts_with('/'));

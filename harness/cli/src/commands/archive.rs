@@ -1,6 +1,6 @@
 //! `harness archive`: a report that others can replay; `harness replay`: repeats its runs.
 
-use super::bench::execute;
+use super::bench::{execute, print_without};
 use super::report::{read, records_in};
 use crate::options::Input;
 use crate::output::put;
@@ -132,7 +132,8 @@ pub struct ReplayArguments {
 /// If the archive cannot be read, a program is missing, or the time does not suffice for one repetition.
 pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     let ReplayArguments { archive, record, session, .. } = arguments;
-    let expected = Expected::of(&read(&[archive.join(RECORD)])?)?;
+    let lines = read(&[archive.join(RECORD)])?;
+    let expected = Expected::of(&lines)?;
     let path = archive.join(EXPECTED);
     let text = files::read_text(&path).map_err(|error| Failure::at(&path, error))?;
     if text != pretty(&expected) {
@@ -141,7 +142,11 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     }
     let mut study = Study::read(&archive.join(STUDY).join(package::STUDY))?;
     let fitting = expected.repeats_within(f64::from(arguments.minutes) * 60.0)?;
-    let session = SessionOptions { repeat: session.repeat.or(fitting), ..session.clone() };
+    // A network that was given is no property of a machine.
+    let given = lines.iter().filter_map(Line::network).filter(|(_, network)| !network.measured);
+    let network = session.network.or(given.map(|(_, network)| network).next_back());
+    let repeat = session.repeat.or(fitting);
+    let session = SessionOptions { repeat, network, ..session.clone() };
     leave_out_missing(&mut study)?;
     let place = tempfile::tempdir()?;
     let temporary = place.path().join("replay.jsonl");
@@ -153,6 +158,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
     let replayed = expected.compare(&outcome.lines);
     let session = outcome.lines.iter().find_map(Line::session);
     print!("{}", table(&replayed, session).text());
+    let has_failed = print_without(&outcome.lines);
     let commit = session.map_or("", |session| &session.machine.commit);
     if commit != expected.commit {
         println!(
@@ -160,7 +166,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<u8, Failure> {
             expected.commit
         );
     }
-    Ok(code(&replayed))
+    Ok(if has_failed { EXIT_FAILED } else { code(&replayed) })
 }
 
 /// Removes the programs of others that are not installed here, and says so.

@@ -1,7 +1,7 @@
 //! `harness bench`: executes a study, appends to the record, and prints tables and which targets are met.
 
 use crate::output::{put, unwritten};
-use bench::experiments::entry::{Entry, Line, Run};
+use bench::experiments::entry::{Entry, Line, NoResult, Run};
 use bench::experiments::group::Groups;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
@@ -151,11 +151,7 @@ fn publish(
 ) -> Result<u8, Failure> {
     if !study.series.is_empty() {
         print!("{}", tables::text(&Groups::of(lines)));
-        for line in lines {
-            if let Entry::Failure(f) = &line.entry {
-                println!("failed: {} on {} ranks: {}", f.setup.case, f.setup.ranks, f.why);
-            }
-        }
+        print_without(lines);
     }
     let code = code(study, rows, lines);
     if study.row.is_empty() {
@@ -172,6 +168,21 @@ fn publish(
         println!("table: {}", path.display());
     }
     Ok(code)
+}
+
+/// Prints the runs that failed or were left out; returns whether one failed.
+pub(super) fn print_without(lines: &[Line]) -> bool {
+    let mut has_failed = false;
+    for line in lines {
+        let (what, NoResult { setup, why }) = match &line.entry {
+            Entry::Failure(failed) => ("failed", failed),
+            Entry::LeftOut(left) => ("left out", left),
+            _ => continue,
+        };
+        println!("{what}: {setup}: {why}");
+        has_failed |= what == "failed";
+    }
+    has_failed
 }
 
 /// The table of targets, with the counts of the verdicts below it.
@@ -223,7 +234,7 @@ fn code(study: &Study, rows: &[Judged], lines: &[Line]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::experiments::entry::{Comm, NoResult};
+    use bench::experiments::entry::Comm;
     use bench::study::judge::unjudged;
     use bench::testing::{line, run, study as read};
 

@@ -117,15 +117,13 @@ fn by_spacing(subject: &Subject, all: &[&Group]) -> Figure {
 /// Rate and memory of meshes of several sizes or programs.
 fn rate_and_memory(subject: &Subject, all: &[&Group]) -> [Figure; 2] {
     let rate: Value = |cells, ranks, time_s| cells / time_s / ranks / 1e6;
-    let rates = |g: &Group| {
-        let (cells, ranks) = (g.cells() as f64, g.setup.ranks as f64);
-        g.time_s.falling(|time_s| rate(cells, ranks, time_s))
-    };
     let names = ["rate", "Cells per second and core", "million cells / (s core)"];
-    let of_rates = ["Cells per second and core", ". Rates are cells over median times"];
-    let figure = over_cells(subject, all, names, of_rates, rates);
+    let at = format!(" at n = {}", all[0].setup.layer_cells_min);
+    let which = format!("{at}. Rates are cells over median times");
+    let of_rates = ["Cells per second and core", &which];
+    let figure = over_cells(subject, all, names, of_rates, Group::rates);
     let names = ["memory", "Peak memory per cell", "bytes per cell"];
-    let of_memory = ["Peak resident memory of all ranks, program and facets included,", ""];
+    let of_memory = ["Peak resident memory of all ranks, program and facets included,", &at];
     let memory = over_cells(subject, all, names, of_memory, Group::bytes_per_cell);
     [with_paper(figure, subject, "", Some(rate)), memory]
 }

@@ -74,12 +74,15 @@ pub struct Subject<'a> {
     pub case: &'a str,
     /// Cells that its series of several meshes was asked for.
     pub cells: Option<f64>,
+    /// The thickness of layers, unless the experiment varies it.
+    pub n: Option<u32>,
 }
 
 impl<'a> Subject<'a> {
     /// The program and the case of a run.
     pub fn of(setup: &'a Setup) -> Self {
-        Self { engine: &setup.engine, case: &setup.case, cells: setup.series_cells }
+        let n = (setup.experiment != "layers").then_some(setup.layer_cells_min);
+        Self { engine: &setup.engine, case: &setup.case, cells: setup.series_cells, n }
     }
 
     /// A name for files: the case, and before it the program unless that is the mesher of this repository.

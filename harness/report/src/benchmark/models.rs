@@ -2,6 +2,7 @@
 
 use super::groups::{Subject, cells_label, range};
 use super::numbers::digits;
+use super::scaling::ranks_axis;
 use crate::figure::{Axis, Figure, Point, Provenance, Series};
 use crate::table::Table;
 use bench::experiments::entry::Comm;
@@ -189,6 +190,6 @@ fn figure(subject: Subject, cells: u64, of: &[&Group], model: &Tested) -> Figure
     );
     let id = format!("model-{}-{}", subject.file(), cells_label(cells));
     let title = format!("Model of the run time: {subject}, {} cells", grouped(cells));
-    let x = Axis { ticks: distinct(of.iter().map(|g| g.setup.ranks as f64)), ..Axis::log("ranks") };
-    Figure { id, title, caption, x, y: Axis::log("run time / s"), series, ..Figure::default() }
+    let (x, y) = (ranks_axis(of), Axis::log("run time / s"));
+    Figure { id, title, caption, x, y, series, ..Figure::default() }
 }

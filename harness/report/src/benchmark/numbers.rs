@@ -1,8 +1,9 @@
 //! The results of a record as LaTeX macros, so that no number of a text is copied by hand: `\result{KEY}` is a median,
-//! `\result[interval]{KEY}` its confidence interval, `\result[unit]{KEY}` its unit.
+//! `\result[interval]{KEY}` its confidence interval, `\result[coverage]{KEY}` the confidence in per cent, `\result[unit]{KEY}` its unit.
 //!
 //! A key is `ENGINE/CASE/EXPERIMENT/CELLS/RANKS/HOW/QUANTITY`, such as `mesher/uav/strong/48000000/16/projected/speedup`. A partition that
-//! was chosen follows the experiment, as in `weights-metis-unit`. The same setup with another n has a number at its end: `speedup-2`.
+//! was chosen follows the experiment, as in `weights-metis-unit`, and so does n in the experiment `layers`: `layers-n16`. Otherwise the same
+//! setup with another n has a number at its end: `speedup-2`.
 //!
 //! `harness report DIR --check paper.tex` compares the numbers of a text with the record. A finding is a `\result` of a key that the record
 //! does not have, a `\defresult` (in a copy of `numbers.tex`) that differs from the record, or a number with a decimal point and three or
@@ -24,6 +25,8 @@ pub struct Number {
     pub value: String,
     /// The interval; empty for a single value.
     pub interval: String,
+    /// The confidence that the interval contains the median, in per cent; empty as well.
+    pub coverage: String,
     /// The unit; empty for a ratio.
     pub unit: &'static str,
 }
@@ -38,6 +41,7 @@ pub fn numbers(groups: &Groups) -> Vec<Number> {
 fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     let s = &group.setup;
     let experiment = match s.division().as_str() {
+        "default" if s.experiment == "layers" => format!("layers n{}", s.layer_cells_min),
         "default" => s.experiment.clone(),
         division => format!("{} {division}", s.experiment),
     };
@@ -46,26 +50,28 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
     let base = groups.reference(group);
     let scales = base.setup.ranks < s.ranks;
     let is_speedup = scales && base.cells() == group.cells();
-    let rate = |time_s: f64| group.cells() as f64 / time_s / s.ranks as f64 / 1e6;
     let quantities = [
         ("time", Some(group.time_s), "s"),
         ("cpu", group.cpu_s(), "s"),
-        ("rate", Some(group.time_s.falling(rate)), "10^6 cells/s/rank"),
+        ("rate", Some(group.rates()), "10^6 cells/s/rank"),
         ("memory", Some(group.bytes_per_cell()), "B/cell"),
         ("speedup", is_speedup.then(|| groups.speedup(group)), ""),
         ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
-        let Median { value, low, high, count, .. } = median.filter(|m| m.value.is_finite())?;
+        let Median { value, low, high, count, coverage } =
+            median.filter(|m| m.value.is_finite())?;
         let key = format!("{setup}/{name}");
         assert!(low <= value && value <= high, "{key}: {value} is not in its interval");
-        let ends = Some([low, high].map(digits).join("--")).filter(|_| count > 1);
-        Some(Number { key, value: digits(value), interval: ends.unwrap_or_default(), unit })
+        let ends = [[low, high].map(digits).join("--"), format!("{:.0}", 100.0 * coverage)];
+        let [interval, coverage] = if count > 1 { ends } else { Default::default() };
+        Some(Number { key, value: digits(value), interval, coverage, unit })
     };
     let cells = Number {
         key: format!("{setup}/cells"),
         value: grouped(group.cells()),
         interval: String::new(),
+        coverage: String::new(),
         unit: "cells",
     };
     quantities.into_iter().filter_map(number).chain([cells]).collect()
@@ -79,11 +85,13 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \result[interval]{KEY} its interval, \result[unit]{KEY} its unit.
+const HEAD: &str = r"% Made by `harness report`: \result{KEY} is a median, \result[interval]{KEY} its interval, \result[coverage]{KEY} the
+% confidence of that in per cent (95 and more need six repetitions), \result[unit]{KEY} its unit.
 \newcommand{\result}[2][value]{\ifcsname result/#2/#1\endcsname\csname result/#2/#1\endcsname
   \else\PackageError{numbers}{the record has no result #2}{}\fi}
-\newcommand{\defresult}[4]{\expandafter\def\csname result/#1/value\endcsname{#2}%
-  \expandafter\def\csname result/#1/interval\endcsname{#3}\expandafter\def\csname result/#1/unit\endcsname{#4}}
+\newcommand{\defresult}[5]{\expandafter\def\csname result/#1/value\endcsname{#2}%
+  \expandafter\def\csname result/#1/interval\endcsname{#3}\expandafter\def\csname result/#1/coverage\endcsname{#4}%
+  \expandafter\def\csname result/#1/unit\endcsname{#5}}
 ";
 
 /// The unit of a result in LaTeX.
@@ -94,15 +102,18 @@ fn unit_tex(number: &Number) -> String {
 /// `numbers.tex`.
 pub fn tex(numbers: &[Number]) -> String {
     let mut out = HEAD.to_owned();
-    for number @ Number { key, value, interval, .. } in numbers {
+    for number @ Number { key, value, interval, coverage, .. } in numbers {
         let unit = unit_tex(number);
-        let _ = writeln!(out, "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{unit}}}");
+        let _ =
+            writeln!(out, "\\defresult{{{key}}}{{{value}}}{{{interval}}}{{{coverage}}}{{{unit}}}");
     }
     out
 }
 
-/// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths.
-const NOT_READ: [&str; 3] = [
+/// What is not a number of a text: arguments of commands that name a label, a file or a source, options of commands, lengths. A bracket after
+/// the first commands begins an interval.
+const NOT_READ: [&str; 4] = [
+    r"\\(?:left|in|[bB]igg?l?)\b",
     r"\\[a-zA-Z]*(?:label|ref|cite|input|include|result|includegraphics|url|usepackage|pgfplotsset|bibitem)\*?\s*(?:\[[^\]]*\])?\s*\{[^}]*\}",
     r"(?:\\[a-zA-Z]+\*?|[}\]])\[[^\]\n]*\]",
     r"[0-9.]+(?:pt|cm|mm|in|em|ex|bp|\\[a-zA-Z]*(?:width|height|size|skip|sep|indent|unitlength)\b)",
@@ -113,6 +124,8 @@ const NOT_READ: [&str; 3] = [
 pub struct Checked {
     /// Numbers that were compared with the record.
     pub compared: usize,
+    /// Those of them that are written by hand, for which any result will do.
+    pub by_hand: usize,
     /// What is wrong, with line numbers.
     pub findings: Vec<String>,
 }
@@ -131,6 +144,7 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
         (of.get(0).map_or(0, |whole| whole.start()), misused(option, &of[2], numbers))
     }));
     let code = NOT_READ.iter().fold(code, |code, pattern| without(pattern, &code));
+    let named = found.len();
     for literal in all(r"[0-9.]*[0-9]", &code).into_iter().filter(|number| is_result(number, &code))
     {
         let number = literal.as_str();
@@ -138,24 +152,27 @@ pub fn check(text: &str, numbers: &[Number]) -> Checked {
         let why = || format!("{number} is written by hand, and no result rounds to it");
         found.push((literal.start(), (!is_known).then(why)));
     }
+    let (compared, by_hand) = (found.len(), found.len() - named);
     found.sort_by_key(|(at, _)| *at);
     let line = |at: usize| 1 + text[..at].matches('\n').count();
     let finding = |(at, why): &(usize, Option<String>)| {
         why.as_ref().map(|why| format!("line {}: {why}", line(*at)))
     };
-    Checked { compared: found.len(), findings: found.iter().filter_map(finding).collect() }
+    Checked { compared, by_hand, findings: found.iter().filter_map(finding).collect() }
 }
 
 /// The texts that a text includes, as it names them, without the figures of a report.
 pub fn included(text: &str) -> Vec<String> {
-    let uses = pattern(r"\\(?:input|include)\s*\{\s*([^}]*?)\s*\}");
+    let uses = pattern(r"\\(?:input|include)(?:\s*\{\s*([^}]*?)\s*\}|[ \t]+([^\s\\{}]+))");
     let code = without_comments(text);
-    let names = uses.captures_iter(&code).map(|of| of[1].to_owned());
-    names.filter(|name| !name.starts_with(r"\figures/")).collect()
+    let names = uses
+        .captures_iter(&code)
+        .map(|of| of.iter().skip(1).flatten().map(|m| m.as_str()).collect());
+    names.filter(|name: &String| !name.starts_with(r"\figures/")).collect()
 }
 
 fn without_comments(text: &str) -> String {
-    without(r"(?m)%.*$", &without(r"\\%", text))
+    without(r"(?m)%.*$", &without(r"\\[\\%]", text))
 }
 
 fn pattern(text: &str) -> Regex {
@@ -187,12 +204,13 @@ fn is_result(found: &Match, code: &str) -> bool {
 fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
     let groups = arguments.split('{').skip(1).filter_map(|group| Some(group.split_once('}')?.0));
     let [key, here @ ..] = &groups.collect::<Vec<_>>()[..] else {
-        return Some("\\defresult needs four arguments".to_owned());
+        return Some("\\defresult needs five arguments".to_owned());
     };
     let Some(n) = numbers.iter().find(|number| number.key == *key) else {
         return Some(format!("the record has no result {key}"));
     };
-    let [here, there] = [here, &[&n.value, &n.interval, &unit_tex(n)]].map(|of| of.join(" "));
+    let [here, there] =
+        [here, &[&n.value, &n.interval, &n.coverage, &unit_tex(n)]].map(|of| of.join(" "));
     (here != there).then(|| format!("{key} is {here} here and {there} in the record"))
 }
 
@@ -200,9 +218,13 @@ fn defines_otherwise(arguments: &str, numbers: &[Number]) -> Option<String> {
 fn misused(option: &str, key: &str, numbers: &[Number]) -> Option<String> {
     match (option, numbers.iter().find(|number| number.key == key)) {
         (_, None) => Some(format!("the record has no result {key}")),
-        ("interval", Some(n)) if n.interval.is_empty() => Some(format!("{key} has no interval")),
-        ("value" | "interval" | "unit", _) => None,
-        _ => Some(format!("\\result has no option {option}: give value, interval or unit")),
+        ("interval" | "coverage", Some(n)) if n.interval.is_empty() => {
+            Some(format!("{key} has no interval"))
+        }
+        ("value" | "interval" | "coverage" | "unit", _) => None,
+        _ => {
+            Some(format!("\\result has no option {option}: give value, interval, coverage or unit"))
+        }
     }
 }
 
@@ -240,8 +262,10 @@ mod tests {
         let speedup = all.iter().find(|n| n.key.ends_with("/2/projected/speedup")).unwrap();
         assert!(speedup.value.starts_with("1.3"), "{speedup:?}");
         assert!(
-            tex(&all)
-                .contains(&format!("\\defresult{{{}}}{{{}}}{{}}{{}}", speedup.key, speedup.value))
+            tex(&all).contains(&format!(
+                "\\defresult{{{}}}{{{}}}{{}}{{}}{{}}",
+                speedup.key, speedup.value
+            ))
         );
     }
 
@@ -253,22 +277,24 @@ mod tests {
 
     #[test]
     fn included_texts_are_found() {
-        let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}";
-        assert_eq!(included(text), ["a", "c.tex", "e"]);
+        let text = "\\input{a} % \\input{b}\n\\include{ c.tex }\\includegraphics{d}100\\% \\input\n{e}\\input{\\figures/f}\\input g.tex\n";
+        assert_eq!(included(text), ["a", "c.tex", "e", "g.tex"]);
     }
 
     fn number(key: &str, value: &str, interval: &str) -> Number {
-        Number { key: key.into(), value: value.into(), interval: interval.into(), unit: "s" }
+        let coverage = if interval.is_empty() { "" } else { "75" }.into();
+        let [key, value, interval] = [key, value, interval].map(str::to_owned);
+        Number { key, value, interval, coverage, unit: "s" }
     }
 
     #[test]
     fn unknown_keys_old_copies_and_numbers_by_hand_are_found() {
         let record = [number("a/time", "1.234", "1.10--1.30"), number("a/speedup", "11.3", "")];
         let findings = |text: &str| check(text, &record).findings;
-        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. % 9.99\n\
+        let right = "It takes \\result{a/time} (\\result[interval]{a/time}), 1.23 or 1.234 s, 11.3 times faster \\cite{x1.999}. \\\\% 9.99\n\
                      \\includegraphics[width=0.487\\textwidth]{fig-1.555} 1.234\\,s, 0.125pt, Section 3.4, 2013, 100\\% \\pgfplotsset{compat=1.16}\n\
-                     \\defresult{a/time}{1.234}{1.10--1.30}{s}";
-        assert_eq!(check(right, &record), Checked { compared: 7, findings: vec![] });
+                     \\defresult{a/time}{1.234}{1.10--1.30}{75}{s}";
+        assert_eq!(check(right, &record), Checked { compared: 7, by_hand: 4, findings: vec![] });
         for (text, part) in [
             ("\\result{a/tim}", "line 1: the record has no result a/tim"),
             ("x\n\\result [unit]\n{ a/tim\n}", "line 2: the record has no result a/tim"),
@@ -277,17 +303,19 @@ mod tests {
             ("x\n1.25 s", "line 2: 1.25 is written by hand"),
             ("\\textbf{12.4}", "12.4 is written by hand"),
             (
-                "\\defresult{a/time}{1.3}{1.10--1.30}{s}",
-                "a/time is 1.3 1.10--1.30 s here and 1.234 1.10--1.30 s in the record",
+                "\\defresult{a/time}{1.3}{1.10--1.30}{75}{s}",
+                "a/time is 1.3 1.10--1.30 75 s here and 1.234 1.10--1.30 75 s in the record",
             ),
-            ("\\defresult{a/time}{1.234}{1.10--1.30}{ms}", "1.10--1.30 ms here"),
+            ("\\defresult{a/time}{1.234}{1.10--1.30}{75}{ms}", "1.10--1.30 75 ms here"),
+            ("$x\\in[9.87, 1.23]$", "9.87 is written by hand"),
+            ("$\\left[9.87, 1.23\\right]$", "9.87 is written by hand"),
             ("[9.87, 1.23]", "9.87 is written by hand"),
             ("\\textbf{a} [1.23, 9.87]", "9.87 is written by hand"),
             ("$x\\in[0, 1)$,\n\\cite{a,\n9.87", "line 3: 9.87 is written by hand"),
             ("a factor of .987", ".987 is written by hand"),
             ("\\result[intervall]{a/time}", "no option intervall"),
             ("\\result[interval]{a/speedup}", "a/speedup has no interval"),
-            ("\\defresult{b}{1.3}{}{}", "no result b"),
+            ("\\defresult{b}{1.3}{}{}{}", "no result b"),
         ] {
             let found = findings(text);
             assert!(found.len() == 1 && found[0].contains(part), "{text}: {found:?}");

@@ -87,7 +87,7 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
     let cells = grouped(all[0].cells());
     let mut caption = format!(
         "Speedup of {subject} with {cells} cells at n = {} over the same program on the fewest ranks, times their number: {}. {} Hollow markers: projected \
-         from simulated ranks (critical path of CPU times plus {}), or measured with more ranks than cores. Lines join powers of two.",
+         from simulated ranks (critical path of CPU times plus {}), or measured with more ranks than cores.",
         all[0].setup.layer_cells_min,
         base_cases(groups, all),
         repetitions(all),
@@ -143,7 +143,7 @@ fn efficiency(groups: &Groups, subject: Subject, sims: &[&Group], file: &str) ->
     };
     let caption = format!(
         "Efficiencies by the POP definitions in {experiment} scaling of {subject}, {size}, n = {}. The base case is {}. They are projected from simulated \
-         ranks. {} Lines join powers of two. {}",
+         ranks. {} {}",
         last.setup.layer_cells_min,
         base_cases(groups, &[last]),
         rank_times(sims),
@@ -165,11 +165,12 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
     let points: Vec<Point> = times.enumerate().map(|(r, s)| Point::exact(r as f64, *s)).collect();
     let last = points.last()?.x;
     let lambda = run.useful_s.lambda(ranks);
+    let by_cells = run.counters.get("leaves").map(|leaves| leaves.lambda(ranks));
     let mut caption = format!(
         "Useful time (CPU time outside communication) per rank: {subject}, {} cells, projected from {ranks} simulated ranks. Load imbalance λ = max/mean: \
-         {lambda:.3} by time, {:.3} by cells. {}",
+         {lambda:.3} by time{}. {}",
         grouped(run.cells),
-        run.counters.get("leaves").map_or(1.0, |leaves| leaves.lambda(ranks)),
+        by_cells.map(|lambda| format!(", {lambda:.3} by cells")).unwrap_or_default(),
         rank_times(&[group])
     );
     if is_counterpart(subject.case) {
@@ -189,7 +190,7 @@ fn load(subject: Subject, group: &Group) -> Option<Figure> {
     Some(Figure { id, title, caption, x, y, series, ..Figure::default() })
 }
 
-fn ranks_axis(all: &[&Group]) -> Axis {
+pub(super) fn ranks_axis(all: &[&Group]) -> Axis {
     Axis { ticks: distinct(all.iter().map(|g| g.setup.ranks as f64)), ..Axis::log("ranks") }
 }
 
