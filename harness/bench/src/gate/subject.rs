@@ -1,14 +1,14 @@
 //! The two programs of a gate: given as files, or built from revisions of a repository or from its working tree.
 //!
 //! Each revision has a directory of its own, with its files in `tree` and the results of its build in `build`. Both are
-//! kept whole, because a program may need libraries or data beside it, and are used where they were built. What all builds
-//! may share, such as compiled dependencies, goes to `shared`. The repository, its index and its working tree stay unchanged.
+//! kept whole, because a program may need libraries or data beside it, and are used where they were built. The repository, its
+//! index and its working tree stay unchanged.
 //!
-//! Invariant: a directory that contains the file `built` has the result of the build command in that file.
+//! Invariant: a directory that contains the file `built` has the result of the build command in that file, by the compiler in it.
 
 use super::GateOptions;
 use super::measures::{CaseMeasures, Measured};
-use crate::experiments::machine::digest_of;
+use crate::experiments::machine::{compiler, digest_of};
 use crate::git;
 use contract::failure::Failure;
 use run::engine::description::Build;
@@ -108,9 +108,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let place = cache.join(revision.unwrap_or("working-tree"));
     let tree = revision.map_or(repository.to_owned(), |_| place.join("tree"));
     let mut values = Values::default();
-    let places =
-        [("target", place.join("build")), ("shared", cache.join("shared")), ("root", tree)];
-    for (name, path) in places {
+    for (name, path) in [("target", place.join("build")), ("root", tree)] {
         let made = fs::create_dir_all(&path).and_then(|()| fs::canonicalize(&path));
         let made = made.map_err(|error| Failure::at(&path, error))?;
         values.insert(name, made.to_string_lossy().into_owned());
@@ -118,10 +116,10 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let tree = Path::new(&values["root"]);
     let program = PathBuf::from(fill(&build.program, &values));
     let words: Vec<String> = build.command.iter().map(|word| fill(word, &values)).collect();
-    let (done, command_line) = (place.join("built"), build.command.join("\n"));
+    let (done, with) = (place.join("built"), build.command.join("\n") + "\n" + &compiler());
     let mut label = "the working tree";
     if let Some(revision) = revision {
-        let is_built = fs::read_to_string(&done).is_ok_and(|with| with == command_line);
+        let is_built = fs::read_to_string(&done).is_ok_and(|of| of == with);
         if is_built && program.is_file() {
             return Ok(program);
         }
@@ -144,7 +142,7 @@ fn program(build: &Build, revision: Option<&str>, repository: &Path) -> Result<P
     let why = format!("the build succeeded, but {} is missing", program.display());
     let why = format!("{label}: {why}: check [build] program");
     Failure::unless(program.is_file(), why)?;
-    fs::write(&done, command_line).map_err(|error| Failure::at(&done, error))?;
+    fs::write(&done, with).map_err(|error| Failure::at(&done, error))?;
     Ok(program)
 }
 

@@ -80,8 +80,7 @@ pub struct Description {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Build {
-    /// Run in the root directory of the revision, `{root}`. `{target}` is a directory for the results, which are kept whole;
-    /// `{shared}` is one for what the builds of all revisions may share.
+    /// Run in the root directory of the revision, `{root}`. `{target}` is a directory for the results, which are kept whole.
     pub command: Vec<String>,
     /// The program that the command builds.
     pub program: String,
