@@ -89,7 +89,8 @@ pub fn grow<F: Borrow<[Facet]>>(quantised: Quantised<F>, job: &mut Job) -> Resul
     });
     let Decided { sides, regions, .. } = decided;
     let (leaks, bounds_nothing) = job.phase("leaks", |comm| {
-        let leaks = leaks::find(&base, regions, sides.summary.inside > 0);
+        let wants_all = options.strict || options.ungraded || sides.summary.inside == 0;
+        let leaks = leaks::find(&base, regions, !wants_all);
         let bounds_nothing = (sides.summary.inside, leaks.0.len()) == (0, 0)
             && match is_closed {
                 true => openness::is_doubled(slice, comm),

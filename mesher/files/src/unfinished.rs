@@ -17,8 +17,8 @@ use std::os::fd::OwnedFd;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::park;
 
-/// Greatest number of unfinished outputs of a process.
-const OUTPUTS: usize = 256;
+/// Greatest number of unfinished outputs of a process: one for each of 4,096 simulated ranks, and reports.
+const OUTPUTS: usize = 4096 + 8;
 
 static STATE: Mutex<State> =
     Mutex::new(State { outputs: [const { None }; OUTPUTS], is_complete: false, is_ending: false });

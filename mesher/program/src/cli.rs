@@ -23,7 +23,7 @@ pub const UNPRINTED: i32 = 4;
 ///
 /// Runs on one rank, or in parallel under a launcher of MPI jobs: `mpirun -n 8 mesher ...`. Exit codes: 0 success, 1 the geometry leaks (--strict), 2 unusable
 /// input or an output directory that is not empty or belongs to another run, 4 output could not be written, 70 a bug, 71 the
-/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4), a mesh that is complete stays.
+/// mesh would not fit into memory or memory ran out, 75 a rank exceeded --stall-limit, 130 interrupted by a signal. Unless the code is 0, no file of the mesh remains; only if a report could not be written (4) or a rank stalls after that (75), a mesh that is complete stays.
 #[derive(Clone, Parser)]
 #[command(version = env!("VERSION"))]
 pub struct Args {
@@ -45,7 +45,7 @@ pub struct Args {
     /// Method that assigns base leaves to ranks
     #[arg(long, visible_alias = "preset", value_enum, default_value = "morton")]
     partitioner: Partitioner,
-    /// Weights of the partition [default: rebalance; unit with --preset paper]
+    /// Weights of the partition [default: rebalance, which is area with METIS or --level-base; unit with --preset paper]
     #[arg(long, value_enum)]
     weights: Option<Weights>,
     /// Level of the base leaves: 0 to 19, or auto
@@ -63,7 +63,7 @@ pub struct Args {
     /// Mesh even if the memory probably does not suffice, instead of ending with exit code 71
     #[arg(long)]
     pub force: bool,
-    /// Make no mesh of a geometry that leaks between spacings, which is a warning otherwise, but end with exit code 1
+    /// Make no mesh of a geometry that leaks between spacings or bounds nothing, which is a warning otherwise, but end with exit code 1
     #[arg(long, conflicts_with = "plan")]
     strict: bool,
     /// Each rank keeps the name of its current phase in DIR/rank-00000.txt, also when the run has failed or was interrupted

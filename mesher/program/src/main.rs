@@ -215,7 +215,10 @@ fn served(line: &str) -> Result<Args, Error> {
     let words: Vec<String> = serde_json::from_str(line)
         .map_err(|e| Error::input(format!("`{line}` is no JSON array of words: {e}")))?;
     // These would end the service.
-    let prints = |w: &String| ["-h", "--help", "-V", "--version"].contains(&w.as_str());
+    let prints = |w: &String| {
+        let is_short = w.starts_with('-') && !["--", "-o"].iter().any(|of| w.starts_with(of));
+        is_short && w.contains(['h', 'V']) || ["--help", "--version"].contains(&w.as_str())
+    };
     if !words.iter().any(prints) {
         let mut args = parse(once("mesher".to_owned()).chain(words))?;
         args.quiet = true;

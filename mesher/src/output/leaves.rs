@@ -110,8 +110,9 @@ pub struct MeshEntry {
     #[serde(flatten)]
     pub rules: Rules,
     geometry: Value,
-    /// What is closed at a coarser spacing, and open at that of the mesh.
-    pub leaks: Vec<Leak>,
+    /// What is closed at a coarser spacing, and open at that of the mesh; left out if not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaks: Option<Vec<Leak>>,
     /// Leaves of the mesh.
     pub leaves: u64,
     /// Leaves by level, 0 to 19.
@@ -137,7 +138,7 @@ impl MeshEntry {
             tree: if mesh.is_base { "base" } else { "final" },
             rules: rules.clone(),
             geometry: json!({ "facets": mesh.facets.total, "digest": hex(mesh.facets.digest) }),
-            leaks: mesh.leaks.0.clone(),
+            leaks: mesh.leaks.1.then(|| mesh.leaks.0.clone()),
             leaves,
             leaves_by_level: by_level.iter().map(|l| l.iter().sum()).collect(),
             leaves_by_side: SIDES.into_iter().zip(by_side).collect(),

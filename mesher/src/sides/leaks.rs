@@ -28,7 +28,7 @@ use std::mem::take;
 const COARSER: Level = 2;
 
 /// Most crossing leaves of the surface level with which T0/1 is always searched. It takes as long as a quarter of the sides, so in larger
-/// meshes it is searched only where T0/2 has leaked or nothing is inside T0.
+/// meshes it is searched only where T0/2 has leaked, nothing is inside T0, or the user asks for leaks.
 const MOST_FOR_T0_1: u64 = 1 << 24;
 
 /// A region that has leaked.
@@ -56,9 +56,9 @@ pub struct Leak {
     pub is_inside: bool,
 }
 
-/// All leaks. The same on all ranks.
+/// All leaks, and whether they are known: whether one was found, or everything was searched. The same on all ranks.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Leaks(pub Vec<Leak>);
+pub struct Leaks(pub Vec<Leak>, pub bool);
 
 /// One side of T0, cut at the level above the surface level, so that no octants deeper than the cut are stored.
 pub struct Region {
@@ -110,16 +110,15 @@ impl Region {
     }
 }
 
-/// The leaks in all regions of T0, which `has_inside`. Messages are not counted: the mesh does not depend on them. Collective; the same
-/// on all ranks.
-pub fn find(base: &Base, regions: Vec<Region>, has_inside: bool) -> Leaks {
+/// The leaks in all regions of T0; whether T0/1 `may_be_skipped`. Messages are not counted: the mesh does not depend on them. Collective;
+/// the same on all ranks.
+pub fn find(base: &Base, regions: Vec<Region>, may_be_skipped: bool) -> Leaks {
     let (rules, mut leaks) = (base.rules, Vec::new());
-    uncounted(base.comm, || {
-        let skips = has_inside && !regions.is_empty() && crossing_leaves(base) > MOST_FOR_T0_1;
-        for region in regions {
-            let before = leaks.len();
-            for k in (1..=COARSER.min(rules.level_surface)).rev() {
-                if k > 1 || !skips || leaks.len() > before {
+    let are_known = uncounted(base.comm, || {
+        let skips = may_be_skipped && !regions.is_empty() && crossing_leaves(base) > MOST_FOR_T0_1;
+        for k in (1..=COARSER.min(rules.level_surface)).rev() {
+            for region in &regions {
+                if k > 1 || !skips || !leaks.is_empty() {
                     let level = rules.level_surface - k;
                     let coarse = region.tree(base, level);
                     let coarse = Base { tree: &coarse, ..*base };
@@ -127,9 +126,10 @@ pub fn find(base: &Base, regions: Vec<Region>, has_inside: bool) -> Leaks {
                 }
             }
         }
+        !skips || !leaks.is_empty()
     });
     leaks.sort_unstable_by_key(|leak| (u32::MAX - leak.level, leak.first));
-    let leaks = Leaks(leaks);
+    let leaks = Leaks(leaks, are_known);
     leaks.check_invariants(rules);
     leaks
 }
@@ -201,9 +201,8 @@ impl Leaks {
     /// If one is violated; the message names the leak.
     pub fn check_invariants(&self, rules: &Rules) {
         let order = |leak: &Leak| (u32::MAX - leak.level, leak.first);
-        for pair in self.0.windows(2) {
-            assert!(order(&pair[0]) < order(&pair[1]), "leaks must be in order: {pair:?}");
-        }
+        let are_sorted = self.0.is_sorted_by(|a, b| order(a) < order(b));
+        assert!(are_sorted, "leaks must be in order: {self:?}");
         let volume = |l: Level| 1u64 << (3 * (LEVEL_MAX - l));
         for leak in &self.0 {
             let (level, (first, code)) = (rules.level_surface, leak.first.leaf());
@@ -218,12 +217,8 @@ impl Leaks {
             assert!(code >> (3 * first) == 0, "a leak's first leaf must lie in the root: {leak:?}");
         }
         for level in 0..rules.level_surface {
-            let of_level = self.0.iter().filter(|leak| leak.level == level);
-            let sum: u64 = of_level.map(|leak| leak.octants).sum();
-            assert!(
-                sum <= volume(0),
-                "the leaks of level {level} must fit into the root: {self:?}"
-            );
+            let octants = self.0.iter().filter(|of| of.level == level).map(|of| of.octants);
+            assert!(octants.sum::<u64>() <= volume(0), "leaks must fit into the root: {self:?}");
         }
     }
 }
@@ -248,7 +243,7 @@ mod tests {
     }
 
     fn check(leaks: &[Leak]) {
-        Leaks(leaks.to_vec()).check_invariants(&rules());
+        Leaks(leaks.to_vec(), true).check_invariants(&rules());
     }
 
     #[test]
