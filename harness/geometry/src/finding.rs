@@ -155,7 +155,7 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     match finding.kind {
         Kind::Openings => openings(finding, input, (width, finest)),
         Kind::Intersections if finding.count_changing == 0 => {
-            "No effect: the facets overlap within one plane or by the rounding of their \
+            "No effect: the facets overlap back to back in one plane or by the rounding of their \
                                                                vertices, so no volumes overlap."
                 .into()
         }
@@ -276,7 +276,9 @@ mod tests {
         let text = |kind, changing| of_width(kind, 3.0, changing, true);
         let mut meanings: Vec<String> = kinds.iter().map(|&kind| text(kind, 3)).collect();
         meanings.push(text(Kind::Intersections, 0));
-        assert!(meanings[11].starts_with("No effect: the facets overlap within one plane"));
+        assert!(
+            meanings[11].starts_with("No effect: the facets overlap back to back in one plane")
+        );
         assert!(meanings[6].starts_with("Where two closed shells overlap"));
         meanings.sort();
         meanings.dedup();

@@ -10,7 +10,7 @@ use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::tree::FacetTree;
 
-/// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or in
+/// A pair that a shift of this length separates, in lattice units, intersects by the rounding of its vertices or is back to back in
 /// one plane. Neither makes two volumes overlap.
 const ROUNDING: f64 = 2.0;
 
@@ -49,10 +49,12 @@ pub fn intersect(a: &FacetLattice, b: &FacetLattice) -> bool {
 }
 
 /// An upper bound on the length of the least shift that separates the interiors of two intersecting triangles, in
-/// lattice units; 0 in one plane, where the smallest shift along the normal does.
+/// lattice units; 0 in one plane, where the smallest shift along the normal does. Those of one plane that face the same way bound
+/// volumes on the same side of it, which that shift does not separate.
 fn depth(a: &FacetLattice, b: &FacetLattice) -> f64 {
     let along = |axis: [i64; 3]| overlap(a, b, axis) as f64 / (dot(axis, axis) as f64).sqrt();
-    axes(a, b).chain([normal(a)]).map(along).fold(f64::INFINITY, f64::min)
+    let opposite = Some(normal(a)).filter(|n| dot(*n, normal(b)) <= 0);
+    axes(a, b).chain(opposite).map(along).fold(f64::INFINITY, f64::min)
 }
 
 /// The length in which the projections of two triangles on an axis (up to 2^59) overlap, times that of the axis; not positive if they
@@ -155,7 +157,9 @@ mod tests {
     fn the_depth_is_the_least_shift_that_separates() {
         let a = [[0, 0, 0], [80, 0, 0], [0, 80, 0]];
         assert_eq!(depth(&a, &[[20, 20, -3], [20, 20, 50], [30, 20, 50]]), 3.0);
-        assert_eq!(depth(&a, &a.map(|[x, y, z]| [x + 20, y, z])), 0.0);
+        let [p, q, r] = a.map(|[x, y, z]| [x + 20, y, z]);
+        assert_eq!(depth(&a, &[p, r, q]), 0.0);
+        assert!(depth(&a, &[p, q, r]) > 10.0);
     }
 
     proptest! {

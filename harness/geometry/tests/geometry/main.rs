@@ -180,6 +180,14 @@ fn boxes_that_share_part_of_a_face_intersect_in_its_plane() {
     assert_eq!(count(&found, Kind::Intersections), 2);
 }
 
+/// Only facets in one plane overlap, but between x = 2 and 4 there are two volumes, and rays find none.
+#[test]
+fn boxes_that_overlap_with_flush_sides_change_the_region() {
+    let boxes = [cuboid([0.0; 3], [4.0; 3]), cuboid([2.0, 0.0, 0.0], [6.0, 4.0, 4.0])].concat();
+    let found = diagnosis(boxes, Some(0.25));
+    assert!(found.finding(Kind::Intersections).unwrap().count_changing >= 4);
+}
+
 #[test]
 fn a_vertex_on_an_edge_is_a_t_junction_and_not_an_opening() {
     let mut facets = cube();
