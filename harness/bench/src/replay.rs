@@ -60,7 +60,7 @@ pub enum Found {
         low: f64,
         /// Upper end.
         high: f64,
-        /// `measured`, `projected` ...: only the same are compared.
+        /// `measured`, `projected` ..., and over which run: only the same are compared.
         how: String,
     },
     /// Seconds, which are not compared.
@@ -231,10 +231,13 @@ fn values(groups: &Groups, group: &Group) -> Vec<Value> {
         ("speedup", (scales && base.cells() == group.cells()).then(|| groups.speedup(group))),
         ("efficiency", scales.then(|| groups.global_efficiency(group))),
     ];
+    let over_base = format!("{} over {}:{}", group.how(), base.how(), base.setup.ranks);
     for (quantity, ratio) in ratios {
+        let has_base = ["speedup", "efficiency"].contains(&quantity);
+        let how = if has_base { over_base.clone() } else { group.how().to_owned() };
         if let Some(Median { value, low, high, .. }) = ratio.filter(|of| of.value.is_finite()) {
             let (low, high) = (low * (1.0 - TOLERANCE), high * (1.0 + TOLERANCE));
-            add(quantity, Found::Ratio { value, low, high, how: group.how().to_owned() });
+            add(quantity, Found::Ratio { value, low, high, how });
         }
     }
     add("time", Found::Time(group.time_s.value));
@@ -318,6 +321,21 @@ mod tests {
         assert_eq!((replayed.count(Verdict::Outside), replayed.holds()), (3, false));
         let missing = expected.compare(&record([2.0, 2.0])[..1]);
         assert_eq!(missing.count(Verdict::Missing), 8);
+    }
+
+    #[test]
+    fn a_ratio_over_another_base_is_not_compared() {
+        let of = |comm, ranks: usize| {
+            line(Entry::Run(Box::new(run(comm, 1000, &[("a", &vec![8.0 / ranks as f64; ranks])]))))
+        };
+        let lines = [of(Comm::Mpi, 1), of(Comm::Sim, 2), of(Comm::Sim, 4)];
+        let replayed = Expected::of(&lines).unwrap().compare(&lines[1..]);
+        // A speedup and an efficiency on four ranks, and two times.
+        assert_eq!(
+            (replayed.count(Verdict::Outside), replayed.count(Verdict::NotCompared)),
+            (0, 4)
+        );
+        assert!(replayed.holds() && replayed.count(Verdict::Missing) > 0);
     }
 
     /// Otherwise a replay would say that the values were changed.

@@ -24,6 +24,11 @@ pub struct Median {
 }
 
 impl Median {
+    /// Returns the coverage in per cent, rounded down.
+    pub fn per_cent(&self) -> f64 {
+        (100.0 * self.coverage).floor()
+    }
+
     /// Returns the median of a quantity that falls as this one rises.
     pub fn falling(self, of: impl Fn(f64) -> f64) -> Self {
         Self { value: of(self.value), low: of(self.high), high: of(self.low), ..self }

@@ -162,6 +162,9 @@ fn are_times(times: impl IntoIterator<Item = f64>) -> bool {
     times.into_iter().all(|time| (0.0..=SECONDS_MAX).contains(&time))
 }
 
+/// How far the clock of a program may be from that of the harness, and from those of its phases.
+const CLOCKS_S: f64 = 0.01;
+
 /// How far a sum may be from that of so many stored values.
 fn rounding(count: usize, sum: f64) -> f64 {
     1e-6 * (1 + count) as f64 + 1e-9 * sum
@@ -184,14 +187,21 @@ pub struct Spread {
 impl Spread {
     /// The spread of the values of ranks 0, 1, ..., rounded to six decimals: a microsecond for times.
     pub fn of(values: &[f64]) -> Self {
-        let round = |v: f64| (v * 1e6).round() / 1e6;
+        let round = |v: &mut f64| *v = (*v * 1e6).round() / 1e6;
+        let mut all = Self::exact(values);
+        all.by_rank.iter_mut().chain([&mut all.sum, &mut all.max]).for_each(round);
+        all
+    }
+
+    /// The same without rounding.
+    pub fn exact(values: &[f64]) -> Self {
         let at = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap_or(0);
         let keep = if values.len() <= BY_RANK_MAX { values } else { &[] };
         Self {
-            sum: round(values.iter().sum()),
-            max: round(values.get(at).copied().unwrap_or(0.0)),
+            sum: values.iter().sum(),
+            max: values.get(at).copied().unwrap_or(0.0),
             at,
-            by_rank: keep.iter().map(|v| round(*v)).collect(),
+            by_rank: keep.to_vec(),
         }
     }
 
@@ -337,8 +347,9 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it has ranks and a wall time, times that a clock can show, and sums that are those of the ranks and of the phases.
-    fn is_possible(&self) -> bool {
+    /// Whether it has ranks and a wall time, which is at most that of the launcher and at least that of any phase, times that a clock can show, and sums
+    /// that are those of the ranks and of the phases.
+    pub(crate) fn is_possible(&self) -> bool {
         let Self { setup, time_wall_s, useful_s, phases, .. } = self;
         let times = phases.iter().flat_map(|of| [of.useful_s.sum, of.wall_s.sum]);
         let of_run = [useful_s.sum, *time_wall_s, self.time_launch_s, self.time_cpu_s];
@@ -349,8 +360,11 @@ impl Run {
         let is_by_rank = phases.iter().all(|phase| phase.useful_s.by_rank.len() == setup.ranks);
         let total: f64 = phases.iter().map(|phase| phase.useful_s.sum).sum();
         let off = rounding(setup.ranks * phases.len(), total);
+        let slowest = phases.iter().map(|phase| phase.wall_s.max).fold(0.0, f64::max);
         setup.ranks > 0
             && *time_wall_s > 0.0
+            && *time_wall_s <= 1.01 * self.time_launch_s + CLOCKS_S
+            && (setup.comm == Comm::Sim || slowest <= 1.01 * time_wall_s + CLOCKS_S)
             && are_times(times.chain(of_run))
             && spreads.all(Spread::is_possible)
             && (phases.is_empty() || !is_by_rank || (useful_s.sum - total).abs() <= off)

@@ -75,7 +75,7 @@ impl Runner<'_> {
         ])?;
         let time_wall_s = report.time_wall_s.unwrap_or(finished.time_wall_s);
         let counters = report.counters.iter().map(|(name, of)| (name.clone(), spread(of)));
-        Ok(Run {
+        let run = Run {
             program: machine::digest_of(engine.files()),
             repeat: repeat.unwrap_or(0),
             warm_up: repeat.is_none(),
@@ -93,7 +93,12 @@ impl Runner<'_> {
             counters: counters.collect(),
             digest: report.digest.unwrap_or_default(),
             setup: setup.clone(),
-        })
+        };
+        refuse(&[(
+            !run.is_possible(),
+            "its run report has numbers that no run can have, such as a time longer than that of its process",
+        )])?;
+        Ok(run)
     }
 }
 
@@ -261,7 +266,7 @@ mod tests {
 
     #[test]
     fn useful_time_is_cpu_time_outside_calls() {
-        let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 9.0, "peak_rss_bytes": [70, 70],
+        let report = r#"{"facets": 12, "cells": 80, "digest": "00", "ranks": 2, "time_wall_s": 0.009, "peak_rss_bytes": [70, 70],
             "counters": {"leaves": [30, 50]}, "phases": [{"name": "read", "time_wall_s": [4.0, 4.5], "time_cpu_s": [2.0, 1.0],
             "time_comm_wall_s": [1.0, 1.0], "time_comm_cpu_s": [0.5, 1.1], "messages": [1, 1], "message_bytes": [8, 16]}]}"#;
         let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -277,9 +282,9 @@ mod tests {
 
     #[test]
     fn the_useful_time_of_a_program_without_phases_is_its_wall_time() {
-        let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.5, "peak_rss_bytes": 9}"#;
+        let report = r#"{"cells": 8, "digest": "00", "time_wall_s": 0.005, "peak_rss_bytes": 9}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Solo).unwrap();
-        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.5, 9.0));
+        assert_eq!((run.useful_s.sum, run.peak_rss_bytes.sum), (0.005, 9.0));
     }
 
     #[test]
@@ -311,10 +316,10 @@ mod tests {
 
     #[test]
     fn reported_time_and_memory_take_precedence() {
-        let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 7.5, "peak_rss_bytes": [3, 4],
+        let report = r#"{"ranks": 2, "cells": 8, "digest": "ab", "time_wall_s": 0.0075, "peak_rss_bytes": [3, 4],
             "phases": [{"name": "all", "time_cpu_s": [2.0, 1.0]}]}"#;
         let run = scripted(&format!("echo '{report}' > $2"), REPORTS, Comm::Sim).unwrap();
-        assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (7.5, 7.0));
+        assert_eq!((run.time_wall_s, run.peak_rss_bytes.sum), (0.0075, 7.0));
         assert_eq!((run.useful_s.by_rank, run.phases[0].useful_s.max), (vec![2.0, 1.0], 2.0));
     }
 
@@ -322,11 +327,11 @@ mod tests {
     fn phases_of_fewer_ranks_or_without_cpu_times_are_not_used_and_no_digest_is_needed() {
         let report = |key: &str| {
             let phases = format!(r#"[{{"name": "all", "{key}": [2.0]}}]"#);
-            let json = format!(r#"{{"cells": 8, "time_wall_s": 7.5, "phases": {phases}}}"#);
+            let json = format!(r#"{{"cells": 8, "time_wall_s": 0.0075, "phases": {phases}}}"#);
             format!("echo '{json}' > $2")
         };
         let run = scripted(&report("time_wall_s"), REPORTS, Comm::Solo).unwrap();
-        assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![7.5], ""));
+        assert_eq!((run.useful_s.by_rank, run.digest.as_str()), (vec![0.0075], ""));
         assert!(run.phases.is_empty());
         let of_rank_0 = scripted(&report("time_cpu_s"), REPORTS, Comm::Sim);
         assert!(of_rank_0.unwrap_err().contains("no phases"));

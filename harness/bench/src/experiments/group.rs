@@ -139,10 +139,10 @@ fn quieten(typical: &mut Run, runs: &[Run]) -> bool {
             median_of(&runs.iter().map(of_run).collect::<Vec<f64>>())
         };
         let times: Vec<f64> = (0..total.len()).map(of_rank).collect();
-        phase.useful_s = Spread::of(&times);
+        phase.useful_s = Spread::exact(&times);
         total.iter_mut().zip(times).for_each(|(total, time)| *total += time);
     }
-    typical.useful_s = Spread::of(&total);
+    typical.useful_s = Spread::exact(&total);
     true
 }
 
@@ -239,13 +239,13 @@ impl Groups {
         let (s, weak) = (&group.setup, group.setup.experiment == "weak");
         let is_comparable = |o: &&Group| {
             let o = &o.setup;
-            let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
             let same_size = match weak {
                 true => o.experiment == "weak" && o.series_cells == s.series_cells,
                 false => o.spacing_min == s.spacing_min,
             };
-            // Another partition on as many ranks is no base.
-            let is_base = weak || o.ranks == 1 || alike && s.experiment != "weights";
+            let alike = (o.comm, &o.experiment) == (s.comm, &s.experiment);
+            // Another partition is no base.
+            let is_base = o.ranks == 1 || (weak || alike) && o.division() == s.division();
             // A measured time has no projected base.
             let is_measured = s.comm == Comm::Sim || o.comm != Comm::Sim;
             let [mesh, other] = [s, o].map(|s| (&s.case, s.layer_cells_min, &s.engine));
@@ -261,14 +261,26 @@ impl Groups {
     /// Returns the speedup of a group over its reference, times the ranks of that: over one rank, if it ran on one.
     pub fn speedup(&self, group: &Group) -> Median {
         let base = self.reference(group);
-        let base_s = base.time_s.value * base.setup.ranks as f64;
-        group.time_s.falling(|time_s| base_s / time_s)
+        self.of_times(group, base.time_s.value * base.setup.ranks as f64 / group.time_s.value)
     }
 
-    /// Returns the efficiency of a group with the interval that follows from that of its time.
+    /// Returns the efficiency of a group.
     pub fn global_efficiency(&self, group: &Group) -> Median {
-        let useful_s = self.efficiency(group).global() * group.time_s.value;
-        group.time_s.falling(|time_s| useful_s / time_s)
+        self.of_times(group, self.efficiency(group).global())
+    }
+
+    /// Returns a value that is proportional to the time of a group's reference over that of the group. It is in its interval if both times are in
+    /// theirs: with at least the coverage that remains when both may fail (Bonferroni).
+    fn of_times(&self, group: &Group, value: f64) -> Median {
+        let (t, base) = (group.time_s, self.reference(group));
+        let b = base.time_s;
+        let coverage = (t.coverage + b.coverage - 1.0).max(0.0);
+        if base.setup == group.setup || coverage == 0.0 {
+            return Median { value, low: value, high: value, coverage, ..t };
+        }
+        let low = value * (b.low / b.value) * (t.value / t.high);
+        let high = value * (b.high / b.value) * (t.value / t.low);
+        Median { value, low, high, coverage, count: t.count.min(b.count) }
     }
 
     /// Whether a group has a reference on fewer ranks, or is on one.

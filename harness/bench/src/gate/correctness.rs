@@ -45,8 +45,8 @@ fn verified(bench: &Bench, engine: &Engine, case: &GateCase) -> Result<CaseRepor
         no_mpi: case.mpi.is_empty(),
         ranks: Some(case.mpi.clone()),
         // `harness verify` varies the partition.
-        partitioners: vec!["morton".to_owned()],
-        level_bases: vec!["auto".to_owned()],
+        partitioners: Some(vec!["morton".to_owned()]),
+        level_bases: Some(vec!["auto".to_owned()]),
         ..Options::of_leaves_alone(vec![case.file.to_string_lossy().into_owned()])
     };
     let report = verify(&options, &programs)?;

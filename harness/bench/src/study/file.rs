@@ -244,10 +244,18 @@ impl Study {
         *setup == run.setup(spacing_min.unwrap_or(spacing), layer_cells_min.unwrap_or(n))
     }
 
-    /// Whether runs on a case of this name are of the study.
-    pub fn has_case(&self, name: &str) -> bool {
-        let mut series = self.series.iter();
-        self.mesh.contains_key(name) || series.any(|series| series.name() == name)
+    /// Whether the study asks for a run, whatever its program and the spacing that gives as many cells as were asked for.
+    pub fn has_run(&self, setup: &Setup) -> bool {
+        let is_of = |series: &Series| {
+            let has_ranks = match setup.comm {
+                Comm::Solo => true,
+                Comm::Mpi => series.mpi.contains(&setup.ranks),
+                Comm::Sim => series.sim.contains(&setup.ranks),
+            };
+            let of = (name_of(&series.experiment), series.name());
+            has_ranks && of == (setup.experiment.clone(), setup.case.clone())
+        };
+        self.series.iter().any(is_of) || self.run.keys().any(|name| self.is_run(name, setup))
     }
 
     fn check(&self) -> Result<(), String> {

@@ -91,28 +91,33 @@ impl Record {
         Err(format!("{name} is {value:e}, and at most {VALUE_MAX:e} is possible"))
     }
 
-    /// Returns the record with the machine, geometries and metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
-    /// dedicated machine only.
+    /// Returns a record with the machine, geometries and metrics of a record or report of `harness gate`: of the commit `named`, else of the revision that was measured,
+    /// else of HEAD. Only reports contain times, which are worth tracking on a dedicated machine only.
     ///
     /// # Errors
-    /// One sentence, if it is neither.
-    pub fn with(mut self, text: &[u8]) -> Result<Self, String> {
-        let Measures { machine, cases, .. } = Measures::parse(text)?;
-        self.machine = machine;
+    /// One sentence, if it is neither, or of another commit.
+    pub fn of_gate(text: &[u8], named: Option<&str>, repository: &Path) -> Result<Self, String> {
+        let Measures { of, machine, cases, .. } = Measures::parse(text)?;
+        let revision = of.revision.as_deref();
+        let of_commit = Self::of_commit(named.or(revision).unwrap_or("HEAD"), repository)?;
+        let mut record = Self { machine, ..of_commit };
+        if let Some(revision) = revision.filter(|revision| *revision != record.commit) {
+            return Err(format!("revision {revision} was measured: leave out --commit"));
+        }
         for (case, measures) in cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
-            self.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
+            record.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
             let numbers = exact.into_iter().chain(memory).chain(counted);
             let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
-            self.metrics.extend(numbers.map(named));
+            record.metrics.extend(numbers.map(named));
         }
-        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(self) };
+        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(record) };
         let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
         for GateFinding { case, metric, candidate, .. } in times.flat_map(|layer| &layer.findings) {
             let metric = metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
-            self.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
+            record.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
         }
-        Ok(self)
+        Ok(record)
     }
 }
 
@@ -161,9 +166,12 @@ fn merged(lines: Vec<Line<Record>>) -> Result<History, String> {
         of_geometry.iter_mut().for_each(|(case, of)| *of = geometries.suffix(case, of));
         let named = |(mut name, value): (String, f64)| {
             // The others depend on the program and the case alone.
-            let of_machine = [MEMORY, "instructions", "allocations"];
+            let of_machine = [MEMORY, "memory", "time", "instructions", "allocations"];
             let is_rate = is_gain(&name) == Some(true);
-            if is_rate || unit(&name) == "s" || of_machine.contains(&plain(&name)) {
+            if is_rate
+                || unit(&name) == "s"
+                || of_machine.iter().any(|of| plain(&name).contains(of))
+            {
                 name += &suffix;
             }
             let is_of = |case: &str| name.strip_prefix(case).is_some_and(|of| of.starts_with('/'));
@@ -380,8 +388,22 @@ mod tests {
         let mut measures = Measures::of_program(Measured::default());
         measures.case("cube").exact.insert("rays".into(), 6);
         measures.case("cube").counted.insert("instructions".into(), 7);
-        let one = record("a", &[]).with(&serde_json::to_vec(&measures).unwrap()).unwrap();
-        assert_eq!(one, record("a", &[("cube/rays", 6.0), ("cube/instructions", 7.0)]));
-        assert!(one.with(b"{}").is_err());
+        let here = Path::new(".");
+        let of = |measures: &Measures, named| {
+            Record::of_gate(&serde_json::to_vec(measures).unwrap(), named, here)
+        };
+        let one = of(&measures, None).unwrap();
+        assert_eq!(
+            one.metrics,
+            [("cube/instructions".into(), 7.0), ("cube/rays".into(), 6.0)].into()
+        );
+        assert_eq!(one.commit, Record::of_commit("HEAD", here).unwrap().commit);
+        // The revision that was measured counts, and no other.
+        measures.of.revision = Some(one.commit.clone());
+        assert_eq!(of(&measures, Some("HEAD")), Ok(one));
+        measures.of.revision = Some("0".repeat(40));
+        assert!(of(&measures, None).unwrap_err().contains("git knows no commit 000"));
+        assert!(of(&measures, Some("HEAD")).unwrap_err().contains("was measured"));
+        assert!(Record::of_gate(b"{}", None, here).is_err());
     }
 }

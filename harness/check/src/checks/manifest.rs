@@ -6,7 +6,7 @@
 
 use super::{Check, CheckResult, Subject, json};
 use contract::lattice::Root;
-use contract::manifest::{BySide, ExtentBox, Leak, Manifest, OCTANTS, Sides};
+use contract::manifest::{BySide, ExtentBox, Geometry, Leak, Manifest, OCTANTS, Sides};
 use serde_json::{Value, json};
 
 /// Name of the check.
@@ -81,7 +81,10 @@ fn run(subject: &Subject, result: &mut CheckResult) {
         ["leaves", "leaves_by_level", "leaves_by_side", "digest"].map(str::to_owned).to_vec();
     keys.extend((0..OCTANTS).map(|octant| format!("octant_digests/{octant}")));
     keys.extend((0..manifest.parts.len()).map(|part| format!("parts/{part}")));
-    let inputs = Manifest { lacks_inputs: manifest.lacks_inputs, ..subject.inputs.clone() };
+    let of_case = subject.case.map(|case| Geometry::of(&case.facets_lattice));
+    let geometry = of_case.or(subject.inputs.geometry);
+    let lacks_inputs = manifest.lacks_inputs;
+    let inputs = Manifest { lacks_inputs, geometry, ..subject.inputs.clone() };
     let of_leaves = differing(&keys, claimed, ("fact", tally));
     let lines = of_leaves.into_iter().chain(differing_inputs(claimed, ("fact", &inputs)));
     lines.for_each(|line| result.report(line));

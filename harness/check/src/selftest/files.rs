@@ -53,6 +53,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
     manifest("manifest: boxes missing", INFORMED, |m| m.boxes.clear()),
     manifest("manifest: one seed too many", INFORMED, |m| m.seeds.push([1 << 20; 3])),
     manifest("manifest: seeds missing", INFORMED, |m| m.seeds.clear()),
+    manifest("manifest: another geometry", INFORMED, |m| {
+        m.geometry.iter_mut().for_each(|of| of.digest.0 ^= 1);
+    }),
     manifest("manifest: wrong treatment of enclosed components", INFORMED, |m| {
         let is_deleted = m.enclosed == Enclosed::Delete;
         m.enclosed = if is_deleted { Enclosed::Keep } else { Enclosed::Delete };

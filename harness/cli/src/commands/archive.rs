@@ -49,10 +49,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let lines = read(&records)?;
     let expected = Expected::of(&lines)?;
     let of_study = Study::read(study)?;
-    let mut cases = lines.iter().filter_map(Line::run).map(|run| &run.setup.case);
-    if let Some(case) = cases.find(|case| !of_study.has_case(case)) {
+    let mut runs = lines.iter().filter_map(Line::run).map(|run| &run.setup);
+    if let Some(setup) = runs.find(|setup| !of_study.has_run(setup)) {
         let why = format!(
-            "the record has runs on {case}, and the study has no such case: give the study that made it"
+            "the record has a run that the study does not ask for, {setup}: give the study that made it"
         );
         return Err(Failure::input(why));
     }

@@ -3,6 +3,7 @@
 use crate::output::{put, unwritten};
 use bench::experiments::entry::{Entry, Line, NoResult, Run};
 use bench::experiments::group::Groups;
+use bench::order::distinct;
 use bench::study::judge::{Judged, Verdict};
 use bench::study::{self, Outcome, SessionOptions, Study};
 use clap::Args;
@@ -34,7 +35,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME|FILE", value_delimiter = ',')]
     engine: Vec<String>,
     /// Print the tables of an existing record without measuring
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["engine", "repeat"])]
     show: bool,
     #[command(flatten)]
     session: SessionOptions,
@@ -59,7 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let record = record.unwrap_or_else(|| PathBuf::from("reports/out/bench.jsonl"));
     let code = match arguments.show {
         true => {
-            let lines = super::report::read(&[record])?;
+            let mut lines = super::report::read(&[record])?;
+            lines.retain(|line| line.run().is_none_or(|run| study.has_run(&run.setup)));
             publish(&study, &study::judged(&study, &lines), &lines, report)?
         }
         false => measure(arguments, study, &record)?,
@@ -77,8 +79,13 @@ fn read(arguments: &Arguments) -> Result<Study, String> {
     let file = arguments.file.clone().unwrap_or_else(default);
     let mut study = Study::read(&file)?;
     study.only(&arguments.only).map_err(|why| format!("{}: {why}", file.display()))?;
-    for series in study.series.iter_mut().filter(|_| !arguments.engine.is_empty()) {
-        series.engines.clone_from(&arguments.engine);
+    let engines = distinct(&arguments.engine);
+    if !engines.is_empty() && (study.series.is_empty() || !study.row.is_empty()) {
+        let why = "--engine is for series, and rows are judged of our mesher: name experiments with --only";
+        return Err(format!("{}: {why}", file.display()));
+    }
+    for series in study.series.iter_mut().filter(|_| !engines.is_empty()) {
+        series.engines = engines.iter().map(|name| name.to_string()).collect();
     }
     Ok(study)
 }

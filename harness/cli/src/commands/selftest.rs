@@ -1,5 +1,6 @@
 //! `harness selftest`: corrupts correct meshes and prints what no check detects.
 
+use crate::options::Input;
 use check::selftest::{self, SelftestCase};
 use clap::Args;
 use contract::case::Case;
@@ -16,9 +17,9 @@ const LIMIT: Duration = Duration::from_secs(600);
 /// `harness selftest`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Paths of the programs.
-    #[command(flatten)]
-    pub programs: Given,
+    /// The reference [default: next to the harness]
+    #[arg(long, value_name = "PATH")]
+    pub reference: Option<Input>,
 }
 
 /// Meshes the built-in cases, corrupts the meshes and prints what survives; returns the exit code.
@@ -26,7 +27,8 @@ pub struct Arguments {
 /// # Errors
 /// If a case cannot be meshed.
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    let programs = Programs::find("mesher", &arguments.programs)?;
+    let given = Given { reference: arguments.reference.clone(), ..Given::default() };
+    let programs = Programs::find("mesher", &given)?;
     programs.reference.require()?;
     let scratch = tempfile::tempdir()?;
     let meshed = selftest::cases().into_iter().map(|(name, text)| {

@@ -22,7 +22,7 @@ pub struct Arguments {
     #[arg(long, requires = "ranks")]
     mpi: bool,
     /// Seed of the schedule of simulated ranks
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, requires = "ranks", conflicts_with = "mpi")]
     seed: u64,
     /// The check that must keep failing, by its name in `harness verify` [default: the one that fails first]
     #[arg(long, value_name = "NAME")]

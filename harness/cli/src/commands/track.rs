@@ -2,6 +2,7 @@
 
 use crate::options::{Input, Output, number_in};
 use crate::output::put_forms;
+use bench::experiments::machine;
 use bench::jsonl;
 use bench::track::history::{self, History, Record};
 use bench::track::{Series, analyse};
@@ -9,6 +10,7 @@ use clap::Args;
 use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
 use report::json::pretty;
 use report::track::{junit, page, summary};
+use run::engine::paths::Paths;
 use std::path::{Path, PathBuf};
 
 /// `harness track`.
@@ -22,9 +24,9 @@ pub struct Arguments {
     /// Also append this value; may be repeated
     #[arg(long, value_name = "CASE/METRIC=NUMBER", value_parser = named_number)]
     value: Vec<(String, f64)>,
-    /// The commit of the appended values
-    #[arg(long, value_name = "REVISION", default_value = "HEAD")]
-    commit: String,
+    /// The commit of the appended values [default: that of the file, or HEAD]
+    #[arg(long, value_name = "REVISION")]
+    commit: Option<String>,
     /// Accept the changes of all metrics at this commit of the history, so that they no longer fail; may be repeated
     #[arg(long, value_name = "COMMIT")]
     accept: Vec<String>,
@@ -69,6 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if !arguments.add.is_empty() || !arguments.value.is_empty() {
         append(arguments)?;
     } else {
+        let without = "there is nothing to append: give --add or --value with --commit";
+        Failure::unless(arguments.commit.is_none(), without)?;
         let why = "is missing: give a history, or the first values with --add or --value";
         Failure::unless(arguments.history.exists(), format!("{shown} {why}"))?;
     }
@@ -108,16 +112,20 @@ fn append(arguments: &Arguments) -> Result<(), Failure> {
     // An unreadable history is refused before anything is appended to it.
     history::read(&arguments.history)?;
     let repository = arguments.repository.as_deref().unwrap_or(Path::new("."));
-    let base = Record::of_commit(&arguments.commit, repository)?;
+    let commit = arguments.commit.as_deref();
     // Each file has a machine and geometries of its own.
     let of_file = |file: &Input| {
         let text = contract::files::read(file).map_err(|error| Failure::at(file, error))?;
-        base.clone().with(&text).map_err(|why| Failure::about(file, why))
+        Record::of_gate(&text, commit, repository).map_err(|why| Failure::about(file, why))
     };
     let mut records = arguments.add.iter().map(of_file).collect::<Result<Vec<_>, Failure>>()?;
-    let mut last = records.pop().unwrap_or(base);
+    if records.is_empty() {
+        let machine = machine::describe(&Paths::find().mpirun, repository).label();
+        let of_commit = Record::of_commit(commit.unwrap_or("HEAD"), repository)?;
+        records.push(Record { machine, ..of_commit });
+    }
+    let last = records.last_mut().expect("a record");
     last.metrics.extend(arguments.value.iter().cloned());
-    records.push(last);
     records.retain(|record| !record.metrics.is_empty());
     if records.is_empty() {
         let why = "nothing was measured, so nothing is appended: no file of --add has a metric";

@@ -4,7 +4,7 @@ use crate::fixture::Fixture;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-/// Reports 1000 cells in 2 s, fails on three ranks, and writes the correct mesh.
+/// Reports 1000 cells in 2 ms, fails on three ranks, and writes the correct mesh.
 const MESHER: &str = r#"#!/bin/sh
 here=$(dirname "$0") ranks=1
 while [ $# -gt 0 ]; do
@@ -18,7 +18,7 @@ while [ $# -gt 0 ]; do
     esac
     shift
 done
-[ -z "$json" ] || printf '{"ranks": %s, "facets": 40, "cells": 1000, "digest": "00", "time_wall_s": 2.0, "peak_rss_bytes": [4096]}' "$ranks" > "$json"
+[ -z "$json" ] || printf '{"ranks": %s, "facets": 40, "cells": 1000, "digest": "00", "time_wall_s": 0.002, "peak_rss_bytes": [4096]}' "$ranks" > "$json"
 "#;
 
 const TARGETS: &str = r#"
@@ -35,7 +35,7 @@ measure = "lambda_cpu"
 name = "rate"
 run = "one"
 measure = "cells_per_second_per_core"
-at_least = 500
+at_least = 500e3
 [[row]]
 name = "mpi"
 run = "two"
@@ -168,10 +168,10 @@ fn a_missed_target_fails_and_a_failed_run_affects_only_its_row() {
     );
     let page = fs::read_to_string(fixture.path("out/targets.md")).unwrap();
     assert!(
-        page.contains("| rate | at least 0.00 M cells/s |") && page.contains("| met |"),
+        page.contains("| rate | at least 0.50 M cells/s |") && page.contains("| met |"),
         "{page}"
     );
-    fixture.write("targets.toml", &TARGETS.replace("at_least = 500", "at_least = 501"));
+    fixture.write("targets.toml", &TARGETS.replace("at_least = 500e3", "at_least = 501e3"));
     let outcome = fixture.harness(&format!("{TARGETS_COMMAND} --only rate --record r.jsonl"));
     assert_eq!(outcome.code, 1, "{}", outcome.printed);
     assert!(outcome.printed.contains("MISSED"), "{}", outcome.printed);

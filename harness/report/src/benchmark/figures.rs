@@ -73,7 +73,7 @@ fn over_cells(
     [what, which]: [&str; 2],
     value: impl Fn(&Group) -> Median,
 ) -> Figure {
-    let (mesh, repetitions) = (subject.mesh(), repetitions(all));
+    let (mesh, repetitions) = (subject.mesh(), repetitions(all, &value));
     let engines = distinct(all.iter().map(|group| group.setup.engine.as_str())).join(", ");
     let id = format!("{id}-{}", subject.file());
     let title = format!("{title}: {mesh}");

@@ -26,16 +26,16 @@ pub fn point(x: f64, m: Median) -> Point {
 }
 
 /// The number of repetitions and the meaning of the error bars, as a sentence.
-pub fn repetitions(groups: &[&Group]) -> String {
-    let covered = groups.iter().map(|g| g.time_s.coverage).fold(1.0, f64::min);
+pub fn repetitions(groups: &[&Group], value: impl Fn(&Group) -> Median) -> String {
+    let runs = format!("Medians of {} runs", range(groups, |g| g.time_s.count as u64));
+    let covered = groups.iter().map(|g| value(g).per_cent()).filter(|covered| *covered > 0.0);
+    let Some(least) = covered.reduce(f64::min) else { return runs + "." };
     let projected = match groups.iter().any(|g| g.setup.comm == Comm::Sim) {
         true => "; those of projections are of the projections of single runs",
         false => "",
     };
     format!(
-        "Medians of {} runs; bars are nonparametric confidence intervals of the median with at least {:.0} % coverage{projected}.",
-        range(groups, |g| g.time_s.count as u64),
-        covered * 100.0
+        "{runs}; bars are nonparametric confidence intervals of the median with at least {least} % coverage{projected}."
     )
 }
 

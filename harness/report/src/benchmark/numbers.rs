@@ -59,12 +59,12 @@ fn of(groups: &Groups, group: &Group) -> Vec<Number> {
         ("efficiency", scales.then(|| groups.global_efficiency(group)), ""),
     ];
     let number = |(name, median, unit): (&str, Option<Median>, &'static str)| {
-        let Median { value, low, high, count, coverage } =
-            median.filter(|m| m.value.is_finite())?;
+        let median = median.filter(|m| m.value.is_finite())?;
+        let Median { value, low, high, .. } = median;
         let key = format!("{setup}/{name}");
         assert!(low <= value && value <= high, "{key}: {value} is not in its interval");
-        let ends = [[low, high].map(digits).join("--"), format!("{:.0}", 100.0 * coverage)];
-        let [interval, coverage] = if count > 1 { ends } else { Default::default() };
+        let ends = [[low, high].map(digits).join("--"), median.per_cent().to_string()];
+        let [interval, coverage] = if median.coverage > 0.0 { ends } else { Default::default() };
         Some(Number { key, value: digits(value), interval, coverage, unit })
     };
     let cells = Number {

@@ -4,6 +4,7 @@ use super::groups::{
     Subject, by_subject, cells_label, cited, is_counterpart, point, provenance, range, rank_times,
     repetitions,
 };
+use super::numbers::digits;
 use crate::figure::{Axis, Figure, Kind, Point, Provenance, Series};
 use bench::experiments::group::{Group, Groups};
 use bench::experiments::pop::{Efficiency, Factor, above_one, heaviest_base_leaf, phase_s};
@@ -68,7 +69,7 @@ fn base_cases(groups: &Groups, of: &[&Group]) -> String {
         let base = groups.reference(group);
         let ranks = base.setup.ranks;
         let s = if ranks == 1 { "" } else { "s" };
-        format!("{} on {ranks} rank{s}, {:.3} s", base.how(), base.time_s.value)
+        format!("{} on {ranks} rank{s}, {} s", base.how(), digits(base.time_s.value))
     };
     distinct(of.iter().map(text)).join("; ")
 }
@@ -90,7 +91,7 @@ fn speedup(groups: &Groups, subject: Subject, all: &[&Group], file: &str) -> Fig
          from simulated ranks (critical path of CPU times plus {}), or measured with more ranks than cores.",
         all[0].setup.layer_cells_min,
         base_cases(groups, all),
-        repetitions(all),
+        repetitions(all, |group| groups.speedup(group)),
         Groups::networks(all.iter().copied()),
     );
     if series[1..].iter().flat_map(|s| &s.points).any(|p| p.y > p.x) {

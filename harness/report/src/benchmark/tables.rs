@@ -2,6 +2,7 @@
 
 use super::groups::Subject;
 use super::models;
+use super::numbers::digits;
 use crate::table::Table;
 use bench::experiments::entry::{Comm, Setup};
 use bench::experiments::group::{Comparison, Group, Groups};
@@ -66,9 +67,9 @@ fn experiment(groups: &Groups, name: &str) -> Table {
             ("partition", &|(g, _)| g.setup.division()),
             ("ranks", &|(g, _)| g.setup.ranks.to_string()),
             ("how", &|(g, _)| g.how().to_owned()),
-            ("median\ntime / s", &|(g, _)| format!("{:.3}", g.time_s.value)),
-            ("interval", &|(g, _)| format!("{:.3} – {:.3}", g.time_s.low, g.time_s.high)),
-            ("coverage", &|(g, _)| format!("{:.0} %", g.time_s.coverage * 100.0)),
+            ("median\ntime / s", &|(g, _)| digits(g.time_s.value)),
+            ("interval", &|(g, _)| [g.time_s.low, g.time_s.high].map(digits).join(" – ")),
+            ("coverage", &|(g, _)| format!("{} %", g.time_s.per_cent())),
             ("runs", &|(g, _)| g.time_s.count.to_string()),
             ("λ\n(time)", &|(_, e)| format!("{:.3}", 1.0 / e.load_balance)),
             ("λ\n(cells)", &|(g, _)| lambda(g)),
@@ -88,7 +89,6 @@ fn experiment(groups: &Groups, name: &str) -> Table {
 /// Projected and measured times of the same meshes on equally many ranks.
 fn projections(groups: &Groups) -> Table {
     let pairs = groups.projections();
-    let time = |group: &Group| format!("{:.3}", group.time_s.value);
     let error = |[sim, measured]: &[&Group; 2]| sim.time_s.value / measured.time_s.value - 1.0;
     Table::of(
         "projected and measured times".to_owned(),
@@ -99,8 +99,8 @@ fn projections(groups: &Groups) -> Table {
             ("experiment", &|[sim, _]| sim.setup.experiment.clone()),
             ("cells", &|[sim, _]| grouped(sim.cells())),
             ("ranks", &|[sim, _]| sim.setup.ranks.to_string()),
-            ("projected / s", &|[sim, _]| time(sim)),
-            ("measured / s", &|[_, measured]| time(measured)),
+            ("projected / s", &|[sim, _]| digits(sim.time_s.value)),
+            ("measured / s", &|[_, measured]| digits(measured.time_s.value)),
             ("error", &|pair| format!("{:+.1} %", error(pair) * 100.0)),
         ],
     )
@@ -180,15 +180,9 @@ mod tests {
             line(Entry::Run(Box::new(run(Comm::Mpi, 1_000_000, &[("grade", &[2.5, 1.0])])))),
         ];
         let text = text(&Groups::of(&lines));
-        for part in [
-            "1,000,000",
-            "1.500",
-            "3.000 – 3.000",
-            "0 %",
-            "67 % at 2 ranks",
-            "+20.0 %",
-            "projected",
-        ] {
+        for part in
+            ["1,000,000", "1.500", "3.00 – 3.00", "0 %", "67 % at 2 ranks", "+20.0 %", "projected"]
+        {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
     }

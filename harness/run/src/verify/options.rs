@@ -51,12 +51,12 @@ pub struct Options {
     /// Rank counts of the runs on MPI; given, they require it [default: 1,2,3,4,7,8,16,32,64]
     #[arg(long, value_delimiter = ',', value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub ranks: Option<Vec<usize>>,
-    /// Partitioners, each at every rank count
-    #[arg(long, value_delimiter = ',', default_value = "metis,morton")]
-    pub partitioners: Vec<String>,
-    /// Base depths, each with every partitioner
-    #[arg(long, value_delimiter = ',', default_value = "auto,3")]
-    pub level_bases: Vec<String>,
+    /// Partitioners, each at every rank count [default: metis,morton]
+    #[arg(long, value_delimiter = ',')]
+    pub partitioners: Option<Vec<String>>,
+    /// Base depths, each with every partitioner [default: auto,3]
+    #[arg(long, value_delimiter = ',')]
+    pub level_bases: Option<Vec<String>>,
     /// Directory for reports and for results that are kept [default: a temporary one]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -117,25 +117,38 @@ impl Options {
     /// Every layout of a run on MPI, in the order of rank counts. The partition is varied as far as the engine offers a choice
     /// and promises that its mesh does not depend on it.
     pub(super) fn layouts(&self, engine: &Description) -> Vec<Layout> {
-        let templates = &engine.run;
-        let independent = engine.promises.is_independent_of(Independence::Partitioner);
-        let varied = |offered: bool, values: &[String]| match offered && independent {
-            true => values.iter().cloned().map(Some).collect(),
-            false => vec![None],
-        };
-        let partitioners = varied(!templates.partitioner.is_empty(), &self.partitioners);
-        let level_bases = varied(!templates.level_base.is_empty(), &self.level_bases);
+        let [partitioners, level_bases] = self.choices(engine).map(|(_, values)| values);
         let mut layouts = Vec::new();
         for ranks in self.rank_counts(engine).into_iter().map(Ranks::Mpi) {
             for partitioner in &partitioners {
-                layouts.extend(level_bases.iter().map(|level_base| Layout {
-                    partitioner: partitioner.clone(),
-                    level_base: level_base.clone(),
-                    ..Layout::on(ranks)
-                }));
+                for level_base in &level_bases {
+                    let (partitioner, level_base) = (partitioner.clone(), level_base.clone());
+                    let layout = Layout { partitioner, level_base, ..Layout::on(ranks) };
+                    // A run has one directory.
+                    if !layouts.contains(&layout) {
+                        layouts.push(layout);
+                    }
+                }
             }
         }
         layouts
+    }
+
+    /// Partitioners and base depths, and whether some were asked for that do not vary.
+    fn choices(&self, engine: &Description) -> [(bool, Vec<Option<String>>); 2] {
+        let run = &engine.run;
+        let independent = engine.promises.is_independent_of(Independence::Partitioner);
+        let all = [
+            (&self.partitioners, &run.partitioner, ["metis", "morton"]),
+            (&self.level_bases, &run.level_base, ["auto", "3"]),
+        ];
+        all.map(|(asked, offered, default)| match independent && !offered.is_empty() {
+            true => {
+                let asked = asked.clone().unwrap_or_else(|| default.map(str::to_owned).into());
+                (false, asked.into_iter().map(Some).collect())
+            }
+            false => (asked.is_some(), vec![None]),
+        })
     }
 }
 
@@ -238,6 +251,11 @@ impl Needs {
             let required = if options.require.contains(&need) { true } else { required(need)? };
             Some(Missing { what: need.name(), why, required })
         });
-        missing.collect()
+        let names = ["partitioners", "level-bases"].into_iter().zip(options.choices(engine));
+        let ignored = names.filter(|(_, (is_ignored, _))| *is_ignored).map(|(name, _)| {
+            let why = format!("--{name} was given, and {} offers no such choice, or does not promise that its mesh does not depend on it", engine.name);
+            Missing { what: name.to_owned(), why, required: true }
+        });
+        missing.chain(ignored).collect()
     }
 }

@@ -215,7 +215,7 @@ fn impossible_numbers_of_a_line_are_noticed() {
         line_of(run).is_possible()
     };
     assert!(is_possible(|_| ()));
-    let faults: [fn(&mut Run); 11] = [
+    let faults: [fn(&mut Run); 13] = [
         |run| run.phases[0].messages.sum = -1e6,
         |run| run.counters = [("a".to_owned(), Spread { max: -1.0, ..Spread::default() })].into(),
         |run| run.peak_rss_bytes.sum = 1.0,
@@ -224,6 +224,8 @@ fn impossible_numbers_of_a_line_are_noticed() {
         |run| run.phases[0].useful_s = Spread::of(&[0.0, 0.0]),
         |run| run.time_wall_s = 0.0,
         |run| run.time_wall_s = 1e308,
+        |run| run.time_launch_s = run.time_wall_s / 2.0,
+        |run| run.time_wall_s = run.phases[0].wall_s.max / 2.0,
         |run| run.phases[0].useful_s.by_rank[1] = -1.0,
         |run| run.useful_s.max = f64::NAN,
         |run| run.setup.ranks = 0,
@@ -347,11 +349,41 @@ fn a_speedup_is_over_one_rank_and_a_measured_one_has_no_projected_base() {
 #[test]
 fn efficiency_and_imbalance_have_the_intervals_of_the_repetitions() {
     let of = |times: &[f64]| line_of(run(Comm::Mpi, 9, &[("a", times)]));
-    let groups = Groups::of(&[of(&[4.0]), of(&[2.0, 2.0]), of(&[4.0, 2.0]), of(&[3.0, 1.0])]);
+    let two = [&[2.0, 2.0][..], &[4.0, 2.0], &[3.0, 1.0]].map(of);
+    let with_base = |base: &[f64]| {
+        let base = base.iter().map(|time| of(&[*time]));
+        Groups::of(&base.chain(two.clone()).collect::<Vec<_>>())
+    };
+    let groups = with_base(&[4.0, 4.0, 4.0]);
     let two = &groups.all[1];
     let (efficiency, imbalance) = (groups.global_efficiency(two), two.imbalance());
     let found = [efficiency, imbalance].map(|of| [of.low, of.value, of.high]);
     let expected = [[0.5, 4.0 / 6.0, 1.0], [1.0, 1.2, 1.5]];
     let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
     assert!(off.fold(0.0, f64::max) < 1e-9, "{found:?}");
+    // Three runs of each: 75 % each, and half in the worst case for both.
+    assert_eq!(efficiency.coverage, 0.5);
+    let wide = with_base(&[3.0, 4.0, 8.0]);
+    let speedup = wide.speedup(&wide.all[1]);
+    assert_eq!([speedup.low, speedup.value, speedup.high], [3.0 / 4.0, 4.0 / 3.0, 4.0]);
+    // A base of one run has no interval.
+    let narrow = with_base(&[4.0]);
+    let speedup = narrow.speedup(&narrow.all[1]);
+    assert_eq!((speedup.low, speedup.high, speedup.coverage), (speedup.value, speedup.value, 0.0));
+}
+
+#[test]
+fn another_partition_on_fewer_ranks_is_no_base() {
+    let of = |ranks: usize, weights: &str| {
+        let mut run = run(Comm::Sim, 9, &[("a", &vec![8.0; ranks])]);
+        run.setup.weights = weights.into();
+        line_of(run)
+    };
+    let bases = |lines: &[Line]| -> Vec<usize> {
+        let groups = Groups::of(lines);
+        groups.all.iter().map(|group| groups.reference(group).setup.ranks).collect()
+    };
+    let two = [of(2, "area"), of(4, "unit"), of(8, "area")];
+    assert_eq!(bases(&two), [2, 4, 2]);
+    assert_eq!(bases(&[&two[..], &[of(1, "")]].concat()), [1; 4]);
 }

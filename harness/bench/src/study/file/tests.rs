@@ -114,8 +114,17 @@ fn series_are_selected_by_their_experiment_and_contradictions_are_reported() {
     study.only(&["weak".to_owned()]).unwrap();
     assert_eq!((study.series.len(), study.engines()), (1, vec!["mesher".to_owned()]));
     let growing = read(&text.replace("mpi", "facets = 80\nmpi")).unwrap();
-    let known = |name| growing.has_case(name);
-    assert_eq!(["cube", "cube-80-facets-per-rank", "ball"].map(known), [true, true, false]);
+    let known = |(experiment, case, comm, ranks): (&str, &str, Comm, usize)| {
+        let of =
+            Setup { experiment: experiment.into(), comm, ranks, ..Setup::serial(case, 1.0, 4) };
+        growing.has_run(&of)
+    };
+    let of_weak = ("weak", "cube-80-facets-per-rank", Comm::Mpi, 1);
+    let asked = [of_weak, ("strong", "cube", Comm::Sim, 2), ("strong", "cube", Comm::Solo, 1)];
+    assert_eq!(asked.map(known), [true; 3]);
+    let others = [("weak", "cube", Comm::Mpi, 1), ("strong", "ball", Comm::Sim, 2)];
+    assert_eq!(others.map(known), [false; 2]);
+    assert!(!known(("strong", "cube", Comm::Sim, 4)) && !known(("layers", "cube", Comm::Sim, 2)));
     for (from, to, why) in [
         ("[1, 2]", "[0]", "ranks are from 1"),
         ("cells = [1e4]", "cells = [1.0]", "cells is from 1e3"),
