@@ -97,20 +97,13 @@ pub enum ReadError {
 
 /// The checksum of a block of metadata: Bob Jenkins' lookup3, as `H5_checksum_lookup3` computes it, with initial value 0.
 pub fn lookup3(bytes: &[u8]) -> u32 {
-    let start = 0xdead_beef_u32.wrapping_add(bytes.len() as u32);
-    let mut s = [start; 3];
-    let mut rest = bytes;
-    while rest.len() > 12 {
-        let (block, after) = rest.split_at(12);
+    let mut s = [0xdead_beef_u32.wrapping_add(bytes.len() as u32); 3];
+    let mut blocks = bytes.chunks(12).peekable();
+    while let Some(block) = blocks.next() {
         add(&mut s, block);
-        mix(&mut s);
-        rest = after;
+        let end = if blocks.peek().is_some() { mix } else { finish };
+        end(&mut s);
     }
-    if rest.is_empty() {
-        return s[2];
-    }
-    add(&mut s, rest);
-    finish(&mut s);
     s[2]
 }
 

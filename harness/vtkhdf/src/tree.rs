@@ -94,8 +94,8 @@ const MARGIN: usize = 8;
 /// The nodes of a window and its margins, to be filled in any order.
 pub struct Window {
     index: u64,
-    split: Vec<u8>,
-    deleted: Vec<u8>,
+    /// The bits of split nodes, and those of deleted ones.
+    bits: [Vec<u8>; 2],
     sides: Vec<u8>,
 }
 
@@ -106,14 +106,14 @@ impl Window {
     /// The window with a number, all zero.
     pub fn new(index: u64) -> Self {
         let bytes = 2 * MARGIN + WINDOW as usize / 8;
-        let bits = || vec![0; bytes];
-        Self { index, split: bits(), deleted: bits(), sides: vec![0; 8 * bytes] }
+        Self { index, bits: [vec![0; bytes], vec![0; bytes]], sides: vec![0; 8 * bytes] }
     }
 
     /// Sets the root, which is in the first window.
     pub fn put_root(&mut self, root: Siblings) {
-        self.split[MARGIN] |= (root.split as u8 & 1) << 7;
-        self.deleted[MARGIN] |= (root.deleted as u8 & 1) << 7;
+        for (bits, new) in self.bits.iter_mut().zip([root.split, root.deleted]) {
+            bits[MARGIN] |= (new as u8 & 1) << 7;
+        }
         self.sides[8 * MARGIN] = (root.crossing as u8 & 1) << 1 | root.inside as u8 & 1;
     }
 
@@ -122,12 +122,10 @@ impl Window {
     pub fn put(&mut self, group: u64, siblings: Siblings) {
         let at = (group + MARGIN as u64).wrapping_sub(self.index * WINDOW / 8) as usize;
         let bytes = at..at.saturating_add(MARGIN + 1);
-        if bytes.end > self.split.len() {
+        if bytes.end > self.bits[0].len() {
             return;
         }
-        for (bits, new) in
-            [(&mut self.split, siblings.split), (&mut self.deleted, siblings.deleted)]
-        {
+        for (bits, new) in self.bits.iter_mut().zip([siblings.split, siblings.deleted]) {
             // The first sibling is the second node of a byte, because the root is in no group.
             let new = (u128::from(new.reverse_bits()) << 63).to_be_bytes();
             bits[bytes.clone()].iter_mut().zip(new).for_each(|(bits, new)| *bits |= new);
@@ -142,9 +140,9 @@ impl Window {
 
     /// The compressed chunks.
     pub fn compress(&self, shape: &Shape, deflater: &mut Deflater) -> Chunks {
-        let [split, deleted, sides] = lengths(shape);
+        let ([split, deleted], [of_split, of_deleted, of_sides]) = (&self.bits, lengths(shape));
         // Arrays shorter than a window have one shorter chunk.
-        [(&self.split, split, 1), (&self.deleted, deleted, 1), (&self.sides, sides, 8)].map(
+        [(split, of_split, 1), (deleted, of_deleted, 1), (&self.sides, of_sides, 8)].map(
             |(bytes, length, per_byte)| {
                 let bytes = &bytes[per_byte * MARGIN..bytes.len() - per_byte * MARGIN];
                 deflater.compress(&bytes[..bytes.len().min(length as usize)])

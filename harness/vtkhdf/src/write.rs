@@ -72,11 +72,7 @@ impl Metadata {
     }
 
     /// Adds a group with the addresses of its members; returns its address.
-    pub(crate) fn group(
-        &mut self,
-        attributes: &[(&str, Value)],
-        members: &[(&'static str, u64)],
-    ) -> u64 {
+    pub(crate) fn group(&mut self, attributes: &[(&str, Value)], members: &[(&str, u64)]) -> u64 {
         let mut header = Vec::new();
         // No index of links: all are in the header.
         add_message(&mut header, message::LINK_INFO, &[&[0, 0][..], &[0xff; 16]].concat());
