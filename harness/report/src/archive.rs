@@ -7,7 +7,6 @@ use bench::replay::{Expected, TOLERANCE};
 use bench::study::package;
 use contract::number::duration;
 use serde_json::{Value, json};
-use std::fmt::Write;
 
 /// Name of the metadata's file, which the standard gives.
 pub const METADATA: &str = "ro-crate-metadata.json";
@@ -97,24 +96,21 @@ pub fn metadata(about: &About, members: &[Member], lines: &[Line]) -> Value {
 /// The page for whoever opens the archive.
 pub fn readme(about: &About, lines: &[Line], expected: &Expected) -> String {
     let About { title, author, licence, day } = about;
-    let mut text = format!("# {title}\n\n{author}, {day}, licence {licence}.\n\n");
-    let commits = machines(lines).into_iter().map(|machine| {
-        let _ = writeln!(text, "Measured on {machine}.");
-        machine.commit.trim_end_matches("-dirty").to_owned()
-    });
-    let commits = distinct(commits.collect::<Vec<_>>()).join(" or ");
-    let _ = write!(
-        text,
-        "\nTo repeat it, in a clone of the programs' repository at commit {commits}:\n\n```\nharness replay THIS_DIRECTORY\n```\n\n\
+    let machines = machines(lines);
+    let measured = machines.iter().map(|machine| format!("Measured on {machine}.\n"));
+    let commits = machines.iter().map(|machine| machine.commit.trim_end_matches("-dirty"));
+    format!(
+        "# {title}\n\n{author}, {day}, licence {licence}.\n\n{}\nTo repeat it, in a clone of the programs' repository at commit {}:\n\n```\nharness replay THIS_DIRECTORY\n```\n\n\
          It prints expected values beside measured ones: digests, cells and counters must be equal; ratios (speedup, efficiency, load \
          imbalance, bytes per cell) lie within the interval of their repetitions and {:.0} % beyond it; times are those of a machine, and \
          are not compared. All runs took {}, and one run of each {}.\n\n\
          `study/` has the study with its cases, geometries and engines, `record.jsonl` every run, `expected.json` the values and bands.\n",
+        measured.collect::<String>(),
+        distinct(commits).join(" or "),
         TOLERANCE * 100.0,
         duration(expected.seconds),
         duration(expected.seconds_once)
-    );
-    text
+    )
 }
 
 /// A path as a relative address: bytes other than `A` to `Z`, `a` to `z`, digits and `/._-` are escaped.

@@ -7,7 +7,6 @@ use bench::gate::report::{End, GateFinding, GateReport, Layer, Verdict};
 use quick_junit::NonSuccessKind::{Error, Failure};
 use quick_junit::TestCaseStatus;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::time::Duration;
 
 /// The report as text: a section per layer; unchanged values are only counted.
@@ -19,14 +18,11 @@ pub fn text(report: &GateReport) -> String {
         finding.verdict != Verdict::Unchanged || layer.name == LayerName::Time
     };
     for layer in &report.layers {
-        // Writing into a string cannot fail.
-        let _ = writeln!(text, "{:<13} {}", layer.name, summary(layer));
-        for finding in layer.findings.iter().filter(|finding| is_shown(layer, finding)) {
-            let _ = writeln!(text, "  {}", line(finding));
-        }
+        text += &format!("{:<13} {}\n", layer.name, summary(layer));
+        let shown = layer.findings.iter().filter(|finding| is_shown(layer, finding));
+        text.extend(shown.map(|finding| format!("  {}\n", line(finding))));
     }
-    let _ = writeln!(text, "{}", verdict(report));
-    text
+    text + &verdict(report) + "\n"
 }
 
 /// The report as Markdown, for the summary page of a CI system.
@@ -88,17 +84,12 @@ fn summary(layer: &Layer) -> String {
 
 fn line(finding: &GateFinding) -> String {
     let GateFinding { case, metric, verdict, note, .. } = finding;
-    let mut line = format!("{verdict:<12} {case}: {metric}");
-    if let (Some(old), Some(new)) = (finding.baseline, finding.candidate) {
-        let _ = write!(line, " {} -> {}", number(old), number(new));
-    }
-    if let Some(change) = finding.change_percent {
-        let _ = write!(line, " ({change:+.2} %)");
-    }
-    if !note.is_empty() {
-        let _ = write!(line, "; {note}");
-    }
-    line
+    let values = finding.baseline.zip(finding.candidate);
+    let values = values.map(|(old, new)| format!(" {} -> {}", number(old), number(new)));
+    let change = finding.change_percent.map(|change| format!(" ({change:+.2} %)"));
+    let note = (!note.is_empty()).then(|| format!("; {note}"));
+    let head = format!("{verdict:<12} {case}: {metric}");
+    [Some(head), values, change, note].into_iter().flatten().collect()
 }
 
 /// Counts exactly, times to four decimals.

@@ -5,7 +5,6 @@ use super::canvas::COLOURS;
 use super::svg::MARKERS;
 use super::{Axis, Figure, Kind, Point, Provenance, Series};
 use crate::table::Table;
-use std::fmt::Write;
 
 /// What a document needs before it can include figures.
 const PREAMBLE: &str = "\\usepackage{pgfplots} \\pgfplotsset{compat=1.16}";
@@ -65,19 +64,17 @@ pub fn tex(figure: &Figure) -> String {
         "% Requires {PREAMBLE}\n\\providecommand{{\\figures}}{{figures}}\n\\begin{{tikzpicture}}\n"
     );
     for (i, [r, g, b]) in COLOURS.iter().enumerate() {
-        // Writing into a string cannot fail, here and below.
-        let _ = writeln!(out, "\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}");
+        out += &format!("\\definecolor{{style{i}}}{{RGB}}{{{r},{g},{b}}}\n");
     }
     let [x, y] = figure.scales();
     let kind = if figure.y.names.is_empty() { "" } else { "xbar stacked, bar width=8pt, " };
     let columns = if longest(figure.series.iter().map(|s| &s.name)) > NAME_MAX { 1 } else { 2 };
     // Of the width, pgfplots keeps 45 pt for labels of four digits.
     let beyond = (4.2 * longest(y.ticks.iter().map(|tick| &tick.1)) as f64 - 14.0).max(4.0);
-    let _ = writeln!(
-        out,
+    out += &format!(
         "\\begin{{axis}}[\n  width=\\linewidth-{beyond:.0}pt, height=0.65\\linewidth, {kind}grid=major, legend cell align=left,\n  \
          scaled ticks=false, tick label style={{font=\\footnotesize}}, label style={{font=\\footnotesize}},\n  \
-         legend style={{at={{(1,1.03)}},anchor=south east,legend columns={columns},draw=none,font=\\footnotesize}},\n  {},\n  {}\n]",
+         legend style={{at={{(1,1.03)}},anchor=south east,legend columns={columns},draw=none,font=\\footnotesize}},\n  {},\n  {}\n]\n",
         axis_options("x", &figure.x, &x),
         axis_options("y", &figure.y, &y)
     );

@@ -101,13 +101,15 @@ fn entries(figure: &Figure) -> Vec<(&str, Symbol<'_>)> {
 fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
     let (right, middle) = (x + LENGTH, x + LENGTH / 2);
     let corners = [(x, y - 16), (right, y + 16)];
+    let line_of = |ends: [_; 2], style: ShapeStyle| {
+        page.draw(&PathElement::new(ends.to_vec(), style)).expect(DRAWN);
+    };
     match symbol {
         Symbol::Series(s) if s.kind == Kind::Bars => {
             bar(corners, s.style).iter().for_each(|part| page.draw(part).expect(DRAWN));
         }
         Symbol::Series(s) if s.kind == Kind::Line => {
-            page.draw(&PathElement::new(vec![(middle, y - 18), (middle, y + 18)], line(s.style)))
-                .expect(DRAWN);
+            line_of([(middle, y - 18), (middle, y + 18)], line(s.style));
         }
         Symbol::Series(s) => {
             page.draw(&path(vec![(x, y), (right, y)], s)).expect(DRAWN);
@@ -117,10 +119,7 @@ fn symbol(page: &Page, (x, y): (i32, i32), symbol: &Symbol) {
             page.draw(&Rectangle::new(corners, rgb(*fill).filled())).expect(DRAWN);
             page.draw(&Rectangle::new(corners, rgb(outline(*fill)))).expect(DRAWN);
         }
-        Symbol::Section => {
-            page.draw(&PathElement::new(vec![(x, y), (right, y)], BLACK.stroke_width(3)))
-                .expect(DRAWN);
-        }
+        Symbol::Section => line_of([(x, y), (right, y)], BLACK.stroke_width(3)),
         Symbol::Nothing => {}
     }
 }
