@@ -86,10 +86,7 @@ impl Failure {
     /// The same, if it is one of the input, with the file's name.
     #[must_use]
     pub fn of_file(self, path: &Path) -> Self {
-        match self.code {
-            EXIT_INPUT => Self::about(path, self.why),
-            _ => self,
-        }
+        if self.code == EXIT_INPUT { Self::about(path, self.why) } else { self }
     }
 }
 
@@ -101,10 +98,8 @@ impl From<String> for Failure {
 
 impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
-        match error.kind() {
-            ErrorKind::Interrupted => Self::interrupted(),
-            _ => Self::input(error),
-        }
+        let is_interrupt = error.kind() == ErrorKind::Interrupted;
+        if is_interrupt { Self::interrupted() } else { Self::input(error) }
     }
 }
 

@@ -61,6 +61,9 @@ impl Block {
     }
 }
 
+/// Is called with some blocks; returns whether to go on.
+pub type Run<'r> = &'r mut dyn FnMut(&[Block]) -> bool;
+
 /// A hyper-tree grid whose structure was read and is valid.
 #[derive(Debug)]
 pub struct TreeFile {
@@ -136,7 +139,7 @@ impl TreeFile {
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn blocks(&self, run: &mut dyn FnMut(&[Block]) -> bool) -> Result<()> {
+    pub fn blocks(&self, run: Run) -> Result<()> {
         let levels = (0..self.file.shape.nodes.len()).map(|index| self.level(index)).collect();
         let mut walk = Walk { levels, blocks: Vec::with_capacity(RUN + 8) };
         if walk.siblings(0, 0, 1, run)? {
@@ -234,13 +237,7 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     /// Visits some siblings, or the root alone, and what is below; returns false if `run` did. The first has the Morton code `key`.
-    fn siblings(
-        &mut self,
-        level: usize,
-        key: u64,
-        count: u32,
-        run: &mut dyn FnMut(&[Block]) -> bool,
-    ) -> Result<bool> {
+    fn siblings(&mut self, level: usize, key: u64, count: u32, run: Run) -> Result<bool> {
         let at = &mut self.levels[level];
         let [split, masked] = at.bits::<2>()?.map(|bits| bits as u8 & !(0xff >> count) as u8);
         let (first, sides) = (at.next, at.sides.at::<8>(at.next)?);

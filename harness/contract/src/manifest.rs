@@ -172,7 +172,7 @@ pub struct EnclosedComponents {
 }
 
 /// One part file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
     /// File name, without a directory.
@@ -273,14 +273,11 @@ impl Manifest {
         if let Some(name) = names.find(|name| Path::new(name).components().count() != 1) {
             return Some(format!("{name:?} is not a plain file name"));
         }
-        let lattice = 0..=UNITS_PER_EDGE;
+        let in_root = |at: &[i64; 3]| at.iter().all(|c| (0..=UNITS_PER_EDGE).contains(c));
         let is_box = |b: &ExtentBox| {
-            b.level <= LEVEL_MAX
-                && (0..3).all(|a| {
-                    b.min[a] <= b.max[a] && [b.min[a], b.max[a]].iter().all(|c| lattice.contains(c))
-                })
+            let is_ordered = (0..3).all(|a| b.min[a] <= b.max[a]);
+            b.level <= LEVEL_MAX && is_ordered && in_root(&b.min) && in_root(&b.max)
         };
-        let are_seeds = self.seeds.as_flattened().iter().all(|c| lattice.contains(c));
         let (Root { origin, edge }, range) = (self.root, 1e-100..1e100);
         let is_root = range.contains(&edge) && origin.iter().all(|c| c.abs() < range.end);
         let faults = [
@@ -288,7 +285,7 @@ impl Manifest {
             (self.level_surface <= LEVEL_MAX, "level_surface: give a level from 0 to 19"),
             (self.layer_cells_min > 0, "layer_cells_min: a layer has at least one cell"),
             (self.boxes.iter().all(is_box), "boxes: one is not in the root, or has no level"),
-            (are_seeds, "seeds: one is not in the root"),
+            (self.seeds.iter().all(in_root), "seeds: one is not in the root"),
             (is_root, "root: give a cube with an edge from 1e-100 to 1e100"),
         ];
         faults.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault.to_owned())

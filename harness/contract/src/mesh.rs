@@ -97,10 +97,8 @@ impl Mesh {
 
     /// Number of leaves in the files, whatever the manifest states.
     pub fn leaf_count(&self) -> u64 {
-        match &self.tree_file {
-            Some(tree) => tree.leaves,
-            None => self.parts.iter().map(|part| part.leaves).sum(),
-        }
+        let of_parts = self.parts.iter().map(|part| part.leaves).sum();
+        self.tree_file.as_ref().map_or(of_parts, |tree| tree.leaves)
     }
 
     /// Passes all leaves to `run`, until it returns false: the blocks of a tree, and each word of a part, whatever it is, as a block. Each run comes

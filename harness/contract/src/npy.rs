@@ -70,23 +70,22 @@ impl PartFile {
 
 /// The type and the dimensions in the npy header at the beginning of a file, and the header's length. It is read as NumPy writes it: a dictionary of Python, with its keys in
 /// alphabetical order.
-fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), String> {
+fn read_header(head: &[u8]) -> Result<(String, Vec<u64>, u64), &'static str> {
     const { assert!(cfg!(target_endian = "little"), "words are cast to bytes and back") };
-    let wrong = |why: &str| why.to_owned();
     let [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, low, high, ..] = *head else {
-        return Err(wrong("it is too short, or not of version 1"));
+        return Err("it is too short, or not of version 1");
     };
     let end = 10 + usize::from(u16::from_le_bytes([low, high]));
-    let text = head.get(10..end).ok_or_else(|| wrong("it is longer than the file"))?;
+    let text = head.get(10..end).ok_or("it is longer than the file")?;
     let text = String::from_utf8_lossy(text);
     let between = |from: &str, to: &str| {
         let (value, _) = text.split_once(from)?.1.split_once(to)?;
         Some(value.trim().to_owned())
     };
     let descr = between("'descr':", ", 'fortran_order'").zip(between("'shape': (", ")"));
-    let (descr, shape) = descr.ok_or_else(|| wrong("it has no type or shape"))?;
+    let (descr, shape) = descr.ok_or("it has no type or shape")?;
     let dimensions = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
-    let shape = dimensions.map(|n| n.parse().map_err(|_| wrong("its shape is not of numbers")));
+    let shape = dimensions.map(|n| n.parse().map_err(|_| "its shape is not of numbers"));
     let descr = descr.trim_matches('\'').to_owned();
     Ok((descr, shape.collect::<Result<_, _>>()?, end as u64))
 }

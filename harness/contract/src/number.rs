@@ -15,10 +15,7 @@ pub fn number(x: f64) -> String {
 
 /// A number with thousands separators.
 pub fn grouped(n: u64) -> String {
-    match n {
-        0..1000 => n.to_string(),
-        _ => format!("{},{:03}", grouped(n / 1000), n % 1000),
-    }
+    if n < 1000 { n.to_string() } else { format!("{},{:03}", grouped(n / 1000), n % 1000) }
 }
 
 /// A duration in seconds up to two minutes, and in minutes beyond, rounded up.

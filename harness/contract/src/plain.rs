@@ -6,7 +6,6 @@
 use crate::case::{Case, Facet};
 use crate::files;
 use serde::Deserialize;
-use std::fmt::Write as _;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -30,9 +29,7 @@ impl PlainCase {
         let case = Case::read(path).map_err(|error| error.to_string())?;
         let text = files::read_text(path).map_err(|error| error.to_string())?;
         let mut table: Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-        for key in ["geometry", "generator", "root_scale"] {
-            table.remove(key);
-        }
+        table.retain(|key, _| !["geometry", "generator", "root_scale"].contains(&key));
         let root = Value::try_from(case.root).expect("a root is representable in TOML");
         table.insert("root".into(), root);
         Ok(Self { table, facets: case.facets })
@@ -81,17 +78,12 @@ const FACETS_AS_TEXT: usize = 1000;
 
 /// An ASCII STL file. Each number has the fewest digits that identify its f32 value.
 fn ascii(facets: &[Facet]) -> String {
-    let mut text = "solid body\n".to_owned();
-    for facet in facets {
-        text.push_str("facet normal 0 0 0\n outer loop\n");
-        for [x, y, z] in facet {
-            // Writing into a string cannot fail.
-            let _ = writeln!(text, "  vertex {x} {y} {z}");
-        }
-        text.push_str(" endloop\nendfacet\n");
-    }
-    text.push_str("endsolid body\n");
-    text
+    let vertex = |[x, y, z]: [f32; 3]| format!("  vertex {x} {y} {z}\n");
+    let facet = |facet: &Facet| {
+        let vertices = facet.map(vertex).concat();
+        format!("facet normal 0 0 0\n outer loop\n{vertices} endloop\nendfacet\n")
+    };
+    format!("solid body\n{}endsolid body\n", facets.iter().map(facet).collect::<String>())
 }
 
 #[cfg(test)]

@@ -44,13 +44,9 @@ pub fn read(path: &Path) -> Result<Body, Failure> {
 /// If they are not an STL file.
 pub fn parse(bytes: &[u8]) -> Result<Body, Failure> {
     Failure::unless(!bytes.is_empty(), wrong("it is empty"))?;
-    match binary(bytes) {
-        Some(facets) => {
-            let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
-            Ok(Body { facets, solids })
-        }
-        None => ascii(bytes),
-    }
+    let Some(facets) = binary(bytes) else { return ascii(bytes) };
+    let solids = vec![Solid { name: None, facet_first: 0, facets: facets.len() }];
+    Ok(Body { facets, solids })
 }
 
 /// The facets of a binary file; `None` if the length of the file contradicts its facet count. The header cannot

@@ -99,6 +99,9 @@ struct Summary {
 /// A level, or number of levels, greater than that of any leaf.
 pub const NO_LEAF: u8 = 100;
 
+/// Is called with an octant and its content; returns whether to visit its children.
+pub type Enter<'e> = &'e mut dyn FnMut(Octant, Handle) -> bool;
+
 /// The leaves of a mesh as a tree. Walks in other crates ask for content and levels a dozen times per leaf: these functions are
 /// `#[inline]`.
 #[derive(Debug, Default)]
@@ -116,9 +119,7 @@ impl Tree {
     /// check `linear` reports them.
     pub fn of_words(words: &[u64]) -> Self {
         let mut builder = Builder::default();
-        for &first in words {
-            let _ = builder.push_block(&Block { first, depth: 0 });
-        }
+        words.iter().for_each(|&first| _ = builder.push_block(&Block { first, depth: 0 }));
         builder.finish()
     }
 
@@ -172,17 +173,12 @@ impl Tree {
     }
 
     /// Visits octants in Morton order, parents first: the root, and the children of nodes for which `enter` returns true.
-    pub fn walk(&self, enter: &mut impl FnMut(Octant, Handle) -> bool) {
+    pub fn walk(&self, enter: Enter) {
         self.walk_below(Octant::ROOT, self.root, enter);
     }
 
     /// The same from an octant with content `of` on.
-    pub fn walk_below(
-        &self,
-        octant: Octant,
-        of: Handle,
-        enter: &mut impl FnMut(Octant, Handle) -> bool,
-    ) {
+    pub fn walk_below(&self, octant: Octant, of: Handle, enter: Enter) {
         if enter(octant, of) && of.is_node() {
             for digit in 0..8 {
                 let child = self.child(of, digit, octant.level);
@@ -311,10 +307,8 @@ impl Builder {
         let other_levels = (self.key ^ key).checked_ilog2().unwrap_or(0) as usize / 3;
         self.close_down_to(usize::from(LEVEL_MAX) - other_levels);
         self.key = key;
-        while self.open <= parent {
-            self.path[self.open] = [Handle::HOLE; 8];
-            self.open += 1;
-        }
+        self.path[self.open..=parent].fill([Handle::HOLE; 8]);
+        self.open = parent + 1;
         self.path[parent][digit(key, parent)] = content;
         Ok(())
     }
