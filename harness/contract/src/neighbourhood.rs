@@ -31,9 +31,9 @@ fn index([x, y, z]: [i32; 3]) -> usize {
     (SELF as i32 + x + 3 * y + 9 * z) as usize
 }
 
-/// The index of the octant across a face.
-fn face(axis: usize, side: i32) -> usize {
-    index(array::from_fn(|a| if a == axis { side } else { 0 }))
+/// The offset of the octant across a face. Faces are numbered -x, x, -y, y, -z, z.
+pub fn across(face: usize) -> [i32; 3] {
+    array::from_fn(|a| if a == face / 2 { 2 * (face as i32 % 2) - 1 } else { 0 })
 }
 
 /// The contents of an octant and of its neighbours.
@@ -60,9 +60,9 @@ impl Neighbourhood {
         Self { octant: self.octant.child(digit), handles }
     }
 
-    /// The content across a face of a child, on the low (-1) or high (1) side of an axis.
-    pub fn across(&self, tree: &Tree, digit: u8, axis: usize, side: i32) -> Handle {
-        let (index, digit) = DESCENT[usize::from(digit)][face(axis, side)];
+    /// The content across a face of a child.
+    pub fn across(&self, tree: &Tree, digit: u8, face: usize) -> Handle {
+        let (index, digit) = DESCENT[usize::from(digit)][index(across(face))];
         tree.child(self.handles[index], digit, self.octant.level)
     }
 
@@ -77,9 +77,9 @@ impl Neighbourhood {
         self.handles[SELF]
     }
 
-    /// The content across a face, on the low (-1) or high (1) side of an axis.
-    pub fn at_face(&self, axis: usize, side: i32) -> Handle {
-        self.handles[face(axis, side)]
+    /// The content across a face.
+    pub fn at_face(&self, face: usize) -> Handle {
+        self.handles[index(across(face))]
     }
 }
 

@@ -51,6 +51,11 @@ impl Octant {
         Self { corner: self.corner.map(|c| c & mask), level }
     }
 
+    /// The parent of an octant other than the root.
+    pub fn parent(&self) -> Self {
+        self.ancestor(self.level - 1)
+    }
+
     /// The digit of the octant among its siblings.
     pub fn digit(&self) -> u8 {
         (0..3).map(|a| u8::from(self.corner[a] & self.edge() != 0) << a).sum()

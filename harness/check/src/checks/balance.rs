@@ -20,11 +20,11 @@ pub(super) const CHECK: Check = Check {
 };
 
 fn run(subject: &Subject, result: &mut CheckResult) {
-    let (tree, touching, levels) = match subject.promises.balance {
-        Some(touching) => (subject.tree(), touching, subject.promises.levels()),
-        None => (subject.tree_with_deleted(), Touching::Corner, 1),
+    let (tree, required) = match subject.promises.balance {
+        Some(touching) => (subject.tree(), (touching, subject.promises.levels())),
+        None => (subject.tree_with_deleted(), (Touching::Corner, 1)),
     };
-    touching_leaves(tree, &subject.terms.root, touching, levels, result);
+    touching_leaves(tree, &subject.terms.root, required, result);
     result.requires(several_levels(subject));
 }
 
@@ -32,8 +32,7 @@ fn run(subject: &Subject, result: &mut CheckResult) {
 fn touching_leaves(
     tree: &Tree,
     root: &Root,
-    touching: Touching,
-    levels: u8,
+    (touching, levels): (Touching, u8),
     result: &mut CheckResult,
 ) {
     let (how, directions): (_, &[[i64; 3]]) = match touching {
@@ -56,7 +55,7 @@ mod tests {
 
     fn check_touching(tree: &Tree, root: &Root, touching: Touching, levels: u8) -> CheckResult {
         let mut result = CheckResult::new("balance");
-        touching_leaves(tree, root, touching, levels, &mut result);
+        touching_leaves(tree, root, (touching, levels), &mut result);
         result
     }
 

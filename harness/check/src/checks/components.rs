@@ -3,10 +3,12 @@
 
 use contract::lattice::FacetLattice;
 use contract::manifest::Manifest;
+use contract::neighbourhood::across;
 use contract::octant::Octant;
 use contract::parity::Parity;
 use contract::sets::Sets;
 use contract::word::{self, Side, leaf_at};
+use rustc_hash::FxHashMap;
 
 /// Number of candidates whose rays are computed before the majority decides.
 const CANDIDATES_MAX: usize = 32;
@@ -54,8 +56,13 @@ pub fn find(words: &[u64], inputs: &Manifest, facets: &[FacetLattice]) -> Vec<Co
         let parity = Parity::new(facets);
         return decided(words, inputs, |leaves| by_rays(leaves, words, &parity));
     }
-    let seeded = seeded_leaves(words, inputs);
-    decided(words, inputs, |leaves| by_seeds(leaves, &seeded, inputs))
+    let (seeded, flow) = (seeded_leaves(words, inputs), inputs.side_of_flow());
+    let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
+    // A component with a seed is flow; any other has the other side.
+    decided(words, inputs, |leaves| match seed_in(leaves, &seeded) {
+        Some(seed) => (flow, Decision::Seed(seed)),
+        None => (other, Decision::NoSeed),
+    })
 }
 
 /// The components of sorted leaves that do not overlap, with the sides that their words state.
@@ -106,43 +113,27 @@ pub fn touches_boundary(words: &[u64], leaves: &[u32]) -> bool {
     leaves.iter().any(|&i| word::octant(words[i as usize]).is_at_boundary())
 }
 
-/// The indices of the leaves that contain seeds, ascending, with the index of the first seed in each.
-pub fn seeded_leaves(words: &[u64], terms: &Manifest) -> Vec<(u32, usize)> {
-    let seeds = terms.seeds.iter().enumerate();
-    let leaves = seeds.filter_map(|(seed, &at)| Some((leaf_at(words, at)? as u32, seed)));
-    let mut seeded: Vec<(u32, usize)> = leaves.collect();
-    seeded.sort_unstable();
-    seeded.dedup_by_key(|(leaf, _)| *leaf);
-    seeded
+/// The first seed in each leaf that contains seeds, by the index of the leaf.
+pub fn seeded_leaves(words: &[u64], terms: &Manifest) -> FxHashMap<u32, usize> {
+    // In reverse, so that the first seed in a leaf replaces the others.
+    let seeds = terms.seeds.iter().enumerate().rev();
+    seeds.filter_map(|(seed, &at)| Some((leaf_at(words, at)? as u32, seed))).collect()
 }
 
 /// The first seed in some leaves, given the leaves with seeds.
-pub fn seed_in(leaves: &[u32], seeded: &[(u32, usize)]) -> Option<usize> {
-    let seed = |leaf: &u32| seeded.binary_search_by_key(leaf, |(seeded, _)| *seeded).ok();
-    leaves.iter().filter_map(seed).map(|at| seeded[at].1).min()
+pub fn seed_in(leaves: &[u32], seeded: &FxHashMap<u32, usize>) -> Option<usize> {
+    leaves.iter().filter_map(|leaf| seeded.get(leaf)).min().copied()
 }
 
 /// The leaves across a face that are at least as coarse. Finer neighbours find this leaf themselves, and so do siblings that
 /// precede it: the search among all leaves dominates the time of an audit without a case.
 fn coarse_neighbours(words: &[u64], octant: &Octant) -> impl Iterator<Item = usize> {
     let precedes = |face: usize| face.is_multiple_of(2) && octant.digit() >> (face / 2) & 1 == 1;
-    let across = (0..6).filter(move |&face| !precedes(face)).filter_map(|face| {
-        let mut offset = [0; 3];
-        offset[face / 2] = if face % 2 == 0 { -1 } else { 1 };
-        octant.neighbour(offset)
-    });
-    across.filter_map(|neighbour| {
+    let faces = (0..6).filter(move |&face| !precedes(face));
+    faces.filter_map(|face| octant.neighbour(across(face))).filter_map(|neighbour| {
         let i = leaf_at(words, neighbour.bounds().0)?;
         (word::level(words[i]) <= neighbour.level).then_some(i)
     })
-}
-
-/// A component with a seed is flow; any other has the other side.
-fn by_seeds(leaves: &[u32], seeded: &[(u32, usize)], inputs: &Manifest) -> (Side, Decision) {
-    let flow = inputs.side_of_flow();
-    let other = if flow == Side::Inside { Side::Outside } else { Side::Inside };
-    let seed = seed_in(leaves, seeded);
-    seed.map_or((other, Decision::NoSeed), |seed| (flow, Decision::Seed(seed)))
 }
 
 /// The first candidate whose rays agree decides. Without one, the majority of all rays decides.

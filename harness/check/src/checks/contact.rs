@@ -4,25 +4,19 @@ use contract::neighbourhood::Neighbourhood;
 use contract::octant::Octant;
 use contract::tree::{HOLES, Handle, Kind, Kinds, Tree};
 
+/// Is called with a leaf, its kind and the kinds across its faces.
+type Visit<'v> = &'v mut dyn FnMut(Octant, Kind, Kinds);
+
 /// Visits leaves of some kinds, with the kinds of everything that shares part of a face with them, holes included: all such leaves whose
 /// parent contains or adjoins one of the kinds that are sought. A leaf that is the root has no faces to look across.
-pub fn visit(tree: &Tree, of: Kinds, sought: Kinds, visit: &mut impl FnMut(Octant, Kind, Kinds)) {
+pub fn visit(tree: &Tree, of: Kinds, sought: Kinds, visit: Visit) {
     below(tree, [of, sought], &Neighbourhood::root(tree), visit);
 }
 
-/// The six faces: axis, side, and the side of whatever is across.
-const FACES: [(usize, i32, u8); 6] =
-    [(0, -1, 1), (0, 1, 0), (1, -1, 1), (1, 1, 0), (2, -1, 1), (2, 1, 0)];
-
-fn below(
-    tree: &Tree,
-    [of, sought]: [Kinds; 2],
-    around: &Neighbourhood,
-    visit: &mut impl FnMut(Octant, Kind, Kinds),
-) {
-    let across = FACES.map(|(axis, side, _)| around.at_face(axis, side));
+fn below(tree: &Tree, [of, sought]: [Kinds; 2], around: &Neighbourhood, visit: Visit) {
+    let mut across = (0..6).map(|face| around.at_face(face));
     let near = |h| tree.kinds(h) & sought != 0;
-    if !around.centre().is_node() || !(near(around.centre()) || across.into_iter().any(near)) {
+    if !around.centre().is_node() || !(near(around.centre()) || across.any(near)) {
         return;
     }
     for digit in 0..8 {
@@ -32,10 +26,8 @@ fn below(
         }
         if let Some(kind) = child.as_leaf() {
             // Of a leaf's neighbours, only those across its faces are found: the other twenty cost most of the time.
-            let facing = |(axis, side, facing)| {
-                on_face(tree, around.across(tree, digit, axis, side), axis, facing)
-            };
-            let kinds = FACES.into_iter().map(facing).fold(0, |all, kinds| all | kinds);
+            let facing = |face| on_face(tree, around.across(tree, digit, face), face ^ 1);
+            let kinds = (0..6).map(facing).fold(0, |all, kinds| all | kinds);
             visit(around.octant.child(digit), kind, kinds);
         } else {
             below(tree, [of, sought], &around.child(tree, digit), visit);
@@ -43,15 +35,15 @@ fn below(
     }
 }
 
-/// Kinds of all leaves in an octant that adjoin its face on the low (0) or high (1) side of an axis.
-fn on_face(tree: &Tree, handle: Handle, axis: usize, side: u8) -> Kinds {
+/// Kinds of all leaves in an octant that adjoin a face of it.
+fn on_face(tree: &Tree, handle: Handle, face: usize) -> Kinds {
     let kinds = tree.kinds(handle);
     if !handle.is_node() || kinds.is_power_of_two() {
         return kinds;
     }
-    let facing = (0..8u8).filter(|d| d >> axis & 1 == side);
+    let facing = (0..8u8).filter(|d| d >> (face / 2) & 1 == face as u8 & 1);
     // Kinds do not depend on the level, so any level serves.
-    facing.fold(0, |k, d| k | on_face(tree, tree.child(handle, d, 0), axis, side))
+    facing.fold(0, |k, d| k | on_face(tree, tree.child(handle, d, 0), face))
 }
 
 /// The names of the kinds.

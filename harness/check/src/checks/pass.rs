@@ -8,7 +8,6 @@ use super::{Check, CheckResult};
 use contract::digest::Digest;
 use contract::failure::Failure;
 use contract::htg::Block;
-use contract::lattice::Root;
 use contract::leafset::LeafSet;
 use contract::manifest::{Manifest, Part, octant_index};
 use contract::mesh::{Mesh, NODES_MAX};
@@ -17,7 +16,7 @@ use contract::word;
 
 /// What the pass found.
 pub(crate) struct Pass {
-    /// The manifest's entries about leaves, as they should be; it has no others.
+    /// The manifest's entries about leaves, as they should be; of others it has the root alone.
     pub(crate) tally: Manifest,
     pub(crate) linear: CheckResult,
     /// `None` if the tree has more nodes than the limit.
@@ -25,11 +24,6 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    /// The leaves as a tree.
-    pub(crate) fn tree(&self) -> &Tree {
-        self.tree.as_ref().expect("without a tree, no check of it runs")
-    }
-
     /// Reads all leaves; the tree may have at most `nodes_max` distinct nodes.
     ///
     /// # Errors
@@ -57,7 +51,6 @@ impl Pass {
 }
 
 struct State {
-    root: Root,
     nodes_max: usize,
     tally: Manifest,
     linear: CheckResult,
@@ -74,20 +67,18 @@ impl State {
     fn new(manifest: &Manifest, nodes_max: usize) -> Self {
         // Of a mesh without parts, the tree is the only one.
         let files = manifest.parts.iter().map(|part| &part.file).chain(&manifest.hyper_tree_grid);
-        let part =
-            |file: &String| Part { file: file.clone(), leaves: 0, digest: Digest::default() };
+        let part = |file: &String| Part { file: file.clone(), ..Part::default() };
         let parts: Vec<Part> = files.map(part).collect();
         let last_of_part = vec![None; parts.len()];
-        let mut tally = Manifest { parts, ..Manifest::default() };
+        let mut tally = Manifest { root: manifest.root, parts, ..Manifest::default() };
         tally.clear_leaves();
         let (linear, builder) = (CheckResult::new(CHECK.name), Builder::default());
-        let (root, by_code, last) = (manifest.root, [0; 128], 0);
-        Self { root, nodes_max, tally, linear, by_code, last_of_part, last, builder }
+        Self { nodes_max, tally, linear, by_code: [0; 128], last_of_part, last: 0, builder }
     }
 
     /// Adds to counts and digests, and checks the order.
     fn count(&mut self, part: usize, run: &[Block]) {
-        let Self { tally: Manifest { parts, octant_digests, .. }, .. } = self;
+        let Self { tally: Manifest { root, parts, octant_digests, .. }, .. } = self;
         let (last, Part { file, leaves, digest }) =
             (&mut self.last_of_part[part], &mut parts[part]);
         for block in run {
@@ -98,7 +89,7 @@ impl State {
             *leaves += block.leaves();
             self.by_code[(word & 127) as usize] += block.leaves();
             if let Some(before) = last.replace(word).filter(|&before| before >= word) {
-                let [before, word] = [before, word].map(|word| Named(Some(word), self.root));
+                let [before, word] = [before, word].map(|word| Named(Some(word), *root));
                 let finding = format_args!("{file} is not sorted: {word} follows {before}");
                 self.linear.report(finding);
             }
@@ -115,7 +106,8 @@ impl State {
                 self.last = block.first;
                 continue;
             }
-            let [leaf, last] = [block.first, self.last].map(|word| Named(Some(word), self.root));
+            let root = self.tally.root;
+            let [leaf, last] = [block.first, self.last].map(|word| Named(Some(word), root));
             match word::check(block.first) {
                 Err(_) => self.linear.report(format_args!("not a leaf: {leaf}")),
                 Ok(()) => self.linear.report(format_args!("two leaves overlap: {leaf} and {last}")),

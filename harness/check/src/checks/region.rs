@@ -116,13 +116,10 @@ impl<'a> Survey<'a> {
     pub fn check_complete(&self, result: &mut CheckResult) {
         self.visit(&mut |octant, kind, position| {
             let wanted = match position {
-                Position::On(_, kept) => Some(kept),
-                Position::Near { crossed: true } if self.knows_crossing => {
-                    Some(self.terms.keep_crossing)
-                }
-                Position::Near { .. } | Position::Undecided => None,
+                Position::On(_, kept) => kept,
+                Position::Near { crossed: true } if self.knows_crossing => self.terms.keep_crossing,
+                Position::Near { .. } | Position::Undecided => return,
             };
-            let Some(wanted) = wanted else { return };
             result.examined += 1;
             if wanted != kind.is_some() {
                 let what = if wanted { "the mesh has a hole" } else { "a leaf must be deleted" };

@@ -114,9 +114,7 @@ fn between(case: &Case, terms: &Manifest, truth: &Truth, level: u8) -> Vec<Leak>
     };
     let mut coarse = make(&cut);
     let seeded = components::seeded_leaves(&coarse.words, terms);
-    let is_crossing =
-        |&(leaf, _): &(u32, usize)| word::side(coarse.words[leaf as usize]) == Side::Crossing;
-    if seeded.iter().any(is_crossing) {
+    if seeded.keys().any(|&leaf| word::is_crossing(coarse.words[leaf as usize])) {
         coarse = make(&Manifest { seeds: Vec::new(), ..cut });
     }
     let root = &terms.root;

@@ -82,7 +82,7 @@ impl<'a> Subject<'a> {
 
     /// The mesh as a tree.
     pub fn tree(&self) -> &Tree {
-        self.pass.tree()
+        self.pass.tree.as_ref().expect("without a tree, no check of it runs")
     }
 
     /// A finding if the tree of the mesh exceeds its limit, so that no check of it can run, or T0 that of a mesh in memory. An audit without T0 shows

@@ -135,6 +135,9 @@ impl Truth {
     }
 }
 
+/// Is called with an octant and the facets that meet it; returns whether to visit its children.
+type Enter<'e> = &'e mut dyn FnMut(Octant, &[u32]) -> bool;
+
 /// Facets, prepared for any number of walks.
 #[derive(Debug)]
 pub struct Facets(Vec<Triangle>);
@@ -159,7 +162,7 @@ impl Facets {
 
     /// Visits octants in Morton order, parents first, each with the facets that meet it if it is enlarged by `margin` lattice units on all
     /// sides: the root, and the children of octants for which `enter` returns true.
-    pub fn walk(&self, margin: i64, enter: &mut dyn FnMut(Octant, &[u32]) -> bool) {
+    pub fn walk(&self, margin: i64, enter: Enter) {
         self.walk_below(Octant::ROOT, &self.all(), margin, enter);
     }
 
@@ -174,13 +177,7 @@ impl Facets {
         });
     }
 
-    fn walk_below(
-        &self,
-        octant: Octant,
-        candidates: &[u32],
-        margin: i64,
-        enter: &mut dyn FnMut(Octant, &[u32]) -> bool,
-    ) {
+    fn walk_below(&self, octant: Octant, candidates: &[u32], margin: i64, enter: Enter) {
         let near: Vec<u32> = self.meeting(candidates, &octant, margin).collect();
         if enter(octant, &near) {
             (0..8).for_each(|digit| self.walk_below(octant.child(digit), &near, margin, enter));

@@ -3,6 +3,8 @@
 //! Trees are 2^30 units long, whatever the version of p4est. Faces are numbered -x, x, -y, y, -z, z, corners by the bits of x, y, z, and edges by
 //! their direction and then as corners, as in p4est. A directed edge has its number, or 12 more if it runs downwards.
 
+use contract::neighbourhood::across;
+
 /// Length of a tree.
 pub const LENGTH: i64 = 1 << 30;
 /// Number of edges of a cube.
@@ -28,17 +30,12 @@ impl Isometry {
         image
     }
 
-    /// The isometry to the tree across a face, from the corner of the face with one number to that of its face `its` with another: the only
-    /// one that lays the cube beyond the face onto that tree. In three dimensions it is a rotation.
-    pub fn gluing(
-        dimension: usize,
-        [face, its]: [usize; 2],
-        [corner, its_corner]: [usize; 2],
-    ) -> Option<Self> {
-        let mut beyond = [0; 3];
-        beyond[face / 2] = if face % 2 == 0 { -LENGTH } else { LENGTH };
-        let (from, onto) =
-            (face_corner(dimension, face, corner), face_corner(dimension, its, its_corner));
+    /// The isometry to the tree across the first face, which is the second face there, from the corner of the first with one number to that
+    /// of the second with another: the only one that lays the cube beyond the face onto that tree. In three dimensions it is a rotation.
+    pub fn gluing(dimension: usize, faces: [usize; 2], corners: [usize; 2]) -> Option<Self> {
+        let [face, its] = faces;
+        let beyond = across(face).map(|edges| i64::from(edges) * LENGTH);
+        let [from, onto] = [0, 1].map(|i| face_corner(dimension, faces[i], corners[i]));
         let all = ORDERS.into_iter().flat_map(|to| {
             let reversed = |bits: usize| [0, 1, 2].map(|axis| bits >> axis & 1 == 1);
             (0..8).map(move |bits| Self { to, is_reversed: reversed(bits), shift: [0; 3] })

@@ -18,7 +18,6 @@ use crate::checks::{CheckResult, NO_LEAVES};
 use crate::promises::Touching;
 use contract::import::forest::{Forest, LENGTHS, Quadrant};
 use isometry::LENGTH;
-use std::cmp::Ordering;
 use std::time::Instant;
 use topology::Topology;
 
@@ -47,9 +46,9 @@ fn key(dimension: usize, point: [i64; 3]) -> u128 {
 
 /// The length of a tree, which is that of the version of p4est: most quadrants are octants of such trees.
 fn length(forest: &Forest) -> i64 {
-    let quadrants = || forest.leaves.iter().flatten();
+    let dimension = forest.connectivity.dimension;
     let fitting = |&length: &i64| {
-        quadrants().filter(|q| leaf(forest.connectivity.dimension, length, q).is_some()).count()
+        forest.leaves.iter().flatten().filter_map(|q| leaf(dimension, length, q)).count()
     };
     LENGTHS.into_iter().max_by_key(fitting).expect("three lengths")
 }
@@ -85,16 +84,12 @@ fn trees(forest: &Forest) -> (Vec<Vec<Leaf>>, [CheckResult; 3]) {
                     .report(format_args!("{name} is no octant of a tree whose length is {length}"));
                 continue;
             };
-            match leaf.key.cmp(&next) {
-                Ordering::Less => {
-                    let why = "begins before the end of the one before it";
-                    linear.report(format_args!("{} {why}", name()));
-                }
-                Ordering::Greater => {
-                    let why = "does not begin where the one before it ends, or the tree begins";
-                    complete.report(format_args!("{} {why}", name()));
-                }
-                Ordering::Equal => {}
+            if leaf.key < next {
+                linear
+                    .report(format_args!("{} begins before the end of the one before it", name()));
+            } else if leaf.key > next {
+                let why = "does not begin where the one before it ends, or the tree begins";
+                complete.report(format_args!("{} {why}", name()));
             }
             next = leaf.key + (1 << (dimension * leaf.size().trailing_zeros() as usize));
             leaves.push(leaf);
@@ -142,22 +137,20 @@ impl Balance<'_> {
     fn too_coarse(&self, tree: usize, leaf: &Leaf) -> Option<(usize, usize, u32)> {
         let (size, dimension) = (2 * leaf.size(), self.topology.dimension);
         let parent = leaf.corner.map(|at| at & !(size - 1));
-        let mut found = None;
         for direction in &self.directions {
             let mut cube = parent;
             for axis in (0..dimension).filter(|axis| direction >> axis & 1 == 1) {
                 cube[axis] += if leaf.corner[axis] == parent[axis] { -size } else { size };
             }
-            self.topology.same_place(tree, cube, size, &mut |other, corner| {
-                let leaves = &self.trees[other];
-                let key = key(dimension, corner);
+            for (other, corner) in self.topology.same_place(tree, cube, size) {
+                let (leaves, key) = (&self.trees[other], key(dimension, corner));
                 let index = leaves.partition_point(|leaf| leaf.key <= key) - 1;
                 if leaves[index].level + 1 < leaf.level {
-                    found = found.or(Some((other, index, direction.count_ones())));
+                    return Some((other, index, direction.count_ones()));
                 }
-            });
+            }
         }
-        found
+        None
     }
 }
 

@@ -13,12 +13,15 @@ use contract::sets::Sets;
 /// A tree, and the number of an edge or corner of it.
 type Place = (usize, usize);
 
+/// The tree across a face, and the isometry to its coordinates; none at the boundary.
+type Across = Option<(usize, Isometry)>;
+
 /// How the trees are glued.
 pub struct Topology {
     /// 2 or 3.
     pub dimension: usize,
     /// The tree across each face of each tree.
-    faces: Vec<Option<(usize, Isometry)>>,
+    faces: Vec<Across>,
     /// Directed edges of all trees that are the same.
     edges: Identified,
     /// Corners of all trees that are the same.
@@ -172,13 +175,7 @@ impl Topology {
 
     /// The cubes of a size that lie where a cube beside or in a tree does, whose minimum corner is given: as many as trees meet there, and
     /// none outside of the forest.
-    pub fn same_place(
-        &self,
-        tree: usize,
-        corner: [i64; 3],
-        size: i64,
-        visit: &mut dyn FnMut(usize, [i64; 3]),
-    ) {
+    pub fn same_place(&self, tree: usize, corner: [i64; 3], size: i64) -> Vec<(usize, [i64; 3])> {
         let side = |axis: usize| match corner[axis] {
             at if at < 0 => Some(0),
             at if at >= LENGTH => Some(1),
@@ -192,37 +189,33 @@ impl Topology {
             outside.iter().map(|(axis, side)| side << axis).sum()
         };
         match outside.as_slice() {
-            [] => visit(tree, corner),
+            [] => vec![(tree, corner)],
             [(axis, side)] => {
                 let across = &self.faces[2 * (self.dimension * tree + axis) + side];
-                across.iter().for_each(|(other, map)| visit(*other, map.of_cube(corner, size)));
+                across.iter().map(|(other, map)| (*other, map.of_cube(corner, size))).collect()
             }
             all if all.len() == self.dimension => {
-                let own = number(all);
-                self.corners
-                    .with((tree, own))
-                    .for_each(|(other, its)| visit(other, at_corner(its)));
+                let same = self.corners.with((tree, number(all)));
+                same.map(|(other, its)| (other, at_corner(its))).collect()
             }
             two => {
                 let axis = (0..3).find(|&axis| side(axis).is_none()).expect("one of three axes");
                 let own = edge_between(number(two), number(two) + (1 << axis));
-                for (other, edge) in self.edges.with((tree, own)) {
+                let along = corner[axis];
+                let place = |(other, edge): Place| {
                     let mut at = at_corner(edge_end(edge % EDGES, false));
-                    let along = corner[axis];
                     at[edge % EDGES / 4] =
                         if edge >= EDGES { LENGTH - size - along } else { along };
-                    visit(other, at);
-                }
+                    (other, at)
+                };
+                self.edges.with((tree, own)).map(place).collect()
             }
         }
     }
 }
 
 /// The neighbours across all faces. Findings are indices out of range, and faces that are not glued in both directions.
-fn glued_faces(
-    connectivity: &Connectivity,
-    result: &mut CheckResult,
-) -> Vec<Option<(usize, Isometry)>> {
+fn glued_faces(connectivity: &Connectivity, result: &mut CheckResult) -> Vec<Across> {
     let &Connectivity { dimension, trees, ref tree_to_tree, ref tree_to_face, .. } = connectivity;
     let faces = 2 * dimension;
     let glued = |index: usize| {

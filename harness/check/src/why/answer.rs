@@ -10,7 +10,6 @@
 
 use super::Mesh;
 pub use super::gradation::Rule;
-use super::gradation::parent;
 use crate::checks::components::{Component, Decision};
 use contract::lattice::{Root, UNITS_PER_EDGE, cell_at};
 use contract::octant::{LEVEL_MAX, Octant};
@@ -81,7 +80,7 @@ impl Answer {
         let is_apart = deleted_by.is_none() || leaf.is_none();
         assert!(is_apart, "the leaf {leaf:?} was deleted: {deleted_by:?}");
         let end = leaf.or(*base_leaf);
-        let above = end.filter(|end| end.level > 0).map(|end| parent(&end));
+        let above = end.filter(|end| end.level > 0).map(|end| end.parent());
         assert_eq!(split.as_ref().map(|split| split.octant), above, "the split above {end:?}");
         split.iter().for_each(|split| split.check_invariants(self.layer_cells_min));
     }
@@ -107,7 +106,7 @@ impl Split {
             let is_early = !is_source || leaf.level > octant.level + 1 || ends;
             assert!(is_early, "{leaf} is too coarse for {octant}");
             is_source = rule == Rule::Layer;
-            octant = if ends { leaf } else { parent(&leaf) };
+            octant = if ends { leaf } else { leaf.parent() };
         }
         assert_eq!(octant, *at, "the cause of {octant} is one of {at}");
         assert!(*is_crossed || !boxes.is_empty(), "{octant} is split without a facet or a box");
@@ -132,7 +131,7 @@ impl Split {
                 }
             };
             clauses.push(format!("{subject}by section 6{near} {}", root.place(*leaf)));
-            (octant, subject) = (parent(leaf), "its parent is split ");
+            (octant, subject) = (leaf.parent(), "its parent is split ");
         }
         let end = match self.links.last() {
             Some((Rule::ExtraLayer, _)) => "it is crossing by section 4".to_owned(),
@@ -212,7 +211,7 @@ impl Mesh<'_> {
             base_leaf,
             side_decided_by,
             deleted_by: deletion.filter(|_| leaf.is_none()),
-            split: octant.map(|octant| self.split(&parent(&octant))),
+            split: octant.map(|octant| self.split(&octant.parent())),
             root,
             layer_cells_min: self.inputs.layer_cells_min,
         };
@@ -231,19 +230,16 @@ impl Mesh<'_> {
                 links.push((Rule::ExtraLayer, leaf));
                 break Some(self.cause(&leaf));
             }
-            let Some((rule, leaf)) = self.finest_that_forces(&at, is_deep) else { break None };
+            // A leaf of the finest possible level.
+            let coarsest = at.level + if is_deep { 2 } else { 1 };
+            let mut levels = (coarsest..=self.level_deepest).rev();
+            let finest = levels.find_map(|level| self.leaf_that_forces(&at, level..=level));
+            let Some((rule, leaf)) = finest else { break None };
             links.push((rule, leaf));
             // After balance, any leaf may follow that may follow after a layer.
-            (at, is_deep) = (parent(&leaf), rule == Rule::Layer);
+            (at, is_deep) = (leaf.parent(), rule == Rule::Layer);
         };
         Split { octant: *octant, links, cause }
-    }
-
-    /// A leaf of the finest possible level that forces the split of an octant, which must be deep or not.
-    fn finest_that_forces(&self, octant: &Octant, is_deep: bool) -> Option<(Rule, Octant)> {
-        let coarsest = octant.level + if is_deep { 2 } else { 1 };
-        let mut levels = (coarsest..=self.level_deepest).rev();
-        levels.find_map(|level| self.leaf_that_forces(octant, level..=level))
     }
 
     /// What splits an octant of T0, or makes a leaf of it a crossing one.

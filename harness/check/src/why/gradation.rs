@@ -40,11 +40,6 @@ pub enum Rule {
     Balance,
 }
 
-/// The parent of an octant other than the root.
-pub(super) fn parent(octant: &Octant) -> Octant {
-    octant.ancestor(octant.level - 1)
-}
-
 impl Mesh<'_> {
     /// Distance from a source of this level within which its layer reaches, in level-19 cells.
     pub(super) fn layer_reach(&self, level: u8) -> i64 {
@@ -61,8 +56,7 @@ impl Mesh<'_> {
         self.is_deep(octant)
             || self.remembered(octant, false, || {
                 let level = octant.level + 1;
-                level <= self.level_deepest
-                    && self.leaf_that_forces(octant, level..=level).is_some()
+                self.leaf_that_forces(octant, level..=level.min(self.level_deepest)).is_some()
             })
     }
 
@@ -87,7 +81,7 @@ impl Mesh<'_> {
 
     /// The rule by which a finer leaf forces an octant to split.
     fn rule_of(&self, leaf: &Octant, octant: &Octant) -> Option<Rule> {
-        let (from, distance) = (parent(leaf), octant.distance(leaf));
+        let (from, distance) = (leaf.parent(), octant.distance(leaf));
         if distance < self.layer_reach(leaf.level) && self.is_deep(&from) {
             Some(Rule::Layer)
         } else if leaf.level > octant.level + 1 && distance == 0 && self.is_justified(&from) {
@@ -108,12 +102,9 @@ impl Mesh<'_> {
             return None;
         }
         let (first, last) = (*levels.start(), *levels.end());
-        let mut start = octant.level;
-        while start > 0 && edge_of(start) < self.layer_reach(first) {
-            start -= 1;
-        }
         let search = Search { mesh: self, octant, first, last };
-        let centre = octant.ancestor(start);
+        let is_wide = |&level: &u8| edge_of(level) >= self.layer_reach(first);
+        let centre = octant.ancestor((1..=octant.level).rev().find(is_wide).unwrap_or(0));
         let mut starts = OFFSETS.iter().filter_map(|&offset| centre.neighbour(offset));
         starts.find_map(|start| {
             // A leaf of the octant's level or a coarser one contains no leaf that is sought.

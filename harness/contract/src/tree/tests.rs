@@ -162,10 +162,10 @@ proptest! {
             found.push(word::key_of(corner) << 7 | u64::from(level) << 2 | u64::from(kind));
             let same = Neighbourhood::of(&tree, neighbourhood.octant);
             assert_eq!(same.handles, neighbourhood.handles);
-            let faces = |o: &[i32; 3]| o.iter().map(|c| c.abs()).sum::<i32>() == 1;
-            for (i, offset) in OFFSETS.iter().enumerate().filter(|(_, o)| faces(o)) {
-                let axis = offset.iter().position(|c| *c != 0).unwrap();
-                assert_eq!(same.at_face(axis, offset[axis]), same.handles[i]);
+            let faces = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
+            for (face, beyond) in faces.iter().enumerate() {
+                let i = OFFSETS.iter().position(|offset| offset == beyond).unwrap();
+                assert_eq!(same.at_face(face), same.handles[i]);
             }
         });
         prop_assert_eq!(found, words);
