@@ -5,7 +5,7 @@
 //! property in the corruption's name.
 
 use super::SelftestCase;
-use super::mutant::{self, AUDITED, INFORMED, Mutant, merge, sibling_groups, split, words};
+use super::mutant::{self, AUDITED, INFORMED, Mutant, merge, sibling_groups, split_first, words};
 use contract::manifest::Keep;
 use contract::neighbourhood::{Neighbourhood, OFFSETS};
 use contract::octant::{CELLS_PER_EDGE, LEVEL_MAX};
@@ -34,7 +34,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
         merge_where(s, |level, near| level == s.case.level_surface && near.in_surface_layer)
     }),
     words("refinement missing along a plane, as for a lost halo", "layer", AUDITED, halo_missing),
-    words("extra layer around deleted leaves missing", "layer", INFORMED, extra_layer_missing),
+    words("extra layer around deleted leaves missing", "layer", INFORMED, |s| {
+        merge_where(s, |level, near| level == s.case.level_surface && near.touch_deleted)
+    }),
     // Beside leaves that balance made, for instance: a reader may not rely on the layers of section 6 there.
     words("layer that only section 6 requires missing", "identical", INFORMED, |s| {
         merge_where(s, |level, near| {
@@ -56,17 +58,9 @@ fn coarser_neighbours(neighbourhood: &Neighbourhood) -> [usize; 4] {
 /// Splits the first leaf whose numbers of coarser neighbours satisfy a predicate. They are then two levels coarser.
 fn split_where(s: &SelftestCase, predicate: impl Fn([usize; 4]) -> bool) -> Option<Vec<u64>> {
     let tree = Tree::of_words(&s.mesh.words);
-    let fit = |&w: &u64| {
-        word::level(w) < LEVEL_MAX
-            && predicate(coarser_neighbours(&Neighbourhood::of(&tree, word::octant(w))))
-    };
-    Some(split(&s.mesh.words, s.mesh.words.iter().position(fit)?))
-}
-
-/// Merges the first graded siblings that satisfy a predicate of their index.
-fn merged_where(s: &SelftestCase, fit: impl Fn(usize) -> bool) -> Option<Vec<u64>> {
-    let i = graded_siblings(s).into_iter().find(|&i| fit(i))?;
-    Some(merge(&s.mesh.words, &[i]))
+    let around = |w| Neighbourhood::of(&tree, word::octant(w));
+    let fit = |w| word::level(w) < LEVEL_MAX && predicate(coarser_neighbours(&around(w)));
+    split_first(&s.mesh.words, fit)
 }
 
 /// Groups of siblings that gradation made, because T0 is coarser there.
@@ -88,6 +82,8 @@ struct Surroundings {
     within_layer: u8,
     /// Whether the siblings are in the layer around a crossing leaf, and their parent is coarser than the surface.
     in_surface_layer: bool,
+    /// Whether they touch a deleted crossing leaf.
+    touch_deleted: bool,
 }
 
 /// The surroundings of the siblings at index `i`, found among all leaves: slow, simple, and independent of the
@@ -116,6 +112,8 @@ fn surroundings(s: &SelftestCase, i: usize) -> Surroundings {
         let too_coarse = at_surface && merged.level < surface;
         found.in_surface_layer |= too_coarse && distance < (n - 1) * cell_surface;
     }
+    let touches = |&w: &u64| word::is_crossing(w) && merged.distance(&word::octant(w)) == 0;
+    found.touch_deleted = !s.case.keep_crossing && s.base.words.iter().any(touches);
     found
 }
 
@@ -124,7 +122,8 @@ fn merge_where(
     s: &SelftestCase,
     predicate: impl Fn(u8, &Surroundings) -> bool,
 ) -> Option<Vec<u64>> {
-    merged_where(s, |i| predicate(word::level(s.mesh.words[i]), &surroundings(s, i)))
+    let fit = |&i: &usize| predicate(word::level(s.mesh.words[i]), &surroundings(s, i));
+    Some(merge(&s.mesh.words, &[graded_siblings(s).into_iter().find(fit)?]))
 }
 
 /// Whether the definition requires a layer of cells of this level that is not implied by the balance.
@@ -142,18 +141,6 @@ fn halo_missing(s: &SelftestCase) -> Option<Vec<u64>> {
         has_layer(s, level) && surroundings(s, i).within_layer > level
     };
     halo.iter().any(thins).then(|| merge(words, &halo))
-}
-
-/// Merges siblings on the surface's level that touch a deleted crossing leaf.
-fn extra_layer_missing(s: &SelftestCase) -> Option<Vec<u64>> {
-    let words = &s.mesh.words;
-    let touches = |i: usize| {
-        let merged = word::octant(mutant::parent(words[i]));
-        let mut crossing = s.base.words.iter().filter(|&&w| word::is_crossing(w));
-        word::level(words[i]) == s.case.level_surface
-            && crossing.any(|&w| merged.distance(&word::octant(w)) == 0)
-    };
-    if s.case.keep_crossing { None } else { merged_where(s, touches) }
 }
 
 #[cfg(test)]
@@ -197,7 +184,8 @@ mod tests {
             )
         };
         let (mesh, base) = (leaf_set(vec![words(&["0", "5", "7"])]), leaf_set(vec![words(&["7"])]));
-        let merged = extra_layer_missing(&SelftestCase { case, mesh, base }).unwrap();
+        let missing = MUTANTS.iter().find(|m| m.name.starts_with("extra layer")).unwrap();
+        let merged = missing.make(&SelftestCase { case, mesh, base }).unwrap().mesh.words;
         assert_eq!(merged, words(&["0", "7"]));
     }
 

@@ -3,8 +3,8 @@
 
 use super::SelftestCase;
 use super::mutant::{
-    self, AUDITED, INFORMED, Mutant, base, changed, merge, middle, sets, sibling_groups, split,
-    words,
+    self, AUDITED, INFORMED, Mutant, base, changed, merge, middle, sets, sibling_groups,
+    split_first, words,
 };
 use contract::manifest::Keep;
 use contract::neighbourhood::Neighbourhood;
@@ -107,12 +107,18 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Some(merge(words, &[sibling_groups(words).into_iter().find(of_base)?]))
     }),
     words("leaf split needlessly", "identical", INFORMED, |s| {
-        Some(split(&s.mesh.words, middle(&s.mesh.words, is_not_finest)?))
+        changed(s, is_not_finest, |words, i| _ = words.splice(i..=i, mutant::children(words[i])))
     }),
     base("T0 too coarse at the surface", "spacing", AUDITED, coarse_at_surface),
     base("T0 too coarse in a box", "spacing", AUDITED, |s| merged_in_box(s, &s.base.words)),
-    base("T0 needlessly fine away from the surface", "identical", INFORMED, fine_away),
-    base("T0 needlessly fine at the surface", "identical", INFORMED, fine_at_surface),
+    base("T0 needlessly fine away from the surface", "identical", INFORMED, |s| {
+        split_first(&s.base.words, |w| !word::is_crossing(w) && is_not_finest(w))
+    }),
+    base("T0 needlessly fine at the surface", "identical", INFORMED, |s| {
+        // On the deepest level, no box requires the split.
+        let is_deepest = |w| is_not_finest(w) && word::level(w) == s.case.level_deepest();
+        split_first(&s.base.words, |w| word::is_crossing(w) && is_deepest(w))
+    }),
     base("T0 with a hole", "complete", AUDITED, |s| {
         let mut words = s.base.words.clone();
         // The self test at scale does not know T0 of a mesh that it did not make.
@@ -155,23 +161,9 @@ fn coarse_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
 fn merged_in_box(s: &SelftestCase, words: &[u64]) -> Option<Vec<u64>> {
     let required = |&i: &usize| {
         let octant = word::octant(words[i]);
-        let parent = octant.ancestor(octant.level - 1);
-        s.case.boxes.iter().any(|b| b.level == octant.level && b.meets(&parent))
+        s.case.boxes.iter().any(|b| b.level == octant.level && b.meets(&octant.parent()))
     };
     Some(merge(words, &[sibling_groups(words).into_iter().find(required)?]))
-}
-
-fn fine_away(s: &SelftestCase) -> Option<Vec<u64>> {
-    let fit = |&w: &u64| !word::is_crossing(w) && word::level(w) < LEVEL_MAX;
-    Some(split(&s.base.words, s.base.words.iter().position(fit)?))
-}
-
-fn fine_at_surface(s: &SelftestCase) -> Option<Vec<u64>> {
-    // On the deepest level, no box requires the split.
-    let deepest = s.case.level_deepest();
-    let fit = |&w: &u64| word::is_crossing(w) && word::level(w) == deepest;
-    let i = s.base.words.iter().position(fit).filter(|_| deepest < LEVEL_MAX)?;
-    Some(split(&s.base.words, i))
 }
 
 #[cfg(test)]
@@ -192,9 +184,10 @@ mod tests {
             let base = leaf_set(vec![words_with_sides(path, deepest)]);
             let mesh = leaf_set(vec![]);
             let correct = SelftestCase { case: case.clone(), mesh, base };
-            fine_away(&correct).is_some() || fine_at_surface(&correct).is_some()
+            let fine = MUTANTS.iter().filter(|m| m.name.starts_with("T0 needlessly fine"));
+            fine.map(|mutant| mutant.make(&correct).is_some()).collect::<Vec<bool>>()
         };
-        assert_eq!(Side::ALL.map(split), [false; 3]);
+        assert_eq!(Side::ALL.map(split), [(); 3].map(|()| vec![false; 2]));
     }
 
     /// Octant 0 has no crossing leaf, and the one in octant 1 is finer than the surface.

@@ -51,10 +51,7 @@ pub struct SelftestCase {
 impl SelftestCase {
     /// The final mesh or T0.
     pub fn set(&self, tree: Tree) -> &LeafSet {
-        match tree {
-            Tree::Final => &self.mesh,
-            Tree::Base => &self.base,
-        }
+        if tree == Tree::Base { &self.base } else { &self.mesh }
     }
 }
 

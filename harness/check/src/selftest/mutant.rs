@@ -153,11 +153,10 @@ pub(super) fn children(word: u64) -> [u64; 8] {
     std::array::from_fn(|d| word::encode(&Leaf { octant: octant.child(d as u8), side }))
 }
 
-/// The words with the leaf at this index split.
-pub(super) fn split(words: &[u64], i: usize) -> Vec<u64> {
-    let mut all = words.to_vec();
-    all.splice(i..=i, children(words[i]));
-    all
+/// The words with the first leaf split that satisfies a predicate.
+pub(super) fn split_first(words: &[u64], predicate: impl Fn(u64) -> bool) -> Option<Vec<u64>> {
+    let i = words.iter().position(|&w| predicate(w))?;
+    Some([&words[..i], &children(words[i]), &words[i + 1..]].concat())
 }
 
 /// Indices of the first of eight sibling leaves that have the same side.
@@ -171,19 +170,16 @@ pub(super) fn sibling_groups(words: &[u64]) -> Vec<usize> {
 /// The parent of a leaf, with the leaf's side.
 pub(super) fn parent(word: u64) -> u64 {
     let octant = word::octant(word);
-    word::encode(&Leaf { octant: octant.ancestor(octant.level - 1), side: word::side(word) })
+    word::encode(&Leaf { octant: octant.parent(), side: word::side(word) })
 }
 
 /// The words with the groups of eight siblings at these ascending indices merged.
 pub(super) fn merge(words: &[u64], sibling_groups: &[usize]) -> Vec<u64> {
-    let mut all = Vec::with_capacity(words.len());
-    let mut from = 0;
-    for &i in sibling_groups {
-        all.extend(&words[from..i]);
-        all.push(parent(words[i]));
-        from = i + 8;
+    let mut all = words.to_vec();
+    // From the last on, so that the indices of those before it remain.
+    for &i in sibling_groups.iter().rev() {
+        all.splice(i..i + 8, [parent(words[i])]);
     }
-    all.extend(&words[from..]);
     all
 }
 
