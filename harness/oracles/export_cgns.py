@@ -54,11 +54,10 @@ def node(parent, name, label, data=None):
 
 
 def shortened(name):
-    """A name in the 32 characters of CGNS, and further ones if it is that of another patch."""
-    yield name[:32]
-    for number in itertools.count(2):
-        end = f"_{number}"
-        yield name[: 32 - len(end)] + end
+    """A name in the 32 bytes of CGNS, and further ones if it is that of another node."""
+    for end in itertools.chain([""], map("_{}".format, itertools.count(2))):
+        # A character that would be cut is left out.
+        yield name.encode()[: 32 - len(end)].decode(errors="ignore") + end
 
 
 def integers(values):
@@ -107,8 +106,8 @@ def write(at, file):
     elements(zone, "NGON_n", NGON, 1, begins, vertices + 1)
     elements(zone, "NFACE_n", NFACE, last + 1, of_cells, faces)
     conditions = node(zone, "ZoneBC", "ZoneBC_t")
-    known = set()
-    for name, kind, count, start in PATCH.findall((at / "boundary").read_text()):
+    known = set(base)  # A family is a child of the base, as the zone is.
+    for name, kind, count, start in PATCH.findall((at / "boundary").read_text("utf-8")):
         if int(count):  # A range cannot be empty.
             name = next(short for short in shortened(name) if short not in known)
             known.add(name)

@@ -11,9 +11,11 @@ import shutil
 import subprocess
 import unittest
 
+import h5py
 import numpy as np
 import pyvista
 
+import export_cgns
 from built import ROOT, InDirectory, decode, needs, run
 from export_cgns import shortened
 from export_mfem import CORNERS, DEPTH, FACES, forest, packed
@@ -52,6 +54,28 @@ class CgnsTest(InDirectory):
         name = 30 * "a" + "bcd"
         names = list(itertools.islice(shortened(name), 11))
         self.assertEqual(names[:2] + names[-1:], [name[:32], 30 * "a" + "_2", 29 * "a" + "_11"])
+
+    def test_names_of_more_than_32_bytes_are_cut_between_characters(self):
+        names = list(itertools.islice(shortened(17 * "ä" + "x"), 2))
+        self.assertEqual(names, [16 * "ä", 15 * "ä" + "_2"])
+
+    def test_patches_may_have_the_names_of_other_nodes_and_of_all_languages(self):
+        solids = ["Zone", "DataClass", 17 * "ä" + "x", 17 * "ä" + "y"]
+        foam = self.at / "case/constant/polyMesh"
+        code, _, why = run("harness", "export", self.at / "mesh", foam, "--side", "outside")
+        self.assertEqual(code, 0, why)
+        boundary = (foam / "boundary").read_text()
+        for patch, solid in zip(["xMin", "xMax", "yMin", "yMax"], solids):
+            boundary = boundary.replace(patch, solid)
+        (foam / "boundary").write_text(boundary, "utf-8")
+        with h5py.File(self.at / "named.cgns", "w", track_order=True, libver="earliest") as file:
+            export_cgns.write(foam, file)
+            conditions = file["Base/Zone/ZoneBC"]
+            self.assertEqual(list(conditions)[:4], ["Zone_2", "DataClass_2", 16 * "ä", 15 * "ä" + "_2"])
+            for name in conditions:
+                self.assertEqual(bytes(conditions[name].attrs["name"]).rstrip(b"\0"), name.encode())
+                self.assertLessEqual(len(name.encode()), 32)
+                self.assertIn(name, file["Base"])
 
     @unittest.skipUnless(shutil.which("cgnscheck"), "cgnscheck is not installed: it is in Debian's package cgns-convert")
     def test_cgns_finds_no_error(self):
