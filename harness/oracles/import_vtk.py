@@ -160,23 +160,28 @@ def of_export(path, grid, edges):
 
 
 def fields(path, grid):
-    """The fields `root` and `digest` of the file, or None. For a .pvtu, VTK returns the fields of a part."""
+    """The fields `root` and `digest` of the file, or None. For a .pvtu, VTK returns the fields of a part, which are those of the whole if
+    VTK has written both; other programs write them as text."""
     root, digest = grid.GetFieldData().GetArray("root"), grid.GetFieldData().GetAbstractArray("digest")
     root = vtk_to_numpy(root).ravel().tolist() if root is not None else None
     digest = digest.GetValue(0) if digest is not None and digest.IsA("vtkStringArray") and digest.GetNumberOfTuples() else None
     with open(path, "rb") as file:
-        if b'type="PUnstructuredGrid"' in file.read(4096):
-            arrays = {array.get("Name"): array for array in ElementTree.parse(path).iterfind("*/FieldData/DataArray")}
-            root, digest = arrays.get("root"), arrays.get("digest")
-            try:
-                root = [float(number) for number in root.text.split()] if root is not None else None
+        is_in_parts = b'type="PUnstructuredGrid"' in file.read(4096)
+    if is_in_parts:
+        arrays = {array.get("Name"): array for array in ElementTree.parse(path).iterfind("*/FieldData/*")}
+        words = {name: (array.text or "").split() for name, array in arrays.items() if array.get("format", "ascii") == "ascii"}
+        try:
+            root = list(map(float, words["root"])) if "root" in words else root if "root" in arrays else None
+            if "digest" in words:
                 # VTK reads text as the codes of its characters and a zero.
-                digest = bytes(map(int, digest.text.split())).decode() if digest is not None else "\0"
-                if not digest.endswith("\0"):
+                *codes, zero = map(int, words["digest"])
+                digest = bytes(codes).decode() or None
+                if zero:
                     raise ValueError
-            except (ValueError, AttributeError):
-                raise Refused("has a root or a digest that is not of numbers: it is damaged") from None
-            digest = digest[:-1] or None
+            elif "digest" not in arrays:
+                digest = None
+        except ValueError:
+            raise Refused("has a root or a digest that is not of numbers: it is damaged") from None
     return root if root is not None and len(root) == 4 else None, digest
 
 

@@ -15,6 +15,9 @@ import unittest
 import numpy as np
 import pyvista
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersParallel import vtkExtractUnstructuredGridPiece
+from vtkmodules.vtkIOParallelXML import vtkXMLPUnstructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 import import_vtk
 from built import EDGE_BITS, PROGRAMS, ROOT, decode, needs
@@ -145,6 +148,19 @@ class DamagedVtuTest(unittest.TestCase):
         path.write_bytes(content.replace(b'Name="rank"', b'Name="race"'))
         self.assertNotEqual(path.read_bytes(), content)
         self.assertEqual(self.imported(path), (0, self.digest))
+
+    def test_a_file_in_parts_that_vtk_wrote_has_the_root_and_the_digest(self):
+        reader = vtkXMLUnstructuredGridReader(file_name=self.at / "all.vtu")
+        part = vtkExtractUnstructuredGridPiece(input_connection=reader.output_port, create_ghost_cells=False)
+        for mode in ("SetDataModeToAscii", "SetDataModeToBinary", "SetDataModeToAppended"):
+            writer = vtkXMLPUnstructuredGridWriter(input_connection=part.output_port, file_name=self.at / "parts.pvtu")
+            writer.SetNumberOfPieces(3)
+            writer.SetEndPiece(2)
+            getattr(writer, mode)()
+            writer.Write()
+            _, edges, stated = import_vtk.cells(str(self.at / "parts.pvtu"), {"sides": None})
+            self.assertEqual((len(edges), stated["digest"]), (reader.GetOutput().GetNumberOfCells(), self.digest), mode)
+            self.assertEqual(stated["root"], json.loads((self.at / "mesh/mesh.json").read_text())["root"])
 
     def test_the_xml_of_a_file(self):
         self.check(self.changes_of_xml)
