@@ -53,14 +53,17 @@ def npy(path, request):
     for name, column in columns.items():
         if column.ndim != 1 or column.dtype.kind not in "iuf":
             raise Refused(f"has a column {name} of type {column.dtype}: convert it to float64 or to integers")
-    return rows({name: column.astype(np.float64) for name, column in columns.items()}, request)
+    return rows([(name, column.astype(np.float64)) for name, column in columns.items()], request)
 
 
 def csv(path, request):
     """Lines of fields, separated by commas, semicolons or white space. A first line that is not numeric names the columns, and so does a
     comment before it with as many words as there are fields, as NumPy writes it. Other lines that begin with # are comments."""
-    text = read_text(path).translate(str.maketrans(",;", "  ", '"'))
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    text = read_text(path)
+    for number, line in enumerate(text.splitlines(), 1):
+        if re.match(r"[^#]*(\d,\d.*;|;.*\d,\d)", line):
+            raise Refused(f"has decimal commas in line {number}: write numbers with decimal points")
+    lines = [line.strip() for line in text.translate(str.maketrans(",;", "  ", '"')).splitlines() if line.strip()]
     comments = list(itertools.takewhile(lambda line: line.startswith("#"), lines))
     lines = [line for line in lines if not line.startswith("#")]
     names = lines[0].split() if lines else []
@@ -77,7 +80,7 @@ def csv(path, request):
         raise Refused(f"is no table of numbers: {why} (comments and the names of columns do not count)") from None
     if is_named and len(names) != len(columns):
         raise Refused(f"has {len(columns)} fields in a line, but {len(names)} names of columns")
-    return rows(dict(zip(names, columns)) if is_named else named(columns), request)
+    return rows(list(zip(names, columns)) if is_named else named(columns).items(), request)
 
 
 def is_number(field):
@@ -101,11 +104,15 @@ def named(columns):
 
 def rows(columns, request):
     """The cells of a table of x, y and z, and either level or edge."""
-    columns = {name.lower(): column for name, column in reversed(columns.items())}
+    names = [name.lower() for name, _ in columns]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise Refused(f"has more than one column {twice}: rename or remove the others")
+    columns = dict(zip(names, (column for _, column in columns)))
 
     def column(name):
         if name.lower() not in columns:
-            raise Refused(f"has no column {name}: its columns are {', '.join(reversed(columns))}")
+            raise Refused(f"has no column {name}: its columns are {', '.join(columns)}")
         return columns[name.lower()]
 
     position, root, sides = request["position"], None, request["sides"]

@@ -159,7 +159,7 @@ class CellsTest(unittest.TestCase):
             np.save(path, array)
             corners, edges, _ = read(path, root=root)
             self.assertEqual((corners.tolist(), edges.tolist()), ([[0, 0.5, 0], [0.5, 0.5, 0]], [0.5, 0.25]))
-        for array in (plain[:, :3], plain[None], plain.astype(complex), np.array(5.0), plain.astype("U9"), np.zeros(2, [("x", "f8", 2)])):
+        for array in (plain[:, :3], plain[None], plain.astype(complex), np.array(5.0), plain.astype("U9"), np.zeros(2, [("x", "f8", 2)]), np.zeros(2, [(name, "f8") for name in ("x", "y", "z", "edge", "X")])):
             np.save(path, array)
             self.refused(path, root=root)
         content = (np.save(path, plain), path.read_bytes())[1]
@@ -177,6 +177,8 @@ class CellsTest(unittest.TestCase):
             "x,y,z,level\n": "has no cells",
             "x,y,level\n0,0,1\n": "has no column z",
             "x,y,z\n0,0,1\n": "has no column level",
+            "x;y;z;level\n0;0;0;1\n0,5;0;0;1": "has decimal commas in line 3",
+            "x,y,z,level,Level\n0,0,0,1,2": "has more than one column level",
             "0 0 0 one\n": "no table of numbers",
             "0 0 0 1\n0 0 0\n": "no table of numbers",
             "x,y,z,level,side\n0,0,0,1\n": "4 fields in a line, but 5 names",
