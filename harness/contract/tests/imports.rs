@@ -224,6 +224,18 @@ fn counts_beyond_the_file_are_errors() {
     }
 }
 
+#[test]
+fn trees_at_edges_and_corners_that_a_forest_lacks_are_errors() {
+    for number in [5, 7] {
+        for count in [6, -1i64] {
+            let why = refusal("unitcube.p8est", |bytes| {
+                bytes[32 + 8 * number..][..8].copy_from_slice(&count.to_le_bytes())
+            });
+            assert!(why.contains("where trees meet, and none of these"), "{why}");
+        }
+    }
+}
+
 /// The connectivity's header follows 32 bytes, and the forest's its own.
 #[test]
 fn a_forest_of_another_format_is_refused() {

@@ -117,12 +117,14 @@ impl Cells {
         let scale = f64::from(1u32 << depth as u32);
         let edge = extent / (extent / (edge / scale)).round() * scale;
         let (mut origin, mut along) = ([0.0; 3], 1.0f64);
+        // In coarsest cells: of the finest cell, which may lie beyond all coarser ones.
+        let tolerance = TOLERANCE / scale;
         for axis in 0..3 {
             let below = (corner[axis] - low[axis]) / edge;
-            let whole = (below - 0.01).ceil();
-            let exact = (below - whole).abs() <= 0.01;
+            let whole = (below - tolerance).ceil();
+            let exact = (below - whole).abs() <= tolerance;
             origin[axis] = if exact { low[axis] } else { corner[axis] - whole * edge };
-            along = along.max(((high[axis] - origin[axis]) / edge - 0.01).ceil());
+            along = along.max(((high[axis] - origin[axis]) / edge - tolerance).ceil());
         }
         Ok(Root { origin, edge: edge * along.log2().ceil().exp2() })
     }
@@ -278,6 +280,21 @@ mod roots {
             cells.push([x, 0.0, 0.0], edge);
         }
         assert_eq!(cells.least_root().unwrap(), Root { origin: [0.0; 3], edge: 8.0 });
+    }
+
+    /// However small a cell beyond the coarsest ones is in them.
+    #[test]
+    fn a_small_cell_beyond_the_coarsest_is_in_the_root() {
+        for edge in [0.5, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 4096.0] {
+            for (x, low) in [(1.0, 0.0), (-edge, -1.0), (-1.0, -1.0), (edge - 1.0, -1.0)] {
+                let mut cells = Cells::default();
+                cells.push([0.0; 3], 1.0);
+                cells.push([x, 0.0, 0.0], edge);
+                let root = cells.least_root().unwrap();
+                assert_eq!(root, Root { origin: [low, 0.0, 0.0], edge: 2.0 }, "{edge} at {x}");
+                assert_eq!(cells.words(&root).unwrap().len(), 2);
+            }
+        }
     }
 
     #[test]

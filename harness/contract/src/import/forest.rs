@@ -173,7 +173,10 @@ impl<'a> Input<'a> {
     /// The lists of `count` edges or corners, but for `of_tree`.
     fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Failure> {
         let offsets = self.numbers(count.saturating_add(1), 1)?;
-        let pairs = if count > 0 { pairs } else { 0 };
+        let why = format!(
+            "it states {pairs} places at edges or corners where trees meet, and none of these"
+        );
+        Failure::unless(count > 0 || pairs == 0, damaged(&why))?;
         let (trees, places) = (self.numbers(pairs, 1)?, self.numbers(pairs, 1)?);
         Ok(Lists { of_tree: Vec::new(), offsets, trees, places })
     }
