@@ -173,10 +173,8 @@ impl<'a> Input<'a> {
     /// The lists of `count` edges or corners, but for `of_tree`.
     fn lists(&mut self, count: u64, pairs: u64) -> Result<Lists, Failure> {
         let offsets = self.numbers(count.saturating_add(1), 1)?;
-        let why = format!(
-            "it states {pairs} places at edges or corners where trees meet, and none of these"
-        );
-        Failure::unless(count > 0 || pairs == 0, damaged(&why))?;
+        let why = "it states trees at edges or corners, and none where trees meet";
+        Failure::unless(count > 0 || pairs == 0, damaged(why))?;
         let (trees, places) = (self.numbers(pairs, 1)?, self.numbers(pairs, 1)?);
         Ok(Lists { of_tree: Vec::new(), offsets, trees, places })
     }
