@@ -18,12 +18,11 @@ pub enum Kind {
     NonManifoldOdd,
     /// Pairs of facets that traverse their common edge, which has no other facet, in the same direction.
     Winding,
-    /// Closed shells of consistent winding that enclose a negative volume, and cannot lie in another closed shell.
+    /// Closed shells of consistent winding that enclose a negative volume, apart from [`Self::Nested`] ones.
     InsideOut,
-    /// Closed shells of consistent winding that enclose a negative volume, within the bounding box of another closed shell; and other
-    /// closed shells that lie in an odd number of closed ones.
+    /// Closed shells that lie in an odd number of other closed ones.
     Nested,
-    /// Facets with the three vertices of an earlier facet, in any order.
+    /// Facets with the three vertices of an earlier facet, in any order. The kinds below count copies of the same winding once.
     Duplicates,
     /// Pairs of facets whose interiors share a point on the lattice; duplicates are not among them.
     Intersections,
@@ -113,7 +112,7 @@ impl Kind {
             Self::Winding => ("neighbours, opposite winding",
                 "No effect: no decision uses a facet's orientation. Thin walls and thin gaps may be confused or missed at these facets."),
             Self::InsideOut => ("closed shells inside out",
-                "No effect, but normals point inward: thin walls and thin gaps are confused, and other programs may exchange inside and outside."),
+                "No effect, but normals point inward: other programs may exchange inside and outside."),
             Self::Nested => ("closed shells in closed shells",
                 "Rays count both surfaces, so the interior of the inner one is outside: right for a cavity. It is deleted if the outside is kept, unless enclosed = keep or a seed lies in it. Remove the inner shell if it was meant as a solid."),
             Self::Duplicates => ("duplicate facets",
@@ -155,9 +154,7 @@ pub fn meaning(finding: &Finding, input: &Input) -> String {
     match finding.kind {
         Kind::Openings => openings(finding, input, (width, finest)),
         Kind::Intersections if finding.count_changing == 0 => {
-            "No effect: the facets overlap back to back in one plane or by the rounding of their \
-                                                               vertices, so no volumes overlap."
-                .into()
+            "No effect: the facets overlap back to back in one plane or by the rounding of their vertices, so no volumes overlap.".into()
         }
         // A gap of two cells holds one of them wherever it lies in the lattice, if it is parallel to a face of the lattice.
         Kind::ThinWalls | Kind::ThinGaps if width / 2.0 < finest => {

@@ -9,7 +9,7 @@ use contract::manifest::Keep;
 use contract::stl;
 use serde::Serialize;
 
-use super::tree::{Aabb, Point, bounds};
+use super::tree::{Aabb, Point};
 
 /// What a case file would have, in the user's units. It takes precedence over that of a case.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -63,8 +63,7 @@ impl Input {
             let body = stl::read(path)?;
             (body.facets, body.solids)
         };
-        let input = Self::new(facets, requested);
-        let mut input = input.map_err(|error| Failure::about(path, error))?;
+        let mut input = Self::new(facets, requested).map_err(|e| Failure::about(path, e))?;
         input.case.solids = solids;
         Ok(input)
     }
@@ -97,7 +96,9 @@ impl Input {
 
     /// The extent of the facets.
     pub fn extent(&self) -> Extent {
-        let Aabb { mins, maxs } = bounds(&self.case.facets);
+        let vertices = self.case.facets.as_flattened().iter();
+        let Aabb { mins, maxs } =
+            Aabb::from_points(vertices.map(|v| Point::from(v.map(f64::from))));
         let origin = Point::from(self.case.root.origin);
         let margin =
             (mins - origin).min(origin + Point::splat(self.case.root.edge) - maxs).min_element();

@@ -17,27 +17,31 @@ const ROUNDING: f64 = 2.0;
 /// The search ends when it has found this number of pairs.
 const PAIRS_MAX: usize = 1 << 22;
 
-/// Pairs of facets whose interiors intersect. Degenerate facets and pairs of facets with the same vertices are left out.
+/// Pairs of facets whose interiors intersect, counted once for all copies of each. Degenerate facets and pairs of facets with
+/// the same vertices are left out.
 pub fn intersections(input: &Input, tree: &FacetTree, first: usize) -> Finding {
     let facet = |f: u32| &input.case.facets_lattice[f as usize];
     let has_area = |f: &u32| normal(facet(*f)) != [0; 3];
     let are_same = |a: &FacetLattice, b: &FacetLattice| a.iter().all(|v| b.contains(v));
-    let mut pairs: Vec<(u32, u32)> = Vec::new();
-    for f in (0..input.case.facets_lattice.len() as u32).filter(has_area) {
-        for g in tree.overlapping(f).into_iter().filter(|g| f < *g && has_area(g)) {
-            let is_pair = !are_same(facet(f), facet(g)) && intersect(facet(f), facet(g));
-            pairs.extend(is_pair.then_some((f, g)));
-        }
-        if pairs.len() >= PAIRS_MAX {
+    let (mut pairs, mut visits): (Vec<(u32, u32)>, _) = (Vec::new(), 0);
+    let ends = |pairs: usize, visits| pairs >= PAIRS_MAX || visits > tree.visits_max;
+    for &f in tree.firsts.iter().filter(|f| has_area(f)) {
+        if ends(pairs.len(), visits) {
             break;
         }
+        let others: Vec<u32> = tree.in_box(&tree.triangle(f).local_aabb()).collect();
+        visits += others.len() as u64;
+        let are_pair = |&g: &u32| {
+            has_area(&g) && intersect(facet(f), facet(g)) && !are_same(facet(f), facet(g))
+        };
+        pairs.extend(others.into_iter().filter(|&g| f < g).filter(are_pair).map(|g| (f, g)));
     }
     let is_rounding = |&(f, g): &(u32, u32)| depth(facet(f), facet(g)) <= ROUNDING;
     pairs.sort_by_cached_key(|pair| (is_rounding(pair), *pair));
     Finding {
         count: pairs.len() as u64,
         count_changing: pairs.partition_point(|pair| !is_rounding(pair)) as u64,
-        is_lower_bound: pairs.len() >= PAIRS_MAX,
+        is_lower_bound: ends(pairs.len(), visits),
         places: pairs.iter().take(first).map(|&(f, g)| place(input, f, g)).collect(),
         ..Finding::new(Kind::Intersections)
     }
@@ -66,19 +70,19 @@ fn overlap(a: &FacetLattice, b: &FacetLattice, axis: [i64; 3]) -> i128 {
 
 /// The normals of the planes that can separate two triangles with area, none of them zero.
 fn axes(a: &FacetLattice, b: &FacetLattice) -> impl Iterator<Item = [i64; 3]> {
-    let (n, m) = (normal(a), normal(b));
-    let edges = |f: &FacetLattice| [0, 1, 2].map(|i| difference(f[(i + 1) % 3], f[i]));
-    let (of_a, of_b) = (edges(a), edges(b));
+    let n = normal(a);
+    // Most pairs need none but the first axis.
+    let edge = |f: &FacetLattice, i: usize| difference(f[(i + 1) % 3], f[i]);
     let is_coplanar = range(b, a[0], n) == (0, 0);
     // In one plane: the projection along an axis that is not parallel to the plane.
     let along = (0..3).position(|x| n[x] != 0).expect("the facet has an area");
     let unit = std::array::from_fn(|x| i64::from(x == along));
     let axis = move |i: usize| match (is_coplanar, i) {
-        (true, 0..3) => cross(of_a[i], unit),
-        (true, _) => cross(of_b[i - 3], unit),
+        (true, 0..3) => cross(edge(a, i), unit),
+        (true, _) => cross(edge(b, i - 3), unit),
         (false, 0) => n,
-        (false, 1) => m,
-        (false, _) => cross(of_a[(i - 2) / 3], of_b[(i - 2) % 3]),
+        (false, 1) => normal(b),
+        (false, _) => cross(edge(a, (i - 2) / 3), edge(b, (i - 2) % 3)),
     };
     (0..if is_coplanar { 6 } else { 11 }).map(axis).filter(|&axis| axis != [0; 3])
 }
@@ -100,6 +104,7 @@ fn place(input: &Input, f: u32, g: u32) -> Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::Requested;
     use crate::tree::Point;
     use contract::lattice::UNITS_PER_EDGE;
     use parry3d_f64::math::Pose;
@@ -111,6 +116,23 @@ mod tests {
 
     fn of(b: FacetLattice) -> bool {
         intersect(&A, &b)
+    }
+
+    #[test]
+    fn a_search_that_ends_early_is_a_lower_bound() {
+        let across = [[2.0, 2.0, -4.0], [2.0, 2.0, 4.0], [3.0, 9.0, 0.0]];
+        let plane = A.map(|v| v.map(|c| c as f32));
+        let [p, q, r] = plane;
+        let facets = vec![plane, across, [r, q, p]];
+        let input = Input::new(facets, Requested::default()).unwrap();
+        let mut tree = FacetTree::new(&input.case.facets_lattice);
+        let found = |tree: &FacetTree| {
+            let finding = intersections(&input, tree, 5);
+            (finding.count, finding.is_lower_bound)
+        };
+        assert_eq!(found(&tree), (2, false));
+        tree.visits_max = 1;
+        assert_eq!(found(&tree), (1, true));
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
     let tree = FacetTree::new(&input.case.facets_lattice);
     findings.push(intersections::intersections(input, &tree, first));
     if let Some(cell) = input.cell {
-        findings.extend(sheets::sheets(input, &tree, (&edges, &shells), cell));
+        findings.extend(sheets::sheets(input, &tree, &shells, cell));
     }
     findings.extend(finding::at_root(input, first));
     for finding in findings.iter_mut().filter(|finding| finding.count > 0) {
@@ -46,7 +46,7 @@ pub fn diagnose(input: &Input, first: usize) -> Diagnosis {
         finding.meaning = finding::meaning(finding, input);
     }
     let closed = shells.all.iter().filter(|shell| shell.is_closed).count() as u64;
-    let of_shells = shells.all.iter().map(|shell| u64::from(shell.facets)).sum();
+    let of_shells = shells.of.iter().filter(|&&shell| shell != u32::MAX).count() as u64;
     let diagnosis = Diagnosis {
         schema: SCHEMA,
         facets: input.case.facets.len() as u64,

@@ -124,12 +124,13 @@ impl Diagnosis {
 
     fn details(&self, finding: &Finding, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Finding { kind, count, count_changing, places, meaning, .. } = finding;
-        let least = if finding.is_lower_bound { "at least " } else { "" };
+        let least = if finding.is_lower_bound { "not all were examined; at least " } else { "" };
         let effect = match count_changing {
             0 => String::new(),
             changing => format!("; {changing} can change the mesh's region"),
         };
-        writeln!(f, "\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0)?;
+        let text = format!("\n{}: {least}{count}{effect}\n  {meaning}", kind.row().0);
+        writeln!(f, "{}", text.trim_end())?;
         for Place { facets, at, width } in places {
             let width = width.map(|width| format!(": {}", self.with_cells(" wide", width)));
             let dots = if facets.len() == Place::FACETS_MAX { ", ..." } else { "" };
@@ -174,9 +175,8 @@ impl Finding {
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.head().iter().try_for_each(|(name, text)| writeln!(f, "{name:<10}{text}"))?;
-        for finding in self.findings.iter().filter(|finding| finding.count > 0) {
-            self.details(finding, f)?;
-        }
+        let is_listed = |finding: &&Finding| finding.count > 0 || finding.is_lower_bound;
+        self.findings.iter().filter(is_listed).try_for_each(|finding| self.details(finding, f))?;
         let verdict = match self.changes_region {
             true => "at least one finding can change the mesh's region",
             false => "no finding that changes the mesh's region",
@@ -287,7 +287,7 @@ mod tests {
             cell      0.250 at the surface\n\n\
             openings: 2; 1 can change the mesh's region\n  Meaning of Openings.\n  \
             at (0.1, 2, -3.5): 0.500 wide (2.00 cells); facets 1, 2\n  and 1 more (--limit)\n\n\
-            intersecting pairs of facets: at least 2; 2 can change the mesh's region\n  Meaning of Intersections.\n  \
+            intersecting pairs of facets: not all were examined; at least 2; 2 can change the mesh's region\n  Meaning of Intersections.\n  \
             at (0.1, 2, -3.5); facets 0, 1, 2, 3, 4, 5, 6, 7, ...\n  and 1 more (--limit)\n\n\
             facets of thin walls: 4; 4 can change the mesh's region\n  Meaning of ThinWalls.\n  \
             at (0.1, 2, -3.5): 0.125 wide (0.500 cells); facets 1, 2\n\n\
@@ -308,5 +308,12 @@ mod tests {
             cell      not known; --spacing-min reports sizes in cells and thin sheets\n\n\
             no finding that changes the mesh's region";
         assert_eq!(plain.to_string(), expected);
+        let nothing_yet = finding(Kind::ThinGaps, 0, 0, vec![]);
+        plain.findings = vec![Finding { is_lower_bound: true, ..nothing_yet }];
+        let text = plain.to_string();
+        assert!(
+            text.contains("facets at thin gaps: not all were examined; at least 0\n"),
+            "{text}"
+        );
     }
 }

@@ -2,15 +2,16 @@
 //!
 //! From points of each facet, a ray leads inward and one outward. The first facet that it meets within a cell is opposite if it has no
 //! vertex in common with the first one and their normals differ by at least 120 degrees. They are a wall on the inner side and a gap on
-//! the outer side, by the winding of the file; facets of two solids that overlap have inner sides that face each other, but no wall.
+//! the outer side, by the winding of the file, which is reversed in shells that are inside out. Facets of two solids that overlap have inner
+//! sides that face each other, but no wall.
 //!
 //! The width is a quantile by area, so a point where two surfaces touch does not stand for a whole wall.
 
 use contract::lattice::UNITS_PER_EDGE;
 use parry3d_f64::query::Ray;
+use std::cell::Cell;
 use std::collections::HashSet;
 
-use super::edges::Edges;
 use super::finding::{Finding, Kind, Place};
 use super::input::Input;
 use super::shells::Shells;
@@ -25,14 +26,6 @@ const TOUCHING: f64 = 2.0;
 /// The quantile of the width that is reported, by area.
 const QUANTILE: f64 = 0.05;
 
-/// Weights of the corners in the points where rays start: the centroid, and three more in a facet that is larger than a cell.
-const STARTS: [[f64; 3]; 4] = [
-    [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
-    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
-    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
-    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
-];
-
 /// A ray that met an opposite facet.
 struct Hit {
     width: f64,
@@ -45,19 +38,17 @@ struct Hit {
 }
 
 /// Thin walls and thin gaps, each with the place at the quantile of its width.
-pub fn sheets(
-    input: &Input,
-    tree: &FacetTree,
-    (edges, shells): (&Edges, &Shells),
-    cell: f64,
-) -> [Finding; 2] {
+pub fn sheets(input: &Input, tree: &FacetTree, shells: &Shells, cell: f64) -> [Finding; 2] {
     let unit = input.case.root.edge / UNITS_PER_EDGE as f64;
     [(Kind::ThinWalls, -1.0), (Kind::ThinGaps, 1.0)].map(|(kind, side)| {
         let may_be = |a: u32, b: u32| {
+            let facets = [a, b].map(|facet| input.case.facets_lattice[facet as usize]);
             let [p, q] = [a, b].map(|facet| shells.of[facet as usize]);
-            kind == Kind::ThinGaps || !shells.are_different_solids(p, q)
+            !facets[0].iter().any(|v| facets[1].contains(v))
+                && (kind == Kind::ThinGaps || !shells.are_different_solids(p, q))
         };
-        let mut hits = hits(tree, edges, side, cell / unit, may_be);
+        let normal = |facet: u32| Some(tree.triangle(facet).normal()? * shells.sign(facet));
+        let (mut hits, is_lower_bound) = hits(tree, side, cell / unit, normal, may_be);
         hits.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.facets.cmp(&b.facets)));
         // Not those that were met: on an edge, which of two facets a ray meets first is a matter of rounding.
         let of_sheets: HashSet<u32> = hits.iter().map(|hit| hit.from).collect();
@@ -67,36 +58,39 @@ pub fn sheets(
             Place { width: Some(hit.width * unit), ..place }
         };
         let places = quantile(&hits).map(place).into_iter().collect();
-        Finding { count: of_sheets.len() as u64, places, ..Finding::new(kind) }
+        Finding { count: of_sheets.len() as u64, is_lower_bound, places, ..Finding::new(kind) }
     })
 }
 
-/// The rays on one side of all facets with an area that meet an opposite facet within `reach`.
+/// The rays on one side of all facets with an area that meet an opposite facet within `reach`, and whether the search ended before
+/// the last facet.
 fn hits(
     tree: &FacetTree,
-    edges: &Edges,
     side: f64,
     reach: f64,
+    normal: impl Fn(u32) -> Option<Point>,
     may_be: impl Fn(u32, u32) -> bool,
-) -> Vec<Hit> {
-    let mut hits = Vec::new();
-    for facet in 0..edges.corners.len() as u32 {
+) -> (Vec<Hit>, bool) {
+    let (mut hits, visits) = (Vec::new(), Cell::new(0));
+    for &facet in &tree.firsts {
+        if visits.get() > tree.visits_max {
+            return (hits, true);
+        }
+        let Some(outward) = normal(facet) else { continue };
         let triangle = tree.triangle(facet);
-        let Some(normal) = triangle.normal() else { continue };
         let is_large = triangle.edges().iter().any(|edge| edge.length() > reach);
-        let starts = &STARTS[..if is_large { STARTS.len() } else { 1 }];
         let [a, b, c] = *triangle.vertices();
-        for [u, v, w] in starts {
-            let ray = Ray::new(a * *u + b * *v + c * *w, side * normal);
-            let corners = &edges.corners[facet as usize];
+        let centre = (a + b + c) / 3.0;
+        let starts = [centre, centre.midpoint(a), centre.midpoint(b), centre.midpoint(c)];
+        let starts = &starts[..if is_large { starts.len() } else { 1 }];
+        for start in starts {
+            let ray = Ray::new(*start, side * outward);
             let is_obstacle = |other: u32| {
-                let shares = edges.corners[other as usize].iter().any(|v| corners.contains(v));
-                !shares && may_be(facet, other)
+                visits.set(visits.get() + 1);
+                may_be(facet, other)
             };
             let (first, width) = tree.first_hits(&ray, reach, is_obstacle);
-            let faces = |other: &u32| {
-                tree.triangle(*other).normal().is_some_and(|n| n.dot(normal) <= OPPOSITE)
-            };
+            let faces = |other: &u32| normal(*other).is_some_and(|n| n.dot(outward) <= OPPOSITE);
             if let Some(other) = first.into_iter().find(faces).filter(|_| width > TOUCHING) {
                 let area = triangle.area() / starts.len() as f64;
                 let middle = ray.point_at(width / 2.0);
@@ -105,7 +99,7 @@ fn hits(
             }
         }
     }
-    hits
+    (hits, false)
 }
 
 /// The hit below whose width lies [`QUANTILE`] of the area of all, which are sorted by width.

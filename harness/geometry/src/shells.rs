@@ -15,21 +15,20 @@ use std::collections::HashMap;
 pub struct Shell {
     /// Index of the first facet.
     pub facet_first: u32,
-    /// Number of facets.
-    pub facets: u32,
     /// Whether an even number of facets meets at every edge, so that rays agree about the inside.
     pub is_closed: bool,
     /// Whether as many facets traverse every edge in one direction as in the other.
     is_oriented: bool,
     /// Six times the enclosed volume on the lattice, negative if the facets are wound inward; without meaning unless `is_oriented`.
     volume_sixfold: i128,
+    /// Whether it is closed and lies in an odd number of other closed shells, so that its interior is outside.
+    is_nested: bool,
     /// On the lattice, whose coordinates are exact in f64.
     bounds: Aabb,
 }
 
 impl Shell {
     fn add(&mut self, facet: &FacetLattice) {
-        self.facets += 1;
         self.volume_sixfold += dot(facet[0], normal(facet));
         for vertex in facet {
             self.bounds.take_point(Point::from_array(vertex.map(|c| c as f64)));
@@ -70,10 +69,10 @@ impl Shells {
                 of[facet] = all.len() as u32;
                 all.push(Shell {
                     facet_first: first,
-                    facets: 0,
                     is_closed: true,
                     is_oriented: true,
                     volume_sixfold: 0,
+                    is_nested: false,
                     bounds: Aabb::new_invalid(),
                 });
             }
@@ -86,46 +85,48 @@ impl Shells {
             shell.is_closed &= uses.len() % 2 == 0;
             shell.is_oriented &= 2 * down == uses.len();
         }
-        Self { all, of }
-    }
-
-    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
-    pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
-        let shell = |index: u32| self.all.get(index as usize);
-        let (Some(one), Some(other)) = (shell(a), shell(b)) else { return false };
-        a != b
-            && (one.is_closed && other.is_closed)
-            && !(one.may_be_in(other) || other.may_be_in(one))
-    }
-
-    /// Closed shells that are wound inward: those that are inside out, and those that may be cavities of another one. Among the latter
-    /// also solids whose interior is outside because they lie in an odd number of other closed shells.
-    pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
-        let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
-        let closed = || self.all.iter().enumerate().filter(|(_, shell)| shell.is_closed);
         let mut interiors: HashMap<usize, Parity> = HashMap::new();
-        for (_, shell) in closed() {
-            let around: Vec<usize> =
-                closed().filter(|(_, other)| shell.may_be_in(other)).map(|(i, _)| i).collect();
-            let facet = shell.facet_first;
-            let corner = input.case.facets_lattice[facet as usize][0];
-            let mut contains = |other: &&usize| {
-                let interior = interiors.entry(**other).or_insert_with(|| {
-                    let facets = input.case.facets_lattice.iter().zip(&self.of);
-                    let own = facets.filter(|(_, of)| **of as usize == **other);
+        for index in (0..all.len()).filter(|&i| all[i].is_closed).collect::<Vec<_>>() {
+            let corner = lattice[all[index].facet_first as usize][0];
+            let mut contains = |other: &usize| {
+                let interior = interiors.entry(*other).or_insert_with(|| {
+                    let own = lattice.iter().zip(&of).filter(|(_, of)| **of as usize == *other);
                     Parity::new(&own.map(|(facet, _)| *facet).collect::<Vec<_>>())
                 });
                 interior.inside(corner) == [true; 6]
             };
+            let is_around = |i: &usize| all[*i].is_closed && all[index].may_be_in(&all[*i]);
+            let around = (0..all.len()).filter(is_around).filter(&mut contains).count();
+            all[index].is_nested = around % 2 == 1;
+        }
+        Self { all, of }
+    }
+
+    /// 1 if the normal of a facet points out of the solid that its shell bounds, or -1; 1 if its shell bounds none.
+    pub fn sign(&self, facet: u32) -> f64 {
+        let shell = self.all.get(self.of[facet as usize] as usize);
+        let is_inward = |shell: &Shell| (shell.volume_sixfold < 0) != shell.is_nested;
+        if shell.is_some_and(|shell| shell.is_oriented && is_inward(shell)) { -1.0 } else { 1.0 }
+    }
+
+    /// Whether two shells, by index, are different solids: closed, and neither can contain the other, by their bounding boxes.
+    pub fn are_different_solids(&self, a: u32, b: u32) -> bool {
+        let [Some(p), Some(q)] = [a, b].map(|i| self.all.get(i as usize)) else { return false };
+        a != b && p.is_closed && q.is_closed && !p.may_be_in(q) && !q.may_be_in(p)
+    }
+
+    /// Closed shells that are inside out, and those that lie in an odd number of other closed ones.
+    pub fn findings(&self, input: &Input, first: usize) -> [Finding; 2] {
+        let mut findings = [Kind::InsideOut, Kind::Nested].map(Finding::new);
+        for shell in &self.all {
             let is_wound_inward = shell.is_oriented && shell.volume_sixfold < 0;
-            let at = match is_wound_inward {
-                true => usize::from(!around.is_empty()),
-                false if around.iter().filter(&mut contains).count() % 2 == 1 => {
-                    findings[1].count_changing += u64::from(input.case.keep != Keep::Outside);
-                    1
-                }
-                false => continue,
-            };
+            if !shell.is_nested && !is_wound_inward {
+                continue;
+            }
+            let at = usize::from(shell.is_nested);
+            let changes = !is_wound_inward && input.case.keep != Keep::Outside;
+            findings[at].count_changing += u64::from(changes);
+            let facet = shell.facet_first;
             findings[at].add(first, || Place::new(vec![facet], input.centroid(facet)));
         }
         findings

@@ -1,6 +1,5 @@
 //! Facets in a tree of boxes: distances and rays, in lattice units.
 
-use contract::case::Facet;
 use contract::lattice::FacetLattice;
 pub use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Pose;
@@ -10,20 +9,29 @@ use parry3d_f64::query::details::distance_segment_segment;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{Segment, Triangle};
 use std::cell::RefCell;
+use std::collections::HashSet;
 
 /// The facets. Those without area count too: they cross leaves like all others.
 pub struct FacetTree {
     triangles: Vec<Triangle>,
     boxes: Bvh,
+    /// The numbers of all facets but copies, in ascending order.
+    pub firsts: Vec<u32>,
+    /// A search from all facets ends when it has visited this number of others: seconds, unless most facets are close to most others.
+    pub visits_max: u64,
 }
 
 impl FacetTree {
-    /// The facets of a case.
+    /// The facets of a case. Of those that are equal with the same winding, searches visit only the first.
     pub fn new(facets: &[FacetLattice]) -> Self {
         let triangles: Vec<Triangle> = facets.iter().map(triangle).collect();
-        let bounds = triangles.iter().map(Triangle::local_aabb).enumerate();
+        let mut seen = HashSet::new();
+        let firsts = (0..).zip(facets).filter(|(_, facet)| seen.insert(from_least(**facet)));
+        let firsts: Vec<u32> = firsts.map(|(number, _)| number).collect();
+        let bounds = firsts.iter().map(|&n| triangles[n as usize].local_aabb()).enumerate();
         let boxes = Bvh::from_iter(BvhBuildStrategy::Binned, bounds);
-        Self { triangles, boxes }
+        let visits_max = (1024 * firsts.len() as u64).max(1 << 25);
+        Self { triangles, boxes, firsts, visits_max }
     }
 
     /// A facet.
@@ -52,16 +60,16 @@ impl FacetTree {
     /// The facets no farther than `radius`, nearest first.
     pub fn within(&self, at: Point, radius: f64) -> Vec<u32> {
         let around = Aabb::from_half_extents(at, Point::splat(radius));
-        let candidates = self.boxes.intersect_aabb(&around);
-        let distances = candidates.map(|facet| (facet, from_point(at, self.triangle(facet))));
+        let distances =
+            self.in_box(&around).map(|facet| (facet, from_point(at, self.triangle(facet))));
         let mut found: Vec<(u32, f64)> = distances.filter(|(_, d)| *d <= radius).collect();
         found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         found.into_iter().map(|(facet, _)| facet).collect()
     }
 
-    /// The facets whose bounding boxes meet that of a facet, itself included.
-    pub fn overlapping(&self, facet: u32) -> Vec<u32> {
-        self.boxes.intersect_aabb(&self.triangle(facet).local_aabb()).collect()
+    /// The facets whose bounding boxes meet a box.
+    pub fn in_box<'a>(&'a self, around: &'a Aabb) -> impl Iterator<Item = u32> + 'a {
+        self.boxes.intersect_aabb(around).map(|index| self.firsts[index as usize])
     }
 
     /// The first facets that a ray meets within `reach`, among those that `is_obstacle` accepts, and their distance: several if they
@@ -73,11 +81,10 @@ impl FacetTree {
         is_obstacle: impl Fn(u32) -> bool,
     ) -> (Vec<u32>, f64) {
         let hits = RefCell::new(Vec::new());
-        self.boxes.cast_ray(ray, reach, |facet, farthest| {
-            let distance = met(self.triangle(facet), ray, farthest)?;
-            if !is_obstacle(facet) {
-                return None;
-            }
+        self.boxes.cast_ray(ray, reach, |index, farthest| {
+            let facet = self.firsts[index as usize];
+            let distance =
+                is_obstacle(facet).then(|| met(self.triangle(facet), ray, farthest))??;
             hits.borrow_mut().push((facet, distance));
             // Others at the same distance are visited, too.
             Some(distance + 1.0)
@@ -95,25 +102,23 @@ impl FacetTree {
         let from_box = |node: &BvhNode, _| {
             (node.mins() - high).max(low - node.maxs()).max(Point::ZERO).length()
         };
-        let of_facet = |facet, _| Some(distance(self.triangle(facet)));
+        let of_facet = |i: u32, _| Some(distance(self.triangle(self.firsts[i as usize])));
         let nearest = self.boxes.find_best(f64::INFINITY, from_box, of_facet);
         nearest.map_or(f64::INFINITY, |(_, distance)| distance)
     }
 }
 
-/// The bounding box of facets, in the user's units.
-pub fn bounds(facets: &[Facet]) -> Aabb {
-    let vertices = facets.as_flattened().iter();
-    Aabb::from_points(vertices.map(|v| Point::from(v.map(f64::from))))
-}
-
 /// A facet in f64. It begins with its least vertex, so that rounding does not depend on where a file begins it.
 pub fn triangle(facet: &FacetLattice) -> Triangle {
-    let mut facet = *facet;
-    let least = (0..3).min_by_key(|&i| facet[i]).unwrap_or(0);
-    facet.rotate_left(least);
-    let [a, b, c] = facet.map(|v| Point::from_array(v.map(|c| c as f64)));
+    let [a, b, c] = from_least(*facet).map(|v| Point::from_array(v.map(|c| c as f64)));
     Triangle::new(a, b, c)
+}
+
+/// The corners of a facet in the same direction around it, from the least one.
+fn from_least(mut corners: FacetLattice) -> FacetLattice {
+    let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+    corners.rotate_left(least);
+    corners
 }
 
 /// Where a ray meets a facet, within `reach` times its direction.

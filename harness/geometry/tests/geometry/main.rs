@@ -266,6 +266,55 @@ fn walls_and_gaps_narrower_than_a_cell_are_thin() {
     assert!(close(first(&found, Kind::ThinWalls).width, 1.0));
 }
 
+/// A facet's orientation has no effect on the mesh, so none on its gaps.
+#[test]
+fn gaps_and_walls_of_shells_that_are_inside_out_are_found() {
+    let inward = |mut facets: Vec<Facet>| {
+        facets.iter_mut().for_each(|f| f.swap(0, 1));
+        facets
+    };
+    let (lower, upper) = (cuboid([0.0; 3], [4.0, 4.0, 1.0]), cuboid([0.0, 0.0, 1.375], [4.0; 3]));
+    for (below, above, inside_out) in [
+        (lower.clone(), inward(upper.clone()), 1),
+        (inward(lower.clone()), upper.clone(), 1),
+        (inward(lower.clone()), inward(upper), 2),
+    ] {
+        let found = diagnosis([below, above].concat(), Some(0.5));
+        assert_eq!(counts(&found), [(Kind::InsideOut, inside_out), (Kind::ThinGaps, 4)]);
+        assert!(found.changes_region);
+    }
+    let wall = diagnosis(inward(lower), Some(2.0));
+    assert_eq!(counts(&wall), [(Kind::InsideOut, 1), (Kind::ThinWalls, 4)]);
+    // A cavity bounds the same wall by either winding.
+    for cavity in [cuboid([0.25; 3], [3.75; 3]), inward(cuboid([0.25; 3], [3.75; 3]))] {
+        let hollow = diagnosis([cube(), cavity].concat(), Some(0.5));
+        assert_eq!(counts(&hollow), [(Kind::Nested, 1), (Kind::ThinWalls, 24)]);
+    }
+    // A shell in the bounding box of an angle, but beside the angle, is no cavity.
+    let angle = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 4.0], [0.0, 4.0]];
+    let at = |i: usize, z| [angle[i % 6][0], angle[i % 6][1], z];
+    let sides = (0..6).flat_map(|i| quad([at(i, 0.0), at(i + 1, 0.0), at(i + 1, 4.0), at(i, 4.0)]));
+    let ends = [[3, 2, 1], [3, 1, 0], [3, 0, 5], [3, 5, 4]];
+    let lids = ends.map(|lid| [lid.map(|i| at(i, 0.0)), [2, 1, 0].map(|i| at(lid[i], 4.0))]);
+    let angle: Vec<Facet> = sides.chain(lids.concat()).collect();
+    assert_eq!(counts(&diagnosis(angle.clone(), Some(0.25))), []);
+    let beside = [angle, inward(cuboid([2.0; 3], [3.0; 3]))].concat();
+    assert_eq!(counts(&diagnosis(beside, Some(0.25))), [(Kind::InsideOut, 1)]);
+}
+
+/// In the time of one pair of facets each: 10^9 pairs take minutes.
+#[test]
+fn many_copies_of_two_facets_take_no_longer_than_others() {
+    let lower = [[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let upper = lower.map(|[x, y, _]| [y, x, 0.25]);
+    let across = [[1.0, 1.0, -1.0], [1.0, 1.0, 0.125], [2.0, 1.0, -1.0]];
+    let facets = [vec![lower; 20_000], vec![upper; 20_000], vec![across]].concat();
+    let found = diagnosis(facets, Some(0.5));
+    assert_eq!(count(&found, Kind::Duplicates), 2 * 19_999);
+    assert_eq!((count(&found, Kind::Intersections), count(&found, Kind::ThinGaps)), (1, 2));
+    assert!(found.findings.iter().all(|finding| !finding.is_lower_bound));
+}
+
 #[test]
 fn facets_on_and_beyond_the_root_are_found() {
     let on = diagnosis(cuboid([-16.0, 0.0, 0.0], [0.0, 1.0, 1.0]), Some(0.25));
