@@ -9,7 +9,7 @@ use contract::manifest::Keep;
 use contract::stl;
 use serde::Serialize;
 
-use super::tree::{Aabb, Point};
+use super::tree::{Aabb, Point, bounds};
 
 /// What a case file would have, in the user's units. It takes precedence over that of a case.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -96,9 +96,7 @@ impl Input {
 
     /// The extent of the facets.
     pub fn extent(&self) -> Extent {
-        let vertices = self.case.facets.as_flattened().iter();
-        let Aabb { mins, maxs } =
-            Aabb::from_points(vertices.map(|v| Point::from(v.map(f64::from))));
+        let Aabb { mins, maxs } = bounds(&self.case.facets);
         let origin = Point::from(self.case.root.origin);
         let margin =
             (mins - origin).min(origin + Point::splat(self.case.root.edge) - maxs).min_element();

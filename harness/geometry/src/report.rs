@@ -60,6 +60,11 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Whether a search has ended early.
+    pub fn is_incomplete(&self) -> bool {
+        self.findings.iter().any(|finding| finding.is_lower_bound)
+    }
+
     /// Asserts the invariants.
     ///
     /// # Panics
@@ -177,9 +182,10 @@ impl fmt::Display for Diagnosis {
         self.head().iter().try_for_each(|(name, text)| writeln!(f, "{name:<10}{text}"))?;
         let is_listed = |finding: &&Finding| finding.count > 0 || finding.is_lower_bound;
         self.findings.iter().filter(is_listed).try_for_each(|finding| self.details(finding, f))?;
-        let verdict = match self.changes_region {
-            true => "at least one finding can change the mesh's region",
-            false => "no finding that changes the mesh's region",
+        let verdict = match () {
+            () if self.changes_region => "at least one finding can change the mesh's region",
+            () if self.is_incomplete() => "what was examined does not change the mesh's region",
+            () => "no finding that changes the mesh's region",
         };
         write!(f, "\n{verdict}")
     }
@@ -311,9 +317,11 @@ mod tests {
         let nothing_yet = finding(Kind::ThinGaps, 0, 0, vec![]);
         plain.findings = vec![Finding { is_lower_bound: true, ..nothing_yet }];
         let text = plain.to_string();
-        assert!(
-            text.contains("facets at thin gaps: not all were examined; at least 0\n"),
-            "{text}"
-        );
+        for part in [
+            "facets at thin gaps: not all were examined; at least 0\n",
+            "what was examined does not change",
+        ] {
+            assert!(text.contains(part), "{text}");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Facets in a tree of boxes: distances and rays, in lattice units.
 
+use contract::case::Facet;
 use contract::lattice::FacetLattice;
 pub use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Pose;
@@ -106,6 +107,12 @@ impl FacetTree {
         let nearest = self.boxes.find_best(f64::INFINITY, from_box, of_facet);
         nearest.map_or(f64::INFINITY, |(_, distance)| distance)
     }
+}
+
+/// The bounding box of facets, in the user's units.
+pub fn bounds(facets: &[Facet]) -> Aabb {
+    let vertices = facets.as_flattened().iter();
+    Aabb::from_points(vertices.map(|v| Point::from(v.map(f64::from))))
 }
 
 /// A facet in f64. It begins with its least vertex, so that rounding does not depend on where a file begins it.

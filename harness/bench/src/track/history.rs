@@ -91,33 +91,42 @@ impl Record {
         Err(format!("{name} is {value:e}, and at most {VALUE_MAX:e} is possible"))
     }
 
-    /// Returns a record with the machine, geometries and metrics of a record or report of `harness gate`: of the commit `named`, else of the revision that was measured,
-    /// else of HEAD. Only reports contain times, which are worth tracking on a dedicated machine only.
+    /// Returns a record of a record or report of `harness gate`: of the commit `named`, else of the revision that was measured, else of HEAD.
     ///
     /// # Errors
     /// One sentence, if it is neither, or of another commit.
     pub fn of_gate(text: &[u8], named: Option<&str>, repository: &Path) -> Result<Self, String> {
-        let Measures { of, machine, cases, .. } = Measures::parse(text)?;
-        let revision = of.revision.as_deref();
-        let of_commit = Self::of_commit(named.or(revision).unwrap_or("HEAD"), repository)?;
-        let mut record = Self { machine, ..of_commit };
-        if let Some(revision) = revision.filter(|revision| *revision != record.commit) {
-            return Err(format!("revision {revision} was measured: leave out --commit"));
+        let revision = Measures::parse(text)?.of.revision;
+        let commit = named.or(revision.as_deref()).unwrap_or("HEAD");
+        let record = Self::of_commit(commit, repository)?;
+        match revision.filter(|revision| *revision != record.commit) {
+            Some(other) => Err(format!("revision {other} was measured: leave out --commit")),
+            None => record.with(text),
         }
+    }
+
+    /// Returns the record with the machine, geometries and metrics of a record or report of `harness gate`. Only reports contain times, which are worth tracking on a
+    /// dedicated machine only.
+    ///
+    /// # Errors
+    /// One sentence, if it is neither.
+    pub fn with(mut self, text: &[u8]) -> Result<Self, String> {
+        let Measures { machine, cases, .. } = Measures::parse(text)?;
+        self.machine = machine;
         for (case, measures) in cases {
             let CaseMeasures { exact, memory, counted, geometry, .. } = measures;
-            record.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
+            self.geometries.extend(geometry.map(|digest| (case.clone(), digest)));
             let numbers = exact.into_iter().chain(memory).chain(counted);
             let named = |(metric, value)| (format!("{case}/{metric}"), value as f64);
-            record.metrics.extend(numbers.map(named));
+            self.metrics.extend(numbers.map(named));
         }
-        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(record) };
+        let Ok(report) = serde_json::from_slice::<GateReport>(text) else { return Ok(self) };
         let times = report.layers.iter().filter(|layer| layer.name == LayerName::Time);
         for GateFinding { case, metric, candidate, .. } in times.flat_map(|layer| &layer.findings) {
             let metric = metric.replace(CPU, "seconds").replace(WALL, "wall_seconds");
-            record.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
+            self.metrics.extend(candidate.map(|seconds| (format!("{case}/{metric}"), seconds)));
         }
-        Ok(record)
+        Ok(self)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::options::{self, Output, examples, root};
 use crate::output::put;
 use clap::Args;
-use contract::failure::{EXIT_FAILED, EXIT_HOLDS, Failure};
+use contract::failure::{EXIT_FAILED, EXIT_HOLDS, EXIT_MISSING, Failure};
 use contract::lattice::Root;
 use geometry::diagnose;
 use geometry::input::{Input, Requested};
@@ -46,5 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(path) = &arguments.json {
         put(path, pretty(&diagnosis))?;
     }
-    Ok(if diagnosis.changes_region { EXIT_FAILED } else { EXIT_HOLDS })
+    Ok(match () {
+        () if diagnosis.changes_region => EXIT_FAILED,
+        () if diagnosis.is_incomplete() => EXIT_MISSING,
+        () => EXIT_HOLDS,
+    })
 }
